@@ -1,0 +1,281 @@
+"""One frozen dataclass per artefact kind; ``store`` turns any of them into HDF5 and back.
+
+How a field is stored follows from its type and its ``metadata``:
+
+- ``ndarray`` or a number marked with ``units``: a dataset with attributes ``units`` and
+  ``quantity``; ``dims`` names its axes, and the axis ``time`` is the dataset ``time`` itself as a
+  dimension scale. ``units="@name"`` takes the text of the sibling field ``name`` (units come
+  with the data: A and N here, A/m and T for somebody else's bench).
+- ``path``: the dataset's name in the file where it is not the field's name.
+- ``str``, ``int``, ``float``, ``bool``: an attribute.
+- a dataclass: a group; a tuple of dataclasses: a group of numbered groups.
+- ``None``: nothing is written.
+
+Sizes in the comments: n samples, L = n_h + 1 nodes, q = n_h (n_h + 1) / 2 cells, r repeats.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pulsetrainer.errors import DataError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+def _data(
+    units: str, quantity: str, *dims: str, path: str | None = None, optional: bool = False
+) -> Any:
+    metadata = {"units": units, "quantity": quantity, "dims": dims, "path": path}
+    return field(metadata=metadata, default=None) if optional else field(metadata=metadata)
+
+
+def _check_equal_length(artefact: Any, names: tuple[str, ...]) -> None:
+    """Raise DataError unless the named arrays, where present, share the length of their last axis."""
+    sizes = {n: np.shape(getattr(artefact, n))[-1] for n in names if getattr(artefact, n) is not None}
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{n} has {k}" for n, k in sizes.items())
+        raise DataError(
+            f"a {artefact.kind} needs arrays of one length along time: {listed}",
+            hint="write the artefact again with the command that made it",
+        )
+
+
+def _check_time(artefact: Any) -> None:
+    """Raise DataError unless ``time_s`` is finite and strictly increasing."""
+    t = artefact.time_s
+    if t is None:
+        return
+    if not np.all(np.isfinite(t)):
+        where = int(np.flatnonzero(~np.isfinite(t))[0])
+        raise DataError(
+            f"time of this {artefact.kind} is not a number at sample {where}", hint="mend the time column"
+        )
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if back.size:
+        k = int(back[0])
+        raise DataError(
+            f"time of this {artefact.kind} does not increase: sample {k + 1} is at {t[k + 1]:g} s, "
+            f"the one before it at {t[k]:g} s",
+            hint="sort the record, drop repeated rows, or give --rate instead of a time column",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a device, or a table from any bench, reported: nothing that a real device does not know."""
+
+    kind: ClassVar[str] = "run"
+
+    time_s: FloatArray | None = _data("s", "time", "time", path="time")  # (n,), None: index only
+    input: FloatArray = _data("@input_unit", "@input_quantity", "time")  # (n,) what was measured
+    output: FloatArray = _data("@output_unit", "@output_quantity", "time")  # (n,) what was measured
+    reference: FloatArray | None = _data(
+        "@input_unit", "reference", "time", optional=True
+    )  # (n,) what was asked
+    input_unit: str = "A"
+    output_unit: str = "N"
+    input_quantity: str = "current"
+    output_quantity: str = "force"
+    signal: str = ""  # name of the excitation, or the imported file
+    complete: bool = True
+    dropped_samples: int = 0  # lost on the wire; the samples that are here are right
+
+    def __post_init__(self) -> None:
+        _check_equal_length(self, ("time_s", "input", "output", "reference"))
+        _check_time(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How well the model describes the data it was identified on."""
+
+    rms: float = _data("@output_unit", "rms error of the fit")
+    max_abs: float = _data("@output_unit", "largest error of the fit")
+    rms_percent: float = _data("percent", "rms error of the fit, of the output span")
+    coverage_percent: float = _data("percent", "cells switched on and off by the input")
+    output_unit: str
+    samples: int
+    iterations: int
+    method: str  # "joint" | "alternating"
+    # the identification record and the fit, thinned for the figures (m samples)
+    time_s: FloatArray | None = _data("s", "time", "time", path="time")
+    input: FloatArray = _data("1", "input", "time")
+    output: FloatArray = _data("@output_unit", "measured output", "time")
+    predicted: FloatArray = _data("@output_unit", "predicted output", "time")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter of an extension, with its confidence interval."""
+
+    name: str
+    value: float
+    unit: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, slots=True)
+class Extension:
+    """One named cause with which a model is extended."""
+
+    cause: str
+    parameters: tuple[Parameter, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """An identified Preisach model: weights mu-hat per cell and offset y0-hat (Carneiro et al. 2018, eq. 2)."""
+
+    kind: ClassVar[str] = "model"
+
+    levels: FloatArray = _data("@input_unit", "input levels: edges of the cells", "level")  # (L,)
+    weights: FloatArray = _data("@weights_unit", "Preisach weights mu", "cell")  # (q,), order of core.plane
+    offset: float = _data("@output_unit", "output offset y0")
+    covered: BoolArray = _data("1", "cell was switched on and off", "cell")  # (q,)
+    weights_unit: str = "N/A^2"
+    input_unit: str = "A"
+    output_unit: str = "N"
+    input_quantity: str = "current"
+    output_quantity: str = "force"
+    operator: str = "continuous"  # how the weights are read: "continuous" | "relay"
+    polarity: int = 1  # -1: the output falls when the input rises
+    fit: Fit | None = None
+    extensions: tuple[Extension, ...] = ()
+
+    def __post_init__(self) -> None:
+        n_h = np.size(self.levels) - 1
+        if np.size(self.weights) != n_h * (n_h + 1) // 2:
+            raise DataError(
+                f"a model with {n_h} levels has {n_h * (n_h + 1) // 2} cells, "
+                f"but weights holds {np.size(self.weights)}",
+                hint="identify the model again: pulsetrainer identify RUN.h5 -o model.h5",
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Waveform:
+    """A target force and the two currents that shall press it: compensated and merely scaled."""
+
+    kind: ClassVar[str] = "waveform"
+
+    time_s: FloatArray = _data("s", "time", "time", path="time")  # (n,) even steps
+    target: FloatArray = _data("@output_unit", "target", "time")  # (n,)
+    compensated: FloatArray = _data(
+        "@input_unit", "compensated drive", "time", path="drive/compensated"
+    )  # (n,)
+    scaled: FloatArray = _data("@input_unit", "scaled drive", "time", path="drive/scaled")  # (n,)
+    predicted: FloatArray = _data(
+        "@output_unit", "output the model predicts for the compensated drive", "time"
+    )
+    scored: BoolArray = _data("1", "sample counts in the evaluation", "time")  # (n,) not the lead-in
+    name: str
+    source: str  # where the shape comes from, in words
+    inversion: str  # "continuous" | "closest-match" | "extended"
+    clipped_samples: int  # targets outside the reachable range
+    input_unit: str = "A"
+    output_unit: str = "N"
+    model: Model | None = None
+
+    def __post_init__(self) -> None:
+        _check_equal_length(self, ("time_s", "target", "compensated", "scaled", "predicted", "scored"))
+        _check_time(self)
+
+
+@dataclass(frozen=True, slots=True)
+class DrivePlayback:
+    """What the device measured while it played one drive, repeat by repeat; NaN where a block was lost."""
+
+    reference: FloatArray = _data("@input_unit", "reference as played", "repeat", "time")  # (r, n)
+    input: FloatArray = _data("@input_unit", "measured input", "repeat", "time")  # (r, n)
+    output: FloatArray = _data("@output_unit", "measured output", "repeat", "time")  # (r, n)
+    input_unit: str = "A"
+    output_unit: str = "N"
+
+
+@dataclass(frozen=True, slots=True)
+class Playback:
+    """A waveform and what the device measured for each of its drives."""
+
+    kind: ClassVar[str] = "playback"
+
+    time_s: FloatArray = _data("s", "time", "time", path="time")  # (n,)
+    waveform: Waveform
+    compensated: DrivePlayback
+    scaled: DrivePlayback
+    input_range: float = _data("@input_unit", "full range of the drive current")  # for tracking in percent
+    input_unit: str = "A"
+    complete: bool = True
+    dropped_samples: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class DriveError:
+    """Errors of one drive, in percent of the full applied force, over all scored samples of all repeats."""
+
+    mean_abs_error_percent: float = _data("percent", "mean absolute error, of full force")
+    max_abs_error_percent: float = _data("percent", "largest absolute error, of full force")
+    rms_error_percent: float = _data("percent", "rms error, of full force")
+    hysteresis_percent: float = _data(
+        "percent", "loop area of force against target, of full force squared, per beat"
+    )
+    current_tracking_max_percent: float = _data("percent", "largest current tracking error, of the range")
+    output: FloatArray = _data("@output_unit", "mean measured output over the repeats", "time")  # (n,)
+    output_unit: str = "N"
+
+
+@dataclass(frozen=True, slots=True)
+class WaveformEvaluation:
+    """The figures of one played waveform."""
+
+    name: str
+    inversion: str
+    repeats: int
+    time_s: FloatArray = _data("s", "time", "time", path="time")  # (n,) scored samples only
+    target: FloatArray = _data("@output_unit", "target", "time")  # (n,)
+    scaled: DriveError
+    compensated: DriveError
+    mean_error_reduction_percent: float = _data("percent", "reduction of the mean absolute error")
+    full_force: float = _data("@output_unit", "full applied force")
+    noise_percent: float = _data("percent", "spread between repeats, of full force")
+    output_unit: str = "N"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelEvaluation:
+    """The prediction error of one model on a held-out run."""
+
+    name: str
+    rms: float = _data("@output_unit", "rms prediction error")
+    rms_percent: float = _data("percent", "rms prediction error, of the output span")
+    max_percent: float = _data("percent", "largest prediction error, of the output span")
+    gain_percent: float = _data("percent", "reduction of the rms against the first model")
+    time_s: FloatArray | None = _data("s", "time", "time", path="time")  # thinned for the figures
+    output: FloatArray = _data("@output_unit", "measured output", "time")
+    predicted: FloatArray = _data("@output_unit", "predicted output", "time")
+    output_unit: str = "N"
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """An error report: of played waveforms, or of models on a held-out run."""
+
+    kind: ClassVar[str] = "evaluation"
+
+    waveforms: tuple[WaveformEvaluation, ...] = ()
+    models: tuple[ModelEvaluation, ...] = ()
+    model: Model | None = None  # the model behind the first waveform, for the figures
+
+
+KINDS: dict[str, type] = {k.kind: k for k in (Run, Model, Waveform, Playback, Evaluation)}
+
+
+def dataset_fields(kind: type) -> list[str]:
+    """Return the names of the fields of ``kind`` that become datasets."""
+    return [f.name for f in fields(kind) if "units" in f.metadata]

@@ -1,0 +1,1 @@
+"""Frames, messages, transport, session, device and the virtual bench."""
