@@ -1,8 +1,8 @@
 """One frozen dataclass per artefact kind; ``store`` turns any of them into HDF5 and back.
 
-How a field is stored follows from its type and its ``metadata``:
+How a field is stored follows from its type and its ``Data`` annotation:
 
-- ``ndarray`` or a number marked with ``units``: a dataset with attributes ``units`` and
+- an array or a number annotated with ``Data``: a dataset with attributes ``units`` and
   ``quantity``; ``dims`` names its axes, and the axis ``time`` is the dataset ``time`` itself as a
   dimension scale. ``units="@name"`` takes the text of the sibling field ``name`` (units come
   with the data: A and N here, A/m and T for somebody else's bench).
@@ -16,8 +16,8 @@ Sizes in the comments: n samples, L = n_h + 1 nodes, q = n_h (n_h + 1) / 2 cells
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +28,18 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-def _data(
-    units: str, quantity: str, *dims: str, path: str | None = None, optional: bool = False
-) -> Any:
-    metadata = {"units": units, "quantity": quantity, "dims": dims, "path": path}
-    return field(metadata=metadata, default=None) if optional else field(metadata=metadata)
+@dataclass(frozen=True, slots=True, init=False)
+class Data:
+    """Marks a field as a dataset: its units, its quantity in words, the names of its axes, its path."""
+
+    units: str
+    quantity: str
+    dims: tuple[str, ...]
+    path: str | None
+
+    def __init__(self, units: str, quantity: str, *dims: str, path: str | None = None) -> None:
+        for name, value in (("units", units), ("quantity", quantity), ("dims", dims), ("path", path)):
+            object.__setattr__(self, name, value)
 
 
 def _check_equal_length(artefact: Any, names: tuple[str, ...]) -> None:
@@ -72,12 +79,12 @@ class Run:
 
     kind: ClassVar[str] = "run"
 
-    time_s: FloatArray | None = _data("s", "time", "time", path="time")  # (n,), None: index only
-    input: FloatArray = _data("@input_unit", "@input_quantity", "time")  # (n,) what was measured
-    output: FloatArray = _data("@output_unit", "@output_quantity", "time")  # (n,) what was measured
-    reference: FloatArray | None = _data(
-        "@input_unit", "reference", "time", optional=True
-    )  # (n,) what was asked
+    time_s: Annotated[FloatArray | None, Data("s", "time", "time", path="time")]  # (n,), None: index only
+    input: Annotated[FloatArray, Data("@input_unit", "@input_quantity", "time")]  # (n,) what was measured
+    output: Annotated[FloatArray, Data("@output_unit", "@output_quantity", "time")]  # (n,) what was measured
+    reference: Annotated[FloatArray | None, Data("@input_unit", "reference", "time")] = (
+        None  # (n,) what was asked
+    )
     input_unit: str = "A"
     output_unit: str = "N"
     input_quantity: str = "current"
@@ -95,19 +102,20 @@ class Run:
 class Fit:
     """How well the model describes the data it was identified on."""
 
-    rms: float = _data("@output_unit", "rms error of the fit")
-    max_abs: float = _data("@output_unit", "largest error of the fit")
-    rms_percent: float = _data("percent", "rms error of the fit, of the output span")
-    coverage_percent: float = _data("percent", "cells switched on and off by the input")
+    rms: Annotated[float, Data("@output_unit", "rms error of the fit")]
+    max_abs: Annotated[float, Data("@output_unit", "largest error of the fit")]
+    rms_percent: Annotated[float, Data("percent", "rms error of the fit, of the output span")]
+    coverage_percent: Annotated[float, Data("percent", "cells switched on and off by the input")]
+    input_unit: str
     output_unit: str
     samples: int
     iterations: int
     method: str  # "joint" | "alternating"
     # the identification record and the fit, thinned for the figures (m samples)
-    time_s: FloatArray | None = _data("s", "time", "time", path="time")
-    input: FloatArray = _data("1", "input", "time")
-    output: FloatArray = _data("@output_unit", "measured output", "time")
-    predicted: FloatArray = _data("@output_unit", "predicted output", "time")
+    time_s: Annotated[FloatArray | None, Data("s", "time", "time", path="time")]
+    input: Annotated[FloatArray, Data("@input_unit", "input", "time")]
+    output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
+    predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,14 +139,16 @@ class Extension:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """An identified Preisach model: weights mu-hat per cell and offset y0-hat (Carneiro et al. 2018, eq. 2)."""
+    """An identified Preisach model: weights mu-hat per cell and offset y0-hat (Carneiro 2018, eq. 2)."""
 
     kind: ClassVar[str] = "model"
 
-    levels: FloatArray = _data("@input_unit", "input levels: edges of the cells", "level")  # (L,)
-    weights: FloatArray = _data("@weights_unit", "Preisach weights mu", "cell")  # (q,), order of core.plane
-    offset: float = _data("@output_unit", "output offset y0")
-    covered: BoolArray = _data("1", "cell was switched on and off", "cell")  # (q,)
+    levels: Annotated[FloatArray, Data("@input_unit", "input levels: edges of the cells", "level")]  # (L,)
+    weights: Annotated[
+        FloatArray, Data("@weights_unit", "Preisach weights mu", "cell")
+    ]  # (q,), order of core.plane
+    offset: Annotated[float, Data("@output_unit", "output offset y0")]
+    covered: Annotated[BoolArray, Data("1", "cell was switched on and off", "cell")]  # (q,)
     weights_unit: str = "N/A^2"
     input_unit: str = "A"
     output_unit: str = "N"
@@ -165,16 +175,16 @@ class Waveform:
 
     kind: ClassVar[str] = "waveform"
 
-    time_s: FloatArray = _data("s", "time", "time", path="time")  # (n,) even steps
-    target: FloatArray = _data("@output_unit", "target", "time")  # (n,)
-    compensated: FloatArray = _data(
-        "@input_unit", "compensated drive", "time", path="drive/compensated"
-    )  # (n,)
-    scaled: FloatArray = _data("@input_unit", "scaled drive", "time", path="drive/scaled")  # (n,)
-    predicted: FloatArray = _data(
-        "@output_unit", "output the model predicts for the compensated drive", "time"
-    )
-    scored: BoolArray = _data("1", "sample counts in the evaluation", "time")  # (n,) not the lead-in
+    time_s: Annotated[FloatArray, Data("s", "time", "time", path="time")]  # (n,) even steps
+    target: Annotated[FloatArray, Data("@output_unit", "target", "time")]  # (n,)
+    compensated: Annotated[
+        FloatArray, Data("@input_unit", "compensated drive", "time", path="drive/compensated")
+    ]  # (n,)
+    scaled: Annotated[FloatArray, Data("@input_unit", "scaled drive", "time", path="drive/scaled")]  # (n,)
+    predicted: Annotated[
+        FloatArray, Data("@output_unit", "output the model predicts for the compensated drive", "time")
+    ]
+    scored: Annotated[BoolArray, Data("1", "sample counts in the evaluation", "time")]  # (n,) not the lead-in
     name: str
     source: str  # where the shape comes from, in words
     inversion: str  # "continuous" | "closest-match" | "extended"
@@ -192,9 +202,9 @@ class Waveform:
 class DrivePlayback:
     """What the device measured while it played one drive, repeat by repeat; NaN where a block was lost."""
 
-    reference: FloatArray = _data("@input_unit", "reference as played", "repeat", "time")  # (r, n)
-    input: FloatArray = _data("@input_unit", "measured input", "repeat", "time")  # (r, n)
-    output: FloatArray = _data("@output_unit", "measured output", "repeat", "time")  # (r, n)
+    reference: Annotated[FloatArray, Data("@input_unit", "reference as played", "repeat", "time")]  # (r, n)
+    input: Annotated[FloatArray, Data("@input_unit", "measured input", "repeat", "time")]  # (r, n)
+    output: Annotated[FloatArray, Data("@output_unit", "measured output", "repeat", "time")]  # (r, n)
     input_unit: str = "A"
     output_unit: str = "N"
 
@@ -205,11 +215,13 @@ class Playback:
 
     kind: ClassVar[str] = "playback"
 
-    time_s: FloatArray = _data("s", "time", "time", path="time")  # (n,)
+    time_s: Annotated[FloatArray, Data("s", "time", "time", path="time")]  # (n,)
     waveform: Waveform
     compensated: DrivePlayback
     scaled: DrivePlayback
-    input_range: float = _data("@input_unit", "full range of the drive current")  # for tracking in percent
+    input_range: Annotated[
+        float, Data("@input_unit", "full range of the drive current")
+    ]  # for tracking in percent
     input_unit: str = "A"
     complete: bool = True
     dropped_samples: int = 0
@@ -219,14 +231,18 @@ class Playback:
 class DriveError:
     """Errors of one drive, in percent of the full applied force, over all scored samples of all repeats."""
 
-    mean_abs_error_percent: float = _data("percent", "mean absolute error, of full force")
-    max_abs_error_percent: float = _data("percent", "largest absolute error, of full force")
-    rms_error_percent: float = _data("percent", "rms error, of full force")
-    hysteresis_percent: float = _data(
-        "percent", "loop area of force against target, of full force squared, per beat"
-    )
-    current_tracking_max_percent: float = _data("percent", "largest current tracking error, of the range")
-    output: FloatArray = _data("@output_unit", "mean measured output over the repeats", "time")  # (n,)
+    mean_abs_error_percent: Annotated[float, Data("percent", "mean absolute error, of full force")]
+    max_abs_error_percent: Annotated[float, Data("percent", "largest absolute error, of full force")]
+    rms_error_percent: Annotated[float, Data("percent", "rms error, of full force")]
+    hysteresis_percent: Annotated[
+        float, Data("percent", "loop area of force against target, of full force squared, per beat")
+    ]
+    current_tracking_max_percent: Annotated[
+        float, Data("percent", "largest current tracking error, of the range")
+    ]
+    output: Annotated[
+        FloatArray, Data("@output_unit", "mean measured output over the repeats", "time")
+    ]  # (n,)
     output_unit: str = "N"
 
 
@@ -237,13 +253,13 @@ class WaveformEvaluation:
     name: str
     inversion: str
     repeats: int
-    time_s: FloatArray = _data("s", "time", "time", path="time")  # (n,) scored samples only
-    target: FloatArray = _data("@output_unit", "target", "time")  # (n,)
+    time_s: Annotated[FloatArray, Data("s", "time", "time", path="time")]  # (n,) scored samples only
+    target: Annotated[FloatArray, Data("@output_unit", "target", "time")]  # (n,)
     scaled: DriveError
     compensated: DriveError
-    mean_error_reduction_percent: float = _data("percent", "reduction of the mean absolute error")
-    full_force: float = _data("@output_unit", "full applied force")
-    noise_percent: float = _data("percent", "spread between repeats, of full force")
+    mean_error_reduction_percent: Annotated[float, Data("percent", "reduction of the mean absolute error")]
+    full_force: Annotated[float, Data("@output_unit", "full applied force")]
+    noise_percent: Annotated[float, Data("percent", "spread between repeats, of full force")]
     output_unit: str = "N"
 
 
@@ -252,13 +268,13 @@ class ModelEvaluation:
     """The prediction error of one model on a held-out run."""
 
     name: str
-    rms: float = _data("@output_unit", "rms prediction error")
-    rms_percent: float = _data("percent", "rms prediction error, of the output span")
-    max_percent: float = _data("percent", "largest prediction error, of the output span")
-    gain_percent: float = _data("percent", "reduction of the rms against the first model")
-    time_s: FloatArray | None = _data("s", "time", "time", path="time")  # thinned for the figures
-    output: FloatArray = _data("@output_unit", "measured output", "time")
-    predicted: FloatArray = _data("@output_unit", "predicted output", "time")
+    rms: Annotated[float, Data("@output_unit", "rms prediction error")]
+    rms_percent: Annotated[float, Data("percent", "rms prediction error, of the output span")]
+    max_percent: Annotated[float, Data("percent", "largest prediction error, of the output span")]
+    gain_percent: Annotated[float, Data("percent", "reduction of the rms against the first model")]
+    time_s: Annotated[FloatArray | None, Data("s", "time", "time", path="time")]  # thinned for the figures
+    output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
+    predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
     output_unit: str = "N"
 
 
@@ -274,8 +290,3 @@ class Evaluation:
 
 
 KINDS: dict[str, type] = {k.kind: k for k in (Run, Model, Waveform, Playback, Evaluation)}
-
-
-def dataset_fields(kind: type) -> list[str]:
-    """Return the names of the fields of ``kind`` that become datasets."""
-    return [f.name for f in fields(kind) if "units" in f.metadata]
