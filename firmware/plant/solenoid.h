@@ -1,6 +1,6 @@
 /* The simulated solenoid, its drive electronics and a finger: one 100 us step at a time.
  *
- * Shared by the host and mps2 ports. Only + - * / and square root are used, in a fixed order, so that
+ * Shared by the host and mps2 ports. Only + - * / are used, in a fixed order, so that
  * every IEEE machine computes the same bits (build with -ffp-contract=off). No malloc, no libm.
  * Nothing in here is known to the firmware core: it sees PWM counts going out and ADC counts coming in. */
 #ifndef PULSETRAINER_SOLENOID_H
@@ -13,15 +13,14 @@
 #endif
 typedef PLANT_REAL real;
 
-/* Everything that can be chosen from outside, by name (solenoid_set): see solenoid_params.c for names,
- * units and ranges. An imperfection that is 0 is absent. */
-struct solenoid_params;
-struct solenoid;
+/* Complete types, so that a port can declare both statically (about 230 kB, half of it with float). */
+#include "plant_state.h"
 
 void solenoid_as_built(struct solenoid_params *p); /* the device of the paper: friction, eddy currents, noise */
 void solenoid_ideal(struct solenoid_params *p);    /* static hysteresis, electronics and sensor noise only */
 
-/* 0: done; -1: no such parameter; -2: outside its range. */
+/* Everything that can be chosen from outside, by name: see solenoid_params.c for names, units and
+ * ranges. An imperfection that is 0 is absent. 0: done; -1: no such parameter; -2: outside its range. */
 int solenoid_set(struct solenoid_params *p, const char *name, double value);
 
 void solenoid_init(struct solenoid *s, const struct solenoid_params *p);
