@@ -6,6 +6,7 @@ How a field is stored follows from its type and its ``Data`` annotation:
   ``quantity``; ``dims`` names its axes, and the axis ``time`` is the dataset ``time`` itself as a
   dimension scale. ``units="@name"`` takes the text of the sibling field ``name`` (units come
   with the data: A and N here, A/m and T for somebody else's bench).
+- ``finite``: neither NaN nor infinity is written or read (what drives a device, what a model is).
 - ``path``: the dataset's name in the file where it is not the field's name.
 - ``str``, ``int``, ``float``, ``bool``: an attribute.
 - a dataclass: a group; a tuple of dataclasses: a group of numbered groups.
@@ -30,15 +31,25 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, init=False)
 class Data:
-    """Marks a field as a dataset: its units, its quantity in words, the names of its axes, its path."""
+    """Marks a field as a dataset: units, quantity in words, axes, path, whether NaN is refused."""
 
     units: str
     quantity: str
     dims: tuple[str, ...]
     path: str | None
+    finite: bool
 
-    def __init__(self, units: str, quantity: str, *dims: str, path: str | None = None) -> None:
-        for name, value in (("units", units), ("quantity", quantity), ("dims", dims), ("path", path)):
+    def __init__(
+        self, units: str, quantity: str, *dims: str, path: str | None = None, finite: bool = False
+    ) -> None:
+        fields = (
+            ("units", units),
+            ("quantity", quantity),
+            ("dims", dims),
+            ("path", path),
+            ("finite", finite),
+        )
+        for name, value in fields:
             object.__setattr__(self, name, value)
 
 
@@ -143,11 +154,13 @@ class Model:
 
     kind: ClassVar[str] = "model"
 
-    levels: Annotated[FloatArray, Data("@input_unit", "input levels: edges of the cells", "level")]  # (L,)
+    levels: Annotated[
+        FloatArray, Data("@input_unit", "input levels: edges of the cells", "level", finite=True)
+    ]  # (L,)
     weights: Annotated[
-        FloatArray, Data("@weights_unit", "Preisach weights mu", "cell")
+        FloatArray, Data("@weights_unit", "Preisach weights mu", "cell", finite=True)
     ]  # (q,), order of core.plane
-    offset: Annotated[float, Data("@output_unit", "output offset y0")]
+    offset: Annotated[float, Data("@output_unit", "output offset y0", finite=True)]
     covered: Annotated[BoolArray, Data("1", "cell was switched on and off", "cell")]  # (q,)
     weights_unit: str = "N/A^2"
     input_unit: str = "A"
@@ -176,11 +189,13 @@ class Waveform:
     kind: ClassVar[str] = "waveform"
 
     time_s: Annotated[FloatArray, Data("s", "time", "time", path="time")]  # (n,) even steps
-    target: Annotated[FloatArray, Data("@output_unit", "target", "time")]  # (n,)
+    target: Annotated[FloatArray, Data("@output_unit", "target", "time", finite=True)]  # (n,)
     compensated: Annotated[
-        FloatArray, Data("@input_unit", "compensated drive", "time", path="drive/compensated")
+        FloatArray, Data("@input_unit", "compensated drive", "time", path="drive/compensated", finite=True)
     ]  # (n,)
-    scaled: Annotated[FloatArray, Data("@input_unit", "scaled drive", "time", path="drive/scaled")]  # (n,)
+    scaled: Annotated[
+        FloatArray, Data("@input_unit", "scaled drive", "time", path="drive/scaled", finite=True)
+    ]  # (n,)
     predicted: Annotated[
         FloatArray, Data("@output_unit", "output the model predicts for the compensated drive", "time")
     ]

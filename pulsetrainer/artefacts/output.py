@@ -1,0 +1,130 @@
+"""Files appear whole or not at all: a temporary name in the same folder, fsync, then a rename."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pulsetrainer.errors import DataError, PulsetrainerError, UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
+
+
+def check_output(path: Path | str, force: bool = False) -> None:
+    """Refuse an output that cannot be written, BEFORE the work that would be lost.
+
+    Raises
+    ------
+    UsageError
+        The file exists and ``force`` is not set, or its folder is missing or not writable.
+    """
+    path = Path(path)
+    folder = path.parent
+    if path.is_dir():
+        raise UsageError(
+            f"the output {path} is a folder", hint=f"name a file in it, such as {path / 'out.h5'}"
+        )
+    if path.exists() and not path.is_file():
+        raise UsageError(f"the output {path} is not an ordinary file", hint="name a file on disk")
+    if not folder.exists():
+        raise UsageError(
+            f"the folder {folder} of the output {path.name} does not exist",
+            hint=f"make it: mkdir -p {shlex.quote(str(folder))}",
+        )
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is a file, so {path} cannot be written", hint="name another output")
+    if path.exists() and not force:
+        raise _exists(path)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UsageError(
+            f"the folder {folder} of the output {path.name} is not writable",
+            hint="write to another folder, or mend the permissions",
+        )
+
+
+def _exists(path: Path) -> UsageError:
+    return UsageError(
+        f"the output {path} exists already", hint="give --force to replace it, or name another file"
+    )
+
+
+@contextlib.contextmanager
+def replacing(path: Path | str, *, force: bool) -> Iterator[Path]:
+    """Give the name of a new temporary file, which becomes ``path`` when the block ends well.
+
+    Whatever goes wrong, the temporary file is removed and a file that was at ``path`` is untouched.
+
+    Raises
+    ------
+    UsageError
+        See ``check_output``; also when another process wrote ``path`` meanwhile and ``force`` is not set.
+    DataError
+        The disk is full or failed.
+    """
+    check_output(path, force)
+    target = Path(path).resolve()  # through a symbolic link, not over it
+    temporary = temporary_name(target)
+    try:
+        yield temporary
+        publish(temporary, target, force=force)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def temporary_name(target: Path) -> Path:
+    """Return a name in the target's folder that no other process uses."""
+    stem = os.fsdecode(os.fsencode(target.name)[:_LONGEST_STEM])
+    return target.with_name(f".{stem}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
+
+
+def publish(temporary: Path, target: Path, *, force: bool) -> None:
+    """Give a finished file its final name, at once and for good.
+
+    Raises
+    ------
+    UsageError
+        Another process wrote ``target`` meanwhile and ``force`` is not set.
+    OSError
+        The disk failed.
+    """
+    _sync(temporary)
+    if force:
+        temporary.replace(target)
+    else:
+        try:
+            os.link(temporary, target)  # unlike a rename, fails where the name is taken
+            temporary.unlink()
+        except FileExistsError:
+            raise _exists(target) from None
+        except OSError:  # a file system without hard links
+            if target.exists():
+                raise _exists(target) from None
+            temporary.replace(target)
+    with contextlib.suppress(OSError):  # a folder cannot be synced everywhere; the file already is
+        _sync(target.parent)
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def cannot_write(path: Path | str, error: Exception) -> PulsetrainerError:
+    """Return the error for a file that could not be written, with the system's reason in it."""
+    reason = getattr(error, "strerror", None) or str(error)
+    full = any(sign in str(error) for sign in ("No space left", "Disk quota", "File too large"))
+    hint = "free some space, or write to another disk" if full else "check the disk and its permissions"
+    return DataError(f"{path} could not be written: {reason}; nothing was changed", hint=hint)

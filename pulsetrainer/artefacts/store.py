@@ -1,0 +1,275 @@
+"""Artefacts on disk: any kind into HDF5 and back, whole or not at all.
+
+The file format: root attributes ``kind``, ``format_version``, ``title``, ``created``, ``history``,
+``provenance`` (JSON), ``samples`` where the kind has a time axis; then the kind's fields as ``kinds`` says.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import h5py
+import numpy as np
+
+from pulsetrainer import __version__
+from pulsetrainer.artefacts.decode import Origin, decode, text_of
+from pulsetrainer.artefacts.encode import encode, values_of
+from pulsetrainer.artefacts.kinds import KINDS
+from pulsetrainer.artefacts.output import cannot_write, check_output, replacing
+from pulsetrainer.artefacts.provenance import Header, Provenance, clean
+from pulsetrainer.artefacts.schema import TIME, kind_of, plan_of
+from pulsetrainer.artefacts.steps import maker, next_step, with_article
+from pulsetrainer.errors import DataError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+__all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "write"]
+
+FORMAT_VERSION = 1
+# from 1.10 on HDF5 keeps checksums of its own structures, and can be read while it grows
+LIBVER = ("v110", "v110")
+_DAMAGED = "restore it from a copy, or make it again: pulsetrainer --help lists the commands"
+_HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
+
+K = TypeVar("K")
+
+
+def write(path: Path | str, artefact: Any, header: Header, *, force: bool = False) -> None:
+    """Write an artefact under its final name, or leave everything as it was.
+
+    Raises
+    ------
+    UsageError
+        See ``check_output``.
+    DataError
+        The artefact does not fit its own annotations, or the disk is full or failed.
+    """
+    write_fields(path, type(artefact), values_of(artefact), header, force=force)
+
+
+def write_fields(
+    path: Path | str, cls: type, values: Mapping[str, Any], header: Header, *, force: bool
+) -> None:
+    """Write an artefact given by its fields, whose arrays may be datasets of another file.
+
+    Raises
+    ------
+    UsageError, DataError
+        As ``write``.
+    """
+    with replacing(path, force=force) as temporary:
+        try:
+            with h5py.File(temporary, "x", libver=LIBVER, locking=False) as file:
+                write_root(file, cls, header, samples=_samples(cls, values))
+                encode(file, cls, values)
+        except DataError as error:
+            raise DataError(f"{path} was not written: {error.message}", hint=error.hint) from error
+        except (OSError, RuntimeError) as error:
+            raise cannot_write(path, error) from error
+
+
+def _samples(cls: type, values: Mapping[str, Any]) -> int | None:
+    """Return the length of the root's time axis; None where the kind has none."""
+    for plan in plan_of(cls):
+        if plan.dims[-1:] == (TIME,) and values[plan.name] is not None:
+            return int(np.shape(values[plan.name])[-1]) if np.shape(values[plan.name]) else None
+    return None
+
+
+def write_root(file: h5py.File, cls: type, header: Header, *, samples: int | None) -> None:
+    """Write the attributes that every kind has."""
+    texts = {
+        "kind": kind_of(cls),
+        "title": clean(header.title),
+        "created": clean(header.created),
+        "history": "\n".join(clean(line) for line in header.history),
+        "provenance": header.provenance.to_json(),  # cleaned item by item when it was built
+    }
+    for name, text in texts.items():
+        file.attrs[name] = text
+    file.attrs["format_version"] = np.int64(FORMAT_VERSION)
+    if samples is not None:
+        file.attrs["samples"] = np.int64(samples)
+
+
+def read(path: Path | str, kind: type[K]) -> K:
+    """Read an artefact that must be of this kind.
+
+    Raises
+    ------
+    DataError
+        The file is absent, unreadable, damaged, of another kind, or of a newer format.
+    """
+    artefact: K = read_one_of(path, kind)
+    return artefact
+
+
+def read_one_of(path: Path | str, *kinds: type) -> Any:
+    """Read an artefact of any of these kinds.
+
+    Raises
+    ------
+    DataError
+        As ``read``.
+    """
+    with _opened(path) as file:
+        got = _kind(file, path)
+        expected = [kind_of(kind) for kind in kinds]
+        if got not in expected:
+            raise DataError(
+                f"{path}: expected {with_article(expected)}, got {with_article([got])}",
+                hint=next_step(expected, got, str(path)),
+            )
+        return _decode(file, path, got)
+
+
+def read_any(path: Path | str) -> Any:
+    """Read an artefact of whatever kind it is.
+
+    Raises
+    ------
+    DataError
+        The file is absent, unreadable, damaged, not an artefact, or of a newer format.
+    """
+    with _opened(path) as file:
+        return _decode(file, path, _kind(file, path))
+
+
+def read_header(path: Path | str) -> Header:
+    """Read what an artefact says about itself.
+
+    Raises
+    ------
+    DataError
+        As ``read_any``.
+    """
+    with _opened(path) as file:
+        _kind(file, path)
+        history = _root_text(file, path, "history")
+        try:
+            provenance = Provenance.from_json(_root_text(file, path, "provenance"))
+        except DataError as error:
+            raise DataError(f"{path}: {error.message}", hint=error.hint) from error
+        return Header(
+            title=_root_text(file, path, "title"),
+            created=_root_text(file, path, "created"),
+            history=tuple(history.split("\n")) if history else (),
+            provenance=provenance,
+        )
+
+
+def _decode(file: h5py.File, path: Path | str, kind: str) -> Any:
+    samples = file.attrs.get("samples")
+    if samples is not None and (
+        np.ndim(samples) or not np.issubdtype(type(samples), np.integer) or samples < 0
+    ):
+        raise DataError(f"{path}: the attribute 'samples' is {samples!r}, expected a count", hint=_DAMAGED)
+    origin = Origin(str(path), kind, maker(kind))
+    return decode(file, KINDS[kind], origin, samples=None if samples is None else int(samples))
+
+
+def _kind(file: h5py.File, path: Path | str) -> str:
+    """Return the kind of an opened file that this version can read."""
+    if not isinstance(file.attrs.get("kind"), str | bytes) or "format_version" not in file.attrs:
+        raise DataError(
+            f"{path} is an HDF5 file, but not one of pulsetrainer's: "
+            "it lacks the attributes kind and format_version",
+            hint="a record of another program comes in as a table: pulsetrainer import FILE.csv -o run.h5",
+        )
+    kind, version = text_of(file.attrs["kind"]), file.attrs["format_version"]
+    if not np.issubdtype(type(version), np.integer):
+        raise DataError(
+            f"{path}: the attribute 'format_version' is {version!r}, expected a whole number", hint=_DAMAGED
+        )
+    if version > FORMAT_VERSION:
+        raise DataError(
+            f"{path} has format version {version}, but pulsetrainer {__version__} "
+            f"reads up to version {FORMAT_VERSION}",
+            hint="update with `pip install --upgrade pulsetrainer`, or make the file again with this version",
+        )
+    if kind not in KINDS:
+        raise DataError(
+            f"{path}: unknown kind {kind!r}, expected one of {', '.join(KINDS)}",
+            hint="update with `pip install --upgrade pulsetrainer`, or check where the file comes from",
+        )
+    return kind
+
+
+def _root_text(file: h5py.File, path: Path | str, name: str) -> str:
+    value = file.attrs.get(name)
+    if not isinstance(value, str | bytes):
+        raise DataError(f"{path}: the attribute {name!r} is missing or not a text", hint=_DAMAGED)
+    return text_of(value)
+
+
+@contextlib.contextmanager
+def _opened(path: Path | str) -> Iterator[h5py.File]:
+    """Open a file for reading; whatever HDF5 finds wrong with it is a DataError."""
+    path = Path(path)
+    _check_readable(path)
+    try:
+        with _open(path) as file:
+            yield file
+    except _HDF5_ERRORS as error:
+        raise _damaged(path, error) from error
+
+
+def _open(path: Path) -> h5py.File:
+    try:
+        return h5py.File(path, "r", locking="best-effort")
+    except OSError as first:
+        try:
+            # a capture that still grows, or was killed: HDF5 wants to be told that one may be writing
+            return h5py.File(path, "r", swmr=True, locking="best-effort")
+        except OSError:
+            raise first from None
+
+
+def _check_readable(path: Path) -> None:
+    """Raise DataError for what can be said before HDF5 looks at it."""
+    if path.is_dir():
+        raise DataError(f"{path} is a folder, expected a file", hint=_names_in(path, path))
+    if not path.exists():
+        raise DataError(f"{path} does not exist", hint=_names_in(path.parent, path))
+    if not path.is_file():
+        raise DataError(f"{path} is not an ordinary file", hint="name a file on disk")
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(8)
+    except OSError as error:
+        raise DataError(f"{path} cannot be read: {error.strerror}", hint="mend its permissions") from error
+    if not start:
+        raise DataError(f"{path} is empty", hint=_DAMAGED)
+    if start != b"\x89HDF\r\n\x1a\n":
+        table = path.suffix.lower() in (".csv", ".tsv", ".txt", ".dat")
+        hint = f"read the table in first: pulsetrainer import {path} -o run.h5" if table else _DAMAGED
+        raise DataError(f"{path} is not an HDF5 file", hint=hint)
+
+
+def _names_in(folder: Path, path: Path) -> str:
+    """Return a hint with the names in a folder that come nearest."""
+    if not folder.is_dir():
+        return f"the folder {folder} does not exist either"
+    names = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
+    near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
+    near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
+    near = near or [name for name in names if name.endswith(".h5")][:5]
+    return f"in that folder there is: {', '.join(near)}" if near else f"no artefact is in {folder}"
+
+
+def _damaged(path: Path, error: Exception) -> DataError:
+    text = str(error)
+    if "truncated file" in text:
+        return DataError(
+            f"{path} is truncated: only {path.stat().st_size} bytes of it are there", hint=_DAMAGED
+        )
+    if "lock file" in text:
+        return DataError(
+            f"{path} is locked by another program", hint="close the program that has it open and try again"
+        )
+    reason = text.strip("'\"").split("\n")[0]
+    return DataError(f"{path} is damaged and cannot be read: {reason}", hint=_DAMAGED)
