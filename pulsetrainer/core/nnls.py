@@ -1,0 +1,166 @@
+"""Non-negative least squares on the normal equations: block principal pivoting.
+
+minimise x' G x / 2 - f' x subject to x >= 0, with G symmetric positive (semi)definite.
+
+Portugal, Judice, Vicente, "A comparison of block pivoting and interior-point algorithms for linear least
+squares problems with nonnegative variables", Math. Comp. 63 (1994) 625-643; with the column
+grouping of Kim and Park, SIAM J. Sci. Comput. 33 (2011) 3261-3281 left out: there is one right side.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.errors import ConvergenceError
+
+# A pivot below this share of the largest diagonal entry is rounding noise of the sums that made G.
+_RELATIVE_RIDGE = 1e-13
+# Some ten units in the last place of a sum of a thousand terms.
+_ROUNDING = 1e-14
+# Full exchanges that may fail to reduce the infeasibilities before descent takes over.
+_PATIENCE = 3
+
+
+class NonNegative(NamedTuple):
+    """The minimiser, where it is positive, and how many systems were solved."""
+
+    x: FloatArray  # (q,)
+    passive: NDArray[np.bool_]  # (q,) True where x may be positive
+    iterations: int
+
+
+def solve(
+    gram: FloatArray,
+    rhs: FloatArray,
+    *,
+    passive: NDArray[np.bool_] | None = None,
+    max_iterations: int = 500,
+) -> NonNegative:
+    """Return the non-negative minimiser for ``gram`` (q, q) and ``rhs`` (q,).
+
+    All variables on the wrong side are exchanged at once, which usually ends within ten systems. Where
+    the exchanges stop making progress, projected Newton steps with a line search go on from the best
+    point: they descend, so they cannot cycle (Bertsekas, SIAM J. Control Optim. 20 (1982) 221-246).
+
+    Variables whose diagonal entry is zero never appear in the data and stay at zero. ``passive``
+    is a first guess of the positive variables, from a neighbouring problem.
+
+    Raises
+    ------
+    ConvergenceError
+        More than ``max_iterations`` systems: the matrix is too far from positive definite.
+    """
+    problem = _Problem(gram, rhs)
+    free = np.zeros(rhs.size, dtype=bool) if passive is None else passive & problem.usable
+    fewest, patience = rhs.size + 1, _PATIENCE
+    for iteration in range(1, max_iterations + 1):
+        x = problem.minimise_over(free)
+        wrong = np.where(free, problem.negative(x), problem.usable & problem.descends(x))
+        count = int(wrong.sum())
+        if count == 0:
+            return NonNegative(np.maximum(x, 0.0), free, iteration)
+        if count < fewest:
+            fewest, patience = count, _PATIENCE
+        elif patience > 0:
+            patience -= 1
+        else:
+            return _descend(problem, np.maximum(x, 0.0), iteration, max_iterations)
+        free = free ^ wrong
+    raise _unsettled(max_iterations)
+
+
+class _Problem:
+    """The quadratic, with the signs of its variables and gradients judged against rounding."""
+
+    def __init__(self, gram: FloatArray, rhs: FloatArray) -> None:
+        self.gram, self.rhs, self.size = gram, rhs, np.abs(gram)
+        diagonal = np.diagonal(gram)
+        self.scale = float(diagonal.max(initial=0.0))
+        self.usable = diagonal > 1e-14 * self.scale
+
+    def minimise_over(self, free: NDArray[np.bool_]) -> FloatArray:
+        return _solve_free(self.gram, self.rhs, free, self.scale)
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        return self.gram @ x - self.rhs
+
+    def objective(self, x: FloatArray) -> float:
+        return float(x @ (0.5 * (self.gram @ x) - self.rhs))
+
+    def negative(self, x: FloatArray) -> NDArray[np.bool_]:
+        return x < -_ROUNDING * np.abs(x).max(initial=0.0)
+
+    def descends(self, x: FloatArray) -> NDArray[np.bool_]:
+        """Where the gradient is negative by more than the rounding of the sums it came from."""
+        return self.gradient(x) < -_ROUNDING * (self.size @ np.abs(x) + np.abs(self.rhs))
+
+
+def _descend(problem: _Problem, x: FloatArray, used: int, max_iterations: int) -> NonNegative:
+    """Projected Newton steps from a feasible ``x`` until the optimality conditions hold."""
+    value = problem.objective(x)
+    for iteration in range(used + 1, max_iterations + 1):
+        free = problem.usable & ((x > 0) | problem.descends(x))
+        newton = problem.minimise_over(free)
+        if not np.any(problem.negative(newton)):
+            x, value = np.maximum(newton, 0.0), problem.objective(newton)
+            if not np.any(problem.usable & ~free & problem.descends(x)):
+                return NonNegative(x, free, iteration)
+            continue
+        # variables at zero that the Newton step pushes below it would block the step: leave them out
+        blocked = free & (x == 0) & (newton < 0)
+        while np.any(blocked):
+            free &= ~blocked
+            newton = problem.minimise_over(free)
+            blocked = free & (x == 0) & (newton < 0)
+        step, trial = 1.0, x
+        while step > 1e-12:
+            trial = np.maximum(x + step * (newton - x), 0.0)
+            trial_value = problem.objective(trial)
+            if trial_value < value:
+                break
+            step *= 0.5
+        x, value = trial, trial_value
+    raise _unsettled(max_iterations)
+
+
+def _unsettled(max_iterations: int) -> ConvergenceError:
+    return ConvergenceError(
+        f"the non-negative fit did not settle within {max_iterations} systems",
+        hint="use fewer levels, add smoothing, or record a signal that covers the plane",
+    )
+
+
+def _solve_free(gram: FloatArray, rhs: FloatArray, free: NDArray[np.bool_], scale: float) -> FloatArray:
+    """Unconstrained minimiser over the free variables, the others zero."""
+    x = np.zeros(rhs.size)
+    index = np.flatnonzero(free)
+    if index.size == 0:
+        return x
+    block = gram[np.ix_(index, index)]
+    ridge = _RELATIVE_RIDGE * scale
+    while True:
+        block[np.diag_indices_from(block)] += ridge
+        try:
+            factor = linalg.cho_factor(block, lower=True, check_finite=False)
+        except linalg.LinAlgError:
+            block = gram[np.ix_(index, index)]
+            ridge *= 10.0  # cells the data cannot tell apart: share their mass
+            continue
+        x[index] = linalg.cho_solve(factor, rhs[index], check_finite=False)
+        return x
+
+
+def kkt_violation(gram: FloatArray, rhs: FloatArray, x: FloatArray) -> float:
+    """Largest violation of the optimality conditions, relative to the largest entry of ``rhs``.
+
+    x >= 0, G x - f >= 0, x (G x - f) = 0.
+    """
+    gradient = gram @ x - rhs
+    size = max(float(np.abs(rhs).max(initial=0.0)), np.finfo(float).tiny)
+    worst = np.where(x > 0, np.abs(gradient), np.maximum(-gradient, 0.0))
+    return float(worst.max(initial=0.0)) / size

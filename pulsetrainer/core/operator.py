@@ -1,0 +1,183 @@
+"""The Preisach operator: from an input and its memory to the output.
+
+y = y0 + sum_k mu_k A_k s_k, with s_k in [-1, 1] the mean state of the relays in cell k (Carneiro, Abreu,
+Restivo 2018, eq. 2; relays are -1 or +1). Summed over triangles this is
+
+    y = y0 - W + 2 sum over the memory's steps of +-E(upper, lower),      W = E(high, low),
+
+with + for a step up and - for a step down: a short sum over turning points instead of n_q relays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
+
+from pulsetrainer.core.memory import State, Trace, negative_saturation, trace
+from pulsetrainer.core.plane import FloatArray, Plane, Reading, finite_vector
+from pulsetrainer.errors import ArgumentError
+
+
+class Rows(NamedTuple):
+    """Design rows in node space: row of sample t = own[t] + base[anchor[t]], the constant -W is left out."""
+
+    own: sparse.csr_array  # (n, n_q) the step from the anchor to the sample
+    base: sparse.csr_array  # (m, n_q) all steps up to each turning point
+
+
+def steps(plane: Plane, to: FloatArray, origin: FloatArray) -> sparse.csr_array:
+    """Rows (n, n_q) in node space of the signed output steps 2 G(to, origin)."""
+    corner, weight = plane.corners(to, origin)
+    number, sign = plane.signed_nodes
+    weight *= 2.0 * sign[corner]
+    pointer = np.arange(to.size + 1, dtype=np.int64) * 4
+    rows = sparse.csr_array((weight.T.ravel(), number[corner].T.ravel(), pointer), shape=(to.size, plane.n_q))
+    rows.sum_duplicates()
+    rows.eliminate_zeros()
+    return rows
+
+
+def follow(plane: Plane, values: ArrayLike, start: State | None, reading: Reading) -> Trace:
+    """Trace an input through the plane's memory under a reading.
+
+    Raises
+    ------
+    ArgumentError
+        The input is empty, not one-dimensional or not finite; the reading is unknown.
+    """
+    u = finite_vector("input", values)
+    state = start or negative_saturation(plane.low)
+    if reading == "continuous":
+        return trace(u, state, plane.low, plane.high)
+    if reading == "relay":
+        extremes = plane.round_to_nodes(np.asarray(state.extremes))
+        rounded = trace(extremes, negative_saturation(plane.low), plane.low, plane.high).final
+        return trace(plane.round_to_nodes(u), rounded, plane.low, plane.high)
+    raise ArgumentError(f"reading must be 'continuous' or 'relay', got {reading!r}", hint="use 'continuous'")
+
+
+def rows(plane: Plane, path: Trace) -> Rows:
+    """Design rows of a traced input in node space."""
+    own = steps(plane, path.value, path.node_value[path.anchor])
+    return Rows(own, base_rows(plane, path))
+
+
+def base_rows(plane: Plane, path: Trace) -> sparse.csr_array:
+    """Rows (m, n_q) of all turning points: each is its parent's row plus one step.
+
+    The ancestors of all nodes are listed by doubling: log2(depth) sparse products.
+    """
+    step = steps(plane, path.node_value, path.node_value[path.parent])
+    count = path.parent.size
+    jump, total = path.parent.copy(), step
+    while np.any(jump != 0):
+        take = sparse.csr_array(
+            (np.ones(count), jump, np.arange(count + 1, dtype=np.int64)), shape=(count, count)
+        )
+        total = total + take @ total  # row 0 is empty, so the root adds nothing
+        jump = jump[jump]
+    return total.tocsr()
+
+
+@dataclass(frozen=True)
+class Preisach:
+    """A Preisach operator with known weights."""
+
+    plane: Plane
+    weights: FloatArray  # mu (n_q,), output unit per input unit squared, none negative
+    offset: float = 0.0  # y0, output unit
+    reading: Reading = "continuous"
+    polarity: int = 1  # -1: the output falls when the input rises
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "weights", self.plane.check_weights(self.weights))
+        if self.polarity not in (-1, 1):
+            raise ArgumentError(f"polarity must be 1 or -1, got {self.polarity}", hint="1: the output rises")
+
+    @cached_property
+    def masses(self) -> FloatArray:
+        """Mass mu_k A_k of every cell (n_q,), output unit."""
+        return self.weights * self.plane.areas
+
+    @cached_property
+    def nodes(self) -> FloatArray:
+        """Everett values at the nodes (n_q,), output unit."""
+        return self.plane.everett_nodes(self.masses)
+
+    @cached_property
+    def grid(self) -> FloatArray:
+        """Everett values on the full grid of nodes (n_h + 1, n_h + 1), output unit."""
+        return self.plane.everett_grid(self.nodes)
+
+    @cached_property
+    def total(self) -> float:
+        """Mass W of the whole plane, output unit."""
+        return float(self.grid[-1, 0])
+
+    @property
+    def saturation(self) -> tuple[float, float]:
+        """Outputs at the negative and at the positive saturation, output unit."""
+        return self.offset - self.polarity * self.total, self.offset + self.polarity * self.total
+
+    @cached_property
+    def _signed(self) -> FloatArray:
+        return self.plane.signed_everett(self.nodes)
+
+    def step(self, to: FloatArray, origin: FloatArray) -> FloatArray:
+        """Signed output step (n,) when the input goes from ``origin`` (n,) straight to ``to`` (n,), polarity 1."""
+        corner, weight = self.plane.corners(to, origin)
+        return 2.0 * np.einsum("kn,kn->n", weight, self._signed[corner])
+
+    def __call__(self, values: ArrayLike, start: State | None = None) -> FloatArray:
+        """Output (n,) for an input (n,) from negative saturation, or from ``start``."""
+        return self.run(values, start)[0]
+
+    def run(self, values: ArrayLike, start: State | None = None) -> tuple[FloatArray, State]:
+        """Output (n,) and the final state, with which the next piece of the input can go on.
+
+        Raises
+        ------
+        ArgumentError
+            The input is empty, not one-dimensional or not finite.
+        """
+        path = follow(self.plane, values, start, self.reading)
+        turning = path.along_tree(self.step(path.node_value, path.node_value[path.parent])) - self.total
+        y = turning[path.anchor] + self.step(path.value, path.node_value[path.anchor])
+        return self.offset + self.polarity * y, path.final
+
+
+def outputs(
+    plane: Plane,
+    weights: FloatArray,
+    offsets: FloatArray,
+    values: ArrayLike,
+    *,
+    start: State | None = None,
+    reading: Reading = "continuous",
+) -> FloatArray:
+    """Outputs (b, n) of one input under many weight vectors (b, n_q) and offsets (b,) at once.
+
+    The memory is followed once; every weight vector then costs one sparse product.
+
+    Raises
+    ------
+    ArgumentError
+        The input is not a finite vector, or the weights do not fit the plane.
+    """
+    if weights.ndim != 2 or weights.shape[1] != plane.n_q or offsets.shape != weights.shape[:1]:
+        raise ArgumentError(
+            f"weights must have shape (b, {plane.n_q}) and offsets (b,), got {weights.shape}, {offsets.shape}",
+            hint="one row of weights for each offset",
+        )
+    path = follow(plane, values, start, reading)
+    nodes = plane.everett_nodes(weights * plane.areas)  # (b, n_q)
+    step = steps(plane, path.node_value, path.node_value[path.parent])
+    turning = path.along_tree(step @ nodes.T)  # (m, b)
+    own = steps(plane, path.value, path.node_value[path.anchor])
+    total = nodes[:, -plane.n_h]  # node (n_h, 0) is the whole plane
+    return ((own @ nodes.T) + turning[path.anchor]).T - total[:, None] + offsets[:, None]

@@ -1,0 +1,238 @@
+"""The discrete Preisach plane and its Everett surface.
+
+The half-plane alpha >= beta over [L_0, L_n] is cut by n_h + 1 levels into n_q = n_h (n_h + 1) / 2 cells.
+Cell (i, j), i >= j, holds the relays that switch up in [L_i, L_i+1] and down in [L_j, L_j+1]; cells
+are numbered k = i (i + 1) / 2 + j. Cells on the diagonal are triangles: half the area.
+
+The Everett function E(alpha, beta) is the mass of the relays inside the triangle between beta and
+alpha (Everett 1955; Mayergoyz 2003, eq. 1.15). At the nodes it is a double cumulative sum of the cells'
+masses, and node (i + 1, j) is numbered like cell (i, j), so that masses and node values are two
+coordinate systems of one space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pulsetrainer.errors import ArgumentError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+Reading = Literal["continuous", "relay"]
+
+
+def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatArray:
+    """Return ``values`` as a one-dimensional float array.
+
+    Raises
+    ------
+    ArgumentError
+        It is not one-dimensional, is shorter than ``at_least``, or holds NaN or infinity.
+    """
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim != 1 or array.size < at_least:
+        raise ArgumentError(
+            f"{name} must be a vector of at least {at_least} samples, got shape {array.shape}",
+            hint=f"pass a one-dimensional {name}",
+        )
+    bad = ~np.isfinite(array)
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        raise ArgumentError(
+            f"{name} must be finite, got {array[first]} at sample {first} "
+            f"({int(bad.sum())} of {array.size} samples are not finite)",
+            hint=f"mask or remove the samples of {name} that are not numbers",
+        )
+    return array
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The levels of a discrete Preisach plane; everything else follows from them."""
+
+    levels: FloatArray  # (n_h + 1,) edges of the cells, strictly increasing
+
+    def __post_init__(self) -> None:
+        levels = finite_vector("levels", self.levels)
+        if levels.size < 3:
+            raise ArgumentError(
+                f"a Preisach plane needs at least 2 levels (3 edges), got {levels.size} edges",
+                hint="use more levels, 48 for instance",
+            )
+        if not np.all(np.diff(levels) > 0):
+            raise ArgumentError(
+                f"levels must strictly increase, got {levels[0]:g} .. {levels[-1]:g} with a smallest step of "
+                f"{np.diff(levels).min():g}",
+                hint="the input range must not be zero",
+            )
+        object.__setattr__(self, "levels", levels)
+
+    @classmethod
+    def uniform(cls, low: float, high: float, n_h: int) -> Plane:
+        """Return the plane with ``n_h`` even levels over [low, high].
+
+        Raises
+        ------
+        ArgumentError
+            Fewer than 2 levels, or a range that is zero or not finite.
+        """
+        if n_h < 2:
+            raise ArgumentError(f"n_h must be at least 2, got {n_h}", hint="48 levels suit most devices")
+        if not (np.isfinite(low) and np.isfinite(high) and high > low):
+            raise ArgumentError(
+                f"the input range must have low < high, got low = {low:g}, high = {high:g}",
+                hint="record an input that moves",
+            )
+        return cls(np.linspace(low, high, n_h + 1))
+
+    @property
+    def n_h(self) -> int:
+        """Number of levels."""
+        return self.levels.size - 1
+
+    @property
+    def n_q(self) -> int:
+        """Number of cells."""
+        return self.n_h * (self.n_h + 1) // 2
+
+    @property
+    def low(self) -> float:
+        """Lower end of the input range."""
+        return float(self.levels[0])
+
+    @property
+    def high(self) -> float:
+        """Upper end of the input range."""
+        return float(self.levels[-1])
+
+    @cached_property
+    def cell_indices(self) -> tuple[IntArray, IntArray]:
+        """Bands (i, j) of every cell, each (n_q,)."""
+        i, j = np.tril_indices(self.n_h)
+        return i.astype(np.int64), j.astype(np.int64)
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """Areas A_k of the cells (n_q,), input unit squared; diagonal cells count half."""
+        i, j = self.cell_indices
+        step = np.diff(self.levels)
+        return step[i] * step[j] * np.where(i == j, 0.5, 1.0)
+
+    @cached_property
+    def thresholds(self) -> FloatArray:
+        """Middles of the bands (n_h,): where the relays of the paper's reading switch."""
+        return 0.5 * (self.levels[1:] + self.levels[:-1])
+
+    def check_weights(self, weights: ArrayLike) -> FloatArray:
+        """Return ``weights`` (n_q,) when they can belong to this plane.
+
+        Raises
+        ------
+        ArgumentError
+            The length is not n_q, or a weight is negative or not finite.
+        """
+        array = np.asarray(weights, dtype=np.float64)
+        if array.shape != (self.n_q,):
+            raise ArgumentError(
+                f"weights must have shape ({self.n_q},) for {self.n_h} levels, got {array.shape}",
+                hint="weights and levels must come from the same model",
+            )
+        if not np.all(np.isfinite(array)) or np.any(array < 0):
+            k = int(np.flatnonzero(~(array >= 0) | ~np.isfinite(array))[0])
+            raise ArgumentError(
+                f"weights must be finite and not negative, got {array[k]:g} in cell {k}",
+                hint="identify the model again",
+            )
+        return array
+
+    def unpack(self, packed: FloatArray) -> FloatArray:
+        """Spread (..., n_q) cell values over the lower triangle of (..., n_h, n_h) squares of zeros."""
+        i, j = self.cell_indices
+        square = np.zeros((*packed.shape[:-1], self.n_h, self.n_h))
+        square[..., i, j] = packed
+        return square
+
+    def everett_nodes(self, masses: FloatArray) -> FloatArray:
+        """Everett values at the nodes, packed (..., n_q), from the cells' masses (..., n_q).
+
+        E[i + 1, j] = sum of masses over p <= i, q >= j: two cumulative sums.
+        """
+        square = self.unpack(masses)
+        np.cumsum(square, axis=-2, out=square)
+        square = np.cumsum(square[..., ::-1], axis=-1)[..., ::-1]
+        i, j = self.cell_indices
+        return square[..., i, j]
+
+    def masses_of(self, nodes: FloatArray) -> FloatArray:
+        """Masses of the cells (n_q,) from packed Everett nodes: the inverse of ``everett_nodes``."""
+        grid = self.everett_grid(nodes)
+        square = grid[1:, :-1] - grid[:-1, :-1] - grid[1:, 1:] + grid[:-1, 1:]
+        i, j = self.cell_indices
+        return square[i, j]
+
+    def adjoint(self, node_values: FloatArray) -> FloatArray:
+        """Transpose of ``everett_nodes``: (..., n_q) node space to (..., n_q) cell space.
+
+        Cell (p, q) collects the nodes (i + 1, j) with i >= p and j <= q.
+        """
+        square = self.unpack(node_values)
+        square = np.cumsum(square[..., ::-1, :], axis=-2)[..., ::-1, :]
+        np.cumsum(square, axis=-1, out=square)
+        i, j = self.cell_indices
+        return square[..., i, j]
+
+    def everett_grid(self, nodes: FloatArray) -> FloatArray:
+        """Everett values on the full (n_h + 1, n_h + 1) grid of nodes, zero on and above the diagonal."""
+        grid = np.zeros((self.n_h + 1, self.n_h + 1))
+        i, j = self.cell_indices
+        grid[i + 1, j] = nodes
+        return grid
+
+    def bands(self, values: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Band index and fraction in [0, 1] of each input value; values outside are clipped to the edges."""
+        clipped = np.clip(values, self.low, self.high)
+        band = np.searchsorted(self.levels, clipped, side="right") - 1
+        band = np.clip(band, 0, self.n_h - 1)
+        left = self.levels[band]
+        return band.astype(np.int64), (clipped - left) / (self.levels[band + 1] - left)
+
+    def round_to_nodes(self, values: FloatArray) -> FloatArray:
+        """Round each value to a level, as the relays of the paper's reading see it.
+
+        Relays switch at the middles of the bands: a relay is up from its threshold on.
+        """
+        return self.levels[np.searchsorted(self.thresholds, values, side="right")]
+
+    @cached_property
+    def signed_nodes(self) -> tuple[IntArray, FloatArray]:
+        """Number and sign of node (a, b), flattened over the (n_h + 1)^2 grid: -1 above the diagonal, 0 on it."""
+        a, b = np.indices((self.n_h + 1, self.n_h + 1)).reshape(2, -1)
+        upper, lower = np.maximum(a, b), np.minimum(a, b)
+        number = np.where(a == b, 0, upper * (upper - 1) // 2 + lower)
+        return number.astype(np.int64), np.sign(a - b).astype(np.float64)
+
+    def corners(self, to: FloatArray, origin: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Flat grid numbers and bilinear weights, each (4, n), of the points (to, origin)."""
+        i, s = self.bands(to)
+        j, t = self.bands(origin)
+        first = i * (self.n_h + 1) + j
+        number = np.stack((first, first + 1, first + self.n_h + 1, first + self.n_h + 2))
+        st = s * t
+        return number, np.stack((1.0 - s - t + st, t - st, s - st, st))
+
+    def signed_everett(self, nodes: FloatArray) -> FloatArray:
+        """Everett values on the flattened grid of nodes, continued antisymmetrically: G(b, a) = -G(a, b).
+
+        Interpolated bilinearly, G(to, origin) is the signed step of the output from ``origin`` to
+        ``to``. Off the diagonal that is the exact integral of a density constant over each cell. In a
+        diagonal cell it comes out as m (to - origin) / step: the cell's mass sits on the diagonal and is the
+        reversible part, and no case needs telling apart.
+        """
+        number, sign = self.signed_nodes
+        return sign * nodes[number]
