@@ -1,0 +1,85 @@
+/* What may never happen to a finger: limits, plausibility of the sensors, the latch.
+ *
+ * Runs in the tick before the PID output is applied. A hard fault kills the output in the same tick;
+ * a soft one ramps the reference to zero first. */
+#ifndef PULSETRAINER_SAFETY_H
+#define PULSETRAINER_SAFETY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "protocol.h"
+
+/* Debounce and plausibility, in ticks of 100 us, 100 uA and mN. */
+#define SAFETY_FORCE_DEBOUNCE 3u
+#define SAFETY_RAIL_DEBOUNCE 3u
+#define SAFETY_RAIL_LOW 1u
+#define SAFETY_RAIL_HIGH 4093u
+#define SAFETY_FROZEN_CURRENT_SPAN 500   /* the reference moved by 50 mA ... */
+#define SAFETY_FROZEN_CURRENT_TICKS 100u /* ... within at least 10 ms, the reading by not one count */
+#define SAFETY_FROZEN_FORCE_SPAN 13000   /* the current moved by 1.3 A, the force by not one count */
+#define SAFETY_NO_CURRENT_TICKS 300u
+#define SAFETY_NO_FORCE_CURRENT 12000
+#define SAFETY_NO_FORCE_LEVEL 300
+#define SAFETY_NO_FORCE_TICKS 5000u
+#define SAFETY_STRAY_CURRENT 1000
+#define SAFETY_STRAY_TICKS 2000u
+
+/* I2t of the coil: a first-order average of the squared current over 2^20 ticks (105 s) may not pass
+ * (1.25 A)^2. The full 1.5 A from cold trips after about two minutes. */
+#define SAFETY_HEAT_LIMIT 156250000L
+
+struct safety_input {
+    int16_t reference; /* after the slew limit */
+    int16_t current;
+    int16_t force;
+    uint16_t current_counts;
+    uint16_t force_counts;
+    uint16_t duty; /* applied since the last tick */
+    uint16_t full; /* the largest duty */
+    bool armed;    /* ARMED, RUNNING or RAMPING */
+    bool driving;  /* RUNNING or RAMPING: the output is on */
+};
+
+/* A reading, and how far what should move it has moved since it last changed. */
+struct safety_still {
+    uint16_t counts;
+    uint16_t ticks;
+    int16_t low;
+    int16_t high;
+};
+
+struct safety {
+    /* Limits: set from the parameters while idle. */
+    int16_t current_trip;
+    int16_t force_trip;
+    uint16_t heartbeat_ticks;
+    uint32_t on_ticks_limit;
+    /* Counters. */
+    volatile uint16_t silent_ticks;
+    uint32_t on_ticks;
+    uint16_t over_force;
+    uint16_t current_rail;
+    uint16_t force_rail;
+    uint16_t no_current;
+    uint16_t no_force;
+    uint16_t stray;
+    struct safety_still current_still;
+    struct safety_still force_still;
+    /* Heat: the sum of the present 1024 ticks and the average. */
+    uint16_t heat_ticks;
+    int32_t heat_sum;
+    int32_t heat;
+};
+
+void safety_init(struct safety *s);
+void safety_begin(struct safety *s); /* at ARM: counters of the run to zero; the heat stays */
+void safety_alive(struct safety *s); /* a valid command came from the host */
+
+/* The first fault found in this tick, or PT_FAULT_NONE. */
+uint8_t safety_tick(struct safety *s, const struct safety_input *in);
+
+/* True for a fault that ramps down before the output goes off. */
+bool safety_is_soft(uint8_t fault);
+
+#endif

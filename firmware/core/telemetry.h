@@ -1,0 +1,43 @@
+/* Samples on their way to the host: a ring filled by the tick, emptied into blocks by the main loop. */
+#ifndef PULSETRAINER_TELEMETRY_H
+#define PULSETRAINER_TELEMETRY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "protocol.h"
+
+#define TELEMETRY_RING 128u
+#define TELEMETRY_MAX_AGE 500u /* ticks: a slow stream still shows signs of life */
+
+struct telemetry_sample {
+    uint32_t tick; /* bit 31: the slew limit was at work */
+    int16_t reference;
+    int16_t current;
+    int16_t force;
+};
+
+struct telemetry {
+    struct telemetry_sample ring[TELEMETRY_RING];
+    volatile uint16_t head;
+    volatile uint16_t tail;
+    volatile bool ended; /* the session's last sample is in the ring, its LAST block not yet sent */
+    uint16_t decimation;
+    uint16_t countdown;
+    bool slewed;
+    uint8_t session;
+    uint32_t produced; /* samples due since the session began, lost ones included */
+    uint32_t dropped;
+};
+
+void telemetry_init(struct telemetry *t);
+void telemetry_begin(struct telemetry *t, uint8_t session);
+void telemetry_tick(struct telemetry *t, const struct telemetry_sample *s, bool slewed);
+void telemetry_end(struct telemetry *t);
+uint16_t telemetry_waiting(const struct telemetry *t);
+
+/* Packs the next block into `payload` (PT_MAX_PAYLOAD bytes) when one is due at `now`; returns its
+ * length or 0. */
+uint8_t telemetry_pack(struct telemetry *t, uint32_t now, uint8_t *payload);
+
+#endif

@@ -1,0 +1,48 @@
+/* The reference: uploaded in pieces into a ring, interpolated linearly to the tick. */
+#ifndef PULSETRAINER_WAVE_H
+#define PULSETRAINER_WAVE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "protocol.h"
+
+enum wave_result { WAVE_OK, WAVE_LAST, WAVE_UNDERRUN };
+
+struct wave {
+    int16_t ring[PT_WAVE_BUFFER_SAMPLES];
+    volatile uint16_t head; /* written by the main loop only, runs freely */
+    volatile uint16_t tail; /* written by the tick only, runs freely */
+    uint32_t total;
+    uint32_t received;
+    uint32_t crc_announced;
+    uint32_t crc;
+    uint16_t ticks_per_sample;
+    bool begun;
+    bool committed;
+    /* Of the tick: the segment from `from` to `to`, sample `index` being `from`. */
+    uint32_t index;
+    uint16_t phase;
+    int16_t from;
+    int16_t to;
+};
+
+uint32_t wave_crc32(uint32_t crc, const uint8_t *data, uint16_t count); /* zlib's; start with 0 */
+
+void wave_reset(struct wave *w);
+void wave_begin(struct wave *w, uint32_t total, uint16_t ticks_per_sample, uint32_t crc);
+uint16_t wave_free(const struct wave *w);
+
+/* Append little-endian samples; the caller has checked the room, the order and the range. */
+void wave_append(struct wave *w, const uint8_t *samples, uint8_t count);
+
+/* Ticks until the ring runs dry; UINT32_MAX when all samples are there. */
+uint32_t wave_ticks_left(const struct wave *w);
+
+void wave_start(struct wave *w);
+
+/* The reference of this tick. WAVE_LAST: it is the last sample. WAVE_UNDERRUN: it is good, but what
+ * follows has not arrived. */
+enum wave_result wave_tick(struct wave *w, int16_t *reference);
+
+#endif

@@ -1,0 +1,120 @@
+/* Device time against the wall clock.
+ *
+ * --speed real: ticks follow the wall clock, armed or not.
+ * --speed max: device time runs as fast as computer and link allow, which must not cheat the safety of
+ * the device nor a host that is merely slow:
+ *   - disarmed, time stands still once the coil has settled: nothing can happen, and two equal captures
+ *     give equal numbers however long the pauses between them were;
+ *   - armed but not started, and while playing whenever the host has been silent for 100 ms of device
+ *     time, the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
+ *     for at most half a second of wall time; after that it goes on at the wall clock, so that a
+ *     host that is really gone trips the 200 ms heartbeat like on a real device. */
+#include "app.h"
+#include "port.h"
+
+#define NS_PER_TICK 100000
+#define BATCH 10                    /* ticks between two looks at the pty */
+#define SILENCE_TICKS 1000          /* 100 ms of device time */
+#define TELEMETRY_HIGH 48           /* waiting samples: the reader is behind */
+#define SETTLE_TICKS 2000           /* after the output went off */
+#define GRACE_NS 500000000          /* wall time that a stalled device waits for its host */
+#define CATCH_UP_NS 250000000       /* a computer that slept: do not run the lost time all at once */
+
+static enum pace_speed speed;
+static int64_t epoch_ns;       /* real: when tick 0 was due; max: since when device time has been stalled */
+static int64_t epoch_ticks;    /* ticks run since then */
+static bool stalled;
+static int32_t silent_ticks;   /* device time since a byte came from the host */
+static int32_t settle_ticks;
+
+void pace_init(enum pace_speed chosen, int64_t now_ns)
+{
+    speed = chosen;
+    epoch_ns = now_ns;
+    epoch_ticks = 0;
+    stalled = false;
+    silent_ticks = 0;
+    settle_ticks = 0;
+}
+
+void pace_heard(void)
+{
+    silent_ticks = 0;
+}
+
+static bool output_off(void)
+{
+    return app.state == PT_STATE_IDLE || app.state == PT_STATE_FAULT;
+}
+
+/* Ticks that the wall clock has made due since epoch_ns. */
+static int32_t due(int64_t now_ns)
+{
+    int64_t ticks = (now_ns - epoch_ns) / NS_PER_TICK - epoch_ticks;
+    if (ticks <= 0)
+        return 0;
+    int32_t n = ticks < BATCH ? (int32_t)ticks : BATCH;
+    epoch_ticks += n;
+    return n;
+}
+
+static int32_t real_ticks(int64_t now_ns)
+{
+    int64_t behind_ns = now_ns - epoch_ns - epoch_ticks * NS_PER_TICK;
+    if (behind_ns > CATCH_UP_NS)
+        epoch_ns += behind_ns;
+    return due(now_ns);
+}
+
+static bool must_wait(void)
+{
+    switch (app.state) {
+    case PT_STATE_RUNNING:
+        return silent_ticks >= SILENCE_TICKS || wave_ticks_left(&app.wave) < 2 * BATCH ||
+               telemetry_waiting(&app.telemetry) >= TELEMETRY_HIGH;
+    case PT_STATE_ARMED:
+        return true;
+    default:
+        return false;
+    }
+}
+
+static int32_t max_ticks(int64_t now_ns)
+{
+    if (output_off()) {
+        stalled = false;
+        if (settle_ticks <= 0)
+            return 0;
+        settle_ticks -= BATCH;
+        return BATCH;
+    }
+    settle_ticks = SETTLE_TICKS;
+    if (!must_wait()) {
+        stalled = false;
+        silent_ticks += BATCH;
+        return BATCH;
+    }
+    if (!stalled) {
+        stalled = true;
+        epoch_ns = now_ns + GRACE_NS;
+        epoch_ticks = 0;
+    }
+    int32_t n = due(now_ns);
+    silent_ticks += n;
+    return n;
+}
+
+int32_t pace_ticks(int64_t now_ns)
+{
+    return speed == PACE_REAL ? real_ticks(now_ns) : max_ticks(now_ns);
+}
+
+int32_t pace_wait_ms(int64_t now_ns)
+{
+    if (speed == PACE_REAL)
+        return output_off() ? 20 : 1; /* 20 ms: half a hundred wake-ups a second cost nothing */
+    if (output_off())
+        return -1;
+    int64_t ms = (epoch_ns - now_ns) / 1000000;
+    return ms > 1 ? (int32_t)ms : 1;
+}
