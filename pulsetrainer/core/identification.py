@@ -130,21 +130,19 @@ def normal_equations(plane: Plane, records: Sequence[Record], reading: Reading) 
     """Assemble the normal equations of all records in mass space; relays are -1 or +1."""
     gram = sparse.csr_array((plane.n_q, plane.n_q))
     sums = np.zeros((2, plane.n_q))
-    weight = output = square = 0.0
+    weight, output, square = 0.0, 0.0, 0.0
     for record in records:
         v = np.ones(record.input.size) if record.weight is None else record.weight
         y = np.where(v > 0, record.output, 0.0)
         path = follow(plane, record.input, record.start, reading)
         part, part_sums = _node_sums(plane, path, y, v)
         gram, sums = gram + part, sums + part_sums
-        weight, output, square = weight + v.sum(), output + v @ y, square + v @ (y * y)
+        weight, output, square = weight + float(v.sum()), output + float(v @ y), square + float(v @ (y * y))
     cells = plane.adjoint(plane.adjoint(gram.toarray()).T.copy())
     row_sum, moment = plane.adjoint(sums)
     # so far rows rise from 0, all relays down, to 2: subtract the constant 1 from each
     cells += weight - row_sum[:, None] - row_sum[None, :]
-    return NormalEquations(
-        plane, cells, moment - output, row_sum - weight, float(weight), float(output), float(square)
-    )
+    return NormalEquations(plane, cells, moment - output, row_sum - weight, weight, output, square)
 
 
 def polarity_of(records: Sequence[Record]) -> int:

@@ -142,8 +142,8 @@ def trace(values: FloatArray, start: State, low: float, high: float) -> Trace:
             stack.append(len(node_value) - 1)
     piece_end.append(path.size)  # samples that rest at the last value
     piece_anchor.append(stack[-1])
-    lengths = np.diff(np.asarray([1, *piece_end], dtype=np.int64))
-    anchor_of = np.repeat(np.asarray(piece_anchor, dtype=np.int64), lengths)[past.size - 1 :]
+    begins = np.asarray([1, *piece_end], dtype=np.int64)
+    anchor_of = np.repeat(np.asarray(piece_anchor, dtype=np.int64), begins[1:] - begins[:-1])[past.size - 1 :]
     final = State(tuple(node_value[k] for k in stack))
     return Trace(u, anchor_of, np.asarray(node_value), np.asarray(parent, dtype=np.int64), final)
 

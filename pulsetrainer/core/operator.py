@@ -129,7 +129,7 @@ class Preisach:
         return self.plane.signed_everett(self.nodes)
 
     def step(self, to: FloatArray, origin: FloatArray) -> FloatArray:
-        """Signed output step (n,) when the input goes from ``origin`` (n,) straight to ``to`` (n,), polarity 1."""
+        """Signed output steps (n,), polarity 1, when the input goes straight from ``origin`` to ``to``."""
         corner, weight = self.plane.corners(to, origin)
         return 2.0 * np.einsum("kn,kn->n", weight, self._signed[corner])
 
@@ -171,7 +171,7 @@ def outputs(
     """
     if weights.ndim != 2 or weights.shape[1] != plane.n_q or offsets.shape != weights.shape[:1]:
         raise ArgumentError(
-            f"weights must have shape (b, {plane.n_q}) and offsets (b,), got {weights.shape}, {offsets.shape}",
+            f"weights must have shape (b, {plane.n_q}), offsets (b,), got {weights.shape}, {offsets.shape}",
             hint="one row of weights for each offset",
         )
     path = follow(plane, values, start, reading)

@@ -211,7 +211,7 @@ class Plane:
 
     @cached_property
     def signed_nodes(self) -> tuple[IntArray, FloatArray]:
-        """Number and sign of node (a, b), flattened over the (n_h + 1)^2 grid: -1 above the diagonal, 0 on it."""
+        """Number and sign of node (a, b) on the flattened (n_h + 1)^2 grid: -1 where a < b, 0 where a = b."""
         a, b = np.indices((self.n_h + 1, self.n_h + 1)).reshape(2, -1)
         upper, lower = np.maximum(a, b), np.minimum(a, b)
         number = np.where(a == b, 0, upper * (upper - 1) // 2 + lower)

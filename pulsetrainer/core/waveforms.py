@@ -1,0 +1,67 @@
+"""Pulse shapes: one period of a normalised pressure, made into a train of forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from pulsetrainer.core.plane import FloatArray, finite_vector
+from pulsetrainer.errors import ArgumentError
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """One period of a pulse: even or uneven samples, the first one comes again after ``period_s``."""
+
+    name: str
+    time_s: FloatArray  # (n,) from 0
+    value: FloatArray  # (n,) any unit; 0..1 in the library
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        t = finite_vector("time", self.time_s, at_least=4)
+        value = finite_vector("value", self.value, at_least=4)
+        if t.size != value.size or not np.all(np.diff(t) > 0):
+            raise ArgumentError(
+                f"the waveform {self.name} needs one value for each of its increasing times",
+                hint="mend the time column",
+            )
+        if np.ptp(value) == 0:
+            raise ArgumentError(
+                f"the waveform {self.name} is constant at {value[0]:g}", hint="give a pulse that moves"
+            )
+
+    @property
+    def period_s(self) -> float:
+        """Length of the period: the last sample is one step before the first comes again."""
+        return float(self.time_s[-1] - self.time_s[0] + np.median(np.diff(self.time_s)))
+
+    @property
+    def normalised(self) -> FloatArray:
+        """Values scaled to 0..1 (n,)."""
+        return (self.value - self.value.min()) / np.ptp(self.value)
+
+
+def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float) -> FloatArray:
+    """Samples of ``periods`` periods of a shape, shifted and scaled to [low, high].
+
+    Interpolated without overshoot (monotone cubic), so the extremes stay those of the shape.
+
+    Raises
+    ------
+    ArgumentError
+        No periods, or an empty range.
+    """
+    if periods < 1 or not high > low:
+        raise ArgumentError(
+            f"a pulse train needs at least one period and low < high, got {periods} periods, "
+            f"{low:g} .. {high:g}",
+            hint="choose a force range inside the reach of the model",
+        )
+    t = shape.time_s - shape.time_s[0]
+    curve = PchipInterpolator(np.append(t, shape.period_s), np.append(shape.normalised, shape.normalised[0]))
+    count = round(periods * shape.period_s * rate_Hz)
+    values = np.clip(curve((np.arange(count) / rate_Hz) % shape.period_s), 0.0, 1.0)
+    return low + (high - low) * values
