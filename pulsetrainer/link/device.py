@@ -1,0 +1,304 @@
+"""A device that is open: who it is, and playing a current while recording what it reports."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
+from pulsetrainer.link import messages as m
+from pulsetrainer.link.bench import Bench
+from pulsetrainer.link.player import Player, describe_fault
+from pulsetrainer.link.ports import find_device_port
+from pulsetrainer.link.recording import Block, FloatArray, Recording
+from pulsetrainer.link.session import Session
+from pulsetrainer.link.transport import SerialTransport
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+PORT_VARIABLE = "PULSETRAINER_PORT"
+DEFAULT_PORT = "bench:"
+_TAKE_EVERY_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    """Who the device is and its limits, as it reports them."""
+
+    serial: str
+    firmware: str
+    protocol: str
+    build: str
+    tick_rate_Hz: float
+    current_limit_A: float
+    force_limit_N: float
+    on_time_limit_s: float
+    heartbeat_s: float
+    wave_buffer_samples: int
+    reset_cause: str
+    latched_fault: str  # what an earlier play ended with; the next play clears it
+
+    @classmethod
+    def from_wire(cls, hello: m.HelloReply, latched_fault: str) -> DeviceInfo:
+        """Return what a greeting says."""
+        return cls(
+            serial=hello.serial.rstrip(b"\0").decode("ascii", errors="replace"),
+            firmware=f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}",
+            protocol=f"{hello.major}.{hello.minor}",
+            build=f"{hello.build_hash:08x}",
+            tick_rate_Hz=float(hello.tick_rate_Hz),
+            current_limit_A=hello.current_limit / 10_000,
+            force_limit_N=hello.force_trip / 1_000,
+            on_time_limit_s=float(hello.on_time_s),
+            heartbeat_s=hello.heartbeat_ms / 1_000,
+            wave_buffer_samples=hello.wave_buffer,
+            reset_cause=m.ResetCause(hello.reset_cause).name.lower(),
+            latched_fault=latched_fault,
+        )
+
+
+class Device:
+    """An open device; closing it stops and disarms it, always."""
+
+    def __init__(
+        self,
+        session: Session,
+        transport: SerialTransport,
+        bench: Bench | None,
+        *,
+        monotonic: Callable[[], float],
+        sleep: Callable[[float], None],
+    ) -> None:
+        self._session = session
+        self._transport = transport
+        self._bench = bench
+        self._monotonic = monotonic
+        self._sleep = sleep
+        self._hello = session.hello()
+        self.info = DeviceInfo.from_wire(self._hello, describe_fault(self._status(), self._hello.tick_rate_Hz))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Stop, disarm and give the port back."""
+        try:
+            with contextlib.suppress(PulsetrainerError):
+                self.stop()
+        finally:
+            self._transport.close()
+            if self._bench is not None:
+                self._bench.close()
+
+    def stop(self) -> None:
+        """Ramp the current to zero and disarm."""
+        self._session.request(m.Stop())
+
+    def _status(self) -> m.StatusReply:
+        reply = self._session.request(m.Status())
+        if not isinstance(reply, m.StatusReply):
+            raise DeviceError("the device answered Status with something else", hint="flash the firmware again")
+        return reply
+
+    def set_parameter(self, name: str, value: int) -> int:
+        """Set a parameter of the firmware in device units and return what the device now holds.
+
+        Limits can only be lowered: the range ends at the absolute limit compiled into the firmware.
+        """
+        rows = {p.name: p for p in m.PARAMETERS}
+        if name not in rows:
+            raise ArgumentError(f"the device has no parameter {name!r}", hint=f"there are: {', '.join(rows)}")
+        row = rows[name]
+        if not row.minimum <= value <= row.maximum:
+            raise ArgumentError(
+                f"{name}={value} is outside {row.minimum}..{row.maximum} {row.unit}",
+                hint="a limit can only be lowered below the one compiled into the firmware",
+            )
+        reply = self._session.request(m.SetParam(row.id, value))
+        if not isinstance(reply, m.ParamReply) or reply.value != value:
+            raise DeviceError(f"the device did not take {name}={value}", hint="flash the firmware again")
+        return reply.value
+
+    def play(
+        self,
+        reference_A: ArrayLike,
+        rate_Hz: float,
+        *,
+        decimation: int = 10,
+        on_block: Callable[[Block], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> Recording:
+        """Play a coil current and return what the device measured meanwhile.
+
+        The reference, shape (n,) in A at ``rate_Hz``, is interpolated linearly to the device's tick; its
+        first sample is tick 0. Telemetry is one sample every ``decimation`` ticks. ``on_block`` gets it
+        in pieces as it comes. Ctrl-C, ``should_stop`` or a fault of the device stop the output first;
+        what was recorded until then is returned with ``complete=False``. The device ends disarmed.
+
+        Raises
+        ------
+        ArgumentError
+            if the reference cannot be played; nothing has been armed then.
+        DeviceError
+            if the device cannot be talked to before it starts.
+        """
+        ticks_per_sample = self._ticks_per_sample(rate_Hz)
+        wire = self._checked(reference_A, ticks_per_sample)
+        if not 1 <= decimation <= m.MAX_DECIMATION:
+            raise ArgumentError(
+                f"decimation {decimation} is outside 1..{m.MAX_DECIMATION}", hint="10 gives 1000 samples a second"
+            )
+        player = Player(
+            self._session, wire, ticks_per_sample, decimation, hello=self._hello, monotonic=self._monotonic
+        )
+        thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
+        thread.start()
+        taken: list[Block] = []
+        ended = False
+        while not ended:
+            try:
+                ended = self._take(player, taken, on_block, should_stop)
+            except KeyboardInterrupt:
+                player.stop.set()
+            except BaseException:
+                player.stop.set()
+                thread.join()
+                raise
+        thread.join()
+        if player.error is not None:
+            raise player.error
+        return self._recording(player, Block.joined(taken))
+
+    def _take(
+        self,
+        player: Player,
+        taken: list[Block],
+        on_block: Callable[[Block], None] | None,
+        should_stop: Callable[[], bool] | None,
+    ) -> bool:
+        """Hand over the telemetry that has come in since the last call; True at the end of the play."""
+        wire = [player.blocks.get()]
+        if wire[0] is not None:
+            self._sleep(_TAKE_EVERY_S)  # in bigger pieces: each one costs a change of threads
+        while not player.blocks.empty():
+            wire.append(player.blocks.get())
+        player.taken_at_s = self._monotonic()
+        present = [b for b in wire if b is not None and b.count]
+        if present:
+            block = Block.from_wire(present, player.decimation)
+            taken.append(block)
+            if on_block is not None:
+                on_block(block)
+        if should_stop is not None and should_stop():
+            player.stop.set()
+        return wire[-1] is None
+
+    def _recording(self, player: Player, block: Block) -> Recording:
+        outcome = player.outcome
+        assert outcome is not None  # noqa: S101 - for the type checker: there is no error
+        received = len(block.tick)
+        if outcome.produced >= 0:
+            dropped = outcome.produced - received
+        else:  # the device is gone: what is missing between the samples that came
+            dropped = int(block.tick[-1]) // player.decimation + 1 - received if received else 0
+        return Recording(
+            tick=block.tick,
+            reference_A=block.reference_A,
+            current_A=block.current_A,
+            force_N=block.force_N,
+            tick_rate_Hz=self.info.tick_rate_Hz,
+            dropped_samples=dropped,
+            complete=outcome.played_to_end,
+            fault=outcome.fault,
+        )
+
+    def _ticks_per_sample(self, rate_Hz: float) -> int:
+        if not (np.isfinite(rate_Hz) and rate_Hz > 0):
+            raise ArgumentError(f"a sample rate of {rate_Hz} Hz is not possible", hint="1000 Hz is usual")
+        exact = self.info.tick_rate_Hz / rate_Hz
+        ticks = round(exact)
+        if ticks < 1 or ticks > m.MAX_TICKS_PER_SAMPLE or abs(exact - ticks) > 1e-9 * exact:
+            nearest = self.info.tick_rate_Hz / min(max(ticks, 1), m.MAX_TICKS_PER_SAMPLE)
+            raise ArgumentError(
+                f"the reference's rate of {rate_Hz:g} Hz does not divide the device's "
+                f"{self.info.tick_rate_Hz:g} Hz",
+                hint=f"resample it to {nearest:g} Hz",
+            )
+        return ticks
+
+    def _checked(self, reference_A: ArrayLike, ticks_per_sample: int) -> NDArray[np.int16]:
+        """Return the reference in wire units if the device may play it."""
+        reference: FloatArray = np.asarray(reference_A, dtype=np.float64)
+        if reference.ndim != 1 or reference.size == 0:
+            raise ArgumentError(
+                f"a reference is a row of samples, got an array of shape {reference.shape}",
+                hint="one current in A per sample",
+            )
+        bad = np.flatnonzero(~np.isfinite(reference))
+        if bad.size:
+            raise ArgumentError(f"sample {bad[0]} of the reference is not a number", hint="mend the waveform")
+        # Half a wire unit of tolerance: rounding must not refuse a waveform that uses the whole range.
+        limit, half = self.info.current_limit_A, m.CURRENT_UNIT_A / 2
+        out = np.flatnonzero((reference < -half) | (reference > limit + half))
+        if out.size:
+            raise ArgumentError(
+                f"sample {out[0]} of the reference is {reference[out[0]]:g} A; the device plays 0..{limit:g} A "
+                f"({out.size} of {reference.size} samples are outside)",
+                hint="scale the waveform into the range",
+            )
+        seconds = (reference.size - 1) * ticks_per_sample / self.info.tick_rate_Hz
+        if seconds > self.info.on_time_limit_s - 1:
+            raise ArgumentError(
+                f"the reference is {seconds:g} s long; the device stays on for at most "
+                f"{self.info.on_time_limit_s:g} s",
+                hint="play it in several pieces",
+            )
+        return np.rint(reference / m.CURRENT_UNIT_A).astype(np.int16)
+
+
+def redact(port: str) -> str:
+    """Return the port without a bench's parameters, which must never reach an artefact."""
+    return DEFAULT_PORT if port.startswith("bench:") else port
+
+
+def open_device(
+    port: str | None,
+    *,
+    monotonic: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> Device:
+    """Open a device and greet it; without a port the environment's ``PULSETRAINER_PORT``, else the bench.
+
+    Raises
+    ------
+    UsageError
+        if the port's text makes no sense.
+    DeviceError
+        if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
+    """
+    port = port or os.environ.get(PORT_VARIABLE) or DEFAULT_PORT
+    bench = Bench(port) if port.startswith("bench:") else None
+    transport: SerialTransport | None = None
+    try:
+        path = bench.path if bench is not None else find_device_port() if port == "auto" else port
+        transport = SerialTransport(path)
+        session = Session(transport, redact(port) if bench is not None else path, monotonic=monotonic)
+        return Device(session, transport, bench, monotonic=monotonic, sleep=sleep)
+    except BaseException:
+        if transport is not None:
+            transport.close()
+        if bench is not None:
+            bench.close()
+        raise

@@ -1,0 +1,224 @@
+"""One play: upload by credit, start, keep the buffer filled and the device convinced that we live.
+
+Runs in a thread of its own, so that a slow disk under the telemetry never starves a device that
+switches off after 200 ms of silence. The thread vouches for the whole program, though: when nobody
+takes its data for some seconds it stops the device itself.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+import zlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.errors import DeviceError, PulsetrainerError
+from pulsetrainer.link import messages as m
+from pulsetrainer.link.session import NoAnswerError, RefusedError, Session
+from pulsetrainer.link.transport import PortLostError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+_BEAT_S = 0.04  # of wall time or of device time: a fifth of the device's patience
+_DRAIN_S = 0.3  # for telemetry on its way after the end
+_RAMP_S = 1.0
+_TAKER_S = 10.0  # nobody took the telemetry for so long: the program hangs
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a play ended."""
+
+    produced: int  # samples the device made, -1: it could not be asked
+    played_to_end: bool
+    fault: str
+
+
+class Player:
+    """Plays one reference [100 uA, int16] and puts wire blocks into ``blocks``, None at the end."""
+
+    def __init__(
+        self,
+        session: Session,
+        reference: NDArray[np.int16],
+        ticks_per_sample: int,
+        decimation: int,
+        *,
+        hello: m.HelloReply,
+        monotonic: Callable[[], float],
+    ) -> None:
+        self._session = session
+        self._samples = reference
+        self._wire = reference.astype("<i2").tobytes()
+        self._ticks_per_sample = ticks_per_sample
+        self.decimation = decimation
+        self._hello = hello
+        self._monotonic = monotonic
+        self._sent = 0
+        self._ack = m.Ack(0, m.State.IDLE, 0, 0, 0, 0)
+        self._play_session = -1
+        self._tick = 0  # latest known tick of the device
+        self._tick_at_send = 0
+        self._last_block = False
+        self.blocks: queue.SimpleQueue[m.Telemetry | None] = queue.SimpleQueue()
+        self.stop = threading.Event()
+        self.stop_reason = "interrupted"
+        self.taken_at_s = monotonic()
+        self.outcome: Outcome | None = None
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        """Play; leaves ``outcome`` or ``error``."""
+        self._session.on_telemetry = self._take
+        try:
+            self.outcome = self._play()
+        except BaseException as error:  # noqa: BLE001 - carried over to the caller's thread
+            self.error = error
+        finally:
+            self._session.on_telemetry = lambda _: None
+            self.blocks.put(None)
+
+    def _take(self, block: m.Telemetry) -> None:
+        if block.session != self._play_session:
+            return  # stale bytes of an earlier play
+        if block.count:
+            self._tick = max(self._tick, block.first_tick + (block.count - 1) * self.decimation)
+        self._last_block = self._last_block or bool(block.flags & m.FLAG_LAST)
+        self.blocks.put(block)
+
+    def _request(self, command: m.Message) -> m.Ack:
+        self._tick_at_send = self._tick
+        reply = self._session.request(command)
+        if not isinstance(reply, m.Ack):
+            raise DeviceError(
+                f"the device answered {type(command).__name__} with {type(reply).__name__}",
+                hint="flash the firmware that came with this program",
+            )
+        self._ack = reply
+        if reply.session == self._play_session:
+            self._tick = max(self._tick, reply.tick)
+        return reply
+
+    def _status(self) -> m.StatusReply:
+        reply = self._session.request(m.Status())
+        if not isinstance(reply, m.StatusReply):
+            raise DeviceError("the device answered Status with something else", hint="flash the firmware again")
+        return reply
+
+    # --- the steps of a play ---------------------------------------------------------------------
+
+    def _upload(self) -> None:
+        n = len(self._samples)
+        self._request(m.Stop())  # whatever an earlier program left half done
+        if self._ack.fault:
+            self._request(m.ClearFault())
+        self._request(m.Stream(self.decimation))
+        self._request(m.WaveBegin(n, self._ticks_per_sample, zlib.crc32(self._wire)))
+        while self._sent < n and self._send_chunk(self._ack.credit):
+            pass
+        self._request(m.WaveCommit(self._sent, zlib.crc32(self._wire[: 2 * self._sent])))
+
+    def _send_chunk(self, credit: int) -> bool:
+        """Send the next samples if the device has room for a whole frame of them."""
+        count = min(m.WaveData.MAX_ITEMS, len(self._samples) - self._sent)
+        if count == 0 or credit < count:
+            return False
+        at = self._sent
+        self._request(m.WaveData(at, count, self._wire[2 * at : 2 * (at + count)]))
+        self._sent = at + count
+        return True
+
+    def _credit(self) -> int:
+        """Room in the device's buffer by what telemetry says it has played; never more than there is."""
+        played = self._tick // self._ticks_per_sample
+        return max(self._ack.credit, min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + played))
+
+    def _beat_due(self) -> bool:
+        if self._monotonic() - self._session.sent_at_s >= _BEAT_S:
+            return True
+        return self._tick - self._tick_at_send >= _BEAT_S * self._hello.tick_rate_Hz
+
+    def _stream(self) -> None:
+        """Keep the buffer full until the play ends, whoever ends it."""
+        while self._ack.state == m.State.RUNNING and not self._last_block:
+            if self._monotonic() - self.taken_at_s > _TAKER_S:
+                self.stop_reason = f"the program did not take its data for {_TAKER_S:g} s"
+                self.stop.set()
+            if self.stop.is_set():
+                self._request(m.Stop())
+                return
+            if self._send_chunk(self._credit()):
+                continue
+            if self._beat_due():
+                self._request(m.Heartbeat())
+            else:
+                self._session.receive()
+
+    def _finish(self) -> m.StatusReply:
+        """Wait for the ramp to end and for the telemetry on its way."""
+        deadline = self._monotonic() + _RAMP_S
+        status = self._status()
+        while status.state in {m.State.RUNNING, m.State.RAMPING} and self._monotonic() < deadline:
+            self._session.receive()
+            status = self._status()
+        deadline = self._monotonic() + _DRAIN_S
+        while not self._last_block and self._monotonic() < deadline:
+            self._session.receive()
+        return status
+
+    def _play(self) -> Outcome:
+        self._upload()
+        if self.stop.is_set():
+            self._request(m.Stop())
+            return Outcome(0, played_to_end=False, fault=self.stop_reason)
+        try:
+            self._request(m.Arm(self._hello.boot_nonce))
+            # Telemetry may overtake a lost reply to START: know its session beforehand.
+            self._play_session = (self._ack.session + 1) & 0xFF
+            self._request(m.Start())
+            self._stream()
+            return self._judge(self._finish())
+        except RefusedError:
+            # The device left the state we thought it in; its status says why.
+            return self._judge(self._finish())
+        except (PortLostError, NoAnswerError) as error:
+            return Outcome(-1, played_to_end=False, fault=error.message)
+        finally:
+            self._leave()
+
+    def _leave(self) -> None:
+        """Disarm, whatever happened; a device that cannot be reached does it by itself."""
+        try:
+            self._session.request(m.Stop())
+        except PulsetrainerError:
+            return
+
+    def _judge(self, status: m.StatusReply) -> Outcome:
+        if status.boot_nonce != self._hello.boot_nonce:
+            cause = m.ResetCause(status.reset_cause).name.lower().replace("_", " ")
+            return Outcome(-1, played_to_end=False, fault=f"the device restarted in mid-play (cause: {cause})")
+        last_tick = (len(self._samples) - 1) * self._ticks_per_sample
+        to_end = status.tick > last_tick and not status.fault
+        fault = describe_fault(status, self._hello.tick_rate_Hz)
+        if not fault and not to_end:
+            fault = self.stop_reason
+        return Outcome(status.produced, to_end, fault)
+
+
+def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:
+    """Return the latched fault with its snapshot, empty if there is none."""
+    if not status.fault:
+        return ""
+    text = m.FAULT_TEXT.get(m.Fault(status.fault)) if status.fault <= max(m.Fault) else None
+    return (
+        f"{text or f'fault {status.fault}'} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
+        f"reference {status.fault_reference * m.CURRENT_UNIT_A:.4f} A, "
+        f"current {status.fault_current * m.CURRENT_UNIT_A:.4f} A, "
+        f"force {status.fault_force * m.FORCE_UNIT_N:.3f} N)"
+    )
