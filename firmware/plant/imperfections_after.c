@@ -8,7 +8,7 @@ static const real creep_tau_ratio[PLANT_CREEP_ELEMENTS] = {R(0.25), R(1), R(4)};
 static const real creep_share[PLANT_CREEP_ELEMENTS] = {R(0.3), R(0.4), R(0.3)};
 
 /* Widths of the friction elements over the Coulomb force; their mean is 1. */
-static const real friction_ratio[PLANT_FRICTION_ELEMENTS] = {R(0.4), R(0.8), R(1.2), R(1.6)};
+static const real friction_ratio[PLANT_FRICTION_ELEMENTS] = {R(0.1), R(0.3), R(0.6), R(1), R(1.6), R(2.4)};
 
 /* Wiggles of the current smaller than this are no path: a noisy current at rest wears nothing in. */
 #define PATH_THRESHOLD_A R(0.005)

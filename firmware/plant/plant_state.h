@@ -21,7 +21,7 @@
 
 #define PLANT_DELAY_TICKS 512
 #define PLANT_CREEP_ELEMENTS 3
-#define PLANT_FRICTION_ELEMENTS 4
+#define PLANT_FRICTION_ELEMENTS 6
 
 /* One member per row of the table in solenoid_params.c, which holds units, ranges and meanings. */
 struct solenoid_params {

@@ -9,12 +9,13 @@
  * coercive field (alpha - beta)/2 and in the interaction field (alpha + beta)/2. */
 #define FULL_CURRENT R(1.5)
 #define FULL_FORCE R(14.0)
-#define IRREVERSIBLE_SHARE R(0.72)
-#define COERCIVE_AT R(0.205)
-#define COERCIVE_WIDTH R(0.155)
-#define INTERACTION_AT R(0.58)
-#define INTERACTION_WIDTH R(0.34)
-#define REVERSIBLE_BEND R(1.0)
+#define IRREVERSIBLE_SHARE R(0.62)
+#define COERCIVE_AT R(0.20)
+#define COERCIVE_WIDTH R(0.13)
+#define INTERACTION_AT R(0.56)
+#define INTERACTION_WIDTH R(0.26)
+#define REVERSIBLE_BEND R(0.8)
+#define REVERSIBLE_BIAS R(0.25)
 #define DEVICE_SPREAD R(0.08)
 
 #define NODE_SPACING ((PLANT_FIELD_HIGH_A - PLANT_FIELD_LOW_A) / (real)(PLANT_NODES - 1))
@@ -87,11 +88,12 @@ static real everett(const struct plant_preisach *p, real alpha, real beta)
     return below + x * (above - below);
 }
 
-/* Saturates like a core that needs ever more field for the same flux. */
+/* The square of a flux that starts from a bias, over that at full current: so the force rises from 0 A on,
+ * and a core that needs ever more field for the same flux bends it. */
 static real reversible(const struct plant_preisach *p, real field)
 {
     real x = field / FULL_CURRENT;
-    real square = x * x;
+    real square = x * (x + R(2) * REVERSIBLE_BIAS) / (R(1) + R(2) * REVERSIBLE_BIAS);
     return p->reversible * square * (R(1) + p->bend) / (R(1) + p->bend * square);
 }
 

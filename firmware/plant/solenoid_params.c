@@ -4,10 +4,10 @@
 #include "plant.h"
 
 /* What the device of the paper has beyond static hysteresis: the numbers to tune against its figures. */
-#define AS_BUILT_COULOMB_N R(0.2)
-#define AS_BUILT_FIELD_LAG_S R(0.006)
-#define AS_BUILT_CREEP R(0.03)
-#define AS_BUILT_THERMAL_DRIFT R(0.004)
+#define AS_BUILT_COULOMB_N R(0.15)
+#define AS_BUILT_FIELD_LAG_S R(0.003)
+#define AS_BUILT_CREEP R(0.06)
+#define AS_BUILT_THERMAL_DRIFT R(0.006)
 
 #define EFFECT 1  /* an imperfection: 0 is absent, whatever its range */
 #define SETTING 0 /* has a default and always counts */
@@ -78,7 +78,7 @@ void solenoid_ideal(struct solenoid_params *p)
     }
     p->supply = R(12);
     p->resistance = R(5);
-    p->inductance = R(0.02);
+    p->inductance = R(0.012);
     p->noise = R(0.003);
     p->current_noise = R(0.0003);
     p->accommodation_path = R(30);
