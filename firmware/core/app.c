@@ -35,6 +35,7 @@ static void apply_params(void)
     app.pid.ki = app.param[PT_PARAM_PID_KI];
     app.pid.feed_resistance = app.param[PT_PARAM_FEED_RESISTANCE];
     app.pid.feed_inductance = app.param[PT_PARAM_FEED_INDUCTANCE];
+    app.pid.feed_offset = app.param[PT_PARAM_FEED_OFFSET];
 }
 
 void app_init(void)

@@ -20,7 +20,7 @@ uint16_t pid_step(struct pid *p, int16_t reference, int16_t measured, uint16_t f
     p->last_reference = reference;
 
     int32_t out = ((p->kp * error) >> 12) + (p->integral >> 16) + ((p->feed_resistance * reference) >> 16) +
-                  ((p->feed_inductance * change) >> 8);
+                  ((p->feed_inductance * change) >> 8) + (reference > 0 ? p->feed_offset : 0);
     int32_t high = (int32_t)full;
     if (!((out >= high && error > 0) || (out <= 0 && error < 0)))
         p->integral = clamp(p->integral + p->ki * error, -(high << 16), high << 16);

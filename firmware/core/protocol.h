@@ -72,13 +72,14 @@
     X(CURRENT_LIMIT, 0, 0, 15000, 15000) \
     X(CURRENT_TRIP, 1, 0, 16500, 16500) \
     X(FORCE_TRIP, 2, 0, 15000, 15000) \
-    X(SLEW_LIMIT, 3, 1, 300, 300) \
+    X(SLEW_LIMIT, 3, 1, 150, 150) \
     X(ON_TIME, 4, 1, 900, 900) \
     X(HEARTBEAT, 5, 20, 200, 200) \
     X(PID_KP, 6, 0, 7680, 32767) \
     X(PID_KI, 7, 0, 3680, 32767) \
     X(FEED_RESISTANCE, 8, 0, 20423, 65535) \
-    X(FEED_INDUCTANCE, 9, 0, 3191, 65535)
+    X(FEED_INDUCTANCE, 9, 0, 3191, 65535) \
+    X(FEED_OFFSET, 10, 0, 374, 1000)
 #define PT_PARAM_CURRENT_LIMIT 0u
 #define PT_PARAM_CURRENT_TRIP 1u
 #define PT_PARAM_FORCE_TRIP 2u
@@ -89,7 +90,8 @@
 #define PT_PARAM_PID_KI 7u
 #define PT_PARAM_FEED_RESISTANCE 8u
 #define PT_PARAM_FEED_INDUCTANCE 9u
-#define PT_PARAM_COUNT 10u
+#define PT_PARAM_FEED_OFFSET 10u
+#define PT_PARAM_COUNT 11u
 
 /* messages: type id, offset of each field, length of the fixed part */
 

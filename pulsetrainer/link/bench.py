@@ -54,7 +54,8 @@ def parse_bench(port: str) -> BenchOptions:
     match = re.fullmatch(r"bench:(?://)?(?:\?(.*))?", port)
     if match is None:
         raise UsageError(
-            f"{port!r} is not a bench port", hint='like this: "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"'
+            f"{port!r} is not a bench port",
+            hint='like this: "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
     ideal, speed = False, "max"
     settings: list[tuple[str, str]] = []
@@ -62,7 +63,9 @@ def parse_bench(port: str) -> BenchOptions:
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
         if name == "ideal":
             if value not in {"", "1", "0"}:
-                raise UsageError(f"bench parameter ideal takes no value, got {value!r}", hint='"bench:?ideal"')
+                raise UsageError(
+                    f"bench parameter ideal takes no value, got {value!r}", hint='"bench:?ideal"'
+                )
             ideal = value != "0"
         elif name == "speed":
             if value not in _SPEEDS:
@@ -91,17 +94,21 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
             near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.5)
             return UsageError(
                 f"the bench has no parameter {name!r}",
-                hint=f"did you mean {' or '.join(near)}?" if near else f"there are: {', '.join([*_OWN, *parameters])}",
+                hint=f"did you mean {' or '.join(near)}?"
+                if near
+                else f"there are: {', '.join([*_OWN, *parameters])}",
             )
         unit, low, high, meaning = parameters[name]
         if f"{name}={value}" in complaint:
             return UsageError(
-                f"bench parameter {name}={value} is outside its range: {low}..{high} {unit}", hint=f"{name}: {meaning}"
+                f"bench parameter {name}={value} is outside its range: {low}..{high} {unit}",
+                hint=f"{name}: {meaning}",
             )
     for what in options.breaks:
         if what.partition("@")[0] not in breaks or what in complaint:
             return UsageError(
-                f"the bench cannot break {what!r}", hint=f"break=WHAT@SECONDS with WHAT one of {', '.join(breaks)}"
+                f"the bench cannot break {what!r}",
+                hint=f"break=WHAT@SECONDS with WHAT one of {', '.join(breaks)}",
             )
     return UsageError(f"the bench refused its parameters: {complaint}", hint='start with "bench:" alone')
 
@@ -136,7 +143,9 @@ class Bench:
             self.close()
             if self._process.returncode == 2:
                 raise _explain(executable, options, complaint)
-            raise DeviceError(f"the bench did not start: {complaint}", hint="is /dev/ptmx there and permitted?")
+            raise DeviceError(
+                f"the bench did not start: {complaint}", hint="is /dev/ptmx there and permitted?"
+            )
 
     @property
     def pid(self) -> int:
@@ -144,7 +153,7 @@ class Bench:
         return self._process.pid
 
     def _first_line(self) -> str:
-        assert self._process.stdout is not None  # noqa: S101 - for the type checker: it is a PIPE
+        assert self._process.stdout is not None
         ready, _, _ = select.select([self._process.stdout], [], [], _START_S)
         return self._process.stdout.readline().decode().strip() if ready else ""
 

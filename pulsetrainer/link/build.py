@@ -44,7 +44,9 @@ def find_compiler() -> list[str]:
 
 
 def _sources(root: Path) -> list[Path]:
-    return sorted(p for folder in _FOLDERS for p in (root / folder).glob("*.c") if p.name not in _NOT_IN_A_PORT)
+    return sorted(
+        p for folder in _FOLDERS for p in (root / folder).glob("*.c") if p.name not in _NOT_IN_A_PORT
+    )
 
 
 def _digest(root: Path, command: list[str]) -> str:
@@ -81,7 +83,8 @@ def firmware_executable(defines: tuple[str, ...] = ()) -> Path:
         handle, temporary = tempfile.mkstemp(prefix="build-", dir=folder)
     except OSError as error:
         raise DeviceError(
-            f"cannot write the firmware cache {folder}: {error}", hint="set XDG_CACHE_HOME to a writable folder"
+            f"cannot write the firmware cache {folder}: {error}",
+            hint="set XDG_CACHE_HOME to a writable folder",
         ) from error
     os.close(handle)
     words = [*command, f"-DPT_BUILD_HASH=0x{digest[:8]}u", *(f"-I{root / i}" for i in _INCLUDES)]

@@ -84,7 +84,9 @@ class Device:
         self._monotonic = monotonic
         self._sleep = sleep
         self._hello = session.hello()
-        self.info = DeviceInfo.from_wire(self._hello, describe_fault(self._status(), self._hello.tick_rate_Hz))
+        self.info = DeviceInfo.from_wire(
+            self._hello, describe_fault(self._status(), self._hello.tick_rate_Hz)
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -109,7 +111,9 @@ class Device:
     def _status(self) -> m.StatusReply:
         reply = self._session.request(m.Status())
         if not isinstance(reply, m.StatusReply):
-            raise DeviceError("the device answered Status with something else", hint="flash the firmware again")
+            raise DeviceError(
+                "the device answered Status with something else", hint="flash the firmware again"
+            )
         return reply
 
     def set_parameter(self, name: str, value: int) -> int:
@@ -158,7 +162,8 @@ class Device:
         wire = self._checked(reference_A, ticks_per_sample)
         if not 1 <= decimation <= m.MAX_DECIMATION:
             raise ArgumentError(
-                f"decimation {decimation} is outside 1..{m.MAX_DECIMATION}", hint="10 gives 1000 samples a second"
+                f"decimation {decimation} is outside 1..{m.MAX_DECIMATION}",
+                hint="10 gives 1000 samples a second",
             )
         player = Player(
             self._session, wire, ticks_per_sample, decimation, hello=self._hello, monotonic=self._monotonic
@@ -207,7 +212,7 @@ class Device:
 
     def _recording(self, player: Player, block: Block) -> Recording:
         outcome = player.outcome
-        assert outcome is not None  # noqa: S101 - for the type checker: there is no error
+        assert outcome is not None
         received = len(block.tick)
         if outcome.produced >= 0:
             dropped = outcome.produced - received

@@ -108,7 +108,9 @@ class Player:
     def _status(self) -> m.StatusReply:
         reply = self._session.request(m.Status())
         if not isinstance(reply, m.StatusReply):
-            raise DeviceError("the device answered Status with something else", hint="flash the firmware again")
+            raise DeviceError(
+                "the device answered Status with something else", hint="flash the firmware again"
+            )
         return reply
 
     # --- the steps of a play ---------------------------------------------------------------------
@@ -137,7 +139,9 @@ class Player:
     def _credit(self) -> int:
         """Room in the device's buffer by what telemetry says it has played; never more than there is."""
         played = self._tick // self._ticks_per_sample
-        return max(self._ack.credit, min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + played))
+        return max(
+            self._ack.credit, min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + played)
+        )
 
     def _beat_due(self) -> bool:
         if self._monotonic() - self._session.sent_at_s >= _BEAT_S:
@@ -202,7 +206,9 @@ class Player:
     def _judge(self, status: m.StatusReply) -> Outcome:
         if status.boot_nonce != self._hello.boot_nonce:
             cause = m.ResetCause(status.reset_cause).name.lower().replace("_", " ")
-            return Outcome(-1, played_to_end=False, fault=f"the device restarted in mid-play (cause: {cause})")
+            return Outcome(
+                -1, played_to_end=False, fault=f"the device restarted in mid-play (cause: {cause})"
+            )
         last_tick = (len(self._samples) - 1) * self._ticks_per_sample
         to_end = status.tick > last_tick and not status.fault
         fault = describe_fault(status, self._hello.tick_rate_Hz)

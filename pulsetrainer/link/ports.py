@@ -93,5 +93,7 @@ def cannot_open(port: str, error: OSError) -> DeviceError:
             hint="check the cable, then `pulsetrainer ports`; without a device use --port bench:",
         )
     if number in {errno.ENOTTY, errno.EINVAL, errno.EISDIR}:
-        return DeviceError(f"{port} is not a serial port: {text}", hint="`pulsetrainer ports` lists the ports")
+        return DeviceError(
+            f"{port} is not a serial port: {text}", hint="`pulsetrainer ports` lists the ports"
+        )
     return DeviceError(f"cannot open the port {port}: {text}", hint="`pulsetrainer ports` lists the ports")
