@@ -122,7 +122,7 @@ static int16_t asked_reference(uint8_t *fault, bool *last)
         case WAVE_OK:
             break;
         }
-        if (app.wave.received == app.wave.total && app.wave.crc != app.wave.crc_announced)
+        if (app.wave.corrupt)
             *fault = PT_FAULT_WAVE_CRC;
     } else if (app.state == PT_STATE_RAMPING && app.reference > APP_RAMP) {
         asked = (int16_t)(app.reference - APP_RAMP);
@@ -247,6 +247,9 @@ uint8_t app_wave_data(uint32_t offset, const uint8_t *samples, uint8_t count)
             return PT_NAK_CODE_RANGE;
     }
     wave_append(w, samples, count);
+    hal_critical_enter();
+    wave_publish(w, count);
+    hal_critical_exit();
     return 0;
 }
 
@@ -361,8 +364,10 @@ static void send_telemetry(void)
     uint8_t out[FRAME_MAX_ENCODED];
     while (hal_uart_tx_space() >= FRAME_MAX_ENCODED + REPLY_RESERVE) {
         hal_critical_enter();
-        uint8_t length = telemetry_pack(&app.telemetry, app.tick, payload);
+        uint32_t now = app.tick;
+        uint32_t dropped = app.telemetry.dropped;
         hal_critical_exit();
+        uint8_t length = telemetry_pack(&app.telemetry, now, dropped, payload);
         if (length == 0)
             return;
         uint16_t n = frame_encode(out, PT_TELEMETRY, 0, payload, length, hal_uart_tx_idle());

@@ -52,10 +52,10 @@ void telemetry_end(struct telemetry *t)
     t->ended = true;
 }
 
-uint8_t telemetry_pack(struct telemetry *t, uint32_t now, uint8_t *payload)
+uint8_t telemetry_pack(struct telemetry *t, uint32_t now, uint32_t dropped, uint8_t *payload)
 {
+    bool ended = t->ended; /* before the count: when it is set, every sample is in the ring */
     uint16_t waiting = telemetry_waiting(t);
-    bool ended = t->ended;
     uint32_t first = waiting ? t->ring[t->tail & MASK].tick & ~SLEWED : now;
     if (!ended && waiting < PT_TELEMETRY_MAX_ITEMS && (waiting == 0 || now - first < TELEMETRY_MAX_AGE))
         return 0;
@@ -84,7 +84,7 @@ uint8_t telemetry_pack(struct telemetry *t, uint32_t now, uint8_t *payload)
     payload[PT_TELEMETRY_SESSION] = t->session;
     payload[PT_TELEMETRY_FLAGS] = flags;
     put_u32(payload + PT_TELEMETRY_FIRST_TICK, first);
-    put_u16(payload + PT_TELEMETRY_DROPPED, t->dropped > 0xFFFFu ? 0xFFFFu : (uint16_t)t->dropped);
+    put_u16(payload + PT_TELEMETRY_DROPPED, dropped > 0xFFFFu ? 0xFFFFu : (uint16_t)dropped);
     payload[PT_TELEMETRY_COUNT] = count;
     return (uint8_t)(item - payload);
 }

@@ -36,8 +36,8 @@ void telemetry_tick(struct telemetry *t, const struct telemetry_sample *s, bool 
 void telemetry_end(struct telemetry *t);
 uint16_t telemetry_waiting(const struct telemetry *t);
 
-/* Packs the next block into `payload` (PT_MAX_PAYLOAD bytes) when one is due at `now`; returns its
- * length or 0. */
-uint8_t telemetry_pack(struct telemetry *t, uint32_t now, uint8_t *payload);
+/* Packs the next block into `payload` (PT_MAX_PAYLOAD bytes) when one is due at tick `now`; returns its
+ * length or 0. Needs no critical section: the tick writes head and `ended`, this writes tail. */
+uint8_t telemetry_pack(struct telemetry *t, uint32_t now, uint32_t dropped, uint8_t *payload);
 
 #endif

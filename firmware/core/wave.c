@@ -32,6 +32,7 @@ void wave_reset(struct wave *w)
     w->ticks_per_sample = 1;
     w->begun = false;
     w->committed = false;
+    w->corrupt = false;
     w->index = 0;
     w->phase = 0;
     w->from = 0;
@@ -63,8 +64,13 @@ void wave_append(struct wave *w, const uint8_t *samples, uint8_t count)
     for (uint8_t k = 0; k < count; k++)
         w->ring[(uint16_t)(head + k) & MASK] = get_i16(samples + 2u * k);
     w->crc = wave_crc32(w->crc, samples, (uint16_t)(2u * count));
+}
+
+void wave_publish(struct wave *w, uint8_t count)
+{
     w->received += count;
-    w->head = (uint16_t)(head + count); /* last: the tick may read from here on */
+    w->head = (uint16_t)(w->head + count);
+    w->corrupt = w->received == w->total && w->crc != w->crc_announced;
 }
 
 uint32_t wave_ticks_left(const struct wave *w)

@@ -20,6 +20,7 @@ struct wave {
     uint16_t ticks_per_sample;
     bool begun;
     bool committed;
+    volatile bool corrupt; /* all samples are there and their CRC is not the announced one */
     /* Of the tick: the segment from `from` to `to`, sample `index` being `from`. */
     uint32_t index;
     uint16_t phase;
@@ -33,8 +34,10 @@ void wave_reset(struct wave *w);
 void wave_begin(struct wave *w, uint32_t total, uint16_t ticks_per_sample, uint32_t crc);
 uint16_t wave_free(const struct wave *w);
 
-/* Append little-endian samples; the caller has checked the room, the order and the range. */
+/* Put little-endian samples behind the others; the caller has checked the room, the order and the range.
+ * The tick sees them only after wave_publish, which belongs into a critical section. */
 void wave_append(struct wave *w, const uint8_t *samples, uint8_t count);
+void wave_publish(struct wave *w, uint8_t count);
 
 /* Ticks until the ring runs dry; UINT32_MAX when all samples are there. */
 uint32_t wave_ticks_left(const struct wave *w);

@@ -30,7 +30,8 @@ bool hal_uart_tx_idle(void);                             /* nothing left to send
 void hal_uart_tx(const uint8_t *bytes, uint16_t count);  /* at most hal_uart_tx_space() */
 void hal_watchdog_feed(void);
 
-void hal_critical_enter(void); /* holds the tick interrupt off; not nested */
+/* Hold the tick interrupt off; not nested. Both are compiler barriers. */
+void hal_critical_enter(void);
 void hal_critical_exit(void);
 
 /* Identity. */

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
+from pulsetrainer.link import codes
 from pulsetrainer.link import messages as m
 from pulsetrainer.link.bench import Bench
 from pulsetrainer.link.player import Player, describe_fault
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
 
 PORT_VARIABLE = "PULSETRAINER_PORT"
 DEFAULT_PORT = "bench:"
-_TAKE_EVERY_S = 0.05
+_INTERRUPTED = "interrupted"
+_STOPPED = "stopped"
+_TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +64,7 @@ class DeviceInfo:
             on_time_limit_s=float(hello.on_time_s),
             heartbeat_s=hello.heartbeat_ms / 1_000,
             wave_buffer_samples=hello.wave_buffer,
-            reset_cause=m.ResetCause(hello.reset_cause).name.lower(),
+            reset_cause=codes.ResetCause(hello.reset_cause).name.lower(),
             latched_fault=latched_fault,
         )
 
@@ -83,6 +86,7 @@ class Device:
         self._bench = bench
         self._monotonic = monotonic
         self._sleep = sleep
+        self._player: Player | None = None
         self._hello = session.hello()
         self.info = DeviceInfo.from_wire(
             self._hello, describe_fault(self._status(), self._hello.tick_rate_Hz)
@@ -105,8 +109,11 @@ class Device:
                 self._bench.close()
 
     def stop(self) -> None:
-        """Ramp the current to zero and disarm."""
-        self._session.request(m.Stop())
+        """Ramp the current to zero and disarm; from another thread it ends a play."""
+        if self._player is not None:
+            self._player.stop(_STOPPED)
+        else:
+            self._session.request(m.Stop())
 
     def _status(self) -> m.StatusReply:
         reply = self._session.request(m.Status())
@@ -121,7 +128,7 @@ class Device:
 
         Limits can only be lowered: the range ends at the absolute limit compiled into the firmware.
         """
-        rows = {p.name: p for p in m.PARAMETERS}
+        rows = {p.name: p for p in codes.PARAMETERS}
         if name not in rows:
             raise ArgumentError(f"the device has no parameter {name!r}", hint=f"there are: {', '.join(rows)}")
         row = rows[name]
@@ -160,58 +167,61 @@ class Device:
         """
         ticks_per_sample = self._ticks_per_sample(rate_Hz)
         wire = self._checked(reference_A, ticks_per_sample)
-        if not 1 <= decimation <= m.MAX_DECIMATION:
+        if not 1 <= decimation <= codes.MAX_DECIMATION:
             raise ArgumentError(
-                f"decimation {decimation} is outside 1..{m.MAX_DECIMATION}",
+                f"decimation {decimation} is outside 1..{codes.MAX_DECIMATION}",
                 hint="10 gives 1000 samples a second",
             )
         player = Player(
             self._session, wire, ticks_per_sample, decimation, hello=self._hello, monotonic=self._monotonic
         )
+        self._player = player
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
         thread.start()
-        taken: list[Block] = []
-        ended = False
-        while not ended:
-            try:
-                ended = self._take(player, taken, on_block, should_stop)
-            except KeyboardInterrupt:
-                player.stop.set()
-            except BaseException:
-                player.stop.set()
-                thread.join()
-                raise
-        thread.join()
+        interrupted = False
+        try:
+            interrupted = self._follow(player, on_block, should_stop)
+        finally:
+            player.stop(_STOPPED)
+            while thread.is_alive():  # it is stopping the device: not to be interrupted, and soon over
+                try:
+                    thread.join()
+                except KeyboardInterrupt:
+                    interrupted = True
+            self._player = None
         if player.error is not None:
             raise player.error
-        return self._recording(player, Block.joined(taken))
+        return self._recording(player, interrupted)
 
-    def _take(
+    def _follow(
         self,
         player: Player,
-        taken: list[Block],
         on_block: Callable[[Block], None] | None,
         should_stop: Callable[[], bool] | None,
     ) -> bool:
-        """Hand over the telemetry that has come in since the last call; True at the end of the play."""
-        wire = [player.blocks.get()]
-        if wire[0] is not None:
-            self._sleep(_TAKE_EVERY_S)  # in bigger pieces: each one costs a change of threads
-        while not player.blocks.empty():
-            wire.append(player.blocks.get())
-        player.taken_at_s = self._monotonic()
-        present = [b for b in wire if b is not None and b.count]
-        if present:
-            block = Block.from_wire(present, player.decimation)
-            taken.append(block)
-            if on_block is not None:
-                on_block(block)
-        if should_stop is not None and should_stop():
-            player.stop.set()
-        return wire[-1] is None
+        """Hand over the telemetry as it comes until the play has ended; True if Ctrl-C hastened the end."""
+        passed = 0
+        ended = interrupted = False
+        while not ended:
+            try:
+                ended = player.ended.is_set()  # before the count: then nothing comes after it
+                count = len(player.received)
+                fresh, passed = player.received[passed:count], count
+                player.taken_at_s = self._monotonic()
+                if on_block is not None and any(b.count for b in fresh):
+                    on_block(Block.from_wire(fresh, player.decimation))
+                if should_stop is not None and should_stop():
+                    player.stop(_STOPPED)
+                if not ended:
+                    self._sleep(_TAKE_EVERY_S)
+            except KeyboardInterrupt:
+                interrupted = True
+                player.stop(_INTERRUPTED)
+        return interrupted
 
-    def _recording(self, player: Player, block: Block) -> Recording:
+    def _recording(self, player: Player, interrupted: bool) -> Recording:
         outcome = player.outcome
+        block = Block.from_wire(player.received, player.decimation)
         assert outcome is not None
         received = len(block.tick)
         if outcome.produced >= 0:
@@ -225,8 +235,9 @@ class Device:
             force_N=block.force_N,
             tick_rate_Hz=self.info.tick_rate_Hz,
             dropped_samples=dropped,
-            complete=outcome.played_to_end,
-            fault=outcome.fault,
+            # Interrupted even if it came during the last ramp: the user wants out.
+            complete=outcome.played_to_end and not interrupted,
+            fault=outcome.fault or (_INTERRUPTED if interrupted else ""),
         )
 
     def _ticks_per_sample(self, rate_Hz: float) -> int:
@@ -234,8 +245,8 @@ class Device:
             raise ArgumentError(f"a sample rate of {rate_Hz} Hz is not possible", hint="1000 Hz is usual")
         exact = self.info.tick_rate_Hz / rate_Hz
         ticks = round(exact)
-        if ticks < 1 or ticks > m.MAX_TICKS_PER_SAMPLE or abs(exact - ticks) > 1e-9 * exact:
-            nearest = self.info.tick_rate_Hz / min(max(ticks, 1), m.MAX_TICKS_PER_SAMPLE)
+        if ticks < 1 or ticks > codes.MAX_TICKS_PER_SAMPLE or abs(exact - ticks) > 1e-9 * exact:
+            nearest = self.info.tick_rate_Hz / min(max(ticks, 1), codes.MAX_TICKS_PER_SAMPLE)
             raise ArgumentError(
                 f"the reference's rate of {rate_Hz:g} Hz does not divide the device's "
                 f"{self.info.tick_rate_Hz:g} Hz",
@@ -255,12 +266,12 @@ class Device:
         if bad.size:
             raise ArgumentError(f"sample {bad[0]} of the reference is not a number", hint="mend the waveform")
         # Half a wire unit of tolerance: rounding must not refuse a waveform that uses the whole range.
-        limit, half = self.info.current_limit_A, m.CURRENT_UNIT_A / 2
+        limit, half = self.info.current_limit_A, codes.CURRENT_UNIT_A / 2
         out = np.flatnonzero((reference < -half) | (reference > limit + half))
         if out.size:
             raise ArgumentError(
-                f"sample {out[0]} of the reference is {reference[out[0]]:g} A; the device plays 0..{limit:g} A "
-                f"({out.size} of {reference.size} samples are outside)",
+                f"sample {out[0]} of the reference is {reference[out[0]]:g} A; "
+                f"the device plays 0..{limit:g} A ({out.size} of {reference.size} samples are outside)",
                 hint="scale the waveform into the range",
             )
         seconds = (reference.size - 1) * ticks_per_sample / self.info.tick_rate_Hz
@@ -270,7 +281,7 @@ class Device:
                 f"{self.info.on_time_limit_s:g} s",
                 hint="play it in several pieces",
             )
-        return np.rint(reference / m.CURRENT_UNIT_A).astype(np.int16)
+        return np.rint(reference / codes.CURRENT_UNIT_A).astype(np.int16)
 
 
 def redact(port: str) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from cobs import cobs
 
-from pulsetrainer.link.messages import MAX_PAYLOAD
+from pulsetrainer.link.codes import MAX_PAYLOAD
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

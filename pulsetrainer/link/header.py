@@ -7,6 +7,7 @@ import struct
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
+from pulsetrainer.link import codes
 from pulsetrainer.link import messages as m
 
 if TYPE_CHECKING:
@@ -64,21 +65,23 @@ def _message(message: type[m.Message]) -> Iterator[str]:
 
 def c_header() -> str:
     """Return the text of ``protocol.h``."""
-    lines = [_TOP.format(major=m.PROTOCOL_MAJOR, minor=m.PROTOCOL_MINOR)]
-    lines.append(f"#define PT_MAGIC 0x{m.MAGIC:08X}uL")
+    lines = [_TOP.format(major=codes.PROTOCOL_MAJOR, minor=codes.PROTOCOL_MINOR)]
+    lines.append(f"#define PT_MAGIC 0x{codes.MAGIC:08X}uL")
     lines += [f"#define PT_{name} {getattr(m, name)}u" for name in _CONSTANTS]
     for title, prefix, members in (
-        ("what the device is doing", "STATE", m.State),
-        ("first cause of a latched fault", "FAULT", m.Fault),
-        ("why a command was refused", "NAK_CODE", m.NakCode),
-        ("why the device last started", "RESET", m.ResetCause),
+        ("what the device is doing", "STATE", codes.State),
+        ("first cause of a latched fault", "FAULT", codes.Fault),
+        ("why a command was refused", "NAK_CODE", codes.NakCode),
+        ("why the device last started", "RESET", codes.ResetCause),
     ):
         lines += ["", f"/* {title} */", *_enum(prefix, members)]
     lines += ["", "/* parameters: X(NAME, id, minimum, default, absolute maximum) */"]
-    rows = [f"    X({p.name.upper()}, {p.id}, {p.minimum}, {p.default}, {p.maximum})" for p in m.PARAMETERS]
+    rows = [
+        f"    X({p.name.upper()}, {p.id}, {p.minimum}, {p.default}, {p.maximum})" for p in codes.PARAMETERS
+    ]
     lines += ["#define PT_PARAMETERS(X) \\", " \\\n".join(rows)]
-    lines += [f"#define PT_PARAM_{p.name.upper()} {p.id}u" for p in m.PARAMETERS]
-    lines.append(f"#define PT_PARAM_COUNT {len(m.PARAMETERS)}u")
+    lines += [f"#define PT_PARAM_{p.name.upper()} {p.id}u" for p in codes.PARAMETERS]
+    lines.append(f"#define PT_PARAM_COUNT {len(codes.PARAMETERS)}u")
     lines += ["", "/* messages: type id, offset of each field, length of the fixed part */"]
     for message in (*m.COMMANDS, *m.REPLIES):
         lines += _message(message)

@@ -7,7 +7,6 @@ takes its data for some seconds it stops the device itself.
 
 from __future__ import annotations
 
-import queue
 import threading
 import zlib
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.errors import DeviceError, PulsetrainerError
+from pulsetrainer.link import codes
 from pulsetrainer.link import messages as m
 from pulsetrainer.link.session import NoAnswerError, RefusedError, Session
 from pulsetrainer.link.transport import PortLostError
@@ -41,7 +41,7 @@ class Outcome:
 
 
 class Player:
-    """Plays one reference [100 uA, int16] and puts wire blocks into ``blocks``, None at the end."""
+    """Plays one reference [100 uA, int16]; ``received`` grows by wire blocks until ``ended`` is set."""
 
     def __init__(
         self,
@@ -61,17 +61,24 @@ class Player:
         self._hello = hello
         self._monotonic = monotonic
         self._sent = 0
-        self._ack = m.Ack(0, m.State.IDLE, 0, 0, 0, 0)
+        self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
         self._play_session = -1
         self._tick = 0  # latest known tick of the device
         self._tick_at_send = 0
         self._last_block = False
-        self.blocks: queue.SimpleQueue[m.Telemetry | None] = queue.SimpleQueue()
-        self.stop = threading.Event()
-        self.stop_reason = "interrupted"
+        # A plain list: appending is atomic, and a Ctrl-C in the reader's thread can lose nothing of it.
+        self.received: list[m.Telemetry] = []
+        self.ended = threading.Event()
+        self._stop = threading.Event()
+        self._stop_reason = ""
         self.taken_at_s = monotonic()
         self.outcome: Outcome | None = None
         self.error: BaseException | None = None
+
+    def stop(self, reason: str) -> None:
+        """Ask for the output to be stopped at once; the first reason counts."""
+        self._stop_reason = self._stop_reason or reason
+        self._stop.set()
 
     def run(self) -> None:
         """Play; leaves ``outcome`` or ``error``."""
@@ -82,15 +89,15 @@ class Player:
             self.error = error
         finally:
             self._session.on_telemetry = lambda _: None
-            self.blocks.put(None)
+            self.ended.set()
 
     def _take(self, block: m.Telemetry) -> None:
         if block.session != self._play_session:
             return  # stale bytes of an earlier play
         if block.count:
             self._tick = max(self._tick, block.first_tick + (block.count - 1) * self.decimation)
-        self._last_block = self._last_block or bool(block.flags & m.FLAG_LAST)
-        self.blocks.put(block)
+        self._last_block = self._last_block or bool(block.flags & codes.FLAG_LAST)
+        self.received.append(block)
 
     def _request(self, command: m.Message) -> m.Ack:
         self._tick_at_send = self._tick
@@ -118,6 +125,10 @@ class Player:
     def _upload(self) -> None:
         n = len(self._samples)
         self._request(m.Stop())  # whatever an earlier program left half done
+        deadline = self._monotonic() + _RAMP_S
+        while self._ack.state == codes.State.RAMPING and self._monotonic() < deadline:
+            self._session.receive()
+            self._request(m.Stop())
         if self._ack.fault:
             self._request(m.ClearFault())
         self._request(m.Stream(self.decimation))
@@ -150,11 +161,10 @@ class Player:
 
     def _stream(self) -> None:
         """Keep the buffer full until the play ends, whoever ends it."""
-        while self._ack.state == m.State.RUNNING and not self._last_block:
+        while self._ack.state == codes.State.RUNNING and not self._last_block:
             if self._monotonic() - self.taken_at_s > _TAKER_S:
-                self.stop_reason = f"the program did not take its data for {_TAKER_S:g} s"
-                self.stop.set()
-            if self.stop.is_set():
+                self.stop(f"the program did not take its data for {_TAKER_S:g} s")
+            if self._stop.is_set():
                 self._request(m.Stop())
                 return
             if self._send_chunk(self._credit()):
@@ -168,7 +178,7 @@ class Player:
         """Wait for the ramp to end and for the telemetry on its way."""
         deadline = self._monotonic() + _RAMP_S
         status = self._status()
-        while status.state in {m.State.RUNNING, m.State.RAMPING} and self._monotonic() < deadline:
+        while status.state in {codes.State.RUNNING, codes.State.RAMPING} and self._monotonic() < deadline:
             self._session.receive()
             status = self._status()
         deadline = self._monotonic() + _DRAIN_S
@@ -178,19 +188,20 @@ class Player:
 
     def _play(self) -> Outcome:
         self._upload()
-        if self.stop.is_set():
+        if self._stop.is_set():
             self._request(m.Stop())
-            return Outcome(0, played_to_end=False, fault=self.stop_reason)
+            return Outcome(0, played_to_end=False, fault=self._stop_reason)
         try:
-            self._request(m.Arm(self._hello.boot_nonce))
-            # Telemetry may overtake a lost reply to START: know its session beforehand.
-            self._play_session = (self._ack.session + 1) & 0xFF
-            self._request(m.Start())
-            self._stream()
-            return self._judge(self._finish())
-        except RefusedError:
-            # The device left the state we thought it in; its status says why.
-            return self._judge(self._finish())
+            try:
+                self._request(m.Arm(self._hello.boot_nonce))
+                # Telemetry may overtake a lost reply to START: know its session beforehand.
+                self._play_session = (self._ack.session + 1) & 0xFF
+                self._request(m.Start())
+                self._stream()
+            except RefusedError as refused:
+                # The device left the state we thought it in; its status says why.
+                return self._judge(self._finish(), refused.message)
+            return self._judge(self._finish(), "")
         except (PortLostError, NoAnswerError) as error:
             return Outcome(-1, played_to_end=False, fault=error.message)
         finally:
@@ -203,28 +214,30 @@ class Player:
         except PulsetrainerError:
             return
 
-    def _judge(self, status: m.StatusReply) -> Outcome:
+    def _judge(self, status: m.StatusReply, refused: str) -> Outcome:
         if status.boot_nonce != self._hello.boot_nonce:
-            cause = m.ResetCause(status.reset_cause).name.lower().replace("_", " ")
+            cause = codes.ResetCause(status.reset_cause).name.lower().replace("_", " ")
             return Outcome(
                 -1, played_to_end=False, fault=f"the device restarted in mid-play (cause: {cause})"
             )
         last_tick = (len(self._samples) - 1) * self._ticks_per_sample
-        to_end = status.tick > last_tick and not status.fault
-        fault = describe_fault(status, self._hello.tick_rate_Hz)
+        fault = describe_fault(status, self._hello.tick_rate_Hz) or self._stop_reason
+        to_end = status.tick > last_tick and not fault
         if not fault and not to_end:
-            fault = self.stop_reason
-        return Outcome(status.produced, to_end, fault)
+            fault = refused or "the device ended the play early"
+        # Refused before it started: the numbers in the status are those of an earlier play.
+        produced = status.produced if status.session == self._play_session else 0
+        return Outcome(produced, to_end, fault)
 
 
 def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:
     """Return the latched fault with its snapshot, empty if there is none."""
     if not status.fault:
         return ""
-    text = m.FAULT_TEXT.get(m.Fault(status.fault)) if status.fault <= max(m.Fault) else None
+    text = codes.FAULT_TEXT.get(codes.Fault(status.fault)) if status.fault <= max(codes.Fault) else None
     return (
         f"{text or f'fault {status.fault}'} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
-        f"reference {status.fault_reference * m.CURRENT_UNIT_A:.4f} A, "
-        f"current {status.fault_current * m.CURRENT_UNIT_A:.4f} A, "
-        f"force {status.fault_force * m.FORCE_UNIT_N:.3f} N)"
+        f"reference {status.fault_reference * codes.CURRENT_UNIT_A:.4f} A, "
+        f"current {status.fault_current * codes.CURRENT_UNIT_A:.4f} A, "
+        f"force {status.fault_force * codes.FORCE_UNIT_N:.3f} N)"
     )

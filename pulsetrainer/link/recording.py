@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pulsetrainer.link.messages import CURRENT_UNIT_A, FORCE_UNIT_N
+from pulsetrainer.link.codes import CURRENT_UNIT_A, FORCE_UNIT_N
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,18 +41,6 @@ class Block:
             reference_A=scaled[:, 0].copy(),
             current_A=scaled[:, 1].copy(),
             force_N=scaled[:, 2].copy(),
-        )
-
-    @classmethod
-    def joined(cls, blocks: Sequence[Block]) -> Block:
-        """Return the blocks one after the other."""
-        if not blocks:
-            return cls.from_wire([], 1)
-        return cls(
-            tick=np.concatenate([b.tick for b in blocks]),
-            reference_A=np.concatenate([b.reference_A for b in blocks]),
-            current_A=np.concatenate([b.current_A for b in blocks]),
-            force_N=np.concatenate([b.force_N for b in blocks]),
         )
 
 

@@ -5,23 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pulsetrainer.errors import DeviceError
-from pulsetrainer.link.frames import Frame, FrameReader, encode
-from pulsetrainer.link.messages import (
-    BY_TYPE,
-    COMMANDS,
+from pulsetrainer.link.codes import (
     FAULT_TEXT,
     MAGIC,
     NAK_TEXT,
     PROTOCOL_MAJOR,
     PROTOCOL_MINOR,
     Fault,
-    Hello,
-    HelloReply,
-    Message,
-    Nak,
     NakCode,
-    Telemetry,
 )
+from pulsetrainer.link.frames import Frame, FrameReader, encode
+from pulsetrainer.link.messages import BY_TYPE, COMMANDS, Hello, HelloReply, Message, Nak, Telemetry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,7 +57,8 @@ class Session:
         self._port = port
         self._monotonic = monotonic
         self._reader = FrameReader()
-        self._seq = 0
+        # Not always from the same number: a late reply to an earlier program must not fit.
+        self._seq = int(monotonic() * 1000) & 0xFF
         self._replies: list[Frame] = []
         self._heard = 0
         self.on_telemetry: Callable[[Telemetry], None] = lambda _: None
