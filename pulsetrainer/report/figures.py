@@ -1,0 +1,201 @@
+"""The figures: pure functions from an artefact to a matplotlib ``Figure``.
+
+Nothing here shows or writes anything; ``render.encode`` makes a file of a figure and
+``render.inline_svg`` a part of a page. ``draw`` chooses by the kind of the artefact.
+Figure numbers are those of Carneiro, Abreu and Restivo, Sensors 2018, 18(5), 1631.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+from pulsetrainer.artefacts.kinds import Evaluation, Model, Playback, Run, Waveform
+from pulsetrainer.errors import DataError
+from pulsetrainer.report import panels
+from pulsetrainer.report.style import (
+    COLUMN_IN,
+    COMPENSATED,
+    FINE,
+    GUIDE,
+    MEASURED,
+    SCALED,
+    TARGET,
+    label,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts.kinds import Fit, ModelEvaluation, WaveformEvaluation
+
+_ROW_IN = 4.4  # height of a figure of one column
+
+
+def _sheet(width_in: float = COLUMN_IN, height_in: float = _ROW_IN) -> Figure:
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+@styled
+def preisach_density(model: Model) -> Figure:
+    """Return the density over the half-plane of switching levels (Carneiro 2018, fig. 7)."""
+    figure = _sheet()
+    panels.density(figure, model)
+    return figure
+
+
+@styled
+def identification(fit: Fit) -> Figure:
+    """Return system and model on the identification signal, and the residual (fig. 8)."""
+    figure = _sheet(height_in=5.4)
+    panels.fit(figure, fit)
+    return figure
+
+
+@styled
+def tracking(played: WaveformEvaluation) -> Figure:
+    """Return target and output with and without compensation, the errors below (fig. 9)."""
+    figure = _sheet()
+    panels.tracking(figure, played)
+    return figure
+
+
+@styled
+def loops(played: WaveformEvaluation) -> Figure:
+    """Return force against target for both drives (fig. 10)."""
+    figure = _sheet()
+    panels.loops(figure, played)
+    return figure
+
+
+@styled
+def prediction(model: ModelEvaluation) -> Figure:
+    """Return a measured run, a model's prediction of it, and the residual."""
+    figure = _sheet()
+    panels.prediction(figure, model)
+    return figure
+
+
+@styled
+def run(record: Run) -> Figure:
+    """Return a run: input and output over time, output over input."""
+    figure = _sheet(2 * COLUMN_IN)
+    left, right = figure.subfigures(1, 2, squeeze=False)[0]
+    above, below = left.subplots(2, 1, sharex=True)
+    x, name = panels.abscissa(record.time_s, record.input.size)
+    if record.reference is not None:
+        panels.trace(above, x, record.reference, **TARGET, label="reference")
+    panels.trace(above, x, record.input, **MEASURED, label="measured")
+    panels.trace(below, x, record.output, **MEASURED)
+    input_label = label(record.input_quantity, record.input_unit)
+    output_label = label(record.output_quantity, record.output_unit)
+    above.set_ylabel(input_label)
+    above.set_title((record.signal or "run") + ("" if record.complete else ", incomplete"))
+    if record.reference is not None:
+        panels.headroom(above)
+    below.set_ylabel(output_label)
+    below.set_xlabel(name)
+    loop = right.subplots()
+    panels.orbit(loop, record.input, record.output, **FINE)
+    loop.set_xlabel(input_label)
+    loop.set_ylabel(output_label)
+    loop.set_title(f"{record.output_quantity} over {record.input_quantity}")
+    return figure
+
+
+@styled
+def waveform(drive: Waveform) -> Figure:
+    """Return a target and its drives; what does not count in the evaluation is shaded."""
+    figure = _sheet(1.5 * COLUMN_IN)
+    panels.drives(figure, drive)
+    return figure
+
+
+@styled
+def playback(played: Playback) -> Figure:
+    """Return every repeat of both drives: force, current, and how well the current followed."""
+    figure = _sheet(1.5 * COLUMN_IN, 1.5 * _ROW_IN)
+    asked = played.waveform
+    force, current, error = figure.subplots(3, 1, sharex=True, height_ratios=(1.4, 1.0, 0.8))
+    panels.trace(force, asked.time_s, asked.target, **TARGET, label="target")
+    for name, drive, style in (
+        ("scaled", played.scaled, SCALED),
+        ("compensated", played.compensated, COMPENSATED),
+    ):
+        panels.repeats(force, played.time_s, drive.output, name, style)
+        panels.repeats(current, played.time_s, drive.input, name, style)
+        panels.current_error(error, played.time_s, drive, played.input_range, style)
+    force.set_ylabel(label("force", played.scaled.output_unit))
+    force.set_title(asked.name + ("" if played.complete else ", incomplete"))
+    current.set_ylabel(label("drive", played.scaled.input_unit))
+    error.axhline(0.0, **GUIDE)
+    error.set_ylabel("error [% of range]")
+    error.set_xlabel(label("time", "s"))
+    for axes in (force, current, error):
+        panels.unscored(axes, asked)
+    panels.headroom(force)
+    return figure
+
+
+@styled
+def model(identified: Model) -> Figure:
+    """Return the density, and beside it the fit where the model carries one."""
+    if identified.fit is None:
+        return preisach_density(identified)
+    figure = _sheet(2 * COLUMN_IN, 5.0)
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.1, 1.0))[0]
+    panels.density(left, identified)
+    panels.fit(right, identified.fit, identified.input_quantity, identified.output_quantity)
+    return figure
+
+
+@styled
+def evaluation(errors: Evaluation) -> Figure:
+    """Return tracking and loops of every waveform, then the prediction of every model.
+
+    Raises
+    ------
+    DataError
+        The evaluation holds neither waveforms nor models.
+    """
+    pairs = -(-len(errors.models) // 2)
+    rows = len(errors.waveforms) + pairs
+    if rows == 0:
+        raise DataError(
+            "this evaluation holds neither played waveforms nor models, so there is nothing to draw",
+            hint="evaluate again: pulsetrainer evaluate PLAYED.h5 -o EVALUATION.h5",
+        )
+    figure = _sheet(2 * COLUMN_IN, _ROW_IN * rows)
+    cells = figure.subfigures(rows, 2, squeeze=False)
+    for row, played in zip(cells, errors.waveforms, strict=False):
+        panels.tracking(row[0], played)
+        panels.loops(row[1], played)
+    for cell, predicted in zip(cells[len(errors.waveforms) :].flat, errors.models, strict=False):
+        panels.prediction(cell, predicted)
+    return figure
+
+
+def draw(artefact: Run | Model | Waveform | Playback | Evaluation) -> Figure:
+    """Return the figure of an artefact, chosen by its kind.
+
+    Raises
+    ------
+    DataError
+        There is no figure for this kind of artefact.
+    """
+    match artefact:
+        case Run():
+            return run(artefact)
+        case Model():
+            return model(artefact)
+        case Waveform():
+            return waveform(artefact)
+        case Playback():
+            return playback(artefact)
+        case Evaluation():
+            return evaluation(artefact)
+    raise DataError(
+        f"there is no figure for a {getattr(artefact, 'kind', type(artefact).__name__)}: "
+        "expected a run, model, waveform, playback or evaluation",
+        hint="pulsetrainer show FILE.h5 tells what a file holds",
+    )

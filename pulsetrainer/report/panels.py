@@ -1,0 +1,271 @@
+"""The parts that figures are made of: each draws one thing on the axes it is given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import PowerNorm
+from matplotlib.patches import Polygon
+
+from pulsetrainer.report.style import (
+    COMPENSATED,
+    ERROR,
+    GRID,
+    GROUND,
+    GUIDE,
+    MODEL,
+    MUTED,
+    SCALED,
+    TARGET,
+    VERMILION,
+    label,
+    pretty_unit,
+)
+from pulsetrainer.report.thin import extremes
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
+    from numpy.typing import NDArray
+
+    from pulsetrainer.artefacts.kinds import (
+        DrivePlayback,
+        Fit,
+        Model,
+        ModelEvaluation,
+        Waveform,
+        WaveformEvaluation,
+    )
+
+    BoolArray = NDArray[np.bool_]
+    FloatArray = NDArray[np.float64]
+
+# A density is mostly small, with a ridge: the square root shows both. Lone spikes far beyond the
+# rest (the least squares make some) do not set the scale.
+_DENSITY_GAMMA = 0.5
+_DENSITY_QUANTILE = 0.99
+_DENSITY_REACH = 2.0
+
+
+def abscissa(time_s: FloatArray | None, n: int) -> tuple[FloatArray, str]:
+    """Return the horizontal axis of a record with its label: time, or else the sample number."""
+    if time_s is None:
+        return np.arange(n, dtype=np.float64), "sample number"
+    return time_s, label("time", "s")
+
+
+def trace(axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
+    """Draw ``y`` over ``x``, thinned to its envelope."""
+    kept = extremes(y)
+    axes.plot(x[kept], y[kept], **style)
+
+
+def orbit(axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
+    """Draw ``y`` against ``x`` in the order of time, thinned to the extremes of both."""
+    kept = extremes(x, y)
+    axes.plot(x[kept], y[kept], **style)
+
+
+def headroom(axes: Axes, share: float = 0.16) -> None:
+    """Make room above the curves and put the legend there, in one row: it never covers a curve."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + share * (high - low))
+    axes.legend(loc="upper left", ncols=4, columnspacing=1.2, borderaxespad=0.2)
+
+
+def density(panel: FigureBase, model: Model) -> None:
+    """Draw the weights of a model over the half-plane alpha >= beta, cells that were not covered hatched."""
+    levels = model.levels
+    n_h = levels.size - 1
+    rows, columns = np.tril_indices(n_h)  # the order of the cells: k = i (i + 1) / 2 + j
+    field = np.full((n_h, n_h), np.nan)
+    field[rows, columns] = np.where(model.covered, model.weights, np.nan)
+
+    axes = panel.add_subplot()
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+    top = _scale(model, rows != columns)
+    mesh = axes.pcolormesh(
+        levels,
+        levels,
+        np.ma.masked_invalid(field),
+        norm=PowerNorm(_DENSITY_GAMMA, vmin=0.0, vmax=top),
+        cmap=colormaps["viridis"].with_extremes(over=VERMILION),
+        rasterized=True,  # as vectors a thousand seams would shine through
+    )
+    corner = [(levels[0], levels[0]), (levels[0], levels[-1]), (levels[-1], levels[-1])]
+    half_plane = Polygon(corner, closed=True, facecolor="none", edgecolor=MUTED, linewidth=0.8)
+    axes.add_patch(half_plane)
+    mesh.set_clip_path(half_plane)  # diagonal cells are triangles
+    missing = np.flatnonzero(~model.covered)
+    if missing.size:
+        cells = [_cell(levels, int(rows[k]), int(columns[k])) for k in missing]
+        axes.add_collection(
+            PolyCollection(cells, facecolors=GRID, edgecolors=MUTED, hatch="/////", linewidths=0.0)
+        )
+    axes.set_xlabel(label("β, switches down at: " + model.input_quantity, model.input_unit))
+    axes.set_ylabel(label("α, switches up at: " + model.input_quantity, model.input_unit))
+    axes.set_title("Preisach density")
+    axes.text(0.97, 0.06, _facts(model), transform=axes.transAxes, ha="right", va="bottom", linespacing=1.5)
+    beyond = bool(np.any(model.weights[model.covered] > top))
+    bar = panel.colorbar(
+        mesh, ax=axes, label=label("μ", model.weights_unit), extend="max" if beyond else "neither", shrink=0.9
+    )
+    bar.outline.set_visible(False)
+
+
+def _scale(model: Model, off_diagonal: BoolArray) -> float:
+    """Return the density at the upper end of the colour scale.
+
+    Cells on the diagonal hold the reversible part: however large, it must not darken the rest.
+    """
+    for chosen in (model.covered & off_diagonal, model.covered):
+        positive = model.weights[chosen & (model.weights > 0)]
+        if positive.size:
+            return float(min(positive.max(), _DENSITY_REACH * np.quantile(positive, _DENSITY_QUANTILE)))
+    return 1.0
+
+
+def _cell(levels: FloatArray, i: int, j: int) -> list[tuple[float, float]]:
+    """Return the corners (beta, alpha) of cell (i, j); a triangle on the diagonal."""
+    left, right, low, high = levels[j], levels[j + 1], levels[i], levels[i + 1]
+    corners = [(left, low), (left, high), (right, high), (right, low)]
+    return corners[:3] if i == j else corners
+
+
+def _facts(model: Model) -> str:
+    """Return what stands in the empty half of the plane."""
+    covered = int(np.count_nonzero(model.covered))
+    lines = [
+        f"{model.levels.size - 1} levels, {model.weights.size} cells",
+        f"{covered} covered" + (", the rest hatched" if covered < model.weights.size else ""),
+        f"offset {model.offset:.4g} {pretty_unit(model.output_unit)}".rstrip(),
+    ]
+    if model.polarity < 0:
+        lines.append("output falls as input rises")
+    lines += [f"with {extension.cause}" for extension in model.extensions]
+    return "\n".join(lines)
+
+
+def fit(
+    panel: FigureBase, record: Fit, input_quantity: str = "input", output_quantity: str = "output"
+) -> None:
+    """Draw output over input, measured and modelled, and the residual over time below."""
+    loop, below = panel.subplots(2, 1, height_ratios=(2.4, 1.0))
+    orbit(loop, record.input, record.output, **GROUND, label="measured")
+    orbit(loop, record.input, record.predicted, **MODEL, label="model")
+    loop.set_xlabel(label(input_quantity, record.input_unit))
+    loop.set_ylabel(label(output_quantity, record.output_unit))
+    loop.set_title("Identification signal")
+    loop.legend(loc="upper left")
+    x, name = abscissa(record.time_s, record.output.size)
+    residual(below, x, record.output - record.predicted, record.rms)
+    below.set_xlabel(name)
+    below.set_ylabel(label("residual", record.output_unit))
+    below.set_title(f"Residual: rms {record.rms_percent:.3g} % of span")
+
+
+def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> None:
+    """Draw a residual between lines at plus and minus its rms."""
+    for y in (-rms, 0.0, rms):
+        axes.axhline(y, **GUIDE)
+    trace(axes, x, difference, **ERROR)
+
+
+def prediction(panel: FigureBase, model: ModelEvaluation) -> None:
+    """Draw a measured record with a model's prediction of it, and the residual below."""
+    above, below = panel.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0))
+    x, name = abscissa(model.time_s, model.output.size)
+    trace(above, x, model.output, **GROUND, label="measured")
+    trace(above, x, model.predicted, **MODEL, label="predicted")
+    above.set_ylabel(label("output", model.output_unit))
+    above.set_title(f"{model.name}: rms {model.rms_percent:.3g} % of span")
+    headroom(above)
+    residual(below, x, model.output - model.predicted, model.rms)
+    below.set_xlabel(name)
+    below.set_ylabel(label("residual", model.output_unit))
+
+
+def tracking(panel: FigureBase, played: WaveformEvaluation) -> None:
+    """Draw target and output of both drives, superimposed, and their errors below."""
+    above, below = panel.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
+    trace(above, played.time_s, played.target, **TARGET, label="target")
+    trace(above, played.time_s, played.scaled.output, **SCALED, label="scaled")
+    trace(above, played.time_s, played.compensated.output, **COMPENSATED, label="compensated")
+    above.set_ylabel(label("force", played.output_unit))
+    above.set_title(_played_title(played))
+    headroom(above)
+    below.axhline(0.0, **GUIDE)
+    for drive, style in ((played.scaled, SCALED), (played.compensated, COMPENSATED)):
+        trace(below, played.time_s, 100.0 * (drive.output - played.target) / played.full_force, **style)
+    below.set_xlabel(label("time", "s"))
+    below.set_ylabel("error [% of full force]")
+
+
+def _played_title(played: WaveformEvaluation) -> str:
+    return f"{played.name}, {played.inversion} inverse"
+
+
+def loops(panel: FigureBase, played: WaveformEvaluation) -> None:
+    """Draw force against target for both drives: perfect is the diagonal, hysteresis opens a loop."""
+    axes = panel.add_subplot()
+    ends = [float(np.nanmin(played.target)), float(np.nanmax(played.target))]
+    axes.plot(ends, ends, **TARGET, label="target")
+    for name, drive, style in (
+        ("scaled", played.scaled, SCALED),
+        ("compensated", played.compensated, COMPENSATED),
+    ):
+        shown = f"{name}, loop {drive.hysteresis_percent:.3g} %"
+        orbit(axes, played.target, drive.output, **style, label=shown)
+    axes.set_aspect("equal")
+    axes.set_xlabel(label("target", played.output_unit))
+    axes.set_ylabel(label("force", played.output_unit))
+    axes.set_title(_played_title(played))
+    panel.legend(loc="outside lower center", ncols=3, columnspacing=1.2)  # inside, a loop would run through
+
+
+def drives(panel: FigureBase, waveform: Waveform) -> None:
+    """Draw what a waveform asks for and the two currents that shall press it."""
+    above, below = panel.subplots(2, 1, sharex=True)
+    trace(above, waveform.time_s, waveform.target, **TARGET, label="target")
+    trace(above, waveform.time_s, waveform.predicted, **MODEL, label="predicted by the model")
+    above.set_ylabel(label("output", waveform.output_unit))
+    above.set_title(f"{waveform.name}: target")
+    trace(below, waveform.time_s, waveform.scaled, **SCALED, label="scaled")
+    trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label=waveform.inversion)
+    below.set_ylabel(label("drive", waveform.input_unit))
+    below.set_xlabel(label("time", "s"))
+    for axes in (above, below):
+        headroom(axes)
+        unscored(axes, waveform)
+
+
+def unscored(axes: Axes, waveform: Waveform) -> None:
+    """Shade the lead-in and whatever else does not count in the evaluation."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], waveform.scored, [True])).astype(np.int8)))
+    last = waveform.time_s.size - 1
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        axes.axvspan(
+            waveform.time_s[min(start, last)], waveform.time_s[min(stop, last)], color=GRID, alpha=0.5, lw=0
+        )
+
+
+def repeats(axes: Axes, time_s: FloatArray, rows: FloatArray, name: str, style: dict[str, Any]) -> None:
+    """Draw every repeat of one measurement, thin, in one colour; only the first is named."""
+    thin = style | {"linewidth": 0.8, "alpha": 0.6, "linestyle": "-"}
+    for k, row in enumerate(rows):
+        trace(axes, time_s, row, **thin, label=f"{name}, {len(rows)} repeats" if k == 0 else None)
+
+
+def current_error(
+    axes: Axes, time_s: FloatArray, drive: DrivePlayback, input_range: float, style: dict[str, Any]
+) -> None:
+    """Draw how far the measured current is from the one asked for, in percent of the range."""
+    thin = style | {"linewidth": 0.8, "alpha": 0.6, "linestyle": "-"}
+    for row in 100.0 * (drive.input - drive.reference) / input_range:
+        trace(axes, time_s, row, **thin)

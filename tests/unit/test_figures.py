@@ -1,0 +1,309 @@
+"""Figures: every kind has one, every axis has its unit, and nothing that matters is lost in thinning."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import replace
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+import report_examples as examples
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib import rcParams
+from matplotlib.collections import PolyCollection, QuadMesh
+
+from pulsetrainer.artefacts.kinds import Evaluation, Run
+from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.report import figures
+from pulsetrainer.report.render import encode, inline_svg
+from pulsetrainer.report.style import THEME, VERMILION, label, pretty_unit
+from pulsetrainer.report.thin import MOST_POINTS, extremes
+
+
+@pytest.fixture(autouse=True)
+def _no_warnings():
+    """A warning of matplotlib or numpy while drawing is a fault of the drawing."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+ARTEFACTS = {
+    "run": examples.run,
+    "run without time": lambda: examples.run(time=False),
+    "model": lambda: examples.model(n_h=12),
+    "model without fit": lambda: examples.model(n_h=12, with_fit=False),
+    "extended model": examples.extended_model,
+    "waveform": examples.waveform,
+    "playback": examples.playback,
+    "evaluation of waveforms": lambda: Evaluation(waveforms=examples.evaluation().waveforms[:1]),
+    "evaluation of models": examples.model_comparison,
+}
+
+
+@pytest.mark.parametrize("make", ARTEFACTS.values(), ids=ARTEFACTS.keys())
+def test_draw_gives_every_kind_a_figure_with_units(make):
+    """Each axis that is labelled names a unit in brackets, or says that it counts samples."""
+    figure = figures.draw(make())
+    labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
+    assert len(labels) >= 2
+    for text in labels:
+        assert re.search(r"\[[^\]]+\]$", text) or text == "sample number", text
+    for axes in figure.axes:
+        # a shared time axis is labelled once, at the bottom
+        assert axes.get_ylabel()
+    assert encode(figure, "png").startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: figures.preisach_density(examples.model(n_h=6)),
+        lambda: figures.identification(examples.fit(300)),
+        lambda: figures.identification(examples.fit(300, time=False)),
+        lambda: figures.tracking(examples.waveform_evaluation()),
+        lambda: figures.loops(examples.waveform_evaluation()),
+        lambda: figures.prediction(examples.model_evaluation(time=False)),
+    ],
+)
+def test_single_figures_render(make):
+    """The figures of the report stand alone, and the same figure is the same bytes."""
+    assert encode(make(), ".svg") == encode(make(), "svg")
+
+
+def test_pdf_and_svg_carry_no_date():
+    """Two files of one figure differ only if the figure does."""
+    figure = figures.loops(examples.waveform_evaluation())
+    assert b"CreationDate" not in encode(figure, "pdf")
+    assert b"dc:date" not in encode(figure, "svg")
+
+
+def test_unknown_format_is_a_usage_error():
+    """The message names the format asked for and those there are."""
+    with pytest.raises(UsageError, match=r"'gif'.*png, svg, pdf"):
+        encode(figures.preisach_density(examples.model(n_h=3)), "gif")
+
+
+def test_drawing_leaves_the_settings_of_matplotlib_alone():
+    """A user's notebook looks the same before and after."""
+    before = dict(rcParams)
+    encode(figures.draw(examples.run(500)), "png")
+    assert dict(rcParams) == before
+
+
+def test_draw_refuses_what_it_does_not_know():
+    """An evaluation of nothing, and a thing that is no artefact."""
+    with pytest.raises(DataError, match="neither"):
+        figures.draw(Evaluation())
+    with pytest.raises(DataError, match="no figure for a str"):
+        figures.draw("text")
+
+
+def _mesh(figure):
+    return next(c for axes in figure.axes for c in axes.collections if isinstance(c, QuadMesh))
+
+
+def test_density_puts_each_cell_in_its_place():
+    """Cell k = i (i + 1) / 2 + j lies at row i (alpha) and column j (beta); below the diagonal is nothing."""
+    base = examples.model(n_h=4, with_fit=False)
+    shown = replace(base, weights=np.arange(10.0), covered=np.ones(10, dtype=bool))
+    field = _mesh(figures.preisach_density(shown)).get_array()
+    k = 0
+    for i in range(4):
+        for j in range(4):
+            if j <= i:
+                assert field[i, j] == k
+                k += 1
+            else:
+                assert field.mask[i, j]
+
+
+def test_density_marks_cells_that_were_not_covered():
+    """A weight that no data speak for is hatched, not coloured."""
+    base = examples.model(n_h=4, with_fit=False)
+    covered = np.ones(10, dtype=bool)
+    covered[[6, 9]] = False  # cell (3, 0), a square, and cell (3, 3), a triangle
+    figure = figures.preisach_density(replace(base, weights=np.ones(10), covered=covered))
+    field = _mesh(figure).get_array()
+    assert field.mask[3, 0]
+    assert field.mask[3, 3]
+    hatched = [
+        c for c in figure.axes[0].collections if isinstance(c, PolyCollection) and not isinstance(c, QuadMesh)
+    ]
+    corners = [len(path.vertices) - 1 for path in hatched[0].get_paths()]
+    assert corners == [4, 3]
+    assert "8 covered, the rest hatched" in figure.axes[0].texts[0].get_text()
+
+
+def test_density_scale_is_not_set_by_the_reversible_diagonal():
+    """A large reversible part does not darken the density; what is beyond the scale shows as such."""
+    base = examples.model(n_h=8, with_fit=False)
+    i, j = np.tril_indices(8)
+    weights = np.where(i == j, 500.0, 1.0 + 0.1 * j)
+    figure = figures.preisach_density(replace(base, weights=weights, covered=np.ones(36, dtype=bool)))
+    assert _mesh(figure).norm.vmax < 3.0
+    assert figure.axes[0].collections[0].colorbar.extend == "max"
+
+
+@pytest.mark.parametrize("weights", [np.zeros(10), np.full(10, 1e-12), np.eye(1, 10, 9).ravel()])
+def test_density_of_nothing_or_next_to_nothing(weights):
+    """A model of zeros is drawn without a warning."""
+    base = examples.model(n_h=4, with_fit=False)
+    encode(figures.preisach_density(replace(base, weights=weights, covered=np.ones(10, dtype=bool))), "png")
+
+
+def test_density_says_when_the_loop_falls():
+    """Polarity is a fact of the model and stands with it."""
+    shown = replace(examples.model(n_h=4, with_fit=False), polarity=-1)
+    assert "output falls" in figures.preisach_density(shown).axes[0].texts[0].get_text()
+
+
+def test_units_of_any_bench():
+    """A record of field and flux density is labelled in its own units."""
+    h = np.linspace(-100, 100, 50)
+    record = Run(
+        time_s=None,
+        input=h,
+        output=np.tanh(h / 40),
+        input_unit="A/m",
+        output_unit="T",
+        input_quantity="field",
+        output_quantity="flux density",
+    )
+    text = [axes.get_ylabel() for axes in figures.draw(record).axes]
+    assert text == ["field [A/m]", "flux density [T]", "flux density [T]"]
+
+
+def test_names_from_users_are_not_read_as_formulas():
+    """Dollars, underscores and brackets of a file name are drawn as they are."""
+    odd = "_a$\\frac{1}$_<b>&[red]"
+    encode(figures.draw(replace(examples.run(200), signal=odd)), "svg")
+    named = replace(examples.model_evaluation(), name=odd)
+    svg = inline_svg(figures.prediction(named), identifier="x", title=odd, description=odd)
+    assert odd in "".join(ET.fromstring(svg).itertext())
+
+
+def test_lost_samples_leave_a_gap():
+    """NaN in input and output, in a short record and in a thinned one."""
+    for n in (1000, 50_000):
+        base = examples.run(1000)
+        record = Run(
+            time_s=np.arange(n) * 0.001,
+            input=np.resize(base.input, n).copy(),
+            output=np.resize(base.output, n).copy(),
+        )
+        record.output[n // 2 : n // 2 + n // 20] = np.nan
+        record.input[:10] = np.nan
+        figure = figures.draw(record)
+        drawn = figure.axes[1].lines[0].get_ydata()
+        assert np.isnan(drawn).any()
+        encode(figure, "png")
+
+
+def test_all_samples_lost():
+    """A record of nothing but NaN is an empty figure, not an error."""
+    nothing = np.full(100, np.nan)
+    encode(figures.draw(Run(time_s=np.arange(100.0), input=nothing, output=nothing)), "png")
+
+
+def test_a_million_samples_are_drawn_by_their_envelope():
+    """At most 4000 points per line, and a single-sample spike survives."""
+    n = 1_000_000
+    x = np.sin(np.linspace(0, 300, n))
+    y = x.copy()
+    y[777_777] = 9.0
+    figure = figures.draw(Run(time_s=np.arange(n) * 0.001, input=x, output=y))
+    lines = [line for axes in figure.axes for line in axes.lines]
+    assert all(line.get_xdata().size <= MOST_POINTS for line in lines)
+    assert figure.axes[1].lines[0].get_ydata().max() == 9.0
+    assert figure.axes[2].lines[0].get_ydata().max() == 9.0
+
+
+@given(
+    st.lists(st.one_of(st.floats(-1e6, 1e6), st.just(np.nan)), min_size=1, max_size=400),
+    st.integers(20, 120),
+)
+@settings(max_examples=150, deadline=None)
+def test_extremes_keep_the_envelope(values, most):
+    """Order, ends, least and greatest sample and gaps stay; never more points than allowed."""
+    y = np.array(values)
+    kept = extremes(y, most=most)
+    assert kept.size <= max(most, 1)
+    assert np.all(np.diff(kept) > 0)
+    assert kept[0] == 0
+    assert kept[-1] == y.size - 1
+    if np.isfinite(y).any():
+        assert np.nanmin(y[kept]) == np.nanmin(y)
+        assert np.nanmax(y[kept]) == np.nanmax(y)
+    assert np.isnan(y[kept]).any() == np.isnan(y).any()
+
+
+def test_extremes_of_two_series_keep_both():
+    """An orbit keeps its outermost points in both directions."""
+    rng = np.random.default_rng(0)
+    x, y = rng.normal(size=(2, 20_000))
+    kept = extremes(x, y, most=100)
+    assert kept.size <= 100
+    for series in (x, y):
+        assert series[kept].min() == series.min()
+        assert series[kept].max() == series.max()
+
+
+def test_playback_draws_every_repeat_and_shades_the_lead_in():
+    """Three repeats of two drives and the target; what is not scored is grey."""
+    figure = figures.draw(examples.playback(repeats=3))
+    assert len(figure.axes[0].lines) == 1 + 2 * 3
+    shaded = figure.axes[0].patches
+    assert len(shaded) == 1
+    assert shaded[0].get_x() == 0.0
+    assert shaded[0].get_x() + shaded[0].get_width() == pytest.approx(0.8)
+
+
+def test_error_panel_is_in_percent_of_full_force():
+    """The curve's maximum is the largest error over the full force."""
+    played = examples.waveform_evaluation()
+    axes = figures.tracking(played).axes[1]
+    scaled = next(line for line in axes.lines if line.get_color() == VERMILION)
+    expected = 100 * np.abs(played.scaled.output - played.target).max() / played.full_force
+    assert np.abs(scaled.get_ydata()).max() == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown"),
+    [("A", "A"), ("N/A^2", "N/A²"), ("m**-1", "m⁻¹"), ("percent", "%"), ("1", ""), ("", ""), ("N*m", "N·m")],
+)
+def test_units_are_printed_as_people_write_them(unit, shown):
+    """Powers are raised, percent is a sign, a pure number has none."""
+    assert pretty_unit(unit) == shown
+
+
+def test_label_of_a_pure_number_has_no_brackets():
+    """No empty pair of brackets on an axis."""
+    assert label("gain", "1") == "gain"
+
+
+def test_inline_svg_fits_a_page():
+    """Own ids, the page's colours and fonts, a text alternative, nothing fetched."""
+    svg = inline_svg(
+        figures.preisach_density(examples.model(n_h=6)), identifier="a", title="T & t", description="D < d"
+    )
+    root = ET.fromstring(svg)
+    identifiers = [e.get("id") for e in root.iter() if e.get("id")]
+    assert len(identifiers) == len(set(identifiers))
+    assert all(name.startswith("a-") for name in identifiers)
+    for reference in re.findall(r"url\(#([^)]+)\)|href=\"#([^\"]+)\"", svg):
+        assert "".join(reference) in identifiers
+    assert root.get("role") == "img"
+    assert root.get("aria-labelledby") == "a-title a-desc"
+    assert root.get("width") is None
+    assert [child.text for child in root[:2]] == ["T & t", "D < d"]
+    assert "font-family" not in svg
+    assert "<style" not in svg
+    assert "currentColor" in svg
+    for colour in THEME:
+        assert f":{colour}" not in svg
+    outside = set(re.findall(r"https?://[^\"'\s<]+", svg))
+    assert outside <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
