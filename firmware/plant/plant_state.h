@@ -17,7 +17,7 @@
 #define PLANT_NODES 234
 #define PLANT_FIELD_LOW_A R(-0.07)
 #define PLANT_FIELD_HIGH_A R(1.70)
-#define PLANT_TURNS 96
+#define PLANT_TURNS 512 /* a demagnetising spiral of 250 swings fits */
 
 #define PLANT_DELAY_TICKS 512
 #define PLANT_CREEP_ELEMENTS 3

@@ -135,8 +135,8 @@ void plant_preisach_init(struct plant_preisach *p, uint32_t seed)
     p->tare = p->force;
 }
 
-/* A full memory forgets its two innermost turning points, the smallest loop it holds. Continuity holds,
- * because the new point carries the present force; the small error goes when that loop is wiped out. */
+/* A full memory forgets its two innermost turning points, the smallest loop it holds. The new point carries
+ * the present force, so nothing jumps now; the error shows, and ends, when that loop is wiped out. */
 static void remember(struct plant_preisach *p)
 {
     if (p->turns == PLANT_TURNS) {
