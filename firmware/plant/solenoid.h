@@ -1,7 +1,8 @@
 /* The simulated solenoid, its drive electronics and a finger: one 100 us step at a time.
  *
  * Shared by the host and mps2 ports. Only + - * / are used, in a fixed order, so that
- * every IEEE machine computes the same bits (build with -ffp-contract=off). No malloc, no libm.
+ * every IEEE machine computes the same bits (build with -ffp-contract=off, and on 32-bit x86 with
+ * -mfpmath=sse). No malloc, no libm; a freestanding port must supply memcpy for structure copies.
  * Nothing in here is known to the firmware core: it sees PWM counts going out and ADC counts coming in. */
 #ifndef PULSETRAINER_SOLENOID_H
 #define PULSETRAINER_SOLENOID_H
