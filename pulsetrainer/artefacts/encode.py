@@ -1,8 +1,7 @@
 """An artefact dataclass into an HDF5 group: datasets with units, named axes, checksums.
 
 Nothing here knows what a field means: ``schema.plan_of`` says what it becomes. Axes are HDF5
-dimension scales, so that h5py, xarray and netCDF readers see them by name. Every dataset carries a
-checksum (Fletcher-32, or that of the object header it lies in): a flipped bit is an error, not a number.
+dimension scales, so that h5py, xarray and netCDF readers see them by name.
 """
 
 from __future__ import annotations
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
 
 INDEX_AXIS = "sample"  # the axis of records without time: a dataset "time" always is a time in seconds
 _CHUNK = 16384
+_GROWING_CHUNK = 4096  # some seconds of a capture: little is left empty in the last one
 _COMPRESS_ABOVE_BYTES = 4096
-_BLOCK = 1 << 18  # samples copied at a time from one file to another
 _WRITE_AGAIN = "write the artefact again with the command that makes it"
 
 Axes = dict[str, h5py.Dataset]
@@ -34,7 +33,14 @@ def values_of(artefact: Any) -> dict[str, Any]:
     return {plan.name: getattr(artefact, plan.name) for plan in plan_of(cls)}
 
 
-def encode(group: h5py.Group, cls: type, values: Mapping[str, Any], inherited: Axes | None = None) -> None:
+def encode(
+    group: h5py.Group,
+    cls: type,
+    values: Mapping[str, Any],
+    *,
+    inherited: Axes | None = None,
+    growing: bool = False,
+) -> None:
     """Write the fields of a dataclass into a group.
 
     Parameters
@@ -44,9 +50,11 @@ def encode(group: h5py.Group, cls: type, values: Mapping[str, Any], inherited: A
     cls
         The dataclass.
     values
-        Its fields by name; an array may be an ``h5py.Dataset`` of another file, then it is copied in blocks.
+        Its fields by name.
     inherited
         The axis ``time`` of the group above, used where the dataclass has none of its own.
+    growing
+        Lay out the arrays of one axis so that they can be appended to.
 
     Raises
     ------
@@ -60,16 +68,16 @@ def encode(group: h5py.Group, cls: type, values: Mapping[str, Any], inherited: A
     # the scale first, for the others are attached to it
     for plan in sorted(plans, key=lambda plan: not plan.is_time_axis):
         if values[plan.name] is not None:
-            _put(group, plan, values, axes)
+            _put(group, plan, values, axes, growing=growing)
         elif not plan.optional:
             raise DataError(f"{plan.name!r} is missing and must be there", hint=_WRITE_AGAIN)
 
 
-def _put(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes) -> None:
+def _put(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes, *, growing: bool) -> None:
     """Write one field of any role."""
     value = values[plan.name]
     if plan.role == "array":
-        _put_array(group, plan, value, values, axes)
+        _put_array(group, plan, values, axes, growing=growing)
     elif plan.role == "number":
         _put_number(group, plan, value, values)
     elif plan.role == "attribute":
@@ -77,31 +85,26 @@ def _put(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Ax
     elif plan.role == "list":
         _put_list(group, plan, value)
     elif plan.role == "group":
-        encode(group.create_group(plan.path), plan.type, values_of(value), _time_of(axes))
+        encode(group.create_group(plan.path), plan.type, values_of(value), inherited=_time_of(axes))
     else:
         numbered = group.create_group(plan.path)
         for k, item in enumerate(value):
-            encode(numbered.create_group(f"{k:04d}"), plan.type, values_of(item), _time_of(axes))
+            encode(numbered.create_group(f"{k:04d}"), plan.type, values_of(item), inherited=_time_of(axes))
 
 
 def _time_of(axes: Axes) -> Axes:
     return {TIME: axes[TIME]} if TIME in axes else {}
 
 
-def _put_array(group: h5py.Group, plan: FieldPlan, value: Any, values: Mapping[str, Any], axes: Axes) -> None:
+def _put_array(
+    group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes, *, growing: bool
+) -> None:
     """Write one array and attach its axes."""
-    if not isinstance(value, h5py.Dataset):
-        value = np.asarray(value)
-    if len(value.shape) != len(plan.dims):
-        raise DataError(
-            f"{plan.name!r} has the shape {value.shape}, expected the axes ({', '.join(plan.dims)})",
-            hint=_WRITE_AGAIN,
-        )
+    array = _checked(plan, np.asarray(values[plan.name]))
     is_bool = plan.type is np.bool_
     dataset = group.create_dataset(
-        plan.path, value.shape, np.uint8 if is_bool else plan.type, **_storage(value)
+        plan.path, data=array.astype(np.uint8 if is_bool else plan.type), **_storage(array, growing=growing)
     )
-    _copy(plan, value, dataset)
     _describe(dataset, plan, values)
     if is_bool:
         dataset.attrs["dtype"] = "bool"  # xarray's own sign for a boolean in an integer
@@ -110,49 +113,42 @@ def _put_array(group: h5py.Group, plan: FieldPlan, value: Any, values: Mapping[s
         axes[TIME] = dataset
         return
     for k, axis in enumerate(plan.dims):
-        scale = _scale(group, axes, axis, value.shape[k])
-        if scale.shape[0] != value.shape[k]:
+        scale = _scale(group, axes, axis, array.shape[k])
+        if scale.shape[0] != array.shape[k]:
             raise DataError(
-                f"{plan.name!r} has {value.shape[k]} values along {axis}, expected {scale.shape[0]}",
+                f"{plan.name!r} has {array.shape[k]} values along {axis}, expected {scale.shape[0]}",
                 hint=_WRITE_AGAIN,
             )
         dataset.dims[k].attach_scale(scale)
         dataset.dims[k].label = scale.name.rsplit("/", 1)[-1]
 
 
-def _copy(plan: FieldPlan, value: Any, dataset: h5py.Dataset) -> None:
-    """Write the numbers, in blocks where they come from another file."""
-    length = value.shape[0]
-    step = _BLOCK if isinstance(value, h5py.Dataset) else max(length, 1)
-    for start in range(0, length, step):
-        block = np.asarray(value[start : start + step])
-        if block.dtype.kind not in "biuf":
-            raise DataError(f"{plan.name!r} holds {block.dtype}, expected numbers", hint=_WRITE_AGAIN)
-        if plan.data is not None and plan.data.finite and not np.all(np.isfinite(block)):
-            raise DataError(
-                f"{plan.name!r} holds a value that is not finite and must not",
-                hint="mend the data it came from",
-            )
-        if block.size:
-            dataset[start : start + step] = block
+def _checked(plan: FieldPlan, array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return the array if its axes and values are what the annotation says."""
+    if array.ndim != len(plan.dims):
+        raise DataError(
+            f"{plan.name!r} has the shape {array.shape}, expected the axes ({', '.join(plan.dims)})",
+            hint=_WRITE_AGAIN,
+        )
+    if array.dtype.kind not in "biuf":
+        raise DataError(f"{plan.name!r} holds {array.dtype}, expected numbers", hint=_WRITE_AGAIN)
+    if plan.data is not None and plan.data.finite and not np.all(np.isfinite(array)):
+        raise DataError(
+            f"{plan.name!r} holds a value that is not finite and must not", hint="mend the data it came from"
+        )
+    return array
 
 
-def _storage(value: Any) -> dict[str, Any]:
-    """Return how an array lies in the file: one chunk, or several and compressed; always a checksum."""
-    shape = value.shape
-    if not np.prod(shape):
-        return {}  # nothing to protect, and a chunk of size 0 is refused
-    if np.prod(shape) * 8 <= _COMPRESS_ABOVE_BYTES:
-        return {"chunks": shape, "fletcher32": True}
-    chunks = (*(1 for _ in shape[:-1]), min(shape[-1], _CHUNK))
+def _storage(array: np.ndarray[Any, Any], *, growing: bool = False) -> dict[str, Any]:
+    """Return how an array lies in the file."""
+    if growing and array.ndim == 1:
+        # no filter: a chunk rewritten at every flush must keep its size and place
+        return {"chunks": (_GROWING_CHUNK,), "maxshape": (None,)}
+    if array.nbytes <= _COMPRESS_ABOVE_BYTES:
+        return {}
+    chunks = (*(1 for _ in array.shape[:-1]), min(array.shape[-1], _CHUNK))
     # level 1: noise does not get smaller at higher levels, only slower
-    return {
-        "chunks": chunks,
-        "fletcher32": True,
-        "shuffle": True,
-        "compression": "gzip",
-        "compression_opts": 1,
-    }
+    return {"chunks": chunks, "shuffle": True, "compression": "gzip", "compression_opts": 1}
 
 
 def _scale(group: h5py.Group, axes: Axes, axis: str, length: int) -> h5py.Dataset:
@@ -173,10 +169,7 @@ def _put_number(group: h5py.Group, plan: FieldPlan, value: Any, values: Mapping[
     number = np.asarray(plan.type(value))
     if plan.data is not None and plan.data.finite and not np.isfinite(number):
         raise DataError(f"{plan.name!r} is {value} and must be finite", hint="mend the data it came from")
-    layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-    layout.set_layout(h5py.h5d.COMPACT)  # inside the object header, under its checksum
-    stored = number.astype(np.uint8) if plan.type is bool else number
-    dataset = group.create_dataset(plan.path, data=stored, dcpl=layout)
+    dataset = group.create_dataset(plan.path, data=number.astype(np.uint8) if plan.type is bool else number)
     _describe(dataset, plan, values)
     if plan.type is bool:
         dataset.attrs["dtype"] = "bool"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import secrets
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pulsetrainer.errors import DataError, PulsetrainerError, UsageError
+from pulsetrainer.errors import DataError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,7 +27,15 @@ def check_output(path: Path | str, force: bool = False) -> None:
         The file exists and ``force`` is not set, or its folder is missing or not writable.
     """
     path = Path(path)
-    folder = path.parent
+    try:
+        _check_target(path, path.parent, force=force)
+    except OSError as error:  # a name too long, a folder that must not be looked into
+        raise UsageError(
+            f"the output {path} cannot be written: {error.strerror or error}", hint="name another output"
+        ) from error
+
+
+def _check_target(path: Path, folder: Path, *, force: bool) -> None:
     if path.is_dir():
         raise UsageError(
             f"the output {path} is a folder", hint=f"name a file in it, such as {path / 'out.h5'}"
@@ -122,9 +131,11 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-def cannot_write(path: Path | str, error: Exception) -> PulsetrainerError:
+def cannot_write(path: Path | str, error: Exception) -> DataError:
     """Return the error for a file that could not be written, with the system's reason in it."""
-    reason = getattr(error, "strerror", None) or str(error)
-    full = any(sign in str(error) for sign in ("No space left", "Disk quota", "File too large"))
+    text = str(error)
+    in_hdf5 = re.search(r"error message = '([^']*)'", text)  # HDF5 wraps it in its own account
+    reason = in_hdf5[1] if in_hdf5 else getattr(error, "strerror", None) or text
+    full = any(sign in text for sign in ("No space left", "quota", "File too large"))
     hint = "free some space, or write to another disk" if full else "check the disk and its permissions"
-    return DataError(f"{path} could not be written: {reason}; nothing was changed", hint=hint)
+    return DataError(f"{path} could not be written: {reason}", hint=hint)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -18,9 +19,10 @@ from pulsetrainer import __version__
 from pulsetrainer.artefacts.decode import Origin, decode, text_of
 from pulsetrainer.artefacts.encode import encode, values_of
 from pulsetrainer.artefacts.kinds import KINDS
-from pulsetrainer.artefacts.output import cannot_write, check_output, replacing
+from pulsetrainer.artefacts.output import check_output, replacing
 from pulsetrainer.artefacts.provenance import Header, Provenance, clean
 from pulsetrainer.artefacts.schema import TIME, kind_of, plan_of
+from pulsetrainer.artefacts.seal import check_seal, seal_of
 from pulsetrainer.artefacts.steps import maker, next_step, with_article
 from pulsetrainer.errors import DataError
 
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "write"]
 
 FORMAT_VERSION = 1
-# from 1.10 on HDF5 keeps checksums of its own structures, and can be read while it grows
+# from 1.10 on a file can be read while it grows, and HDF5 keeps checksums of most of its own structures
 LIBVER = ("v110", "v110")
 _DAMAGED = "restore it from a copy, or make it again: pulsetrainer --help lists the commands"
 _HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
@@ -48,35 +50,36 @@ def write(path: Path | str, artefact: Any, header: Header, *, force: bool = Fals
     DataError
         The artefact does not fit its own annotations, or the disk is full or failed.
     """
-    write_fields(path, type(artefact), values_of(artefact), header, force=force)
-
-
-def write_fields(
-    path: Path | str, cls: type, values: Mapping[str, Any], header: Header, *, force: bool
-) -> None:
-    """Write an artefact given by its fields, whose arrays may be datasets of another file.
-
-    Raises
-    ------
-    UsageError, DataError
-        As ``write``.
-    """
+    cls: type = type(artefact)
+    values = values_of(artefact)
     with replacing(path, force=force) as temporary:
         try:
-            with h5py.File(temporary, "x", libver=LIBVER, locking=False) as file:
-                write_root(file, cls, header, samples=_samples(cls, values))
-                encode(file, cls, values)
+            image = _image(cls, values, header)
         except DataError as error:
             raise DataError(f"{path} was not written: {error.message}", hint=error.hint) from error
-        except (OSError, RuntimeError) as error:
-            raise cannot_write(path, error) from error
+        with temporary.open("xb") as stream:
+            stream.write(image)
+            stream.write(seal_of(zlib.crc32(image)))
+
+
+def _image(cls: type, values: Mapping[str, Any], header: Header) -> bytes:
+    """Return the whole HDF5 file as bytes.
+
+    Built in memory: a disk that is full makes HDF5 fail while closing and crash when the program ends.
+    """
+    with h5py.File(kind_of(cls), "w", driver="core", backing_store=False, libver=LIBVER) as file:
+        write_root(file, cls, header, samples=_samples(cls, values))
+        encode(file, cls, values)
+        file.flush()
+        image: bytes = file.id.get_file_image()
+        return image
 
 
 def _samples(cls: type, values: Mapping[str, Any]) -> int | None:
     """Return the length of the root's time axis; None where the kind has none."""
     for plan in plan_of(cls):
-        if plan.dims[-1:] == (TIME,) and values[plan.name] is not None:
-            return int(np.shape(values[plan.name])[-1]) if np.shape(values[plan.name]) else None
+        if plan.dims[-1:] == (TIME,) and np.ndim(values[plan.name]):
+            return int(np.shape(values[plan.name])[-1])
     return None
 
 
@@ -210,7 +213,13 @@ def _root_text(file: h5py.File, path: Path | str, name: str) -> str:
 def _opened(path: Path | str) -> Iterator[h5py.File]:
     """Open a file for reading; whatever HDF5 finds wrong with it is a DataError."""
     path = Path(path)
-    _check_readable(path)
+    try:
+        _check_readable(path)
+    except OSError as error:
+        raise DataError(
+            f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
+        ) from error
+    check_seal(path)
     try:
         with _open(path) as file:
             yield file
@@ -230,18 +239,15 @@ def _open(path: Path) -> h5py.File:
 
 
 def _check_readable(path: Path) -> None:
-    """Raise DataError for what can be said before HDF5 looks at it."""
+    """Raise DataError or OSError for what can be said before HDF5 looks at it."""
     if path.is_dir():
         raise DataError(f"{path} is a folder, expected a file", hint=_names_in(path, path))
     if not path.exists():
         raise DataError(f"{path} does not exist", hint=_names_in(path.parent, path))
     if not path.is_file():
         raise DataError(f"{path} is not an ordinary file", hint="name a file on disk")
-    try:
-        with path.open("rb") as stream:
-            start = stream.read(8)
-    except OSError as error:
-        raise DataError(f"{path} cannot be read: {error.strerror}", hint="mend its permissions") from error
+    with path.open("rb") as stream:
+        start = stream.read(8)
     if not start:
         raise DataError(f"{path} is empty", hint=_DAMAGED)
     if start != b"\x89HDF\r\n\x1a\n":

@@ -1,0 +1,264 @@
+"""A run that is on disk while it is measured: a program that dies loses nothing that was appended.
+
+The file grows under a name of its own beside the final one. HDF5's single-writer mode keeps its structure
+readable at every moment, and the sample count is written last: a reader trusts that many samples.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import h5py
+import numpy as np
+
+from pulsetrainer.artefacts.encode import encode
+from pulsetrainer.artefacts.kinds import FloatArray, Run
+from pulsetrainer.artefacts.output import cannot_write, check_output, publish
+from pulsetrainer.artefacts.schema import plan_of
+from pulsetrainer.artefacts.seal import append_seal
+from pulsetrainer.artefacts.store import LIBVER, write_root
+from pulsetrainer.errors import ArgumentError, DataError, PulsetrainerError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from pulsetrainer.artefacts.provenance import Header
+
+# HDF5 must never meet a full disk: it would fail while closing and crash when the program ends. One
+# batch allocates four chunks of 32 KB at most per 4096 samples; the rest is for its own structures.
+_RESERVE_BYTES = 1 << 20
+_BYTES_PER_SAMPLE = 32
+_COLUMNS = ("time_s", "reference", "input", "output")
+
+
+class RunRecorder:
+    """Writes a run batch by batch; use it in a ``with`` block.
+
+    A block that ends well finishes the run as complete, one that ends with an exception (Ctrl-C too) keeps
+    what was recorded as ``complete=False``; if nothing was recorded, nothing is left behind.
+
+    Parameters
+    ----------
+    path
+        The final name.
+    header
+        What the artefact says about itself.
+    force
+        Replace an existing file.
+    input_unit, output_unit, input_quantity, output_quantity, signal
+        As in ``Run``.
+
+    Raises
+    ------
+    UsageError
+        See ``store.check_output``.
+    DataError
+        The disk is full or failed.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        header: Header,
+        *,
+        force: bool = False,
+        input_unit: str = "A",
+        output_unit: str = "N",
+        input_quantity: str = "current",
+        output_quantity: str = "force",
+        signal: str = "",
+    ) -> None:
+        check_output(path, force)
+        self._final = Path(path)
+        self._force = force
+        self._samples = 0
+        self._last_time = -np.inf
+        self._finished = False
+        self.dropped_samples = 0  # set it as losses become known: an interrupted run tells them too
+        empty = np.zeros(0)
+        values: dict[str, Any] = dict.fromkeys(_COLUMNS, empty) | {
+            "input_unit": input_unit,
+            "output_unit": output_unit,
+            "input_quantity": input_quantity,
+            "output_quantity": output_quantity,
+            "signal": signal,
+            "complete": False,
+            "dropped_samples": 0,
+        }
+        self.partial = _claim_partial(self._final)
+        try:
+            self._check_space(0)
+            self._file = h5py.File(self.partial, "w", libver=LIBVER, locking="best-effort")
+            write_root(self._file, Run, header, samples=0)
+            encode(self._file, Run, values, growing=True)
+            self._file.swmr_mode = True
+        except BaseException as error:
+            self.partial.unlink(missing_ok=True)
+            if isinstance(error, OSError | RuntimeError):
+                raise cannot_write(self.partial, error) from error
+            raise
+        paths = {plan.name: plan.path for plan in plan_of(Run)}
+        self._datasets = {name: self._file[paths[name]] for name in _COLUMNS}
+
+    @property
+    def samples(self) -> int:
+        """How many samples are safe on disk."""
+        return self._samples
+
+    def append(self, time_s: ArrayLike, reference: ArrayLike, input: ArrayLike, output: ArrayLike) -> None:  # noqa: A002 - the field's name
+        """Append a batch; when this returns, it survives the death of the program.
+
+        Raises
+        ------
+        ArgumentError
+            The arrays differ in length, or the time does not increase, also from the batch before.
+        DataError
+            The disk is full or failed; what was appended before is kept.
+        """
+        arrays: dict[str, FloatArray] = {
+            name: np.atleast_1d(np.asarray(array, dtype=np.float64))
+            for name, array in zip(_COLUMNS, (time_s, reference, input, output), strict=True)
+        }
+        count = self._check_batch(arrays)
+        if count == 0:
+            return
+        self._check_space(count)
+        total = self._samples + count
+        try:
+            for name, dataset in self._datasets.items():
+                dataset.resize(total, axis=0)
+                dataset[self._samples :] = arrays[name]
+                dataset.flush()
+            self._file.attrs.modify("samples", np.int64(total))
+            self._file.flush()
+        except (OSError, RuntimeError) as error:
+            raise cannot_write(self.partial, error) from error
+        self._samples = total
+        self._last_time = float(arrays["time_s"][-1])
+
+    def _check_batch(self, arrays: dict[str, FloatArray]) -> int:
+        """Return the length of a batch that can be appended."""
+        if self._finished:
+            raise ArgumentError("the run is finished: nothing can be appended", hint="record a new run")
+        if len({array.shape for array in arrays.values()}) != 1 or arrays["time_s"].ndim != 1:
+            shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+            raise ArgumentError(
+                f"a batch needs four arrays of one length: {shapes}", hint="this is a bug in the caller"
+            )
+        time = np.concatenate(([self._last_time], arrays["time_s"]))
+        if not (np.all(np.diff(time) > 0) and np.all(np.isfinite(time[1:]))):
+            k = int(np.argmin((np.diff(time) > 0) & np.isfinite(time[1:])))
+            raise ArgumentError(
+                f"the time of sample {self._samples + k} is {time[k + 1]:g} s after {time[k]:g} s: "
+                "it must increase",
+                hint="this is a bug in the caller",
+            )
+        return len(arrays["time_s"])
+
+    def _check_space(self, count: int) -> None:
+        """Raise DataError while there still is room to keep what was recorded."""
+        if not hasattr(os, "statvfs"):
+            return
+        try:
+            disk = os.statvfs(self.partial.parent)
+        except OSError:
+            return
+        free = disk.f_bavail * disk.f_frsize
+        if free < _RESERVE_BYTES + count * _BYTES_PER_SAMPLE:
+            raise DataError(
+                f"the disk of {self.partial.parent} is full: {free} bytes are left",
+                hint="free some space, or write to another disk; what was recorded so far is kept",
+            )
+
+    def finish(self, *, complete: bool = True, dropped_samples: int | None = None) -> Path:
+        """Give the run its final name and return it.
+
+        Parameters
+        ----------
+        complete
+            Whether everything that was asked for was recorded.
+        dropped_samples
+            How many samples were lost on the wire; default: the attribute ``dropped_samples``.
+
+        Raises
+        ------
+        DataError
+            Nothing was recorded, or the disk failed.
+        UsageError
+            Another process wrote the final name meanwhile; the run is kept under its partial name.
+        """
+        if self._finished:
+            return self._final
+        self._finished = True
+        dropped = self.dropped_samples if dropped_samples is None else dropped_samples
+        try:
+            if self._samples:
+                self._file.attrs.modify("complete", np.uint8(complete))
+                self._file.attrs.modify("dropped_samples", np.int64(dropped))
+            self._file.close()
+            if not self._samples:
+                self.partial.unlink(missing_ok=True)
+                raise DataError(
+                    f"nothing was recorded, so {self._final} was not written",
+                    hint="check the device: pulsetrainer ports",
+                )
+            with contextlib.suppress(OSError):  # without a seal the file is only less guarded
+                append_seal(self.partial)
+            publish(self.partial, self._final.resolve(), force=self._force)
+        except (OSError, RuntimeError) as error:
+            raise self._kept(cannot_write(self._final, error)) from error
+        except PulsetrainerError as error:
+            raise self._kept(error) from error
+        return self._final
+
+    def _kept(self, error: PulsetrainerError) -> PulsetrainerError:
+        """Return the error with the place where the samples are."""
+        if not self.partial.exists():
+            return error
+        return type(error)(f"{error.message}; the recording is kept in {self.partial}", hint=error.hint)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if error is None:
+            self.finish()
+            return
+        if not self._samples and not self._finished:
+            self._finished = True
+            with contextlib.suppress(OSError, RuntimeError):
+                self._file.close()
+            self.partial.unlink(missing_ok=True)
+            return
+        try:
+            self.finish(complete=False)
+        except PulsetrainerError as second:
+            # the first error tells why the block ended; this one, where the samples are
+            error.add_note(f"{second.message} ({second.hint})")
+
+
+def _claim_partial(final: Path) -> Path:
+    """Create an empty file beside the final name and return its name.
+
+    An older partial file is the recording of a program that was killed: it is never overwritten.
+    """
+    for k in itertools.count(1):
+        partial = final.with_name(f"{final.name}.partial" if k == 1 else f"{final.name}.partial-{k}")
+        try:
+            partial.open("xb").close()
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise cannot_write(partial, error) from error
+        return partial
+    raise AssertionError  # itertools.count does not end
