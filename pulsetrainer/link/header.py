@@ -67,7 +67,7 @@ def c_header() -> str:
     """Return the text of ``protocol.h``."""
     lines = [_TOP.format(major=codes.PROTOCOL_MAJOR, minor=codes.PROTOCOL_MINOR)]
     lines.append(f"#define PT_MAGIC 0x{codes.MAGIC:08X}uL")
-    lines += [f"#define PT_{name} {getattr(m, name)}u" for name in _CONSTANTS]
+    lines += [f"#define PT_{name} {getattr(codes, name)}u" for name in _CONSTANTS]
     for title, prefix, members in (
         ("what the device is doing", "STATE", codes.State),
         ("first cause of a latched fault", "FAULT", codes.Fault),

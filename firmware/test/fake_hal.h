@@ -1,0 +1,35 @@
+/* A HAL for tests: the current follows the PWM through a small coil, everything can be overridden. */
+#ifndef PULSETRAINER_FAKE_HAL_H
+#define PULSETRAINER_FAKE_HAL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "frame.h"
+
+struct fake {
+    bool pwm_enabled;
+    uint16_t pwm;
+    int32_t current;       /* 100 uA times 256 */
+    int32_t force_current; /* >= 0: what the current converter reads instead */
+    int32_t force_force;   /* the same for the force converter */
+    uint32_t kills;
+    uint32_t fed;
+    bool overrun;
+    uint16_t tx_space;
+    uint8_t reset_cause;
+    uint32_t nonce;
+};
+extern struct fake fake;
+
+void fake_reset(void);                  /* power on: also calls app_init */
+void fake_ticks(uint32_t n);            /* n ticks, the main loop after each */
+void fake_ticks_without_main(uint32_t n);
+bool fake_output_on(void);
+
+/* Sends a command and returns the reply (its payload valid until the next call); type 0: none came. */
+struct frame fake_command(uint8_t type, const uint8_t *payload, uint8_t length);
+struct frame fake_command_seq(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_t length);
+uint16_t fake_telemetry(uint8_t *payload); /* oldest telemetry block received, its length; 0: none */
+
+#endif

@@ -1,0 +1,471 @@
+/* The whole core behind a fake HAL, spoken to in frames: states, refusals and the way to output off. */
+#include <string.h>
+
+#include "app.h"
+#include "check.h"
+#include "fake_hal.h"
+#include "hal.h"
+#include "units.h"
+
+#define SAMPLES 61u
+
+static uint8_t state_of(struct frame f)
+{
+    CHECK_EQUAL(f.type, PT_ACK);
+    return f.type == PT_ACK ? f.payload[PT_ACK_STATE] : 0xFFu;
+}
+
+static uint8_t nak_of(struct frame f)
+{
+    return f.type == PT_NAK ? f.payload[PT_NAK_CODE] : 0;
+}
+
+static struct frame hello(uint8_t major)
+{
+    uint8_t p[PT_HELLO_LEN];
+    put_u32(p + PT_HELLO_MAGIC, PT_MAGIC);
+    p[PT_HELLO_MAJOR] = major;
+    p[PT_HELLO_MINOR] = 0;
+    return fake_command(PT_HELLO, p, sizeof p);
+}
+
+static uint32_t crc_of_constant(int16_t value, uint32_t count)
+{
+    uint8_t bytes[2];
+    uint32_t crc = 0;
+    put_i16(bytes, value);
+    for (uint32_t k = 0; k < count; k++)
+        crc = wave_crc32(crc, bytes, 2);
+    return crc;
+}
+
+static struct frame begin(uint32_t total, uint16_t ticks, uint32_t crc)
+{
+    uint8_t p[PT_WAVE_BEGIN_LEN];
+    put_u32(p + PT_WAVE_BEGIN_TOTAL, total);
+    put_u16(p + PT_WAVE_BEGIN_TICKS_PER_SAMPLE, ticks);
+    put_u32(p + PT_WAVE_BEGIN_CRC32, crc);
+    return fake_command(PT_WAVE_BEGIN, p, sizeof p);
+}
+
+static struct frame data(uint32_t offset, int16_t value, uint8_t count)
+{
+    uint8_t p[PT_WAVE_DATA_LEN + 2u * PT_WAVE_DATA_MAX_ITEMS];
+    put_u32(p + PT_WAVE_DATA_OFFSET, offset);
+    p[PT_WAVE_DATA_COUNT] = count;
+    for (uint8_t k = 0; k < count; k++)
+        put_i16(p + PT_WAVE_DATA_LEN + 2u * k, value);
+    return fake_command(PT_WAVE_DATA, p, (uint8_t)(PT_WAVE_DATA_LEN + 2u * count));
+}
+
+static struct frame commit(uint32_t count, uint32_t crc)
+{
+    uint8_t p[PT_WAVE_COMMIT_LEN];
+    put_u32(p + PT_WAVE_COMMIT_COUNT, count);
+    put_u32(p + PT_WAVE_COMMIT_CRC32, crc);
+    return fake_command(PT_WAVE_COMMIT, p, sizeof p);
+}
+
+static struct frame arm(uint32_t nonce)
+{
+    uint8_t p[PT_ARM_LEN];
+    put_u32(p, nonce);
+    return fake_command(PT_ARM, p, sizeof p);
+}
+
+static struct frame set_param(uint8_t id, int32_t value)
+{
+    uint8_t p[PT_SET_PARAM_LEN];
+    p[PT_SET_PARAM_ID] = id;
+    put_i32(p + PT_SET_PARAM_VALUE, value);
+    return fake_command(PT_SET_PARAM, p, sizeof p);
+}
+
+static struct frame plain(uint8_t type)
+{
+    return fake_command(type, NULL, 0);
+}
+
+/* A constant current of `value`, SAMPLES samples of `ticks` ticks; `total` of them announced. */
+static void ready(int16_t value, uint16_t ticks, uint32_t total)
+{
+    fake_reset();
+    CHECK_EQUAL(hello(PT_PROTOCOL_MAJOR).type, PT_HELLO_REPLY);
+    CHECK_EQUAL(state_of(begin(total, ticks, crc_of_constant(value, total))), PT_STATE_IDLE);
+    CHECK_EQUAL(state_of(data(0, value, SAMPLES)), PT_STATE_IDLE);
+    CHECK_EQUAL(state_of(commit(SAMPLES, crc_of_constant(value, SAMPLES))), PT_STATE_IDLE);
+}
+
+static void running(int16_t value, uint16_t ticks)
+{
+    ready(value, ticks, SAMPLES);
+    CHECK_EQUAL(state_of(arm(fake.nonce)), PT_STATE_ARMED);
+    CHECK_EQUAL(state_of(plain(PT_START)), PT_STATE_RUNNING);
+}
+
+static void alive_ticks(uint32_t n)
+{
+    while (n > 0) {
+        uint32_t piece = n < 500 ? n : 500;
+        fake_ticks(piece);
+        (void)plain(PT_HEARTBEAT);
+        n -= piece;
+    }
+}
+
+/* Ticks until the output is off, at most `most`. */
+static uint32_t off_after(uint32_t most)
+{
+    for (uint32_t k = 1; k <= most; k++) {
+        fake_ticks(1);
+        if (!fake.pwm_enabled)
+            return k;
+    }
+    return most + 1u;
+}
+
+static void the_output_is_off_until_everything_says_on(void)
+{
+    fake_reset();
+    fake_ticks(10);
+    CHECK(!fake.pwm_enabled);
+    CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE);
+    CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_VERSION);
+    (void)hello(PT_PROTOCOL_MAJOR);
+    CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_STATE); /* no waveform */
+    (void)begin(SAMPLES, 10, crc_of_constant(100, SAMPLES));
+    (void)data(0, 100, SAMPLES);
+    CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_STATE); /* not committed */
+    CHECK_EQUAL(nak_of(commit(SAMPLES, 1)), PT_NAK_CODE_CRC);
+    CHECK_EQUAL(nak_of(commit(SAMPLES - 1u, crc_of_constant(100, SAMPLES))), PT_NAK_CODE_CRC);
+    (void)commit(SAMPLES, crc_of_constant(100, SAMPLES));
+    CHECK_EQUAL(nak_of(arm(fake.nonce + 1u)), PT_NAK_CODE_NONCE);
+    CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE); /* not armed */
+    CHECK_EQUAL(state_of(arm(fake.nonce)), PT_STATE_ARMED);
+    fake_ticks(100);
+    CHECK(!fake.pwm_enabled);
+    CHECK_EQUAL(state_of(plain(PT_START)), PT_STATE_RUNNING);
+    fake_ticks(100);
+    CHECK(fake_output_on());
+}
+
+static void a_run_ends_disarmed_and_has_every_sample(void)
+{
+    uint8_t p[PT_MAX_PAYLOAD];
+    uint32_t next = 0;
+    bool last = false;
+    running(8000, 10);
+    alive_ticks(10u * (SAMPLES - 1u) + 1u);
+    CHECK_EQUAL(app.state, PT_STATE_RAMPING);
+    alive_ticks(2000);
+    CHECK_EQUAL(app.state, PT_STATE_IDLE);
+    CHECK(!fake.pwm_enabled);
+    CHECK_EQUAL(app.fault, PT_FAULT_NONE);
+    while (fake_telemetry(p) != 0) {
+        CHECK(!last);
+        CHECK_EQUAL(get_u32(p + PT_TELEMETRY_FIRST_TICK), next);
+        CHECK_EQUAL(p[PT_TELEMETRY_SESSION], 1);
+        for (uint8_t k = 0; k < p[PT_TELEMETRY_COUNT]; k++)
+            CHECK_EQUAL(get_i16(p + PT_TELEMETRY_LEN + 6u * k), 8000);
+        next += 10u * p[PT_TELEMETRY_COUNT];
+        last = (p[PT_TELEMETRY_FLAGS] & PT_FLAG_LAST) != 0;
+    }
+    CHECK(last);
+    CHECK_EQUAL(next, 10u * SAMPLES);
+    CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE);
+    CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_STATE);
+}
+
+static void another_major_version_is_answered_but_never_armed(void)
+{
+    ready(100, 10, SAMPLES);
+    struct frame f = hello(PT_PROTOCOL_MAJOR + 1u);
+    CHECK_EQUAL(f.type, PT_HELLO_REPLY);
+    CHECK_EQUAL(f.length, PT_HELLO_REPLY_LEN);
+    CHECK_EQUAL(f.payload[PT_HELLO_REPLY_MAJOR], PT_PROTOCOL_MAJOR);
+    CHECK(memcmp(f.payload + PT_HELLO_REPLY_SERIAL, "SIXTEEN-LETTERS!", 16) == 0);
+    CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_VERSION);
+}
+
+static void a_silent_host_means_off_within_300_ms(void)
+{
+    running(15000, 1000);
+    alive_ticks(3000);
+    fake_ticks(2000);
+    CHECK_EQUAL(app.state, PT_STATE_RUNNING);
+    fake_ticks(1);
+    CHECK_EQUAL(app.state, PT_STATE_RAMPING);
+    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+    CHECK(off_after(2000) <= APP_RAMP_TICKS);
+    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    CHECK_EQUAL(nak_of(begin(10, 10, 0)), PT_NAK_CODE_FAULT);
+    CHECK_EQUAL(state_of(plain(PT_CLEAR_FAULT)), PT_STATE_IDLE);
+    CHECK_EQUAL(nak_of(begin(10, 10, 0)), 0);
+}
+
+static void garbage_is_no_sign_of_life(void)
+{
+    uint8_t junk[3] = {1, 2, 3};
+    running(5000, 1000);
+    for (int k = 0; k < 30; k++) {
+        fake_ticks(100);
+        (void)fake_command(0x7F, junk, 3);      /* unknown */
+        (void)fake_command(PT_START, junk, 3);  /* wrong length */
+    }
+    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+}
+
+static void over_current_kills_in_the_same_tick(void)
+{
+    running(10000, 1000);
+    alive_ticks(1000);
+    fake.force_current = 3400; /* 1.66 A */
+    CHECK_EQUAL(off_after(10), 1);
+    CHECK_EQUAL(app.fault, PT_FAULT_OVER_CURRENT);
+    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+}
+
+static void over_force_kills_at_the_third_sample(void)
+{
+    running(10000, 1000);
+    alive_ticks(1000);
+    fake.force_force = 3700; /* 15.3 N */
+    CHECK_EQUAL(off_after(10), 3);
+    CHECK_EQUAL(app.fault, PT_FAULT_OVER_FORCE);
+}
+
+static void a_force_while_only_armed_trips_too(void)
+{
+    ready(100, 10, SAMPLES);
+    (void)arm(fake.nonce);
+    fake.force_force = 3700;
+    fake_ticks(5);
+    CHECK_EQUAL(app.fault, PT_FAULT_OVER_FORCE);
+    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+}
+
+static void a_missed_tick_is_a_fault(void)
+{
+    running(10000, 1000);
+    alive_ticks(1000);
+    fake.overrun = true;
+    CHECK_EQUAL(off_after(10), 1);
+    CHECK_EQUAL(app.fault, PT_FAULT_TICK_OVERRUN);
+}
+
+static void an_underrun_ramps_down_and_faults(void)
+{
+    ready(15000, 10, 2u * SAMPLES);
+    (void)arm(fake.nonce);
+    (void)plain(PT_START);
+    alive_ticks(10u * (SAMPLES - 1u));
+    CHECK_EQUAL(app.state, PT_STATE_RUNNING);
+    alive_ticks(1);
+    CHECK_EQUAL(app.fault, PT_FAULT_UNDERRUN);
+    CHECK_EQUAL(app.state, PT_STATE_RAMPING);
+    CHECK(off_after(2000) <= APP_RAMP_TICKS);
+    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+}
+
+static void a_wave_with_a_wrong_checksum_is_stopped(void)
+{
+    ready(9000, 10, 2u * SAMPLES);
+    (void)arm(fake.nonce);
+    (void)plain(PT_START);
+    alive_ticks(100);
+    (void)data(SAMPLES, 9001, SAMPLES);
+    fake_ticks(1);
+    CHECK_EQUAL(app.fault, PT_FAULT_WAVE_CRC);
+}
+
+static void the_first_cause_stays_with_its_snapshot(void)
+{
+    running(12000, 1000);
+    alive_ticks(1000);
+    fake_ticks(2001); /* silence, then over-current during the ramp */
+    fake.force_current = 3400;
+    CHECK_EQUAL(off_after(10), 1);
+    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+    struct frame f = plain(PT_STATUS);
+    CHECK_EQUAL(f.type, PT_STATUS_REPLY);
+    CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT], PT_FAULT_HEARTBEAT);
+    CHECK_EQUAL(get_u32(f.payload + PT_STATUS_REPLY_FAULT_TICK), 3000); /* the tick after 0..2999 */
+    CHECK_EQUAL(get_i16(f.payload + PT_STATUS_REPLY_FAULT_REFERENCE), 12000);
+    CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT_STATE], PT_STATE_RUNNING);
+}
+
+static void stop_ramps_and_disarms(void)
+{
+    running(15000, 1000);
+    alive_ticks(1000);
+    CHECK_EQUAL(state_of(plain(PT_STOP)), PT_STATE_RAMPING);
+    CHECK(off_after(2000) <= APP_RAMP_TICKS);
+    CHECK_EQUAL(app.state, PT_STATE_IDLE);
+    CHECK_EQUAL(app.fault, PT_FAULT_NONE);
+    CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE);
+}
+
+static void a_new_hello_stops_what_an_earlier_host_left_running(void)
+{
+    running(15000, 1000);
+    alive_ticks(1000);
+    (void)hello(PT_PROTOCOL_MAJOR);
+    CHECK_EQUAL(app.state, PT_STATE_RAMPING);
+}
+
+static void parameters_only_lower_the_compiled_limits(void)
+{
+    fake_reset();
+    (void)hello(PT_PROTOCOL_MAJOR);
+    CHECK_EQUAL(nak_of(set_param(PT_PARAM_FORCE_TRIP, 15001)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(nak_of(set_param(PT_PARAM_CURRENT_TRIP, 16501)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(nak_of(set_param(PT_PARAM_HEARTBEAT, 201)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(nak_of(set_param(PT_PARAM_COUNT, 1)), PT_NAK_CODE_PARAM);
+    CHECK_EQUAL(set_param(PT_PARAM_CURRENT_LIMIT, 5000).type, PT_PARAM_REPLY);
+    (void)begin(10, 10, 0);
+    CHECK_EQUAL(nak_of(data(0, 5001, 10)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(nak_of(data(0, -1, 10)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(nak_of(data(0, 5000, 10)), 0);
+    running(10000, 1000);
+    CHECK_EQUAL(nak_of(set_param(PT_PARAM_FORCE_TRIP, 1000)), PT_NAK_CODE_STATE);
+}
+
+static void upload_is_idempotent_and_in_order(void)
+{
+    fake_reset();
+    (void)hello(PT_PROTOCOL_MAJOR);
+    (void)begin(3000, 10, 0);
+    CHECK_EQUAL(get_u16(data(0, 1, 50).payload), PT_WAVE_BUFFER_SAMPLES - 50u);
+    CHECK_EQUAL(get_u16(data(0, 1, 50).payload), PT_WAVE_BUFFER_SAMPLES - 50u); /* again, another seq */
+    CHECK_EQUAL(nak_of(data(49, 1, 50)), PT_NAK_CODE_OFFSET);
+    CHECK_EQUAL(nak_of(data(51, 1, 50)), PT_NAK_CODE_OFFSET);
+    for (uint32_t at = 50; at < 1000; at += 50)
+        CHECK_EQUAL(nak_of(data(at, 1, 50)), 0);
+    CHECK_EQUAL(nak_of(data(1000, 1, 50)), PT_NAK_CODE_CREDIT);
+    CHECK_EQUAL(nak_of(data(1000, 1, 24)), 0);
+    CHECK_EQUAL(nak_of(begin(0, 10, 0)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(nak_of(begin(10, 0, 0)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(nak_of(begin(9000001, 1, 0)), PT_NAK_CODE_RANGE); /* longer than the on-time */
+    CHECK_EQUAL(nak_of(begin(0xFFFFFFFFu, 10000, 0)), PT_NAK_CODE_RANGE);
+    (void)begin(30, 10, 0);
+    CHECK_EQUAL(nak_of(data(0, 1, 50)), PT_NAK_CODE_OFFSET); /* beyond what was announced */
+}
+
+static void a_repeated_command_is_answered_from_memory(void)
+{
+    ready(5000, 10, SAMPLES);
+    (void)arm(fake.nonce);
+    CHECK_EQUAL(fake_command_seq(PT_START, 200, NULL, 0).type, PT_ACK);
+    uint8_t session = app.session;
+    fake_ticks(10);
+    struct frame f = fake_command_seq(PT_START, 200, NULL, 0);
+    CHECK_EQUAL(f.type, PT_ACK);
+    CHECK_EQUAL(f.payload[PT_ACK_SESSION], session);
+    CHECK_EQUAL(app.session, session);
+    CHECK_EQUAL(fake_command_seq(PT_START, 201, NULL, 0).type, PT_NAK);
+}
+
+static void a_host_that_does_not_read_costs_samples_not_replies(void)
+{
+    uint8_t p[PT_MAX_PAYLOAD];
+    uint32_t received = 0;
+    uint16_t dropped = 0;
+    running(5000, 1000);
+    fake.tx_space = FRAME_MAX_ENCODED; /* room for a reply only */
+    alive_ticks(20000);
+    CHECK_EQUAL(plain(PT_HEARTBEAT).type, PT_ACK);
+    CHECK_EQUAL(fake_telemetry(p), 0);
+    fake.tx_space = 4096;
+    (void)plain(PT_STOP);
+    fake_ticks(1500);
+    while (fake_telemetry(p) != 0) {
+        received += p[PT_TELEMETRY_COUNT];
+        dropped = get_u16(p + PT_TELEMETRY_DROPPED);
+    }
+    CHECK_EQUAL(received + dropped, app.telemetry.produced);
+    CHECK(dropped > 1000);
+}
+
+static void the_slew_limit_is_flagged_and_the_asked_value_reported(void)
+{
+    uint8_t p[PT_MAX_PAYLOAD];
+    running(15000, 10);
+    fake_ticks(300);
+    CHECK(fake_telemetry(p) != 0);
+    CHECK(p[PT_TELEMETRY_FLAGS] & PT_FLAG_SLEW);
+    CHECK_EQUAL(get_i16(p + PT_TELEMETRY_LEN), 15000);
+    CHECK(fake_telemetry(p) == 0 || !(p[PT_TELEMETRY_FLAGS] & PT_FLAG_SLEW));
+}
+
+static void the_watchdog_wants_both_contexts(void)
+{
+    fake_reset();
+    fake_ticks(10);
+    uint32_t fed = fake.fed;
+    CHECK(fed > 0);
+    fake_ticks_without_main(10); /* the main loop hangs */
+    CHECK_EQUAL(fake.fed, fed);
+    app_poll();
+    CHECK_EQUAL(fake.fed, fed + 1u);
+    app_poll(); /* the tick hangs */
+    app_poll();
+    CHECK_EQUAL(fake.fed, fed + 1u);
+}
+
+static void a_reset_in_mid_play_is_off_and_remembers_nothing(void)
+{
+    running(12000, 1000);
+    alive_ticks(1000);
+    CHECK(fake_output_on());
+    fake.nonce++;
+    app_init();
+    CHECK(!fake.pwm_enabled);
+    fake_ticks(100);
+    CHECK(!fake.pwm_enabled);
+    CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE);
+    CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_VERSION);
+}
+
+static void every_wrong_length_is_refused(void)
+{
+    uint8_t junk[PT_MAX_PAYLOAD];
+    memset(junk, 1, sizeof junk);
+    static const uint8_t lengths[][2] = {
+#define ROW(name, item) {PT_##name, (item) ? 0xFFu : PT_##name##_LEN},
+        PT_COMMANDS(ROW)
+#undef ROW
+    };
+    fake_reset();
+    for (uint16_t c = 0; c < sizeof lengths / sizeof lengths[0]; c++)
+        for (uint8_t n = 0; n <= PT_MAX_PAYLOAD; n++)
+            if (n != lengths[c][1] && !(lengths[c][0] == PT_WAVE_DATA && n == PT_WAVE_DATA_LEN + 2u))
+                CHECK_EQUAL(nak_of(fake_command(lengths[c][0], junk, n)), PT_NAK_CODE_LENGTH);
+    CHECK_EQUAL(nak_of(fake_command(0x55, junk, 1)), PT_NAK_CODE_UNKNOWN);
+}
+
+int main(void)
+{
+    RUN(the_output_is_off_until_everything_says_on);
+    RUN(a_run_ends_disarmed_and_has_every_sample);
+    RUN(another_major_version_is_answered_but_never_armed);
+    RUN(a_silent_host_means_off_within_300_ms);
+    RUN(garbage_is_no_sign_of_life);
+    RUN(over_current_kills_in_the_same_tick);
+    RUN(over_force_kills_at_the_third_sample);
+    RUN(a_force_while_only_armed_trips_too);
+    RUN(a_missed_tick_is_a_fault);
+    RUN(an_underrun_ramps_down_and_faults);
+    RUN(a_wave_with_a_wrong_checksum_is_stopped);
+    RUN(the_first_cause_stays_with_its_snapshot);
+    RUN(stop_ramps_and_disarms);
+    RUN(a_new_hello_stops_what_an_earlier_host_left_running);
+    RUN(parameters_only_lower_the_compiled_limits);
+    RUN(upload_is_idempotent_and_in_order);
+    RUN(a_repeated_command_is_answered_from_memory);
+    RUN(a_host_that_does_not_read_costs_samples_not_replies);
+    RUN(the_slew_limit_is_flagged_and_the_asked_value_reported);
+    RUN(the_watchdog_wants_both_contexts);
+    RUN(a_reset_in_mid_play_is_off_and_remembers_nothing);
+    RUN(every_wrong_length_is_refused);
+    CHECK_DONE();
+}
