@@ -4,9 +4,9 @@
 #include "plant.h"
 
 /* What the device of the paper has beyond static hysteresis: the numbers to tune against its figures. */
-#define AS_BUILT_COULOMB_N R(0.15)
-#define AS_BUILT_FIELD_LAG_S R(0.003)
-#define AS_BUILT_CREEP R(0.06)
+#define AS_BUILT_COULOMB_N R(0.2)
+#define AS_BUILT_FIELD_LAG_S R(0.0027)
+#define AS_BUILT_CREEP R(0.03)
 #define AS_BUILT_THERMAL_DRIFT R(0.006)
 
 #define EFFECT 1  /* an imperfection: 0 is absent, whatever its range */
