@@ -293,3 +293,29 @@ def smoothed(inputs: FloatArray, time_s: FloatArray, step: float, low: float, hi
         )
     spline = UnivariateSpline(time_s, inputs, k=3, s=inputs.size * step**2 / 12.0)
     return np.clip(spline(time_s), low, high)
+
+
+def slew_limited(inputs: FloatArray, rate_Hz: float, slew: float) -> FloatArray:
+    """Nearest input (n,) that moves at most ``slew`` input units per second: jumps become ramps.
+
+    Where cells have no weight the exact inverse jumps, and a coil cannot. The mean of the highest
+    path below the input and the lowest path above it, both with that slope (McShane 1934), starts a ramp as
+    long before a jump as it ends after it, so nothing is delayed.
+
+    Raises
+    ------
+    ArgumentError
+        ``slew`` or ``rate_Hz`` is not positive.
+    """
+    if not (slew > 0 and rate_Hz > 0):
+        raise ArgumentError(
+            f"slew and rate must be positive, got {slew:g} and {rate_Hz:g}", hint="30 A/s suits the solenoid"
+        )
+    u = finite_vector("inputs", inputs)
+    ramp = np.arange(u.size) * (slew / rate_Hz)
+
+    def highest_below(path: FloatArray) -> FloatArray:
+        left = np.minimum.accumulate(path - ramp) + ramp
+        return np.minimum(left, np.minimum.accumulate((path + ramp)[::-1])[::-1] - ramp)
+
+    return 0.5 * (highest_below(u) - highest_below(-u))

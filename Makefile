@@ -1,0 +1,78 @@
+# Two commands for a fresh machine: `make demo` and `make test`. Needs Python 3.11+, make and a C compiler.
+PYTHON ?= python3
+PORT   ?= bench:
+VENV   := .venv
+BIN    := $(VENV)/bin
+PT     := $(BIN)/pulsetrainer
+D      := build/demo
+
+FIRMWARE := $(shell find firmware -name '*.[ch]')
+CORE     := $(wildcard pulsetrainer/core/*.py)
+REPORT   := $(wildcard pulsetrainer/report/*.py pulsetrainer/report/templates/*) pulsetrainer/flows/evaluate.py
+PULSES   := normal bifid
+METHODS  := paper continuous
+PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h5))
+
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: demo test lint bench bounds clean help
+
+help:  ## say what there is
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+
+demo: $(D)/report.html  ## capture, identify, invert, play, evaluate: two pulses, two methods, one report
+	@$(PT) show $(D)/evaluation.h5
+	@echo "report: $(D)/report.html"
+
+# --- set-up -----------------------------------------------------------------------------------------
+$(VENV)/installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/installed-test: $(VENV)/installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@touch $@
+
+# --- the main job: a rule a file; only what is stale is made again ------------------------------------
+$(D):
+	mkdir -p $@
+
+$(D)/run.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
+	$(PT) capture identification --port '$(PORT)' -o $@ --force
+
+# the paper: relays, closest match, spline; ours: continuous reading, exact inverse
+$(D)/model-paper.h5: $(D)/run.h5 $(CORE)
+	$(PT) identify $< --operator relay -o $@ --force
+$(D)/model-continuous.h5: $(D)/run.h5 $(CORE)
+	$(PT) identify $< --operator continuous -o $@ --force
+
+define PULSE_RULES
+$(D)/drive-$(1)-$(2).h5: $(D)/model-$(2).h5 waveforms/$(1).csv pulsetrainer/flows/invert.py
+	$(PT) invert $(1) --model $$< -o $$@ --force
+$(D)/played-$(1)-$(2).h5: $(D)/drive-$(1)-$(2).h5 $(FIRMWARE)
+	$(PT) play $$< --port '$(PORT)' -o $$@ --force
+endef
+$(foreach m,$(METHODS),$(foreach p,$(PULSES),$(eval $(call PULSE_RULES,$(p),$(m)))))
+
+$(D)/evaluation.h5 $(D)/report.html &: $(PLAYED) $(REPORT)
+	$(PT) evaluate $(PLAYED) -o $(D)/evaluation.h5 --html $(D)/report.html --force
+
+bounds: $(D)/report.html tests/regression/bounds.toml  ## hold the demo's figures against their bounds
+	$(PT) evaluate $(PLAYED) --bounds tests/regression/bounds.toml
+
+# --- checks -------------------------------------------------------------------------------------------
+test: $(VENV)/installed-test  ## all tests
+	$(BIN)/python -m pytest -n 2 --dist loadgroup
+
+lint: $(VENV)/installed-test  ## style, types, import contracts
+	$(BIN)/ruff check --output-format=concise .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/installed-test  ## speed and memory, as ratios in one run
+	$(BIN)/python -m pytest benchmarks -p no:xdist --timeout=0 -s
+
+clean:  ## remove what was built
+	rm -rf build $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,51 @@
+"""The program: one typer command per module; heavy imports wait until a command runs."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from pulsetrainer import __version__
+from pulsetrainer.cli import capture, evaluate, guard, identify, import_, invert, play, plot, ports, show
+
+# Plain help: drawing it with rich would cost a third of the time until it shows.
+app = typer.Typer(
+    name="pulsetrainer",
+    help="Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+app.command("capture")(capture.capture)
+app.command("import")(import_.import_)
+app.command("identify")(identify.identify)
+app.command("invert")(invert.invert)
+app.command("play")(play.play)
+app.command("evaluate")(evaluate.evaluate)
+app.command("show")(show.show)
+app.command("plot")(plot.plot)
+app.command("ports")(ports.ports)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"pulsetrainer {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the whole traceback of an error.")] = False,
+) -> None:
+    """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate."""
+
+
+def main() -> None:
+    """Run the program and exit with its code."""
+    sys.exit(guard.funnel(app, sys.argv[1:]))

@@ -1,0 +1,69 @@
+"""The one funnel: every error becomes a message, a hint and an exit code here, and nowhere else."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from pulsetrainer.errors import Interrupted, PulsetrainerError, UsageError
+
+_DEBUG_HINT = "run it again with --debug for the whole traceback, and report it"
+
+
+def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
+    """Run the program on ``argv`` and return its exit code; nothing but ``SystemExit`` gets past."""
+    debug = "--debug" in argv
+    words = [word for word in argv if word != "--debug"]
+    problem: PulsetrainerError
+    try:
+        code = program(args=words, standalone_mode=False, prog_name="pulsetrainer")
+    except PulsetrainerError as error:
+        problem = error
+        _trace(debug)
+    except KeyboardInterrupt:
+        problem = Interrupted("stopped by you", hint="nothing was written")
+    except BrokenPipeError:  # the reader of our output went away: its business
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:  # noqa: BLE001 - the last resort, which is the point of this function
+        problem = _usage_of(error) or _bug_of(error)
+        _trace(debug)
+    else:
+        return int(code or 0)
+    report(problem, command=next((w for w in words if not w.startswith("-")), ""), as_json="--json" in words)
+    return problem.exit_code
+
+
+def _trace(debug: bool) -> None:
+    if debug:
+        traceback.print_exc()
+
+
+def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
+    """Write a problem to stderr for a person, and with ``as_json`` to stdout for a script."""
+    if as_json:
+        error = {"kind": problem.kind, "message": problem.message, "hint": problem.hint}
+        sys.stdout.write(json.dumps({"schema": 1, "command": command, "error": error}) + "\n")
+    sys.stderr.write(f"error: {problem.message}\n")
+    if problem.hint:
+        sys.stderr.write(f"  try: {problem.hint}\n")
+
+
+def _usage_of(error: Exception) -> UsageError | None:
+    """Return what the command-line parser objects to, or None when the error is not the parser's."""
+    explain = getattr(error, "format_message", None)
+    if explain is None:
+        return None
+    context = getattr(error, "ctx", None)
+    name = getattr(context, "command_path", "pulsetrainer")
+    return UsageError(str(explain()).rstrip("."), hint=f"{name} --help")
+
+
+def _bug_of(error: Exception) -> PulsetrainerError:
+    if type(error).__name__ == "Abort":  # Ctrl-C, as the parser words it
+        return Interrupted("stopped by you", hint="nothing was written")
+    return PulsetrainerError(f"a bug: {type(error).__name__}: {error}", hint=_DEBUG_HINT)

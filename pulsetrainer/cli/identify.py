@@ -1,0 +1,62 @@
+"""``pulsetrainer identify``: from runs to a model."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pulsetrainer.cli.console import Screen, plain
+from pulsetrainer.cli.options import AsJson, Force, Out
+
+
+class Operator(StrEnum):
+    """How the weights are read."""
+
+    continuous = "continuous"
+    relay = "relay"
+
+
+class Method(StrEnum):
+    """How weights and offset are found."""
+
+    joint = "joint"
+    alternating = "alternating"
+
+
+def identify(
+    runs: Annotated[list[Path], typer.Argument(help="Runs to fit together.", metavar="RUN.h5...")],
+    out: Out,
+    levels: Annotated[int, typer.Option(help="Levels of the Preisach plane.")] = 48,
+    operator: Annotated[
+        Operator, typer.Option(help="continuous, or relay as in the paper.")
+    ] = Operator.continuous,
+    method: Annotated[Method, typer.Option(help="joint, or alternating as in the paper.")] = Method.joint,
+    force: Force = False,
+    json: AsJson = False,
+) -> None:
+    """Fit a Preisach model to one or several runs.
+
+    Example: pulsetrainer identify run.h5 -o model.h5
+    """
+    from pulsetrainer.flows import identify as flow
+
+    screen = Screen("identify", as_json=json)
+    options = flow.Options(tuple(runs), out, levels, operator.value, method.value, force)
+    with screen.working("fitting") as context:
+        result = flow.run(options, context)
+    screen.result(plain(result))
+    unit = result.output_unit
+    screen.facts(
+        f"{result.output}: Preisach model of {result.levels} levels, {result.cells} cells",
+        {
+            "fit": f"{result.fit_rms_percent:.3f} % rms, {result.fit_max_percent:.2f} % max, of the span",
+            "fit rms": f"{result.fit_rms:.4g} {unit}",
+            "offset y0": f"{result.offset:.4g} {unit}",
+            "cells switched": f"{result.coverage_percent:.1f} %",
+            "loop": "falling" if result.polarity < 0 else "rising",
+            "took": f"{result.seconds:.2f} s, {result.iterations} iterations",
+        },
+    )

@@ -1,0 +1,31 @@
+"""``pulsetrainer plot``: a figure of whatever a file holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pulsetrainer.cli.console import Screen
+from pulsetrainer.cli.options import AsJson, Force, Out
+
+
+def plot(
+    file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    out: Out,
+    force: Force = False,
+    json: AsJson = False,
+) -> None:
+    """Draw an artefact as PNG, SVG or PDF.
+
+    Example: pulsetrainer plot model.h5 -o model.png
+    """
+    from pulsetrainer.flows import plot as flow
+
+    screen = Screen("plot", as_json=json)
+    with screen.working(f"drawing {file.name}") as context:
+        result = flow.run(flow.Options(file, out, force), context)
+    screen.result(result)
+    if not json:
+        typer.echo(f"wrote {result.output}: a {result.kind}")

@@ -1,0 +1,23 @@
+"""``pulsetrainer ports``: what could be a device."""
+
+from __future__ import annotations
+
+from pulsetrainer.cli.console import Screen
+from pulsetrainer.cli.options import AsJson
+
+
+def ports(json: AsJson = False) -> None:
+    """List the serial ports, which of them is a trainer, and whether each can be opened.
+
+    Example: pulsetrainer ports
+    """
+    from pulsetrainer.link import list_ports
+
+    screen = Screen("ports", as_json=json)
+    found = list_ports()
+    screen.result({"ports": found})
+    if found:
+        names = list(found[0].__dataclass_fields__)
+        screen.table("serial ports", names, [[getattr(port, name) for name in names] for port in found])
+    else:
+        screen.note("no serial port; plug the device in, or use the simulated one: --port bench:")

@@ -1,0 +1,47 @@
+"""``pulsetrainer show``: what is in a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pulsetrainer.cli.console import Screen
+from pulsetrainer.cli.evaluate import tables
+from pulsetrainer.cli.options import AsJson
+
+
+def show(
+    file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    json: AsJson = False,
+) -> None:
+    """Say what an artefact is, where it comes from, and its main figures.
+
+    Example: pulsetrainer show model.h5
+    """
+    from pulsetrainer.artefacts.kinds import Evaluation
+    from pulsetrainer.flows import show as flow
+
+    screen = Screen("show", as_json=json)
+    with screen.working("reading") as context:
+        result = flow.run(flow.Options(file), context)
+    header = result.header
+    screen.result(
+        {
+            "file": file,
+            "kind": result.kind,
+            "title": header.title,
+            "created": header.created,
+            "history": header.history,
+            "facts": result.facts,
+        }
+    )
+    title = f"{file}: {result.kind}, {header.title}, {header.created}"
+    if isinstance(result.artefact, Evaluation):
+        screen.facts(title, {})
+        tables(screen, result.artefact)
+    else:
+        screen.facts(title, result.facts)
+    if not json:
+        typer.echo("history\n" + "\n".join(f"  {line}" for line in header.history))

@@ -1,0 +1,190 @@
+"""Identify: from one or several runs to a Preisach model."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.artefacts import output, provenance, store
+from pulsetrainer.artefacts.kinds import BoolArray, Fit, Model, Run
+from pulsetrainer.core import metrics
+from pulsetrainer.core.identification import Identified, Method, coverage, identify
+from pulsetrainer.core.plane import Plane, Reading
+from pulsetrainer.errors import DataError
+from pulsetrainer.flows.modelling import known_from, record_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pulsetrainer.flows.context import Context
+
+_TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Which runs to fit, and how."""
+
+    runs: tuple[Path, ...]
+    output: Path
+    levels: int = 48
+    operator: Reading = "continuous"
+    method: Method = "joint"
+    force: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """How the model came out."""
+
+    output: Path
+    levels: int
+    cells: int
+    offset: float
+    output_unit: str
+    fit_rms: float
+    fit_rms_percent: float
+    fit_max_percent: float
+    coverage_percent: float
+    polarity: int
+    iterations: int
+    seconds: float
+
+
+def run(options: Options, context: Context) -> Result:
+    """Fit the runs and store the model.
+
+    Raises
+    ------
+    UsageError
+        The output exists.
+    DataError
+        A file is no run, the runs differ in their units, or an input or output does not vary.
+    ConvergenceError
+        The fit did not settle.
+    """
+    output.check_output(options.output, options.force)
+    begun = time.perf_counter()
+    runs = [store.read(path, Run) for path in options.runs]
+    _check_units(options.runs, runs)
+    for path, one in zip(options.runs, runs, strict=True):
+        if not one.complete:
+            context.note(f"{path} is incomplete; fitting the {one.input.size} samples it has")
+    ranges = [input_range(one) for one in runs]
+    low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
+    _check_range(options.runs, low, high, runs[0].input_unit)
+    plane = Plane.uniform(low, high, options.levels)
+    context.progress(0.1)
+    found = identify(
+        [record_of(one, low, high) for one in runs], plane, reading=options.operator, method=options.method
+    )
+    context.progress(0.8)
+    if found.operator.polarity < 0:
+        context.note("the output falls when the input rises: fitted as a falling loop")
+    covered = coverage(plane, [one.input for one in runs])
+    model = _model(runs, found, covered)
+    context.progress(0.9)
+    header = provenance.make_header(
+        f"Preisach model of {', '.join(path.stem for path in options.runs)}",
+        argv=context.argv,
+        now=context.now(),
+        parameters={k: v for k, v in asdict(options).items() if k not in ("runs", "output", "force")},
+        inputs=provenance.digests(options.runs),
+        ancestors=[store.read_header(path) for path in options.runs],
+        libraries=provenance.library_versions(),
+    )
+    store.write(options.output, model, header, force=options.force)
+    context.progress(1.0)
+    assert model.fit is not None
+    return Result(
+        output=options.output,
+        levels=plane.n_h,
+        cells=plane.n_q,
+        offset=model.offset,
+        output_unit=model.output_unit,
+        fit_rms=model.fit.rms,
+        fit_rms_percent=model.fit.rms_percent,
+        fit_max_percent=100.0 * model.fit.max_abs / float(np.ptp(np.concatenate([r.output for r in runs]))),
+        coverage_percent=model.fit.coverage_percent,
+        polarity=model.polarity,
+        iterations=model.fit.iterations,
+        seconds=time.perf_counter() - begun,
+    )
+
+
+def input_range(one: Run) -> tuple[float, float]:
+    """Range of the input of a run; what noise adds beyond the reference does not count."""
+    low, high = float(np.min(one.input)), float(np.max(one.input))
+    if one.reference is not None:
+        low, high = max(low, float(np.min(one.reference))), min(high, float(np.max(one.reference)))
+    return low, high
+
+
+def _check_units(paths: Sequence[Path], runs: Sequence[Run]) -> None:
+    """Raise DataError unless all runs measure in the same units."""
+    first = runs[0]
+    for path, one in zip(paths, runs, strict=True):
+        if (one.input_unit, one.output_unit) != (first.input_unit, first.output_unit):
+            raise DataError(
+                f"{path} is in {one.input_unit} and {one.output_unit}, "
+                f"but {paths[0]} is in {first.input_unit} and {first.output_unit}",
+                hint="import the runs again with the same --input-unit and --output-unit",
+            )
+
+
+def _check_range(paths: Sequence[Path], low: float, high: float, unit: str) -> None:
+    """Raise DataError when the input does not move."""
+    if not high > low:
+        names = ", ".join(str(path) for path in paths)
+        raise DataError(
+            f"the input of {names} does not move: it is {low:g} {unit} in all samples",
+            hint="record a run that sweeps the range: pulsetrainer capture identification -o run.h5",
+        )
+
+
+def _model(runs: Sequence[Run], found: Identified, covered: BoolArray) -> Model:
+    """Return the stored form of an identified operator, with its fit."""
+    operator, first = found.operator, runs[0]
+    plane = operator.plane
+    measured, predicted = [], []
+    for one in runs:
+        known = known_from(one.input, plane.low, plane.high)
+        measured.append(one.output[known:])
+        predicted.append(operator(one.input)[known:])
+    errors = metrics.prediction(np.concatenate(measured), np.concatenate(predicted))
+    shown = slice(
+        known_from(first.input, plane.low, plane.high), None, max(1, first.input.size // _TRACE_SAMPLES)
+    )
+    fit = Fit(
+        rms=errors.rms,
+        max_abs=errors.max_abs,
+        rms_percent=errors.rms_percent,
+        coverage_percent=100.0 * float(np.mean(covered)),
+        input_unit=first.input_unit,
+        output_unit=first.output_unit,
+        samples=sum(part.size for part in measured),
+        iterations=found.iterations,
+        method=found.method,
+        time_s=None if first.time_s is None else first.time_s[shown],
+        input=first.input[shown],
+        output=first.output[shown],
+        predicted=operator(first.input)[shown],
+    )
+    return Model(
+        levels=plane.levels,
+        weights=operator.weights,
+        offset=operator.offset,
+        covered=covered,
+        weights_unit=f"{first.output_unit}/({first.input_unit})^2",
+        input_unit=first.input_unit,
+        output_unit=first.output_unit,
+        input_quantity=first.input_quantity,
+        output_quantity=first.output_quantity,
+        operator=operator.reading,
+        polarity=operator.polarity,
+        fit=fit,
+    )

@@ -1,0 +1,57 @@
+"""Plot: one figure of whatever an artefact holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pulsetrainer.artefacts import output, store
+from pulsetrainer.errors import UsageError
+from pulsetrainer.report import figures, render
+
+if TYPE_CHECKING:
+    from pulsetrainer.flows.context import Context
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Which file, and where the figure goes."""
+
+    file: Path
+    output: Path
+    force: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """The figure's file and the kind it shows."""
+
+    output: Path
+    kind: str
+
+
+def run(options: Options, context: Context) -> Result:
+    """Draw the artefact.
+
+    Raises
+    ------
+    UsageError
+        The output exists, or its format is unknown.
+    DataError
+        The file cannot be read or is not an artefact.
+    """
+    form = options.output.suffix.lower().lstrip(".")
+    if form not in render.FORMATS:
+        raise UsageError(
+            f"a figure is written as {', '.join(render.FORMATS)}, but {options.output} ends in {form!r}",
+            hint=f"name it {options.output.with_suffix('.png')}",
+        )
+    output.check_output(options.output, options.force)
+    artefact = store.read_any(options.file)
+    context.progress(0.3)
+    picture = render.encode(figures.draw(artefact), form)
+    with output.replacing(options.output, force=options.force) as temporary:
+        temporary.write_bytes(picture)
+    context.progress(1.0)
+    return Result(options.output, artefact.kind)

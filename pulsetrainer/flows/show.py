@@ -1,0 +1,122 @@
+"""Show: what an artefact is, where it comes from, and its main figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pulsetrainer.artefacts import store
+from pulsetrainer.artefacts.kinds import Evaluation, Model, Playback, Run, Waveform
+from pulsetrainer.artefacts.provenance import Header
+from pulsetrainer.core.memory import turning_points
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.flows.evaluate import metrics_of
+
+if TYPE_CHECKING:
+    from pulsetrainer.flows.context import Context
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Which file."""
+
+    file: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What is in it."""
+
+    file: Path
+    kind: str
+    header: Header
+    artefact: Any
+    facts: dict[str, Any]  # name: value, in the order in which a person would ask
+
+
+def run(options: Options, context: Context) -> Result:
+    """Read an artefact and sum it up.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read or is not an artefact.
+    """
+    artefact = store.read_any(options.file)
+    header = store.read_header(options.file)
+    context.progress(1.0)
+    return Result(options.file, artefact.kind, header, artefact, facts(artefact))
+
+
+def facts(artefact: Any) -> dict[str, Any]:
+    """Return the main figures of an artefact."""
+    if isinstance(artefact, Run):
+        return _run(artefact)
+    if isinstance(artefact, Model):
+        return _model(artefact)
+    if isinstance(artefact, Waveform):
+        return _waveform(artefact)
+    if isinstance(artefact, Playback):
+        return _waveform(artefact.waveform) | {
+            "repeats": artefact.compensated.output.shape[0],
+            "complete": artefact.complete,
+            "dropped_samples": artefact.dropped_samples,
+        }
+    if isinstance(artefact, Evaluation):
+        return dict(metrics_of(artefact))
+    return {field.name: getattr(artefact, field.name) for field in fields(artefact)}
+
+
+def _span(values: FloatArray, unit: str) -> str:
+    if values.size == 0:
+        return "no samples"
+    return f"{np.min(values):.4g} .. {np.max(values):.4g} {unit}"
+
+
+def _run(run: Run) -> dict[str, Any]:
+    timed = run.time_s is not None and run.time_s.size > 1
+    steps = np.diff(run.time_s) if run.time_s is not None and timed else np.zeros(0)
+    return {
+        "signal": run.signal,
+        "samples": run.input.size,
+        "seconds": float(run.time_s[-1] - run.time_s[0]) if run.time_s is not None and timed else None,
+        "rate_Hz": float(1.0 / np.median(steps)) if timed else None,
+        "gaps": int(np.sum(steps > 1.5 * np.median(steps))) if timed else None,
+        f"input ({run.input_quantity})": _span(run.input, run.input_unit),
+        f"output ({run.output_quantity})": _span(run.output, run.output_unit),
+        "reversals": max(turning_points(run.input if run.reference is None else run.reference).size - 1, 0),
+        "complete": run.complete,
+        "dropped_samples": run.dropped_samples,
+    }
+
+
+def _model(model: Model) -> dict[str, Any]:
+    fit = model.fit
+    return {
+        "levels": model.levels.size - 1,
+        "cells": model.weights.size,
+        "operator": model.operator,
+        "polarity": model.polarity,
+        f"input ({model.input_quantity})": _span(model.levels, model.input_unit),
+        "offset": f"{model.offset:.4g} {model.output_unit}",
+        "positive weights": int(np.sum(model.weights > 0)),
+        "fit_rms_percent": fit.rms_percent if fit else None,
+        "coverage_percent": fit.coverage_percent if fit else None,
+        "extensions": [extension.cause for extension in model.extensions],
+    }
+
+
+def _waveform(waveform: Waveform) -> dict[str, Any]:
+    return {
+        "waveform": waveform.name,
+        "inversion": waveform.inversion,
+        "samples": waveform.time_s.size,
+        "seconds": float(waveform.time_s[-1]),
+        "target": _span(waveform.target[waveform.scored], waveform.output_unit),
+        "compensated drive": _span(waveform.compensated, waveform.input_unit),
+        "clipped_samples": waveform.clipped_samples,
+        "source": waveform.source,
+    }
