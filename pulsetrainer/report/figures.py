@@ -45,10 +45,10 @@ def preisach_density(model: Model) -> Figure:
 
 
 @styled
-def identification(fit: Fit) -> Figure:
+def identification(fit: Fit, input_quantity: str = "input", output_quantity: str = "output") -> Figure:
     """Return system and model on the identification signal, and the residual (fig. 8)."""
     figure = _sheet(height_in=5.4)
-    panels.fit(figure, fit)
+    panels.fit(figure, fit, input_quantity, output_quantity)
     return figure
 
 
@@ -69,10 +69,10 @@ def loops(played: WaveformEvaluation) -> Figure:
 
 
 @styled
-def prediction(model: ModelEvaluation) -> Figure:
-    """Return a measured run, a model's prediction of it, and the residual."""
+def prediction(model: ModelEvaluation, reach: float | None = None) -> Figure:
+    """Return a measured run, a model's prediction of it, and the residual, to be drawn up to ``reach``."""
     figure = _sheet()
-    panels.prediction(figure, model)
+    panels.prediction(figure, model, reach)
     return figure
 
 
@@ -170,8 +170,9 @@ def evaluation(errors: Evaluation) -> Figure:
     for row, played in zip(cells, errors.waveforms, strict=False):
         panels.tracking(row[0], played)
         panels.loops(row[1], played)
+    reach = panels.largest_residual(errors.models)
     for cell, predicted in zip(cells[len(errors.waveforms) :].flat, errors.models, strict=False):
-        panels.prediction(cell, predicted)
+        panels.prediction(cell, predicted, reach)
     return figure
 
 

@@ -27,6 +27,7 @@ from pulsetrainer.report.style import (
 from pulsetrainer.report.thin import extremes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any
 
     from matplotlib.axes import Axes
@@ -152,9 +153,7 @@ def _facts(model: Model) -> str:
     return "\n".join(lines)
 
 
-def fit(
-    panel: FigureBase, record: Fit, input_quantity: str = "input", output_quantity: str = "output"
-) -> None:
+def fit(panel: FigureBase, record: Fit, input_quantity: str, output_quantity: str) -> None:
     """Draw output over input, measured and modelled, and the residual over time below."""
     loop, below = panel.subplots(2, 1, height_ratios=(2.4, 1.0))
     orbit(loop, record.input, record.output, **GROUND, label="measured")
@@ -177,8 +176,11 @@ def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> N
     trace(axes, x, difference, **ERROR)
 
 
-def prediction(panel: FigureBase, model: ModelEvaluation) -> None:
-    """Draw a measured record with a model's prediction of it, and the residual below."""
+def prediction(panel: FigureBase, model: ModelEvaluation, reach: float | None = None) -> None:
+    """Draw a measured record with a model's prediction of it, and the residual below.
+
+    With ``reach`` the residual is drawn from -reach to reach, so that several models compare by eye.
+    """
     above, below = panel.subplots(2, 1, sharex=True, height_ratios=(1.7, 1.0))
     x, name = abscissa(model.time_s, model.output.size)
     trace(above, x, model.output, **GROUND, label="measured")
@@ -187,8 +189,17 @@ def prediction(panel: FigureBase, model: ModelEvaluation) -> None:
     above.set_title(f"{model.name}: rms {model.rms_percent:.3g} % of span")
     headroom(above)
     residual(below, x, model.output - model.predicted, model.rms)
+    if reach is not None and np.isfinite(reach) and reach > 0:
+        below.set_ylim(-1.05 * reach, 1.05 * reach)
     below.set_xlabel(name)
     below.set_ylabel(label("residual", model.output_unit))
+
+
+def largest_residual(models: Sequence[ModelEvaluation]) -> float:
+    """Return the largest residual of all models, NaN where there is none."""
+    return max(
+        (float(np.nanmax(np.abs(m.output - m.predicted), initial=0.0)) for m in models), default=float("nan")
+    )
 
 
 def tracking(panel: FigureBase, played: WaveformEvaluation) -> None:

@@ -1,0 +1,81 @@
+"""Figures in words: the text alternatives for a reader who does not see them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.report.style import pretty_unit
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from pulsetrainer.artefacts.kinds import Fit, Model, ModelEvaluation, WaveformEvaluation
+
+
+def _range(values: NDArray[np.float64], unit: str) -> str:
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return "without a single value"
+    return f"from {known.min():.3g} to {known.max():.3g} {pretty_unit(unit)}".rstrip()
+
+
+def density(model: Model) -> str:
+    """Say where the density is largest and how much of the plane was covered."""
+    n_h = model.levels.size - 1
+    i, j = np.tril_indices(n_h)
+    covered = int(np.count_nonzero(model.covered))
+    text = (
+        f"Colour map over the half-plane of switching levels, {model.input_quantity} "
+        f"{_range(model.levels, model.input_unit)}: {n_h} levels, "
+        f"{covered} of {model.weights.size} cells covered."
+    )
+    off_diagonal = np.where((i != j) & model.covered, model.weights, 0.0)
+    if off_diagonal.max(initial=0.0) > 0:
+        k = int(np.argmax(off_diagonal))
+        beta, alpha = model.levels[j[k] : j[k] + 2].mean(), model.levels[i[k] : i[k] + 2].mean()
+        text += (
+            " Off the diagonal the density is greatest, "
+            f"{off_diagonal[k]:.3g} {pretty_unit(model.weights_unit)}, for relays that switch up "
+            f"at {alpha:.3g} and down at {beta:.3g} {pretty_unit(model.input_unit)}."
+        )
+    return text
+
+
+def identification(fit: Fit) -> str:
+    """Say what was measured and how far the model is from it."""
+    unit = pretty_unit(fit.output_unit)
+    return (
+        f"Above: loops of the measured output, {_range(fit.output, fit.output_unit)}, over the input, "
+        f"{_range(fit.input, fit.input_unit)}, with the output of the model laid on them. "
+        f"Below: the residual over time, rms {fit.rms:.3g} {unit}, at most {fit.max_abs:.3g} {unit}."
+    )
+
+
+def tracking(played: WaveformEvaluation) -> str:
+    """Say how far each drive is from the target."""
+    return (
+        f"Above: target force, {_range(played.target, played.output_unit)}, over time, "
+        f"{_range(played.time_s, 's')}, with the measured force of the scaled and of the compensated drive. "
+        f"Below: their errors; the largest is {played.scaled.max_abs_error_percent:.2f} % of full force for "
+        f"the scaled and {played.compensated.max_abs_error_percent:.2f} % for the compensated drive."
+    )
+
+
+def loops(played: WaveformEvaluation) -> str:
+    """Say how wide each loop is."""
+    return (
+        "Measured force over target force, beside the diagonal where both are equal. "
+        f"The scaled drive makes a loop of {played.scaled.hysteresis_percent:.2f} % of full force squared, "
+        f"the compensated drive one of {played.compensated.hysteresis_percent:.2f} %."
+    )
+
+
+def prediction(model: ModelEvaluation) -> str:
+    """Say how far the prediction is from the measurement."""
+    return (
+        f"Above: measured output, {_range(model.output, model.output_unit)}, with the prediction of "
+        f"{model.name} laid on it. Below: the residual, rms {model.rms:.3g} "
+        f"{pretty_unit(model.output_unit)}, at most {model.max_percent:.2f} % of the span."
+    )

@@ -1,0 +1,78 @@
+"""The report: one HTML page that needs nothing but itself, for a screen, a phone and paper."""
+
+from __future__ import annotations
+
+import json
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from pulsetrainer.report import views
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pulsetrainer.artefacts.kinds import Evaluation
+
+
+def render_evaluation(
+    evaluation: Evaluation,
+    *,
+    title: str,
+    created: str,
+    provenance_json: str,
+    published: views.Published | None = None,
+    history: Sequence[str] = (),
+) -> str:
+    """Return the report of an evaluation as one self-contained HTML page.
+
+    Parameters
+    ----------
+    evaluation
+        Of played waveforms, or of models on a held-out run.
+    title, created, provenance_json, history
+        From the header of the artefact: a line for a person, ISO 8601, a JSON object, a line per command.
+    published
+        Figures of a published device by waveform, to stand beside: ``mean_error_reduction_percent``,
+        ``scaled.max_abs_error_percent`` and so on.
+
+    """
+    played = [(one, f"waveform-{k}") for k, one in enumerate(evaluation.waveforms, start=1)]
+    beside = published or {}
+    return (
+        _environment()
+        .get_template("evaluation.html.j2")
+        .render(
+            title=title,
+            created=created,
+            provenance=_indented(provenance_json),
+            history=tuple(history),
+            readouts=[views.readout(one, identifier) for one, identifier in played],
+            overview=views.overview(played, beside),
+            compared=any(one.name in beside for one, _ in played),
+            model=None if evaluation.model is None else views.model_section(evaluation.model),
+            waveforms=[views.waveform_section(one, identifier) for one, identifier in played],
+            prediction=views.prediction_section(evaluation.models) if evaluation.models else None,
+        )
+    )
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    return Environment(
+        loader=PackageLoader("pulsetrainer.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def _indented(text: str) -> str:
+    """Return JSON in lines for a reader; what is not JSON is shown as it is."""
+    try:
+        return json.dumps(json.loads(text), indent=2, ensure_ascii=False)
+    except ValueError:
+        return text

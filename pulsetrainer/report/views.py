@@ -1,0 +1,283 @@
+"""What the page shows, before it is a page: small frozen values, each number with its name.
+
+A number keeps its full precision in ``value`` and its dotted name in ``metric``, for instance
+``normal.continuous.scaled.max_abs_error_percent``, so that page and HDF5 can be held against each other.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Final
+
+from markupsafe import Markup
+
+from pulsetrainer.report import alternatives, figures
+from pulsetrainer.report.panels import largest_residual
+from pulsetrainer.report.render import inline_svg
+from pulsetrainer.report.style import label, pretty_unit
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from matplotlib.figure import Figure
+
+    from pulsetrainer.artefacts.kinds import Model, ModelEvaluation, WaveformEvaluation
+
+    Published = Mapping[str, Mapping[str, float]]
+
+FORCE: Final = "% of full force"
+# per drive, in the table of a waveform: field, what it is, its unit in words
+DRIVE_METRICS: Final = (
+    ("mean_abs_error_percent", "mean absolute error", FORCE),
+    ("max_abs_error_percent", "largest absolute error", FORCE),
+    ("rms_error_percent", "rms error", FORCE),
+    ("hysteresis_percent", "total hysteresis: loop area per beat", "% of full force squared"),
+    ("current_tracking_max_percent", "largest current tracking error", "% of the current range"),
+)
+# the columns of the overview, as dotted names within a waveform
+OVERVIEW: Final = (
+    "scaled.mean_abs_error_percent",
+    "compensated.mean_abs_error_percent",
+    "mean_error_reduction_percent",
+    "scaled.max_abs_error_percent",
+    "compensated.max_abs_error_percent",
+    "scaled.hysteresis_percent",
+    "compensated.hysteresis_percent",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number as it is printed, its value to the last digit, its name; or an empty place."""
+
+    text: str
+    value: str = ""
+    metric: str = ""
+    published: bool = False  # somebody else's: not of this evaluation
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of a table: what it is about, in which unit or by which method, and its numbers."""
+
+    name: str
+    note: str
+    cells: tuple[Number, ...]
+    link: str = ""
+    published: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A figure with its caption."""
+
+    svg: Markup
+    caption: str
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One part of the page: facts, a table, figures."""
+
+    identifier: str
+    title: str
+    facts: tuple[tuple[str, Number], ...] = ()
+    rows: tuple[Row, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Readout:
+    """The one number to see first of a played waveform."""
+
+    title: str
+    link: str
+    reduction: Number
+    scaled: Number
+    compensated: Number
+
+
+def number(value: float, metric: str = "", digits: str = ".2f", *, published: bool = False) -> Number:
+    """Return a number for the page; NaN, the mean of nothing, is said in words."""
+    text = format(value, digits).replace("-", "−") if math.isfinite(value) else "no value"
+    return Number(text, repr(float(value)), metric, published)
+
+
+def _count(value: int, metric: str = "") -> Number:
+    return Number(str(value), str(value), metric)
+
+
+def _picture(figure: Figure, identifier: str, title: str, description: str, caption: str) -> Picture:
+    svg = inline_svg(figure, identifier=identifier, title=title, description=description)
+    return Picture(Markup(svg), caption)  # noqa: S704 - our own XML, its texts are escaped
+
+
+def _stem(played: WaveformEvaluation) -> str:
+    return f"{played.name}.{played.inversion}"
+
+
+def _title(played: WaveformEvaluation) -> str:
+    return f"{played.name}, {played.inversion} inverse"
+
+
+def _metric(played: WaveformEvaluation, dotted: str) -> Number:
+    drive, _, field = dotted.rpartition(".")
+    return number(
+        float(getattr(getattr(played, drive) if drive else played, field)), f"{_stem(played)}.{dotted}"
+    )
+
+
+def readout(played: WaveformEvaluation, link: str) -> Readout:
+    """Return what stands at the top of the page for one played waveform."""
+    return Readout(
+        _title(played),
+        link,
+        number(
+            played.mean_error_reduction_percent, f"{_stem(played)}.mean_error_reduction_percent", digits=".1f"
+        ),
+        _metric(played, "scaled.mean_abs_error_percent"),
+        _metric(played, "compensated.mean_abs_error_percent"),
+    )
+
+
+def overview(played: Sequence[tuple[WaveformEvaluation, str]], published: Published) -> tuple[Row, ...]:
+    """Return one row per waveform and inverse, and below those of a waveform the published device.
+
+    ``played`` holds each evaluation with the identifier of its section.
+    """
+    rows: list[Row] = []
+    for name in dict.fromkeys(one.name for one, _ in played):
+        rows += [
+            Row(name, f"{one.inversion} inverse", tuple(_metric(one, dotted) for dotted in OVERVIEW), link)
+            for one, link in played
+            if one.name == name
+        ]
+        if name in published:
+            known = published[name]
+            cells = tuple(
+                number(known[dotted], f"{name}.{dotted}", ".1f", published=True)
+                if dotted in known
+                else Number("")
+                for dotted in OVERVIEW
+            )
+            rows.append(Row(name, "published device", cells, published=True))
+    return tuple(rows)
+
+
+def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
+    """Return the part of the page about one played waveform."""
+    stem, title = _stem(played), _title(played)
+    return Section(
+        identifier,
+        title,
+        facts=(
+            ("mean error reduced by [%]", _metric(played, "mean_error_reduction_percent")),
+            (f"spread between repeats [{FORCE}]", _metric(played, "noise_percent")),
+            (
+                label("full force", played.output_unit),
+                number(played.full_force, f"{stem}.full_force", ".4g"),
+            ),
+            ("repeats", _count(played.repeats, f"{stem}.repeats")),
+        ),
+        rows=tuple(
+            Row(
+                words, unit, tuple(_metric(played, f"{drive}.{field}") for drive in ("scaled", "compensated"))
+            )
+            for field, words, unit in DRIVE_METRICS
+        ),
+        pictures=(
+            _picture(
+                figures.tracking(played),
+                f"{identifier}-tracking",
+                f"Force and error over time: {title}",
+                alternatives.tracking(played),
+                "Force with and without compensation, mean of the repeats; below, the error of each.",
+            ),
+            _picture(
+                figures.loops(played),
+                f"{identifier}-loops",
+                f"Force against target: {title}",
+                alternatives.loops(played),
+                "Force against target. Hysteresis opens a loop; without it the curve is the diagonal.",
+            ),
+        ),
+    )
+
+
+def model_section(model: Model) -> Section:
+    """Return the part of the page about the model behind the waveforms."""
+    facts = [
+        ("levels", _count(model.levels.size - 1, "model.levels")),
+        ("cells", _count(model.weights.size, "model.cells")),
+        (label("offset", model.output_unit), number(model.offset, "model.offset", ".4g")),
+    ]
+    pictures = [
+        _picture(
+            figures.preisach_density(model),
+            "model-density",
+            "Preisach density",
+            alternatives.density(model),
+            "The density over the levels at which relays switch up (α) and down (β). "
+            "The diagonal is the reversible part; orange lies beyond the scale.",
+        )
+    ]
+    if model.fit is not None:
+        facts += [
+            ("covered cells [%]", number(model.fit.coverage_percent, "model.fit.coverage_percent", ".1f")),
+            (label("rms of the fit", model.output_unit), number(model.fit.rms, "model.fit.rms", ".3g")),
+            ("rms of the fit [% of span]", number(model.fit.rms_percent, "model.fit.rms_percent", ".3g")),
+        ]
+        pictures.append(
+            _picture(
+                figures.identification(model.fit, model.input_quantity, model.output_quantity),
+                "model-fit",
+                "Model and system on the identification signal",
+                alternatives.identification(model.fit),
+                "System and model on the identification signal, and what the model leaves over; "
+                "the dotted lines are at plus and minus the rms.",
+            )
+        )
+    rows = tuple(
+        Row(
+            f"{extension.cause}: {parameter.name}",
+            pretty_unit(parameter.unit),
+            tuple(
+                number(value, f"model.{extension.cause}.{parameter.name}{suffix}", ".4g")
+                for value, suffix in (
+                    (parameter.value, ""),
+                    (parameter.lower, ".lower"),
+                    (parameter.upper, ".upper"),
+                )
+            ),
+        )
+        for extension in model.extensions
+        for parameter in extension.parameters
+    )
+    return Section("model", "Model", tuple(facts), rows, tuple(pictures))
+
+
+def prediction_section(models: Sequence[ModelEvaluation]) -> Section:
+    """Return the part of the page about models on a held-out run."""
+    rows, pictures = [], []
+    reach = largest_residual(models)
+    for k, model in enumerate(models, start=1):
+        stem = PurePath(model.name).stem
+        cells = (
+            number(model.rms, f"{stem}.rms", ".4g"),
+            number(model.rms_percent, f"{stem}.rms_percent", ".3f"),
+            number(model.max_percent, f"{stem}.max_percent"),
+            number(model.gain_percent, f"{stem}.gain_percent", ".1f"),
+        )
+        rows.append(Row(model.name, pretty_unit(model.output_unit), cells))
+        pictures.append(
+            _picture(
+                figures.prediction(model, reach),
+                f"prediction-{k}",
+                f"Prediction by {model.name}",
+                alternatives.prediction(model),
+                f"{model.name} on the held-out run; the dotted lines are at plus and minus the rms.",
+            )
+        )
+    return Section("prediction", "Prediction of a held-out run", (), tuple(rows), tuple(pictures))
