@@ -116,14 +116,14 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
 class Bench:
     """A running firmware process; ``path`` is its pty."""
 
-    def __init__(self, port: str) -> None:
+    def __init__(self, port: str, executable: Path | None = None) -> None:
         if os.name != "posix":
             raise DeviceError(
                 "the virtual bench needs a pseudo-terminal, which this system does not have",
                 hint="use Linux, macOS or WSL for bench:, or a real device with --port COM3",
             )
         options = parse_bench(port)
-        executable = firmware_executable()
+        executable = executable or firmware_executable()
         # A session of its own: Ctrl-C in the terminal must reach the host program only, which then stops
         # the device in order. The pipe on standard input is the leash: it closes however we end.
         self._process = subprocess.Popen(

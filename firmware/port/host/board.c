@@ -86,10 +86,15 @@ static bool breaks_now(enum broken what)
     return now;
 }
 
-bool board_main_loop_hangs(void)
+bool board_main_loop_runs(void)
 {
     if (breaks_now(HANG))
         hanging = true;
+    return !hanging;
+}
+
+bool board_hangs(void)
+{
     return hanging;
 }
 

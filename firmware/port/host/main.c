@@ -137,7 +137,7 @@ static void serve(void)
     for (uint32_t round = 0;; round++) {
         if (!read_host())
             return;
-        if (!board_main_loop_hangs())
+        if (board_main_loop_runs())
             do
                 app_poll();
             while (board_received());

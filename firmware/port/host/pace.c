@@ -8,7 +8,8 @@
  *   - armed but not started, and while playing whenever the host has been silent for 100 ms of device
  *     time, the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
  *     for at most half a second of wall time; after that it goes on at the wall clock, so that a
- *     host that is really gone trips the 200 ms heartbeat like on a real device. */
+ *     host that is really gone trips the 200 ms heartbeat like on a real device.
+ * A coil that has tripped its heat model cools only while time runs: open a new bench instead of waiting. */
 #include "app.h"
 #include "port.h"
 
@@ -70,6 +71,8 @@ static bool must_wait(void)
 {
     switch (app.state) {
     case PT_STATE_RUNNING:
+        if (board_hangs()) /* nobody to wait for: the watchdog has to see time pass */
+            return false;
         return silent_ticks >= SILENCE_TICKS || wave_ticks_left(&app.wave) < 2 * BATCH ||
                telemetry_waiting(&app.telemetry) >= TELEMETRY_HIGH;
     case PT_STATE_ARMED:

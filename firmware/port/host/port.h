@@ -17,7 +17,8 @@ const uint8_t *board_to_send(int32_t *count);   /* a contiguous piece of the tra
 void board_sent(int32_t count);
 bool board_break(const char *what_at);          /* "force-frozen@0.5": false when it means nothing */
 void board_list_breaks(void);
-bool board_main_loop_hangs(void);
+bool board_main_loop_runs(void);                /* false once "hang" has struck */
+bool board_hangs(void);
 uint64_t board_ticks(void);                     /* since power-on */
 
 /* pace.c: how many ticks may run now. */

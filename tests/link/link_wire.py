@@ -1,0 +1,75 @@
+"""A hand on the wire of a real firmware process, one command at a time."""
+
+from __future__ import annotations
+
+import time
+import zlib
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from pulsetrainer.link import codes
+from pulsetrainer.link import messages as m
+from pulsetrainer.link.bench import Bench
+from pulsetrainer.link.session import Session
+from pulsetrainer.link.transport import SerialTransport
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    import numpy as np
+
+
+class Wire:
+    """A session on a bench, one command at a time."""
+
+    def __init__(self, port: str, executable: Path | None = None) -> None:
+        self.bench = Bench(port, executable)
+        self.transport = SerialTransport(self.bench.path)
+        self.session = Session(self.transport, "bench:", monotonic=time.monotonic)
+        self.telemetry: list[m.Telemetry] = []
+        self.session.on_telemetry = self.telemetry.append
+
+    def close(self) -> None:
+        self.transport.close()
+        self.bench.close()
+
+    def ask(self, command: m.Message) -> m.Message:
+        return self.session.request(command)
+
+    def status(self) -> m.StatusReply:
+        reply = self.ask(m.Status())
+        assert isinstance(reply, m.StatusReply)
+        return reply
+
+    def start(self, samples: np.ndarray, *, total: int | None = None, decimation: int = 10) -> m.HelloReply:
+        """Greet, upload ``samples`` [100 uA] at 1 kHz of ``total`` announced, arm and start."""
+        hello = self.session.hello()
+        wire = samples.astype("<i2").tobytes()
+        self.ask(m.Stream(decimation))
+        self.ask(m.WaveBegin(total or len(samples), 10, zlib.crc32(wire)))
+        for at in range(0, len(samples), 61):
+            piece = wire[2 * at : 2 * (at + 61)]
+            self.ask(m.WaveData(at, len(piece) // 2, piece))
+        self.ask(m.WaveCommit(len(samples), zlib.crc32(wire)))
+        self.ask(m.Arm(hello.boot_nonce))
+        self.ask(m.Start())
+        return hello
+
+    def wait_for(self, *states: codes.State, seconds: float = 5.0) -> m.StatusReply:
+        """Return the status once the device is in one of ``states``."""
+        deadline = time.monotonic() + seconds
+        while True:
+            status = self.status()
+            if status.state in states:
+                return status
+            assert time.monotonic() < deadline, f"still {codes.State(status.state).name} after {seconds} s"
+            time.sleep(0.01)
+
+
+@contextmanager
+def within(seconds: float) -> Iterator[None]:
+    """Assert that the block takes no longer than a generous limit."""
+    begun = time.monotonic()
+    yield
+    assert time.monotonic() - begun < seconds

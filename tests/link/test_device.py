@@ -1,0 +1,272 @@
+"""Playing and recording on the real firmware."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import numpy as np
+import pytest
+from link_wire import within
+
+from pulsetrainer.errors import ArgumentError, DeviceError, UsageError
+from pulsetrainer.link import Block, open_device, player, redact
+from pulsetrainer.link.codes import CURRENT_UNIT_A, PARAMETERS
+from pulsetrainer.link.messages import GetParam
+
+
+def test_handshake_says_who_and_how_much(device):
+    """The device names itself and its limits."""
+    info = device.info
+    assert info.serial == "BENCH-0"
+    assert (info.tick_rate_Hz, info.current_limit_A, info.force_limit_N) == (10_000, 1.5, 15.0)
+    assert (info.heartbeat_s, info.reset_cause, info.latched_fault) == (0.2, "power", "")
+
+
+def test_every_sample_of_a_play_comes_back_aligned(device, pulse):
+    """Telemetry at 1 kHz is the reference sample for sample; the current follows within 1 % of 1.5 A."""
+    recording = device.play(pulse, 1000)
+    assert recording.complete
+    assert (recording.fault, recording.dropped_samples) == ("", 0)
+    np.testing.assert_array_equal(recording.tick, 10 * np.arange(len(pulse)))
+    np.testing.assert_allclose(recording.time_s, np.arange(len(pulse)) / 1000)
+    np.testing.assert_allclose(recording.reference_A, pulse, atol=CURRENT_UNIT_A)
+    assert np.abs(recording.current_A - recording.reference_A).max() < 0.015
+    assert recording.force_N.max() > 5
+
+
+def test_interpolation_is_linear_at_the_tick(device):
+    """At 10 kHz telemetry the reference between two samples is straight."""
+    corners = np.array([0.0, 0.1, 0.05, 0.2])
+    recording = device.play(corners, 100, decimation=1)
+    assert recording.complete
+    expected = np.interp(recording.tick, 100 * np.arange(4), corners)
+    assert len(recording.tick) == 301
+    np.testing.assert_allclose(recording.reference_A, expected, atol=1.01 * CURRENT_UNIT_A)
+
+
+@pytest.mark.parametrize(("rate_Hz", "decimation"), [(10_000, 1), (1000, 7), (250, 100), (2, 1000)])
+def test_rates_and_decimations(device, rate_Hz, decimation):
+    """Any rate that divides the tick, any decimation: the ticks are where they should be."""
+    reference = np.linspace(0.2, 0.3, 41 if rate_Hz < 10 else 3000)
+    recording = device.play(reference, rate_Hz, decimation=decimation)
+    last = (len(reference) - 1) * round(10_000 / rate_Hz)
+    assert recording.complete
+    np.testing.assert_array_equal(recording.tick, np.arange(0, last + 1, decimation))
+
+
+def test_a_single_sample_is_a_play(device):
+    """The shortest reference is one sample."""
+    recording = device.play([0.2], 1000)
+    assert recording.complete
+    assert recording.tick.tolist() == [0]
+
+
+def test_a_long_waveform_streams_through_the_small_buffer(device):
+    """90 s at 1 kHz through a buffer of 1024 samples: nothing lost, in a few seconds of wall time."""
+    reference = 0.75 - 0.75 * np.cos(2 * np.pi * 1.25 * np.arange(90_000) / 1000)
+    with within(20):
+        recording = device.play(reference, 1000)
+    assert recording.complete
+    assert (len(recording.tick), recording.dropped_samples) == (90_000, 0)
+    np.testing.assert_allclose(recording.reference_A, reference, atol=CURRENT_UNIT_A)
+
+
+def test_four_full_strokes_a_second_are_tracked(device):
+    """A 4 Hz full-range pulse train stays within 1 % of the range at every tick."""
+    reference = 0.75 - 0.75 * np.cos(2 * np.pi * 4 * np.arange(2000) / 1000)
+    recording = device.play(reference, 1000, decimation=1)
+    assert np.abs(recording.current_A - recording.reference_A).max() < 0.015
+
+
+def test_blocks_arrive_in_order_and_make_up_the_recording(device, pulse):
+    """on_block sees every sample once, in order, while the play goes on."""
+    blocks: list[Block] = []
+    recording = device.play(np.tile(pulse, 5), 1000, on_block=blocks.append)
+    np.testing.assert_array_equal(np.concatenate([b.tick for b in blocks]), recording.tick)
+    np.testing.assert_array_equal(np.concatenate([b.force_N for b in blocks]), recording.force_N)
+
+
+def test_plays_follow_each_other(device, pulse):
+    """A device can be played again and again; each recording starts at tick 0."""
+    for _ in range(3):
+        recording = device.play(pulse, 1000)
+        assert recording.complete
+        assert recording.tick[0] == 0
+
+
+def test_equal_benches_give_equal_numbers(pulse):
+    """However time passes outside, the same bench and reference give the same record, bit for bit."""
+    records = []
+    for pause_s in (0.0, 0.3):
+        with open_device("bench:?seed=3&creep=0.05") as device:
+            time.sleep(pause_s)
+            device.play(pulse, 1000)
+            time.sleep(pause_s)
+            records.append(device.play(pulse, 1000))
+    np.testing.assert_array_equal(records[0].force_N, records[1].force_N)
+    np.testing.assert_array_equal(records[0].current_A, records[1].current_A)
+
+
+def test_real_speed_is_the_wall_clock(pulse):
+    """speed=real plays one second in one second."""
+    with open_device("bench:?speed=real") as device:
+        begun = time.monotonic()
+        recording = device.play(pulse[:1000], 1000)
+        took_s = time.monotonic() - begun
+    assert recording.complete
+    assert 0.95 < took_s < 10
+
+
+@pytest.mark.parametrize(
+    ("reference", "rate_Hz", "says"),
+    [
+        ([0.1, np.nan], 1000, "sample 1 of the reference is not a number"),
+        ([0.1, 0.2, 1.6], 1000, r"sample 2 of the reference is 1.6 A; the device plays 0..1.5 A"),
+        ([-0.1], 1000, "sample 0 of the reference is -0.1 A"),
+        ([], 1000, "shape"),
+        ([[0.1]], 1000, "shape"),
+        ([0.1], 3000, "3000 Hz does not divide the device's 10000 Hz"),
+        ([0.1], 0, "not possible"),
+        ([0.1], np.inf, "not possible"),
+        (np.zeros(901), 1, "901|900"),
+    ],
+)
+def test_what_cannot_be_played_is_refused_before_arming(device, reference, rate_Hz, says):
+    """A reference outside the device's limits is a clear error and nothing happens."""
+    with pytest.raises(ArgumentError, match=says):
+        device.play(reference, rate_Hz)
+    assert device._status().session == 0
+    assert device.play([0.1], 1000).complete
+
+
+def test_decimation_is_checked(device):
+    """A decimation of nothing is refused."""
+    with pytest.raises(ArgumentError, match="decimation 0"):
+        device.play([0.1], 1000, decimation=0)
+
+
+def test_parameters_can_only_lower_limits(device):
+    """A limit above the compiled one is refused by the program, and by the device itself."""
+    assert device.set_parameter("force_trip", 5000) == 5000
+    for row in PARAMETERS:
+        with pytest.raises(ArgumentError, match="outside"):
+            device.set_parameter(row.name, row.maximum + 1)
+    with pytest.raises(ArgumentError, match="no parameter"):
+        device.set_parameter("magic", 1)
+
+
+def test_should_stop_ends_a_play(device):
+    """The caller can end a play; what came until then is kept, the device is disarmed."""
+    seen = []
+    recording = device.play(
+        np.full(500_000, 0.5),
+        1000,
+        on_block=seen.append,
+        should_stop=lambda: sum(len(b.tick) for b in seen) > 1000,
+    )
+    assert not recording.complete
+    assert recording.fault == "stopped"
+    assert 1000 < len(recording.tick) < 500_000
+    assert recording.dropped_samples == 0
+    assert device._status().state == 0
+
+
+def test_ctrl_c_stops_first_and_keeps_what_was_recorded(device):
+    """KeyboardInterrupt anywhere in a play: the output stops, no sample that was made is lost."""
+
+    def interrupt(block: Block) -> None:
+        if block.tick[-1] > 5000:
+            raise KeyboardInterrupt
+
+    recording = device.play(np.full(500_000, 0.5), 1000, on_block=interrupt)
+    assert (recording.complete, recording.fault, recording.dropped_samples) == (False, "interrupted", 0)
+    np.testing.assert_array_equal(recording.tick, 10 * np.arange(len(recording.tick)))
+    assert device._status().state == 0
+    assert device.play([0.1], 1000).complete
+
+
+def test_an_error_of_the_caller_stops_the_device(device):
+    """An exception in on_block reaches the caller, the output is off by then."""
+
+    def fail(_: Block) -> None:
+        raise RuntimeError("disk full")
+
+    with pytest.raises(RuntimeError, match="disk full"):
+        device.play(np.full(500_000, 0.5), 1000, on_block=fail)
+    assert device._status().state == 0
+
+
+def test_stop_from_another_thread(device):
+    """Device.stop ends a play that another thread waits for."""
+    timer = threading.Timer(0.2, device.stop)
+    timer.start()
+    recording = device.play(np.full(800_000, 0.3), 1000)
+    timer.join()
+    assert (recording.complete, recording.fault) == (False, "stopped")
+
+
+def test_a_slow_reader_does_not_trip_the_device(pulse):
+    """on_block may take longer than the device's patience of 200 ms."""
+    with open_device("bench:?speed=real") as device:
+        recording = device.play(pulse, 1000, on_block=lambda _: time.sleep(0.4))
+    assert recording.complete
+    assert recording.dropped_samples == 0
+
+
+def test_a_reader_that_hangs_is_stopped(monkeypatch):
+    """The playing thread does not vouch for a program that no longer takes its data."""
+    monkeypatch.setattr(player, "_TAKER_S", 0.3)
+    with open_device("bench:?speed=real") as device:
+        recording = device.play(np.full(20_000, 0.5), 1000, on_block=lambda _: time.sleep(1.0))
+    assert not recording.complete
+    assert "did not take its data" in recording.fault
+    assert recording.tick[-1] < 30_000
+
+
+def test_closing_always_disarms(pulse):
+    """Leaving the context ends the firmware process."""
+    with open_device("bench:") as device:
+        device.play(pulse, 1000)
+        bench = device._bench
+    assert bench._process.returncode == 0
+
+
+def test_the_environment_names_the_port(monkeypatch):
+    """Without a port PULSETRAINER_PORT decides, then the bench."""
+    monkeypatch.setenv("PULSETRAINER_PORT", "/dev/no-such-port")
+    with pytest.raises(DeviceError, match="no port /dev/no-such-port"):
+        open_device(None)
+    monkeypatch.delenv("PULSETRAINER_PORT")
+    with open_device(None) as device:
+        assert device.info.serial == "BENCH-0"
+
+
+def test_the_port_is_redacted_for_provenance():
+    """The bench's hidden parameters never leave with a port's name; other ports are named in full."""
+    assert redact("bench:?creep=0.05&seed=3") == "bench:"
+    assert redact("bench:") == "bench:"
+    assert redact("/dev/ttyUSB0") == "/dev/ttyUSB0"
+
+
+def test_nothing_hidden_is_readable(wire):
+    """Two benches that differ in every hidden parameter are one and the same to ask."""
+    told = []
+    for port in ("bench:?ideal", "bench:?seed=3&creep=0.05&noise=0.01&coulomb=1&speed=real"):
+        one = wire(port)
+        hello = one.session.hello()
+        status = one.status()
+        parameters = [one.ask(GetParam(row.id)) for row in PARAMETERS]
+        told.append((_without_nonce(hello), _without_nonce(status), parameters))
+    assert told[0] == told[1]
+
+
+def _without_nonce(message):
+    return [getattr(message, name) for name, _ in message.wire_fields() if name != "boot_nonce"]
+
+
+def test_bad_bench_ports_are_usage_errors():
+    """An unknown parameter is answered with its neighbours."""
+    with pytest.raises(UsageError, match="no parameter 'crep'") as caught:
+        open_device("bench:?crep=0.05")
+    assert "creep" in caught.value.hint
