@@ -145,7 +145,7 @@ def _facts(model: Model) -> str:
     lines = [
         f"{model.levels.size - 1} levels, {model.weights.size} cells",
         f"{covered} covered" + (", the rest hatched" if covered < model.weights.size else ""),
-        f"offset {model.offset:.4g} {pretty_unit(model.output_unit)}".rstrip(),
+        f"offset {model.offset:.4g} {pretty_unit(model.output_unit)}".rstrip().replace("-", "−"),
     ]
     if model.polarity < 0:
         lines.append("output falls as input rises")
@@ -161,7 +161,7 @@ def fit(panel: FigureBase, record: Fit, input_quantity: str, output_quantity: st
     loop.set_xlabel(label(input_quantity, record.input_unit))
     loop.set_ylabel(label(output_quantity, record.output_unit))
     loop.set_title("Identification signal")
-    loop.legend(loc="upper left")
+    headroom(loop, 0.1)
     x, name = abscissa(record.time_s, record.output.size)
     residual(below, x, record.output - record.predicted, record.rms)
     below.set_xlabel(name)

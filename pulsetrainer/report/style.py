@@ -7,6 +7,7 @@ reader lose nothing. The hues are of Okabe and Ito's palette (2008). Each colour
 
 from __future__ import annotations
 
+import re
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Final, ParamSpec, TypeVar
 
@@ -70,6 +71,7 @@ SETTINGS: Final[Any] = {
     "axes.spines.right": False,
     "axes.xmargin": 0.01,
     "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-3, 5),
     "grid.color": GRID,
     "grid.linewidth": 0.6,
     "xtick.color": MUTED,
@@ -111,7 +113,8 @@ def pretty_unit(unit: str) -> str:
         return ""
     if unit == "percent":
         return "%"
-    head, *powers = unit.replace("**", "^").split("^")
+    # brackets around one word, as in N/(A)^2, are for machines
+    head, *powers = re.sub(r"\((\w+)\)", r"\1", unit).replace("**", "^").split("^")
     for power in powers:
         digits = len(power) - len(power.lstrip("-0123456789"))
         head += power[:digits].translate(_POWERS) + power[digits:]

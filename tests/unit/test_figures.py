@@ -273,7 +273,17 @@ def test_error_panel_is_in_percent_of_full_force():
 
 @pytest.mark.parametrize(
     ("unit", "shown"),
-    [("A", "A"), ("N/A^2", "N/A²"), ("m**-1", "m⁻¹"), ("percent", "%"), ("1", ""), ("", ""), ("N*m", "N·m")],
+    [
+        ("A", "A"),
+        ("N/A^2", "N/A²"),
+        ("N/(A)^2", "N/A²"),
+        ("T/(A/m)^2", "T/(A/m)²"),
+        ("m**-1", "m⁻¹"),
+        ("percent", "%"),
+        ("1", ""),
+        ("", ""),
+        ("N*m", "N·m"),
+    ],
 )
 def test_units_are_printed_as_people_write_them(unit, shown):
     """Powers are raised, percent is a sign, a pure number has none."""
