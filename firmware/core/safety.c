@@ -25,6 +25,7 @@ void safety_begin(struct safety *s)
     s->current_rail = 0;
     s->force_rail = 0;
     s->no_current = 0;
+    s->weak_current = 0;
     s->no_force = 0;
     still_reset(&s->current_still);
     still_reset(&s->force_still);
@@ -100,8 +101,11 @@ static uint8_t sensors(struct safety *s, const struct safety_input *in)
     if (still_span(&s->force_still, in->force_counts, in->current) >= SAFETY_FROZEN_FORCE_SPAN)
         return PT_FAULT_FORCE_FROZEN;
 
-    bool no_current = in->duty >= in->full && in->current < in->reference / 2;
-    if (lasts(&s->no_current, no_current, SAFETY_NO_CURRENT_TICKS))
+    bool dead = in->duty > in->full / 4u && in->current < SAFETY_NO_CURRENT_LEVEL;
+    if (lasts(&s->no_current, dead, SAFETY_NO_CURRENT_TICKS))
+        return PT_FAULT_NO_CURRENT;
+    bool weak = in->duty >= in->full && in->current < in->reference / 2;
+    if (lasts(&s->weak_current, weak, SAFETY_WEAK_TICKS))
         return PT_FAULT_NO_CURRENT;
     bool no_force = in->current >= SAFETY_NO_FORCE_CURRENT && in->force < SAFETY_NO_FORCE_LEVEL;
     if (lasts(&s->no_force, no_force, SAFETY_NO_FORCE_TICKS))

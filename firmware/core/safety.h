@@ -18,7 +18,9 @@
 #define SAFETY_FROZEN_CURRENT_SPAN 500   /* the reference moved by 50 mA ... */
 #define SAFETY_FROZEN_CURRENT_TICKS 100u /* ... within at least 10 ms, the reading by not one count */
 #define SAFETY_FROZEN_FORCE_SPAN 13000   /* the current moved by 1.3 A, the force by not one count */
-#define SAFETY_NO_CURRENT_TICKS 300u
+#define SAFETY_NO_CURRENT_LEVEL 500      /* 50 mA at a quarter of the full drive, for 5 ms: a dead shunt */
+#define SAFETY_NO_CURRENT_TICKS 50u
+#define SAFETY_WEAK_TICKS 300u           /* half the reference at full drive, for 30 ms: a weak supply */
 #define SAFETY_NO_FORCE_CURRENT 12000
 #define SAFETY_NO_FORCE_LEVEL 300
 #define SAFETY_NO_FORCE_TICKS 5000u
@@ -62,6 +64,7 @@ struct safety {
     uint16_t current_rail;
     uint16_t force_rail;
     uint16_t no_current;
+    uint16_t weak_current;
     uint16_t no_force;
     uint16_t stray;
     struct safety_still current_still;

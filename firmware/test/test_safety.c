@@ -137,6 +137,11 @@ static void full_drive_without_current_trips(void)
     normal();
     in.duty = in.full;
     in.current = 1000;
+    CHECK_EQUAL(until_fault(1000, &fault, true, true), SAFETY_WEAK_TICKS);
+    CHECK_EQUAL(fault, PT_FAULT_NO_CURRENT);
+    normal();
+    in.duty = (uint16_t)(in.full / 4u + 1u);
+    in.current = 0;
     CHECK_EQUAL(until_fault(1000, &fault, true, true), SAFETY_NO_CURRENT_TICKS);
     CHECK_EQUAL(fault, PT_FAULT_NO_CURRENT);
 }

@@ -70,7 +70,8 @@ def find_device_port() -> str:
 
 def cannot_open(port: str, error: OSError) -> DeviceError:
     """Return what to tell about a port that would not open: absent, busy or not permitted."""
-    number = error.errno
+    # pyserial drops the number of what stopped it; the exception it came from still has it.
+    number = error.errno or next(iter(getattr(error.__context__, "args", ())), None)
     text = str(error)
     if "://" in port:
         return DeviceError(

@@ -31,13 +31,16 @@ class Wire:
         self.session.on_telemetry = self.telemetry.append
 
     def close(self) -> None:
+        """Let go of the port and end the firmware process."""
         self.transport.close()
         self.bench.close()
 
     def ask(self, command: m.Message) -> m.Message:
+        """Return the reply to a command."""
         return self.session.request(command)
 
     def status(self) -> m.StatusReply:
+        """Return the full state."""
         reply = self.ask(m.Status())
         assert isinstance(reply, m.StatusReply)
         return reply

@@ -117,6 +117,8 @@ static void start_firmware(uint8_t reset_cause)
 void board_init(const struct solenoid_params *p, uint8_t reset_cause)
 {
     solenoid_init(&plant, p);
+    frozen.current = solenoid_adc_current(&plant);
+    frozen.force = solenoid_adc_force(&plant);
     start_firmware(reset_cause);
 }
 

@@ -1,0 +1,223 @@
+"""The bench: its port's text, its compiler, its process."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import pytest
+
+from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.link import build, open_device
+from pulsetrainer.link.bench import Bench, BenchOptions, parse_bench
+
+
+@pytest.mark.parametrize(
+    ("port", "options"),
+    [
+        ("bench:", BenchOptions()),
+        ("bench://", BenchOptions()),
+        ("bench:?ideal", BenchOptions(ideal=True)),
+        ("bench:?ideal=1&speed=real", BenchOptions(ideal=True, speed="real")),
+        ("bench:?seed=3&creep=0.05", BenchOptions(settings=(("seed", "3"), ("creep", "0.05")))),
+        ("bench:?break=reset@2", BenchOptions(breaks=("reset@2",))),
+    ],
+)
+def test_ports_that_make_sense(port, options):
+    """The text of a bench port is taken apart."""
+    assert parse_bench(port) == options
+
+
+@pytest.mark.parametrize("port", ["bench", "bench:ideal", "bench:?speed=fast", "bench:?ideal=yes"])
+def test_ports_that_do_not(port):
+    """What cannot be understood is a usage error with an example."""
+    with pytest.raises(UsageError) as caught:
+        parse_bench(port)
+    assert "bench:" in caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("port", "message", "hint"),
+    [
+        ("bench:?crep=1", "no parameter 'crep'", "creep"),
+        ("bench:?zzzz=1", "no parameter 'zzzz'", "there are: ideal, speed, break, seed"),
+        ("bench:?creep=7", "creep=7 is outside its range: 0..0.5", "creep:"),
+        ("bench:?creep=lots", "creep=lots is outside its range", ""),
+        ("bench:?creep=", "creep= is outside its range", ""),
+        ("bench:?break=leg@1", "cannot break 'leg@1'", "current-rail"),
+        ("bench:?break=reset@soon", "cannot break 'reset@soon'", "WHAT@SECONDS"),
+    ],
+)
+def test_unknown_and_impossible_parameters_teach(port, message, hint):
+    """Name, range and meaning of what was mistyped."""
+    with pytest.raises(UsageError) as caught:
+        Bench(port)
+    assert message in caught.value.message
+    assert hint in caught.value.hint
+
+
+def _executable(cache: str) -> str:
+    os.environ["XDG_CACHE_HOME"] = cache
+    return str(build.firmware_executable())
+
+
+def test_two_processes_may_build_at_once(tmp_path):
+    """Both get the same whole executable, nothing half-made stays behind."""
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        first, second = pool.map(_executable, [str(tmp_path)] * 2)
+    assert first == second
+    assert [p.name for p in Path(first).parent.iterdir()] == [Path(first).name]
+
+
+def test_the_cache_is_used(monkeypatch):
+    """A second call compiles nothing; other flags are another executable."""
+    first = build.firmware_executable()
+    monkeypatch.setattr(build.subprocess, "run", lambda *_, **__: pytest.fail("compiled again"))
+    assert build.firmware_executable() == first
+
+
+def test_without_a_compiler_both_remedies_are_named(monkeypatch):
+    """No cc, no ziglang: a device error with both ways out."""
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(build.shutil, "which", lambda _: None)
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(DeviceError) as caught:
+        build.firmware_executable()
+    assert caught.value.exit_code == 4
+    assert "apt install gcc" in caught.value.hint
+    assert "pip install ziglang" in caught.value.hint
+
+
+def test_ziglang_is_used_where_there_is_no_cc(monkeypatch):
+    """The package index's compiler steps in."""
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(build.shutil, "which", lambda _: None)
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: name == "ziglang" or None)
+    assert build.find_compiler() == [sys.executable, "-m", "ziglang", "cc"]
+
+
+def test_a_compiler_that_fails_is_quoted(monkeypatch, tmp_path):
+    """The compiler's own words are in the error, nothing is cached."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(DeviceError, match="does not compile") as caught:
+        build.firmware_executable(("-DPT_PROTOCOL_MAJOR=not a number",))
+    assert "error" in caught.value.message
+    assert list((tmp_path / "pulsetrainer" / "firmware").iterdir()) == []
+
+
+def test_a_cache_that_cannot_be_written_is_told(monkeypatch, tmp_path):
+    """A file where the cache folder should be."""
+    (tmp_path / "pulsetrainer").write_text("in the way", encoding="utf-8")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(DeviceError, match="cannot write the firmware cache"):
+        build.firmware_executable()
+
+
+def _gone(pid: int, seconds: float = 10.0) -> bool:
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        stat = Path(f"/proc/{pid}/stat")
+        try:
+            if stat.read_text(encoding="utf-8").rpartition(")")[2].split()[0] == "Z":
+                return True
+        except OSError:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+HOST = """
+import sys
+import numpy as np
+from pulsetrainer.link import open_device
+device = open_device("bench:?speed=real")
+def tell(block):
+    print(device._bench.pid, block.tick[-1], flush=True)
+recording = device.play(np.full(60_000, 0.5), 1000, on_block=tell)
+device.close()
+print("END", recording.complete, recording.fault, len(recording.tick), recording.dropped_samples, flush=True)
+"""
+
+
+@pytest.fixture
+def host():
+    """A program that plays for a minute; its firmware process's id once it plays."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOST], stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stdout is not None
+    pid = int(process.stdout.readline().split()[0])
+    yield process, pid
+    process.kill()
+    process.communicate()
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for the process in /proc")
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
+def test_a_host_killed_in_mid_play_leaves_no_process(host, how):
+    """However the host program ends, its firmware process ends too."""
+    process, pid = host
+    assert not _gone(pid, 0.1)
+    process.send_signal(how)
+    process.wait()
+    assert _gone(pid)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for the process in /proc")
+def test_ctrl_c_in_the_terminal_stops_the_device_in_order(host):
+    """SIGINT to the whole process group: the record until then is whole, the firmware process gone."""
+    process, pid = host
+    time.sleep(0.5)
+    os.killpg(process.pid, signal.SIGINT)
+    out, _ = process.communicate(timeout=20)
+    end = out.splitlines()[-1].split()
+    assert end[:3] == ["END", "False", "interrupted"]
+    assert int(end[3]) > 300
+    assert end[4] == "0"
+    assert _gone(pid)
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads processor time from /proc")
+def test_an_idle_bench_costs_nothing():
+    """An open, disarmed bench sleeps."""
+    with open_device("bench:") as device:
+        stat = Path(f"/proc/{device._bench.pid}/stat")
+
+        def ticks() -> int:
+            fields = stat.read_text(encoding="utf-8").rpartition(")")[2].split()
+            return int(fields[11]) + int(fields[12])
+
+        before = ticks()
+        time.sleep(0.5)
+        assert ticks() - before <= 2
+
+
+def test_the_firmware_runs_alone_from_a_terminal():
+    """Without a leash it serves until its host closes the pty."""
+    process = subprocess.Popen(
+        [str(build.firmware_executable())], stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True
+    )
+    assert process.stdout is not None
+    path = process.stdout.readline().strip()
+    with open_device(path) as device:
+        assert device.play([0.1, 0.2], 1000).complete
+    assert process.wait(timeout=10) == 0
+    process.stdout.close()
+
+
+@pytest.mark.parametrize(
+    "words", [["--set", "creep"], ["--speed", "slow"], ["--what"], ["--break", "it"], ["--set"]]
+)
+def test_the_firmware_refuses_bad_arguments(words):
+    """Exit status 2 and a line that says why."""
+    done = subprocess.run(
+        [str(build.firmware_executable()), *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.strip()

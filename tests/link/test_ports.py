@@ -1,0 +1,127 @@
+"""Ports: listed, found, and each failure with its own remedy."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import socket
+import threading
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pulsetrainer.errors import DeviceError
+from pulsetrainer.link import list_ports, open_device, ports
+from pulsetrainer.link.transport import SerialTransport
+
+
+def _computer(monkeypatch, *found):
+    rows = [
+        SimpleNamespace(device=name, description="", serial_number=None, vid=vid, pid=pid)
+        for name, vid, pid in found
+    ]
+    monkeypatch.setattr(ports.serial_ports, "comports", lambda: rows)
+
+
+OURS = (0x0403, 0x6015)
+
+
+def test_the_device_is_listed_first(monkeypatch):
+    """Ports with the device's USB id come before the others."""
+    _computer(monkeypatch, ("/dev/ttyS0", None, None), ("/dev/ttyUSB7", *OURS))
+    listed = list_ports()
+    assert [(p.device, p.is_device, p.vid_pid) for p in listed] == [
+        ("/dev/ttyUSB7", True, "0403:6015"),
+        ("/dev/ttyS0", False, ""),
+    ]
+    assert listed[0].status == "absent"
+
+
+def test_one_device_is_found_by_itself(monkeypatch):
+    """Auto-detection takes the one port with our USB id."""
+    _computer(monkeypatch, ("/dev/ttyUSB0", 0x1A86, 0x7523), ("/dev/ttyUSB7", *OURS))
+    assert ports.find_device_port() == "/dev/ttyUSB7"
+
+
+def test_two_devices_are_listed_not_guessed(monkeypatch):
+    """Several found: all are named, none is opened."""
+    _computer(monkeypatch, ("/dev/ttyUSB1", *OURS), ("/dev/ttyUSB2", *OURS))
+    with pytest.raises(DeviceError, match=r"2 devices are connected: /dev/ttyUSB1, /dev/ttyUSB2"):
+        open_device("auto")
+
+
+def test_no_device_points_to_the_bench(monkeypatch):
+    """None found: what is there, and the virtual bench as a way on."""
+    _computer(monkeypatch, ("/dev/ttyUSB0", 0x1A86, 0x7523))
+    with pytest.raises(DeviceError, match="no device found") as caught:
+        open_device("auto")
+    assert "bench:" in caught.value.hint
+
+
+def test_an_absent_port(monkeypatch):
+    """The ports that are there are named."""
+    _computer(monkeypatch, ("/dev/ttyS9", None, None))
+    with pytest.raises(DeviceError, match=r"no port /dev/ttyUSB42 \(ports here: /dev/ttyS9\)") as caught:
+        open_device("/dev/ttyUSB42")
+    assert caught.value.exit_code == 4
+
+
+def test_a_busy_port(wire):
+    """A second program on the port is told so."""
+    path = wire("bench:").bench.path
+    with pytest.raises(DeviceError, match="busy") as caught:
+        SerialTransport(path)
+    assert "close the other program" in caught.value.hint
+
+
+def test_a_port_without_permission():
+    """The group's name is in the remedy."""
+    error = ports.cannot_open("/dev/ttyUSB0", PermissionError(errno.EACCES, "Permission denied"))
+    assert "no permission" in error.message
+    assert "dialout" in error.hint
+
+
+def test_something_that_is_no_port(tmp_path):
+    """A plain file is not a serial port; neither is nonsense."""
+    plain = tmp_path / "notes.txt"
+    plain.touch()
+    with pytest.raises(DeviceError, match="not a serial port"):
+        SerialTransport(str(plain))
+    with pytest.raises(DeviceError, match="not a port"):
+        SerialTransport("gopher://somewhere")
+
+
+def test_a_socket_nobody_listens_on():
+    """Host and port are what to check."""
+    with pytest.raises(DeviceError, match=r"cannot reach socket://127\.0\.0\.1:9"):
+        SerialTransport("socket://127.0.0.1:9")
+
+
+def test_a_device_behind_a_socket(wire):
+    """socket:// is a port like any other: greeting, a play, nothing lost."""
+    one = wire("bench:?speed=real")
+    server = socket.create_server(("127.0.0.1", 0))
+
+    def carry() -> None:
+        peer, _ = server.accept()
+        with peer:
+            peer.settimeout(0.002)
+            while True:
+                with contextlib.suppress(TimeoutError):
+                    data = peer.recv(4096)
+                    if not data:
+                        return
+                    one.transport.write(data)
+                came = one.transport.read()
+                if came:
+                    peer.sendall(came)
+
+    carrier = threading.Thread(target=carry, daemon=True)
+    carrier.start()
+    with open_device(f"socket://127.0.0.1:{server.getsockname()[1]}") as device:
+        recording = device.play(np.linspace(0, 1, 500), 1000)
+    carrier.join(timeout=5)
+    server.close()
+    assert recording.complete
+    assert (len(recording.tick), recording.dropped_samples) == (500, 0)

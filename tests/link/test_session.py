@@ -1,0 +1,139 @@
+"""Greeting and talking through noise, strangers and other versions."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import tty
+
+import pytest
+
+from pulsetrainer.errors import DeviceError
+from pulsetrainer.link import messages as m
+from pulsetrainer.link.build import firmware_executable
+from pulsetrainer.link.codes import MAGIC
+from pulsetrainer.link.frames import Frame, encode
+from pulsetrainer.link.session import NoAnswerError, Session
+from pulsetrainer.link.transport import SerialTransport
+
+
+def test_greeting_gets_through_garbage(wire):
+    """Whatever bytes lie on the line when the port opens, the handshake finds the device."""
+    one = wire("bench:")
+    one.transport.write(os.urandom(700) + encode(Frame(3, 1, b""))[:3])
+    assert one.session.hello().magic == MAGIC
+
+
+def test_a_repeated_command_is_done_once(wire):
+    """The same sequence number again: the same answer, from memory."""
+    one = wire("bench:")
+    one.session.hello()
+    for _ in range(2):  # a lost reply, simulated by rewinding the sequence
+        one.session._seq = 76
+        reply = one.ask(m.SetParam(2, 5000))
+        assert isinstance(reply, m.ParamReply)
+
+
+def test_late_and_doubled_replies_are_ignored(wire):
+    """Three times the same command on the wire: the next command still gets its own answer."""
+    one = wire("bench:")
+    one.session.hello()
+    for _ in range(3):
+        one.transport.write(encode(Frame(m.Heartbeat.TYPE, 99, b"")))
+    assert isinstance(one.ask(m.Status()), m.StatusReply)
+    assert isinstance(one.ask(m.GetParam(0)), m.ParamReply)
+
+
+def test_another_protocol_major_is_named_with_the_remedy(wire):
+    """Both versions and what to do are in the message."""
+    newer = wire("bench:", firmware_executable(("-DPT_PROTOCOL_MAJOR=2u",)))
+    with pytest.raises(
+        DeviceError, match=r"protocol 2\.0, this program 1\.0: the program is older"
+    ) as caught:
+        newer.session.hello()
+    assert "pip install --upgrade" in caught.value.hint
+    older = wire("bench:", firmware_executable(("-DPT_PROTOCOL_MAJOR=0u",)))
+    with pytest.raises(DeviceError, match="the device is older") as caught:
+        older.session.hello()
+    assert "flash" in caught.value.hint
+
+
+def test_another_minor_version_is_fine(wire):
+    """A newer minor version of the same protocol is spoken to."""
+    assert wire("bench:", firmware_executable(("-DPT_PROTOCOL_MINOR=7u",))).session.hello().minor == 7
+
+
+@pytest.fixture
+def stranger():
+    """A pty with somebody else behind it: call with what it says, again and again."""
+    ends, stop = os.openpty(), threading.Event()
+    tty.setraw(ends[1])
+    threads: list[threading.Thread] = []
+
+    def behave(says: bytes) -> str:
+        def talk() -> None:
+            os.set_blocking(ends[0], False)
+            while not stop.wait(0.02):
+                try:
+                    os.write(ends[0], says)
+                except BlockingIOError:
+                    continue
+
+        threads.append(threading.Thread(target=talk, daemon=True))
+        threads[-1].start()
+        return os.ttyname(ends[1])
+
+    yield behave
+    stop.set()
+    for thread in threads:
+        thread.join()
+    for end in ends:
+        os.close(end)
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    """Give up greeting early: these tests wait for exactly that."""
+    monkeypatch.setattr("pulsetrainer.link.session._HELLO_S", 0.5)
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize("says", [b"$GPGGA,123519,4807.038,N*47\r\n", b"\0\x05abcd\0" * 20])
+def test_a_device_that_is_not_ours_is_told(stranger, says):
+    """Something talks, but it is not the firmware."""
+    transport = SerialTransport(stranger(says))
+    with pytest.raises(DeviceError, match="not a pulsetrainer device"):
+        Session(transport, "port", monotonic=time.monotonic).hello()
+    transport.close()
+
+
+@pytest.mark.usefixtures("impatient")
+def test_nobody_is_told(stranger):
+    """Silence is another message than a stranger."""
+    transport = SerialTransport(stranger(b""))
+    with pytest.raises(NoAnswerError, match="nobody answers"):
+        Session(transport, "port", monotonic=time.monotonic).hello()
+    transport.close()
+
+
+def test_damaged_replies_are_asked_for_again(wire):
+    """A flipped byte in a reply costs a retry, not an error."""
+    one = wire("bench:")
+    one.session.hello()
+    intact, count = one.transport.read, [0]
+
+    def damage() -> bytes:
+        data = bytearray(intact())
+        if data:
+            count[0] += 1
+            if count[0] % 3 == 1:
+                data[len(data) // 2] ^= 0x10
+        return bytes(data)
+
+    one.transport.read = damage
+    for k in range(30):
+        reply = one.ask(m.GetParam(k % 10))
+        assert isinstance(reply, m.ParamReply)
+        assert reply.id == k % 10
+    assert one.session.damaged > 5
