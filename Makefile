@@ -21,7 +21,7 @@ help:  ## say what there is
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 demo: $(D)/report.html  ## capture, identify, invert, play, evaluate: two pulses, two methods, one report
-	@$(PT) show $(D)/evaluation.h5
+	@$(PT) evaluate $(PLAYED)
 	@echo "report: $(D)/report.html"
 
 # --- set-up -----------------------------------------------------------------------------------------
@@ -56,7 +56,7 @@ endef
 $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(eval $(call PULSE_RULES,$(p),$(m)))))
 
 $(D)/evaluation.h5 $(D)/report.html &: $(PLAYED) $(REPORT)
-	$(PT) evaluate $(PLAYED) -o $(D)/evaluation.h5 --html $(D)/report.html --force
+	$(PT) evaluate $(PLAYED) -o $(D)/evaluation.h5 --html $(D)/report.html --force > /dev/null
 
 bounds: $(D)/report.html tests/regression/bounds.toml  ## hold the demo's figures against their bounds
 	$(PT) evaluate $(PLAYED) --bounds tests/regression/bounds.toml

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -38,6 +39,7 @@ class Screen:
     def __init__(self, command: str, *, as_json: bool) -> None:
         self.command = command
         self.as_json = as_json
+        self.width = shutil.get_terminal_size().columns if sys.stdout.isatty() else _PIPE_WIDTH
 
     def note(self, text: str) -> None:
         """Say one line to the person, beside the results."""
@@ -89,13 +91,12 @@ class Screen:
         from rich.table import Table
         from rich.text import Text
 
-        table = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD)
+        table = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1))
         for number, name in enumerate(columns):
             table.add_column(Text(name), justify="right" if number else "left", no_wrap=not number)
         for row in rows:
             table.add_row(*(Text(_text(cell)) for cell in row))
-        width = None if sys.stdout.isatty() else _PIPE_WIDTH
-        Console(width=width, markup=False, highlight=False).print(table)
+        Console(width=self.width, markup=False, highlight=False).print(table)
 
 
 def _text(value: Any) -> str:

@@ -30,7 +30,9 @@ def evaluate(
     force: Force = False,
     json: AsJson = False,
 ) -> None:
-    """Report the force error of playbacks, or the prediction error of models on a run.
+    """Report how large the errors are.
+
+    Force errors of playbacks, or prediction errors of models on a run that they were not fitted to.
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
@@ -105,34 +107,42 @@ def _figures(errors: DriveError) -> dict[str, float]:
     return {name: getattr(errors, name) for name in METRICS}
 
 
+_FIGURES = (
+    ("mean error, scaled", "scaled.mean_abs_error_percent"),
+    ("mean error, compensated", "compensated.mean_abs_error_percent"),
+    ("reduction of the mean error", "mean_error_reduction_percent"),
+    ("max error, scaled", "scaled.max_abs_error_percent"),
+    ("max error, compensated", "compensated.max_abs_error_percent"),
+    ("loop area, scaled", "scaled.hysteresis_percent"),
+    ("loop area, compensated", "compensated.hysteresis_percent"),
+    ("current tracking, worst", "compensated.current_tracking_max_percent"),
+)
+_LABEL_WIDTH, _COLUMN_WIDTH = 32, 13
+
+
 def tables(screen: Screen, evaluation: Evaluation) -> None:
     """Print the figures of an evaluation beside those of the published device."""
-    from pulsetrainer.flows.evaluate import PUBLISHED
+    from pulsetrainer.flows.evaluate import PUBLISHED, metrics_of
 
-    rows = []
+    figures = metrics_of(evaluation)
+    columns: dict[str, list[tuple[str, dict[str, float]]]] = {}  # by pulse: heading and figures
     for w in evaluation.waveforms:
-        paper = PUBLISHED.get(w.name, {})
-        rows += [
-            [
-                f"{w.name}, {w.inversion}",
-                w.scaled.mean_abs_error_percent,
-                w.compensated.mean_abs_error_percent,
-                w.mean_error_reduction_percent,
-                paper.get("mean_error_reduction_percent"),
-                w.scaled.max_abs_error_percent,
-                w.compensated.max_abs_error_percent,
-                paper.get("compensated.max_abs_error_percent"),
-                w.compensated.hysteresis_percent,
-                w.compensated.current_tracking_max_percent,
-            ]
+        stem = f"{w.name}.{w.inversion}."
+        published = [("published", PUBLISHED[w.name])] if w.name in PUBLISHED else []
+        found = {name[len(stem) :]: value for name, value in figures.items() if name.startswith(stem)}
+        columns.setdefault(w.name, published).append((w.inversion, found))
+    width = _LABEL_WIDTH + _COLUMN_WIDTH * sum(len(group) for group in columns.values())
+    pages = [list(columns)] if width <= screen.width else [[name] for name in columns]
+    for page in pages:
+        shown = [
+            (f"{name}\n{heading}".replace("-", "-\n"), found)
+            for name in page
+            for heading, found in columns[name]
         ]
-    if rows:
-        columns = [
-            "pulse, inversion", "mean scaled", "mean comp.", "reduction", "published",
-            "max scaled", "max comp.", "published", "loop comp.", "current",
-        ]  # fmt: skip
         screen.table(
-            "force error in % of full force; current: tracking error in % of its range", columns, rows
+            "force error, % of full force",
+            ["", *(heading for heading, _ in shown)],
+            [[label, *(found.get(metric) for _, found in shown)] for label, metric in _FIGURES],
         )
     if evaluation.models:
         screen.table(

@@ -41,7 +41,9 @@ def invert(
     force: Force = False,
     json: AsJson = False,
 ) -> None:
-    """Compute the compensated and the merely scaled current for a pulse.
+    """Find the current that presses a pulse.
+
+    Both the compensated one and, to compare, the merely scaled one with the same extremes.
 
     Example: pulsetrainer invert normal --model model.h5 -o drive.h5
     """

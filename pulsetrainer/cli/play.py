@@ -19,7 +19,9 @@ def play(
     force: Force = False,
     json: AsJson = False,
 ) -> None:
-    """Play the compensated and the scaled current in turn and record the force.
+    """Press a pulse and record the force.
+
+    The compensated and the scaled current take turns.
 
     Example: pulsetrainer play drive.h5 -o played.h5
     """

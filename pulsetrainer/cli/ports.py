@@ -7,7 +7,9 @@ from pulsetrainer.cli.options import AsJson
 
 
 def ports(json: AsJson = False) -> None:
-    """List the serial ports, which of them is a trainer, and whether each can be opened.
+    """List the serial ports.
+
+    Which of them is a trainer, and whether each can be opened.
 
     Example: pulsetrainer ports
     """

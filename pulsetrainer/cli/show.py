@@ -16,7 +16,9 @@ def show(
     file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
     json: AsJson = False,
 ) -> None:
-    """Say what an artefact is, where it comes from, and its main figures.
+    """Say what is in a file.
+
+    Its kind, its main figures, and the commands it came from.
 
     Example: pulsetrainer show model.h5
     """

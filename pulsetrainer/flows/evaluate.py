@@ -30,14 +30,12 @@ from pulsetrainer.report import html
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
 
-# Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631: the published device, by waveform
+# Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631: the published device. The maxima are given for the device
+# as a whole, so they stand beside both pulses.
+_PUBLISHED_MAXIMA = {"scaled.max_abs_error_percent": 28.7, "compensated.max_abs_error_percent": 7.8}
 PUBLISHED: dict[str, dict[str, float]] = {
-    "normal": {
-        "mean_error_reduction_percent": 73.9,
-        "scaled.max_abs_error_percent": 28.7,
-        "compensated.max_abs_error_percent": 7.8,
-    },
-    "bifid": {"mean_error_reduction_percent": 70.3},
+    "normal": {"mean_error_reduction_percent": 73.9, **_PUBLISHED_MAXIMA},
+    "bifid": {"mean_error_reduction_percent": 70.3, **_PUBLISHED_MAXIMA},
 }
 METRICS = ("mean_abs_error_percent", "max_abs_error_percent", "rms_error_percent", "hysteresis_percent",
            "current_tracking_max_percent")  # fmt: skip

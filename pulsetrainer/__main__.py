@@ -1,0 +1,5 @@
+"""``python -m pulsetrainer``."""
+
+from pulsetrainer.cli.app import main
+
+main()

@@ -1,0 +1,48 @@
+"""Help is quick, complete, and shows an example for every command."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+COMMANDS = ("capture", "import", "identify", "invert", "play", "evaluate", "show", "plot", "ports")
+HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich")
+
+
+def test_help_imports_nothing_heavy():
+    """Speed is not timed here: what would make it slow is not there."""
+    code = (
+        "import sys\n"
+        "from pulsetrainer.cli import app, guard\n"
+        "assert guard.funnel(app.app, ['--help']) == 0\n"
+        f"print([name for name in {HEAVY!r} if name in sys.modules], file=sys.stderr)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "[]"
+    for command in COMMANDS:
+        assert command in done.stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_an_example(run, command):
+    """What it does, its options, one line to copy."""
+    done = run(command, "--help")
+    assert done.code == 0
+    assert f"Example: pulsetrainer {command}" in " ".join(done.out.split())
+    assert "--json" in done.out
+
+
+def test_version(run):
+    """The version of the package."""
+    from pulsetrainer import __version__
+
+    done = run("--version")
+    assert (done.code, done.out.strip()) == (0, f"pulsetrainer {__version__}")
+
+
+def test_no_words_show_the_help(run):
+    """The program alone explains itself."""
+    done = run()
+    assert "identify" in done.out + done.err
