@@ -51,7 +51,7 @@ def chain(folder: Path, port: str, *, operator: str, waveforms: tuple[str, ...])
     for name in waveforms:
         drive, played = f"drive-{name}-{operator}.h5", f"played-{name}-{operator}.h5"
         steps.append(["invert", name, "--model", f"model-{operator}.h5", "-o", drive])
-        steps.append(["play", drive, "--port", port, "-o", played, "--repeats", 3])
+        steps.append(["play", drive, "--port", port, "-o", played])
     for words in steps:
         done = pulsetrainer(folder, *words)
         assert done.code == 0, (words, done)
