@@ -30,6 +30,7 @@ PORT_VARIABLE = "PULSETRAINER_PORT"
 DEFAULT_PORT = "bench:"
 _INTERRUPTED = "interrupted"
 _STOPPED = "stopped"
+_RAMP_S = 0.11  # the device counts its way back to zero as on-time
 _TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
 
 
@@ -87,10 +88,12 @@ class Device:
         self._monotonic = monotonic
         self._sleep = sleep
         self._player: Player | None = None
-        self._hello = session.hello()
-        self.info = DeviceInfo.from_wire(
-            self._hello, describe_fault(self._status(), self._hello.tick_rate_Hz)
-        )
+        self._greet()
+
+    def _greet(self) -> None:
+        self._hello = self._session.hello()
+        latched = describe_fault(self._status(), self._hello.tick_rate_Hz)
+        self.info = DeviceInfo.from_wire(self._hello, latched)
 
     def __enter__(self) -> Self:
         return self
@@ -140,6 +143,7 @@ class Device:
         reply = self._session.request(m.SetParam(row.id, value))
         if not isinstance(reply, m.ParamReply) or reply.value != value:
             raise DeviceError(f"the device did not take {name}={value}", hint="flash the firmware again")
+        self._greet()  # the limits in force have changed
         return reply.value
 
     def play(
@@ -275,7 +279,7 @@ class Device:
                 hint="scale the waveform into the range",
             )
         seconds = (reference.size - 1) * ticks_per_sample / self.info.tick_rate_Hz
-        if seconds > self.info.on_time_limit_s - 1:
+        if seconds > self.info.on_time_limit_s - _RAMP_S:
             raise ArgumentError(
                 f"the reference is {seconds:g} s long; the device stays on for at most "
                 f"{self.info.on_time_limit_s:g} s",
@@ -309,8 +313,9 @@ def open_device(
     transport: SerialTransport | None = None
     try:
         path = bench.path if bench is not None else find_device_port() if port == "auto" else port
-        transport = SerialTransport(path)
-        session = Session(transport, redact(port) if bench is not None else path, monotonic=monotonic)
+        name = DEFAULT_PORT if bench is not None else path
+        transport = SerialTransport(path, name)
+        session = Session(transport, name, monotonic=monotonic)
         return Device(session, transport, bench, monotonic=monotonic, sleep=sleep)
     except BaseException:
         if transport is not None:

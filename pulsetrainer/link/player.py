@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-_BEAT_S = 0.04  # of wall time or of device time: a fifth of the device's patience
+_BEATS = 5  # in the time that the device is patient, by the wall clock and by its own
 _DRAIN_S = 0.3  # for telemetry on its way after the end
 _RAMP_S = 1.0
 _TAKER_S = 10.0  # nobody took the telemetry for so long: the program hangs
@@ -155,9 +155,10 @@ class Player:
         )
 
     def _beat_due(self) -> bool:
-        if self._monotonic() - self._session.sent_at_s >= _BEAT_S:
+        beat_s = self._hello.heartbeat_ms / 1000 / _BEATS
+        if self._monotonic() - self._session.sent_at_s >= beat_s:
             return True
-        return self._tick - self._tick_at_send >= _BEAT_S * self._hello.tick_rate_Hz
+        return self._tick - self._tick_at_send >= beat_s * self._hello.tick_rate_Hz
 
     def _stream(self) -> None:
         """Keep the buffer full until the play ends, whoever ends it."""

@@ -38,10 +38,10 @@ class Transport(Protocol):
 
 
 class SerialTransport:
-    """A port opened by pyserial, for this program alone."""
+    """A port opened by pyserial, for this program alone; ``name`` is what messages call it."""
 
-    def __init__(self, port: str) -> None:
-        self._port = port
+    def __init__(self, port: str, name: str = "") -> None:
+        self._port = name or port
         try:
             self._serial: Any = serial.serial_for_url(port, do_not_open=True)
             self._serial.baudrate = BAUD

@@ -10,6 +10,7 @@ import zlib
 import numpy as np
 import pytest
 
+from pulsetrainer.errors import ArgumentError
 from pulsetrainer.link import messages as m
 from pulsetrainer.link import open_device
 from pulsetrainer.link.codes import Fault, NakCode, State
@@ -75,12 +76,18 @@ def test_lowered_limits_trip():
         assert device.play([0.1], 1000).complete
 
 
-def test_too_long_an_on_time_is_refused():
-    """A reference longer than the on-time is refused by the device too."""
+def test_too_long_an_on_time_is_refused(wire):
+    """A reference longer than the on-time is refused by the program, and by the device itself."""
     with open_device("bench:") as device:
         device.set_parameter("on_time", 2)
-        with pytest.raises(RefusedError, match="refused WaveBegin"):
+        with pytest.raises(ArgumentError, match=r"2\.999 s long; the device stays on for at most 2 s"):
             device.play(HALF_AMP, 1000)
+        assert device.play(HALF_AMP[:1890], 1000).complete
+    one = wire("bench:")
+    one.session.hello()
+    one.ask(m.WaveBegin(899_900, 10, 0))
+    with pytest.raises(RefusedError, match="refused WaveBegin: a value is outside its limits"):
+        one.ask(m.WaveBegin(899_901, 10, 0))
 
 
 @pytest.mark.parametrize("speed", ["real", "max"])
@@ -94,15 +101,23 @@ def test_a_silent_host_trips_the_heartbeat(wire, speed):
     assert 2000 <= status.fault_tick <= 2100
 
 
-@pytest.mark.parametrize("speed", ["real", "max"])
-def test_a_slow_host_does_not_trip_the_heartbeat(wire, speed):
-    """A command every 120 ms of wall time is enough, whatever the speed."""
+@pytest.mark.parametrize(("speed", "pause_s"), [("real", 0.08), ("max", 0.3)])
+def test_a_slow_host_does_not_trip_the_heartbeat(wire, speed, pause_s):
+    """A command now and then is enough; at full speed the device waits for a host that is merely slow."""
     one = wire(f"bench:?speed={speed}")
     one.start(np.full(900, 5000, dtype=np.int16))
     for _ in range(4):
-        time.sleep(0.12)
+        time.sleep(pause_s)
         one.ask(m.Heartbeat())
     assert one.status().fault == Fault.NONE
+
+
+def test_a_shorter_heartbeat_is_kept():
+    """The host beats five times in whatever patience the device has."""
+    with open_device("bench:") as device:
+        device.set_parameter("heartbeat", 50)
+        assert device.info.heartbeat_s == 0.05
+        assert device.play(np.full(20_000, 0.5), 1000).complete
 
 
 def test_an_armed_device_left_alone_disarms(wire):

@@ -7,12 +7,13 @@ import threading
 import time
 import tty
 
+import numpy as np
 import pytest
 
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.link import messages as m
 from pulsetrainer.link.build import firmware_executable
-from pulsetrainer.link.codes import MAGIC
+from pulsetrainer.link.codes import MAGIC, Fault, State
 from pulsetrainer.link.frames import Frame, encode
 from pulsetrainer.link.session import NoAnswerError, Session
 from pulsetrainer.link.transport import SerialTransport
@@ -62,6 +63,17 @@ def test_another_protocol_major_is_named_with_the_remedy(wire):
 def test_another_minor_version_is_fine(wire):
     """A newer minor version of the same protocol is spoken to."""
     assert wire("bench:", firmware_executable(("-DPT_PROTOCOL_MINOR=7u",))).session.hello().minor == 7
+
+
+def test_a_new_program_on_a_running_device_stops_it(wire):
+    """Who greets takes over: the run that was left ends, its stale telemetry harms nobody."""
+    one = wire("bench:?speed=real")
+    one.start(np.full(1000, 5000, dtype=np.int16))
+    time.sleep(0.1)
+    later = Session(one.transport, "bench:", monotonic=time.monotonic)
+    assert later.hello().magic == MAGIC
+    one.session = later
+    assert one.wait_for(State.IDLE).fault == Fault.NONE
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@
  * the device nor a host that is merely slow:
  *   - disarmed, time stands still once the coil has settled: nothing can happen, and two equal captures
  *     give equal numbers however long the pauses between them were;
- *   - armed but not started, and while playing whenever the host has been silent for 100 ms of device
- *     time, the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
+ *   - armed but not started, and while playing whenever the host has been silent for half the
+ *     heartbeat (100 ms of device time), the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
  *     for at most half a second of wall time; after that it goes on at the wall clock, so that a
  *     host that is really gone trips the 200 ms heartbeat like on a real device.
  * A coil that has tripped its heat model cools only while time runs: open a new bench instead of waiting. */
@@ -15,7 +15,6 @@
 
 #define NS_PER_TICK 100000
 #define BATCH 10                    /* ticks between two looks at the pty */
-#define SILENCE_TICKS 1000          /* 100 ms of device time */
 #define TELEMETRY_HIGH 48           /* waiting samples: the reader is behind */
 #define SETTLE_TICKS 2000           /* after the output went off */
 #define GRACE_NS 500000000          /* wall time that a stalled device waits for its host */
@@ -73,7 +72,7 @@ static bool must_wait(void)
     case PT_STATE_RUNNING:
         if (board_hangs()) /* nobody to wait for: the watchdog has to see time pass */
             return false;
-        return silent_ticks >= SILENCE_TICKS || wave_ticks_left(&app.wave) < 2 * BATCH ||
+        return silent_ticks >= app.safety.heartbeat_ticks / 2 || wave_ticks_left(&app.wave) < 2 * BATCH ||
                telemetry_waiting(&app.telemetry) >= TELEMETRY_HIGH;
     case PT_STATE_ARMED:
         return true;
