@@ -27,14 +27,16 @@ class State:
     extremes: tuple[float, ...]  # alternating: low, max, min, max, ...; the last one is the present input
 
     def __post_init__(self) -> None:
-        steps = np.diff(self.extremes)
-        if len(self.extremes) < 1 or not np.all(np.isfinite(self.extremes)):
+        path = np.asarray(self.extremes, dtype=np.float64)
+        if path.ndim != 1 or path.size < 1 or not np.all(np.isfinite(path)):
             raise ArgumentError(
                 f"a memory state needs at least one finite extreme, got {self.extremes}",
                 hint="start from negative_saturation(low)",
             )
-        shrinking = np.all(np.abs(steps[1:]) < np.abs(steps[:-1])) and np.all(steps[::2] > 0)
-        if not (shrinking and np.all(steps[1::2] < 0)):
+        # compare the extremes, not their distances: close to zero the distances round to the same number
+        lowest, highest = path[::2], path[1::2]
+        closing = np.all(np.diff(lowest) > 0) and np.all(np.diff(highest) < 0)
+        if not closing or (highest.size > 0 and lowest[-1] >= highest[-1]):
             raise ArgumentError(
                 f"extremes of a memory state must alternate and close in on each other, got {self.extremes}",
                 hint="start from a state that this package returned",
@@ -61,7 +63,7 @@ def demagnetised(low: float, high: float, swings: int = 200) -> State:
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     shrink = 1.0 - np.arange(swings) / swings
     turns = middle + half * shrink * np.where(np.arange(swings) % 2 == 0, 1.0, -1.0)
-    return State((float(low), *turns.tolist()))
+    return State((float(low), *np.minimum(turns, high).tolist()))
 
 
 @dataclass(frozen=True, slots=True)
