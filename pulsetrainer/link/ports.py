@@ -32,7 +32,24 @@ def _status(device: str) -> str:
         return "free"
     if not path.exists():
         return "absent"
-    return "free" if os.access(path, os.R_OK | os.W_OK) else "no permission"
+    if not os.access(path, os.R_OK | os.W_OK):
+        return "no permission"
+    return "busy" if _is_open_somewhere(path) else "free"
+
+
+def _is_open_somewhere(path: Path) -> bool:
+    """Return whether a process that we may look into has the port open (Linux; elsewhere unknown, False).
+
+    Opening the port to find out could pulse its control lines and reset the board.
+    """
+    target = path.resolve()
+    for descriptor in Path("/proc").glob("[0-9]*/fd/*"):
+        try:
+            if descriptor.readlink() == target:
+                return True
+        except OSError:
+            continue  # closed meanwhile, or somebody else's
+    return False
 
 
 def list_ports() -> list[PortInfo]:

@@ -199,10 +199,9 @@ def test_an_error_of_the_caller_stops_the_device(device):
 
 def test_stop_from_another_thread(device):
     """Device.stop ends a play that another thread waits for."""
-    timer = threading.Timer(0.2, device.stop)
-    timer.start()
-    recording = device.play(np.full(800_000, 0.3), 1000)
-    timer.join()
+    other = threading.Thread(target=device.stop)
+    recording = device.play(np.full(800_000, 0.3), 1000, on_block=lambda _: other.ident or other.start())
+    other.join()
     assert (recording.complete, recording.fault) == (False, "stopped")
 
 

@@ -75,6 +75,13 @@ def test_a_busy_port(wire):
     assert "close the other program" in caught.value.hint
 
 
+def test_a_busy_port_is_listed_as_busy(monkeypatch, wire):
+    """The list says so without opening the port."""
+    path = wire("bench:").bench.path
+    _computer(monkeypatch, (path, *OURS))
+    assert list_ports()[0].status == "busy"
+
+
 def test_a_port_without_permission():
     """The group's name is in the remedy."""
     error = ports.cannot_open("/dev/ttyUSB0", PermissionError(errno.EACCES, "Permission denied"))
