@@ -144,7 +144,7 @@ LIBRARY = (
         name="bifid",
         meaning="pulsus bisferiens, two systolic peaks: aortic regurgitation (with or without stenosis), "
         "hypertrophic obstructive cardiomyopathy",
-        source="Carneiro F, Abreu C, Restivo MT, Hysteresis Compensation in a Tactile Device for Arterial "
+        source="Carneiro F, Abreu P, Restivo MT, Hysteresis Compensation in a Tactile Device for Arterial "
         "Pulse Reproduction, Sensors 2018, 18(5), 1631",
         mmHg=(60, 140),
         beats=(Beat(0.0, 1.0, BISFERIENS),),

@@ -129,7 +129,7 @@ def playback(played: Playback) -> Figure:
     force.set_title(asked.name + ("" if played.complete else ", incomplete"))
     current.set_ylabel(label("drive", played.scaled.input_unit))
     error.axhline(0.0, **GUIDE)
-    error.set_ylabel("error [% of range]")
+    error.set_ylabel("current error [% of range]")
     error.set_xlabel(label("time", "s"))
     for axes in (force, current, error):
         panels.unscored(axes, asked)
