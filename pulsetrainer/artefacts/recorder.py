@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 # batch allocates four chunks of 32 KB at most per 4096 samples; the rest is for its own structures.
 _RESERVE_BYTES = 1 << 20
 _BYTES_PER_SAMPLE = 32
+_CACHE_BYTES = 1 << 16
 _COLUMNS = ("time_s", "reference", "input", "output")
 
 
@@ -93,7 +94,10 @@ class RunRecorder:
         self.partial = _claim_partial(self._final)
         try:
             self._check_space(0)
-            self._file = h5py.File(self.partial, "w", libver=LIBVER, locking="best-effort")
+            # the cache holds one chunk: the samples before it are not needed any more
+            self._file = h5py.File(
+                self.partial, "w", libver=LIBVER, locking="best-effort", rdcc_nbytes=_CACHE_BYTES
+            )
             write_root(self._file, Run, header, samples=0)
             encode(self._file, Run, values, growing=True)
             self._file.swmr_mode = True

@@ -15,7 +15,7 @@ from pulsetrainer.errors import DataError
 
 _FORMAT = b"\npulsetrainer crc32 %08x\n"
 _PATTERN = re.compile(rb"\npulsetrainer crc32 ([0-9a-f]{8})\n")
-_LENGTH = len(_FORMAT % 0)
+SEAL_LENGTH = len(_FORMAT % 0)
 _BLOCK = 1 << 20
 
 
@@ -46,7 +46,7 @@ def check_seal(path: Path) -> None:
         The checksum differs, or the file cannot be read.
     """
     try:
-        length = path.stat().st_size - _LENGTH
+        length = path.stat().st_size - SEAL_LENGTH
         if length < 0:
             return
         with path.open("rb") as stream:

@@ -18,6 +18,7 @@ import numpy as np
 from pulsetrainer import __version__
 from pulsetrainer.artefacts.decode import Origin, decode, text_of
 from pulsetrainer.artefacts.encode import encode, values_of
+from pulsetrainer.artefacts.growing import GrowingFile, is_growing
 from pulsetrainer.artefacts.kinds import KINDS
 from pulsetrainer.artefacts.output import check_output, replacing
 from pulsetrainer.artefacts.provenance import Header, Provenance, clean
@@ -227,15 +228,17 @@ def _opened(path: Path | str) -> Iterator[h5py.File]:
         raise _damaged(path, error) from error
 
 
-def _open(path: Path) -> h5py.File:
-    try:
-        return h5py.File(path, "r", locking="best-effort")
-    except OSError as first:
-        try:
-            # a capture that still grows, or was killed: HDF5 wants to be told that one may be writing
-            return h5py.File(path, "r", swmr=True, locking="best-effort")
-        except OSError:
-            raise first from None
+@contextlib.contextmanager
+def _open(path: Path) -> Iterator[h5py.File]:
+    """Open a file that is whole, or a capture that still grows or was killed."""
+    with path.open("rb") as stream:
+        growing = is_growing(stream.read(64))
+    if growing:
+        with contextlib.closing(GrowingFile(path)) as shown, h5py.File(shown, "r") as file:
+            yield file
+        return
+    with h5py.File(path, "r", locking="best-effort") as file:
+        yield file
 
 
 def _check_readable(path: Path) -> None:

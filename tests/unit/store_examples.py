@@ -1,0 +1,122 @@
+"""Random artefacts of every kind, made from the same annotations the store reads; and when two are equal."""
+
+from __future__ import annotations
+
+import dataclasses
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from pulsetrainer.artefacts import kinds
+from pulsetrainer.artefacts.provenance import Device, Header, make_header
+from pulsetrainer.artefacts.schema import TIME, FieldPlan, plan_of
+
+NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
+# what a text attribute holds: any Unicode but NUL and lone surrogates, which are escaped on writing
+TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=12)
+ATTRIBUTES = {
+    str: TEXTS,
+    int: st.integers(-(2**63), 2**63 - 1),
+    float: st.floats(),
+    bool: st.booleans(),
+}
+
+
+def header(title: str = "an example", **more: Any) -> Header:
+    """Return a header as a command would make it."""
+    return make_header(
+        title, argv=["capture", "-o", "run.h5"], now=NOW, device=Device("1", "2", "bench:"), **more
+    )
+
+
+def run(n: int = 50, **more: Any) -> kinds.Run:
+    """Return a plain run of n samples."""
+    time = np.arange(n) / 1000
+    fields = {"time_s": time, "input": np.sin(time), "output": np.cos(time), "reference": np.sin(time)}
+    return kinds.Run(**fields | more)
+
+
+def model(n_h: int = 3, **more: Any) -> kinds.Model:
+    """Return a plain model with n_h levels."""
+    cells = n_h * (n_h + 1) // 2
+    return kinds.Model(np.linspace(0, 1, n_h + 1), np.ones(cells), 0.5, np.ones(cells, bool), **more)
+
+
+def waveform(n: int = 20, **more: Any) -> kinds.Waveform:
+    """Return a plain waveform of n samples."""
+    time, ones = np.arange(n) / 100, np.ones(n)
+    scored = np.ones(n, bool)
+    return kinds.Waveform(time, ones, ones, ones, ones, scored, "normal", "drawn", "continuous", 0, **more)
+
+
+def playback(n: int = 20, repeats: int = 2) -> kinds.Playback:
+    """Return a plain playback."""
+    measured = kinds.DrivePlayback(*(np.ones((repeats, n)) for _ in range(3)))
+    return kinds.Playback(np.arange(n) / 100, waveform(n, model=model()), measured, measured, 1.5)
+
+
+EXAMPLES = {
+    "run": run,
+    "model": model,
+    "waveform": waveform,
+    "playback": playback,
+    "evaluation": kinds.Evaluation,
+}
+
+
+@st.composite
+def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None) -> Any:
+    """Draw an artefact: shapes, NaN, missing optional parts and texts at random, axes as annotated."""
+    plans = plan_of(cls)
+    own_time = any(plan.is_time_axis for plan in plans)
+    level = draw(st.integers(1, 5))
+    lengths = {
+        TIME: inherited if inherited is not None and not own_time else draw(st.integers(0, 700)),
+        "level": level,
+        "cell": level * (level - 1) // 2,
+        "repeat": draw(st.integers(0, 3)),
+    }
+    values = {}
+    for plan in plans:
+        if plan.optional and draw(st.booleans()):
+            values[plan.name] = None
+        else:
+            values[plan.name] = draw(_values(plan, lengths))
+    return cls(**values)
+
+
+def _values(plan: FieldPlan, lengths: dict[str, int]) -> st.SearchStrategy[Any]:
+    """Return the strategy for one field."""
+    floats = (
+        st.floats(allow_nan=not plan.data.finite, allow_infinity=not plan.data.finite) if plan.data else None
+    )
+    if plan.is_time_axis:
+        return st.integers(0, 2**32 - 1).map(
+            lambda seed: np.cumsum(np.random.default_rng(seed).uniform(1e-4, 1, lengths[TIME]))
+        )
+    if plan.role == "array":
+        elements = st.booleans() if plan.type is np.bool_ else floats
+        return hnp.arrays(plan.type, tuple(lengths[axis] for axis in plan.dims), elements=elements)
+    if plan.role == "number":
+        return {float: floats, int: ATTRIBUTES[int], bool: st.booleans()}[plan.type]
+    if plan.role == "attribute":
+        return ATTRIBUTES[plan.type]
+    if plan.role == "list":
+        return st.lists(ATTRIBUTES[plan.type], max_size=3).map(tuple)
+    inner = artefacts(plan.type, lengths[TIME])
+    return inner if plan.role == "group" else st.lists(inner, max_size=2).map(tuple)
+
+
+def equal(a: Any, b: Any) -> bool:
+    """Whether two artefacts are the same to the last bit, dtypes included; NaN equals NaN."""
+    if dataclasses.is_dataclass(a):
+        fields = dataclasses.fields(a)
+        return type(a) is type(b) and all(equal(getattr(a, f.name), getattr(b, f.name)) for f in fields)
+    if isinstance(a, np.ndarray):
+        return a.dtype == b.dtype and a.shape == b.shape and np.array_equal(a, b, equal_nan=True)
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(equal, a, b))
+    return type(a) is type(b) and (a == b or (a != a and b != b))  # noqa: PLR0124 - NaN
