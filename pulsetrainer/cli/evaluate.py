@@ -122,6 +122,18 @@ _LABEL_WIDTH, _COLUMN_WIDTH = 32, 13
 
 def tables(screen: Screen, evaluation: Evaluation) -> None:
     """Print the figures of an evaluation beside those of the published device."""
+    if evaluation.waveforms:
+        _pulses(screen, evaluation)
+    if evaluation.models:
+        screen.table(
+            "prediction error on the run",
+            ["model", "rms", "rms %", "max %", "gain %"],
+            [[m.name, m.rms, m.rms_percent, m.max_percent, m.gain_percent] for m in evaluation.models],
+        )
+
+
+def _pulses(screen: Screen, evaluation: Evaluation) -> None:
+    """One table of all pulses where it fits the screen, else one for each pulse."""
     from pulsetrainer.flows.evaluate import PUBLISHED, metrics_of
 
     figures = metrics_of(evaluation)
@@ -143,10 +155,4 @@ def tables(screen: Screen, evaluation: Evaluation) -> None:
             "force error, % of full force",
             ["", *(heading for heading, _ in shown)],
             [[label, *(found.get(metric) for _, found in shown)] for label, metric in _FIGURES],
-        )
-    if evaluation.models:
-        screen.table(
-            "prediction error on the run",
-            ["model", "rms", "rms %", "max %", "gain %"],
-            [[m.name, m.rms, m.rms_percent, m.max_percent, m.gain_percent] for m in evaluation.models],
         )

@@ -30,8 +30,8 @@ from pulsetrainer.report import html
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
 
-# Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631: the published device. The maxima are given for the device
-# as a whole, so they stand beside both pulses.
+# Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631: the published device. The maxima are given for the
+# device as a whole, so they stand beside both pulses.
 _PUBLISHED_MAXIMA = {"scaled.max_abs_error_percent": 28.7, "compensated.max_abs_error_percent": 7.8}
 PUBLISHED: dict[str, dict[str, float]] = {
     "normal": {"mean_error_reduction_percent": 73.9, **_PUBLISHED_MAXIMA},
@@ -232,7 +232,7 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 output_unit=one.output_unit,
             )
         )
-    return Evaluation(models=tuple(found))
+    return Evaluation(models=tuple(found), model=model)
 
 
 def metrics_of(evaluation: Evaluation) -> dict[str, float]:
