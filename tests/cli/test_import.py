@@ -24,13 +24,13 @@ def test_a_magnetic_loop_without_time_fits_within_a_third_of_a_percent(run, name
 
 def test_a_falling_loop_is_found_said_and_fitted(run):
     """The surgical tool's jaw closes when the spindle turns up; another speed is predicted within 2 %."""
-    for speed in ("f0p1", "f0p3"):
+    for speed, samples in (("f0p1", 10000), ("f0p3", 9987)):
         done = run(
             "import", DATA / f"davinci_{speed}_torque10.csv", "--input", "u", "--output", "y",
             "--input-unit", "deg", "--output-unit", "deg", "-o", f"{speed}.h5", "--json",
         )  # fmt: skip
         assert done.code == 0, done
-        assert done.json["facts"]["samples"] == 10000
+        assert done.json["facts"]["samples"] == samples
         assert done.json["facts"]["rate_Hz"] == pytest.approx(500.0)
     done = run("identify", "f0p1.h5", "-o", "model.h5", "--json")
     assert done.json["polarity"] == -1
