@@ -1,0 +1,328 @@
+"""How a text file is a table: its delimiter, decimal sign, header and comments; and its numbers.
+
+Every rule is explicit: the delimiter is the one that makes most cells numbers; a comma is a decimal sign
+only where something else separates; the first line is a header if it has text where the next one has a
+number; a column that starts with text is a column of text. Numpy parses all rows at once; only if that fails
+are the cells looked at one by one, to fill what is missing or to name the one that is to blame.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.errors import DataError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pulsetrainer.artefacts.kinds import FloatArray
+
+_DELIMITERS = ("\t", ";", ",", None)  # None: blanks
+_SAMPLE_LINES = 60
+_COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+_MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
+_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
+
+Lines = Iterator[tuple[int, str]]  # line number, line
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """What makes a table of a text file."""
+
+    encoding: str
+    delimiter: str | None
+    decimal_comma: bool
+    names: tuple[str, ...]
+    units: tuple[str, ...]  # of a second header line; empty texts where there is none
+    comments: tuple[str, ...]  # above the first row
+    first_line: int  # of the first row
+    text_columns: frozenset[int]
+
+    def split(self, line: str) -> list[str]:
+        """Return the cells of a line, without one that only a delimiter at the end makes."""
+        cells = split(line, self.delimiter)
+        if len(cells) == len(self.names) + 1 and not cells[-1]:
+            cells.pop()
+        return cells
+
+
+@dataclass(slots=True)
+class Rows:
+    """Where in the file the rows are: comments and blank lines shift them."""
+
+    shifts: list[tuple[int, int]] = field(default_factory=list)  # (row, line) wherever the distance changes
+
+
+def split(line: str, delimiter: str | None) -> list[str]:
+    """Return the cells of a line, stripped."""
+    if delimiter is None:
+        return line.split()
+    if '"' in line:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def number(cell: str, *, decimal_comma: bool) -> float | None:
+    """Return the number in a cell, NaN where it says that the value is missing, None where it is text."""
+    try:
+        # Python reads 1_000 as a number; no instrument writes it
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        if decimal_comma and _COMMA_DECIMAL.fullmatch(cell):
+            return float(cell.replace(",", "."))
+        return np.nan if cell.lower() in _MISSING else None
+
+
+def detect(path: Path) -> Dialect:
+    """Return how a file is to be read.
+
+    Raises
+    ------
+    DataError
+        It is no text, or no table.
+    OSError
+        It cannot be read.
+    """
+    encoding = _encoding(path)
+    comments: list[tuple[int, str]] = []
+    lines: list[tuple[int, str]] = []
+    declared: str | None = None
+    with path.open(encoding=encoding, errors="surrogateescape", newline=None) as stream:
+        for count, line in enumerate(stream, 1):
+            text = line.strip()
+            if count == 1 and (found := _SIGNED_DELIMITER.fullmatch(text)):
+                declared = found[1]
+            elif text.startswith("#"):
+                if len(lines) <= 2:
+                    comments.append((count, _readable(text.lstrip("# "))))
+            elif text:
+                lines.append((count, _readable(line.strip("\r\n"))))
+            if len(lines) == _SAMPLE_LINES:
+                break
+    if not lines:
+        raise DataError(f"{path} is empty", hint="export the record again")
+    delimiter = declared or _delimiter([line for _, line in lines])
+    return _with_header(path, encoding, delimiter, lines, comments)
+
+
+def _encoding(path: Path) -> str:
+    with path.open("rb") as stream:
+        start = stream.read(4096)
+    if start.startswith(_UTF16_MARKS):
+        return "utf-16"
+    if b"\0" in start:
+        ours = start.startswith(b"\x89HDF")
+        raise DataError(
+            f"{path} is not a text file",
+            hint="it is HDF5: see `pulsetrainer show`" if ours else "export the record as CSV",
+        )
+    return "utf-8-sig"
+
+
+def _readable(line: str) -> str:
+    """Return a line in which bytes that are not UTF-8 are read as Western Windows letters."""
+    if line.isascii():
+        return line
+    raw = line.encode("utf-8", "surrogateescape")
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", "replace")
+
+
+def _delimiter(lines: list[str]) -> str | None:
+    """Return the delimiter that makes the largest share of cells numbers, the first of equals."""
+    body = lines[1:] or lines  # the first line may be a header
+
+    def share(delimiter: str | None) -> float:
+        rows = [split(line, delimiter) for line in body]
+        if max(map(len, rows)) < 2:
+            return -1.0
+        cells = [cell for row in rows for cell in row if cell]
+        comma = delimiter != ","
+        return (
+            float(np.mean([number(cell, decimal_comma=comma) is not None for cell in cells]))
+            if cells
+            else 0.0
+        )
+
+    shares = [share(delimiter) for delimiter in _DELIMITERS]
+    return "," if max(shares) < 0 else _DELIMITERS[int(np.argmax(shares))]
+
+
+def _with_header(
+    path: Path,
+    encoding: str,
+    delimiter: str | None,
+    lines: list[tuple[int, str]],
+    commented: list[tuple[int, str]],
+) -> Dialect:
+    """Return the dialect, with what the lines above the first row say."""
+    rows = [split(line, delimiter) for _, line in lines]
+    decimal_comma = delimiter != "," and any(
+        _COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row
+    )
+    text = [[number(cell, decimal_comma=decimal_comma) is None for cell in row] for row in rows]
+    heads = 0
+    second = text[1] if len(text) > 1 else []
+    if all(text[0]) or any(a and not b for a, b in zip(text[0], second, strict=False)):
+        heads = 1
+        if len(text) > 2 and second and all(second) and not all(text[2]):
+            heads = 2
+    if heads == len(rows):
+        raise DataError(f"{path} is empty below its header", hint="export the record again")
+    first = rows[heads]
+    comments = tuple(comment for count, comment in commented if count < lines[heads][0])
+    names = rows[0] if heads else _commented_names(comments, delimiter, len(first))
+    if not first[-1] and not names[-1]:  # only a delimiter at the end of the line makes that column
+        names, first = names[:-1], first[:-1]
+    elif len(names) == len(first) + 1 and not names[-1]:
+        names = names[:-1]
+    elif len(first) == len(names) + 1 and not first[-1]:
+        first = first[:-1]
+    if len(names) != len(first):
+        raise DataError(
+            f"{path} has {len(names)} column names, but {len(first)} columns in line {lines[heads][0]}",
+            hint="mend the header; decimal commas need another delimiter, such as a semicolon",
+        )
+    if all(text[heads][: len(first)]):
+        raise DataError(
+            f"{path} has no column of numbers: line {lines[heads][0]} is {lines[heads][1][:60]!r}",
+            hint="export the record as CSV, one column a quantity",
+        )
+    units = [cell.strip("()[] ") for cell in rows[1]] if heads == 2 else []
+    return Dialect(
+        encoding,
+        delimiter,
+        decimal_comma,
+        tuple(name or f"column{k + 1}" for k, name in enumerate(names)),
+        tuple(units) if len(units) == len(names) else ("",) * len(names),
+        comments,
+        lines[heads][0],
+        frozenset(k for k, is_text in enumerate(text[heads][: len(first)]) if is_text),
+    )
+
+
+def _commented_names(comments: tuple[str, ...], delimiter: str | None, count: int) -> list[str]:
+    """Return names from the last comment, if it is a header (numpy writes it so), or numbers."""
+    if comments:
+        cells = split(comments[-1], delimiter)
+        if len(cells) == count and all(number(cell, decimal_comma=True) is None for cell in cells):
+            return cells
+    return [f"column{k + 1}" for k in range(count)]
+
+
+def parse(path: Path, dialect: Dialect) -> tuple[FloatArray, Rows]:
+    """Return the numbers (rows, columns) and where they are in the file; a column of text is NaN.
+
+    Raises
+    ------
+    DataError
+        A row is too short or too long, or a cell in a column of numbers is text: both are named.
+    OSError
+        The file cannot be read.
+    """
+    if not dialect.text_columns:
+        try:
+            return _load(path, dialect, careful=False)
+        except ValueError:
+            pass  # something is missing or wrong: look closer
+    return _load(path, _surveyed(path, dialect), careful=True)
+
+
+def _load(path: Path, dialect: Dialect, *, careful: bool) -> tuple[FloatArray, Rows]:
+    rows = Rows()
+    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
+        lines = _numbered(stream, dialect, rows)
+        texts = _cell_by_cell(lines, dialect) if careful else _as_they_are(lines, dialect)
+        values: FloatArray = np.loadtxt(
+            texts, delimiter="," if careful else dialect.delimiter, comments=None, quotechar='"', ndmin=2
+        )
+    return values, rows
+
+
+def _numbered(stream: Iterator[str], dialect: Dialect, rows: Rows) -> Lines:
+    """Yield the rows with their line numbers, and note where these jump."""
+    row, distance = 0, -1
+    for count, line in enumerate(islice(stream, dialect.first_line - 1, None), dialect.first_line):
+        if line.isspace() or line.lstrip().startswith("#"):
+            continue
+        if count - row != distance:
+            distance = count - row
+            rows.shifts.append((row, count))
+        row += 1
+        yield count, line
+
+
+def _as_they_are(lines: Lines, dialect: Dialect) -> Iterator[str]:
+    """Yield lines as numpy takes them; ValueError where the decimal sign changes."""
+    for _, line in lines:
+        if not dialect.decimal_comma:
+            yield line
+        elif "." in line:
+            raise ValueError(line)
+        else:
+            yield line.replace(",", ".")
+
+
+def _cell_by_cell(lines: Lines, dialect: Dialect) -> Iterator[str]:
+    """Yield lines with NaN for what is missing and for text in a column of text."""
+    for _, line in lines:
+        cells = dialect.split(line.strip("\r\n"))
+        for k, cell in enumerate(cells):
+            if k in dialect.text_columns or cell.lower() in _MISSING:
+                cells[k] = "nan"
+            elif dialect.decimal_comma:
+                cells[k] = cell.replace(",", ".")
+        yield ",".join(cells)
+
+
+def _surveyed(path: Path, dialect: Dialect) -> Dialect:
+    """Look at every cell; return the dialect with the decimal sign that the whole file uses.
+
+    Raises
+    ------
+    DataError
+        See ``parse``.
+    """
+    point = comma = ""
+    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
+        for count, line in _numbered(stream, dialect, Rows()):
+            cells = dialect.split(line.strip("\r\n"))
+            if len(cells) != len(dialect.names):
+                raise DataError(
+                    f"{path} has {len(cells)} columns in line {count}, expected {len(dialect.names)}: "
+                    f"{', '.join(dialect.names)}",
+                    hint="mend or remove that line, or export the record again",
+                )
+            for k, cell in enumerate(cells):
+                if k in dialect.text_columns:
+                    continue
+                if number(cell, decimal_comma=dialect.delimiter != ",") is None:
+                    raise DataError(
+                        f"{path} has {_place(cell, k, count, dialect)}: not a number",
+                        hint="mend or remove that line",
+                    )
+                if not point and "." in cell:
+                    point = _place(cell, k, count, dialect)
+                if not comma and "," in cell:
+                    comma = _place(cell, k, count, dialect)
+            if point and comma:
+                raise DataError(
+                    f"{path} mixes decimal signs: {point}, but {comma}",
+                    hint="export it with one decimal sign",
+                )
+    return replace(dialect, decimal_comma=bool(comma))
+
+
+def _place(cell: str, column: int, line: int, dialect: Dialect) -> str:
+    return f"{_readable(cell)!r} in column {dialect.names[column]}, line {line}"

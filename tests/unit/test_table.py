@@ -1,0 +1,309 @@
+"""Tables: any dialect reads to the same numbers; what is wrong is named by line and column."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pulsetrainer.artefacts.table import read_table, run_from_table, write_table
+from pulsetrainer.errors import ArgumentError, DataError, UsageError
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+COLUMNS = {"input_column": "u", "output_column": "y"}
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Return a function that reads a text as a table."""
+
+    def read(text, encoding="utf-8"):
+        path = tmp_path / "t.csv"
+        path.write_bytes(text.encode(encoding) if isinstance(text, str) else text)
+        return read_table(path)
+
+    return read
+
+
+def _refused(table, text, *words):
+    """Assert that a text is no table, and that the message has these words."""
+    with pytest.raises(DataError) as caught:
+        table(text)
+    for word in ("t.csv", *words):
+        assert word in caught.value.message
+    assert caught.value.hint
+    assert caught.value.exit_code == 3
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_every_dialect_reads_to_the_same_numbers(data, tmp_path_factory):
+    """Delimiter, decimal sign, header, comments, blank lines, line ends, encoding: the numbers are equal."""
+    delimiter = data.draw(st.sampled_from([",", ";", "\t", " ", "  ", " ; "]))
+    comma = delimiter.strip() != "," and data.draw(st.booleans())
+    width = data.draw(st.integers(2, 4))
+    number = st.floats(allow_nan=False, allow_infinity=False)
+    rows = data.draw(st.lists(st.lists(number, min_size=width, max_size=width), min_size=1, max_size=8))
+    names = data.draw(st.sampled_from([None, ["t_s", "current_A", "Kraft(N)", "B[T]"][:width]]))
+    filler = st.lists(st.sampled_from(["", "   ", "# pause"]), max_size=2)
+    written = [delimiter.join(map(repr, row)) for row in rows]
+    if comma:
+        written = [line.replace(".", ",") for line in written]
+    lines = [delimiter.join(names)] if names else []
+    for line in written:
+        lines += [*data.draw(filler), line]
+    lines += data.draw(filler)
+    text = data.draw(st.sampled_from(["\n", "\r\n"])).join(lines) + data.draw(st.sampled_from(["", "\n"]))
+    path = tmp_path_factory.mktemp("dialect") / "t.csv"
+    path.write_bytes(text.encode(data.draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))))
+    read = read_table(path)
+    np.testing.assert_array_equal(read.values, rows)
+    assert read.names == tuple(names or [f"column{k + 1}" for k in range(width)])
+    for row, line in enumerate(written):
+        assert text.splitlines()[read.line_of(row) - 1] == line
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    values=st.lists(st.floats(), max_size=20),
+    names=st.lists(st.text(st.characters(codec="utf-8"), max_size=8), min_size=2, max_size=3, unique=True),
+)
+def test_what_is_written_is_written(values, names, tmp_path_factory):
+    """The file has the header, and every number to the last bit, NaN and infinities included."""
+    path = tmp_path_factory.mktemp("write") / "t.csv"
+    write_table(path, dict.fromkeys(names, values), comments=["source: here\nand there"])
+    content = path.read_bytes()
+    assert content.startswith(b"# source: here\n# and there\n")
+    last = content.splitlines()[len(content.splitlines()) - len(values) :] if values else []
+    np.testing.assert_array_equal([float(line.split(b",")[1]) for line in last], values)
+
+
+def test_write_and_read(tmp_path):
+    """What write_table writes, read_table reads, units and comments too."""
+    columns = {"t_s": np.arange(20_000) / 1e3, "current (A)": np.random.default_rng(1).random(20_000)}
+    write_table(tmp_path / "t.csv", columns, comments=["source: here"])
+    read = read_table(tmp_path / "t.csv")
+    for name, values in columns.items():
+        np.testing.assert_array_equal(read.column(name), values)
+    assert read.units == {"t_s": "s", "current (A)": "A"}
+    assert read.comments == ("source: here",)
+    with pytest.raises(UsageError, match="exists already"):
+        write_table(tmp_path / "t.csv", columns)
+    write_table(tmp_path / "t.csv", {"a": [1.0], "b": [2.0]}, force=True)
+    with pytest.raises(ArgumentError, match="one length"):
+        write_table(tmp_path / "x.csv", {"a": [1.0], "b": [2.0, 3.0]})
+    assert not (tmp_path / "x.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        ("current_A", "current", "A"),
+        ("Force (N)", "Force", "N"),
+        ("time [ms]", "time", "ms"),
+        ("Kraft / N", "Kraft", "N"),
+        ("coil_current", "coil_current", ""),
+        ("H_A/m", "H", "A/m"),
+        ("(N)", "(N)", ""),
+        ("x", "x", ""),
+        ("Temperatur °C (°C)", "Temperatur °C", "°C"),
+    ],
+)
+def test_units_in_headings(table, heading, name, unit):
+    """A unit is read where a heading says one; the column answers to its name without it, in any case."""
+    read = table(f"t;{heading}\n0;1\n1;2\n")
+    assert read.unit(heading) == unit
+    assert read.unit(name.upper()) == unit
+
+
+def test_a_line_of_units_below_the_header(table):
+    """Oscilloscopes put the units on a line of their own."""
+    read = table("Time,Ch 1\n(ms),(V)\n0,1\n1,2\n")
+    assert read.units == {"Time": "ms", "Ch 1": "V"}
+    assert read.line_of(0) == 3
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sep=;\nt;u\n0;1,5\n1;2,5\n",
+        "# t;u\n0;1.5\n1;2.5\n",
+        "t;u;\n0;1,5;\n1;2,5;\n",
+        "t;u\n0;1.5;\n1;2.5;\n",
+        '"t";"u"\n"0";"1,5"\n"1";"2,5"\n',
+        "t u\n0 1,5\n1 2,5\n",
+        "t\tu\n0\t1,5\n1\t2,5",
+        "t, u\n0, 1.5\n1, 2.5\n",
+        "t;u\n0;1,5\n# pause\n\n1;2,5\n",
+    ],
+)
+def test_habits_of_programs(table, text):
+    """A declared delimiter, a header in a comment, delimiters at line ends, quotes, blanks."""
+    read = table(text)
+    assert read.names == ("t", "u")
+    np.testing.assert_array_equal(read.values, [[0, 1.5], [1, 2.5]])
+
+
+def test_comments_are_those_above_the_first_row(table):
+    """A remark between the rows is no header, and no comment on the record."""
+    read = table("# source: here\n0,1\n# a,b\n1,2\n")
+    assert read.comments == ("source: here",)
+    assert read.names == ("column1", "column2")
+
+
+def test_letters_of_old_programs(table):
+    """A header in the Western Windows encoding is read, with its signs."""
+    assert table("Zeit;Weg (µm)\n0;1\n1;2\n".encode("cp1252")).units == {"Weg (µm)": "µm"}
+
+
+def test_a_single_column(table):
+    """One column is a table too, with or without a name."""
+    assert table("u\n1\n2\n").names == ("u",)
+    np.testing.assert_array_equal(table("1.5\n2.5\n").values, [[1.5], [2.5]])
+
+
+def test_columns_of_text_are_passed_over(table):
+    """A column of time stamps does not spoil the others; asking for it says what it is."""
+    read = table("when,u,y\n12:00:01,1,2\n12:00:02,,4\n")
+    np.testing.assert_array_equal(read.column("y"), [2, 4])
+    np.testing.assert_array_equal(read.column("u"), [1, np.nan])
+    with pytest.raises(DataError, match="has text, not numbers, in column when, as in line 2"):
+        read.column("when")
+
+
+@pytest.mark.parametrize("missing", ["", "NaN", "n/a", "-", "NULL"])
+def test_missing_values_are_nan_until_they_are_needed(table, missing):
+    """A missing value is no error by itself; a column that must be whole names line, column and how many."""
+    read = table(f"# c\nt,u,y\n0,1,2\n\n1,{missing},3\n2,3,4\n")
+    assert np.isnan(read.column("u")[1])
+    with pytest.raises(DataError, match=r"nan in column u, line 5 \(1 of 3 rows"):
+        read.check_finite("u")
+    with pytest.raises(DataError, match="line 5"):
+        run_from_table(read, **COLUMNS)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["is empty"]),
+        ("\n  \n# only a comment\n", ["is empty"]),
+        ("t,u\n", ["is empty below its header"]),
+        ("t,u,y\n0,1,2\n1,abc,3\n", ["'abc'", "column u", "line 3", "not a number"]),
+        ("t,u,y\n0,1,2\n\n# x\n1,2,1_000\n", ["'1_000'", "column y", "line 5"]),
+        ("t,u,y\n0,1,2\n1,2\n", ["2 columns in line 3", "expected 3"]),
+        ("t,u\n0,1\n1,2,3\n", ["3 columns in line 3", "expected 2"]),
+        ("t,u\n0,1,2\n1,2,3\n", ["2 column names", "3 columns in line 2"]),
+        (
+            "t;u\n0;1,5\n1;2.5\n",
+            ["mixes decimal signs", "'2.5' in column u, line 3", "'1,5' in column u, line 2"],
+        ),
+        ("t;u\n0;1.5\n1;2,5\n", ["mixes decimal signs", "line 2", "line 3"]),
+        ("t,u,u\n0,1,2\n", ["two columns named 'u'"]),
+        ("dear reader\nthis is\nno table\n", ["no column of numbers", "line"]),
+        ("t;u\n0;234,5\n1;2.345,6\n", ["'2.345,6'", "column u", "line 3"]),
+        (b"\x89HDF\r\n\x1a\n\0\0", ["is not a text file"]),
+        (b"\x00\x01\x02", ["is not a text file"]),
+        (b"\xff\xfe1", ["is not a text file"]),
+    ],
+)
+def test_what_is_wrong_is_named(table, text, words):
+    """Text among numbers, ragged rows, two decimal signs, no table at all: line, column, next step."""
+    _refused(table, text, *words)
+
+
+def test_a_late_decimal_comma_is_found(table):
+    """A file that starts with a thousand whole numbers and only then shows its decimal sign."""
+    whole = "".join(f"{k};{k}\n" for k in range(1000))
+    read = table(f"t;u\n{whole}1000;0,5\n")
+    assert read.column("u")[-1] == 0.5
+    _refused(table, f"t;u\n{whole}1000;0,5\n1001;0.5\n", "mixes decimal signs", "line 1003")
+
+
+def test_files_that_are_not_there(tmp_path):
+    """An absent file and a folder."""
+    for path in (tmp_path / "absent.csv", tmp_path):
+        with pytest.raises(DataError, match="cannot be read"):
+            read_table(path)
+
+
+def test_a_column_that_does_not_exist_offers_the_nearest(table):
+    """A typing error in a column's name."""
+    with pytest.raises(DataError, match="no column 'curent'; it has t_s, current_A, force_N") as caught:
+        table("t_s,current_A,force_N\n0,1,2\n").column("curent")
+    assert "'current_A'" in caught.value.hint
+
+
+# --- runs -------------------------------------------------------------------------------------------
+
+
+def test_a_run_with_units_of_any_bench(table):
+    """Names, units and quantities come from the header; time in ms becomes seconds."""
+    run = run_from_table(
+        table("time [ms],H (A/m),B (T),set (A/m)\n0,1,2,1.1\n2,3,4,3.1\n"),
+        input_column="H",
+        output_column="B",
+        reference_column="set",
+    )
+    np.testing.assert_array_equal(run.time_s, [0, 2e-3])
+    np.testing.assert_array_equal(run.reference, [1.1, 3.1])
+    assert (run.input_unit, run.input_quantity) == ("A/m", "H")
+    assert (run.output_unit, run.output_quantity) == ("T", "B")
+    assert run.signal == "t.csv"
+
+
+def test_units_given_win(table):
+    """What the user says about units is right; without any the unit is 1."""
+    read = table("t,u_V,y\n0,1,2\n1,2,3\n")
+    run = run_from_table(read, **COLUMNS, input_unit="mV")
+    assert (run.input_unit, run.output_unit) == ("mV", "1")
+
+
+def test_a_rate_instead_of_a_time(table):
+    """Samples a second; both a rate and a time column are too much, a rate of nothing too little."""
+    read = table("t,u,y\n9,1,2\n8,2,3\n")
+    np.testing.assert_array_equal(run_from_table(read, **COLUMNS, rate_Hz=4).time_s, [0, 0.25])
+    for bad in ({"rate_Hz": 4, "time_column": "t"}, {"rate_Hz": 0}, {"rate_Hz": np.nan}, {"rate_Hz": np.inf}):
+        with pytest.raises(UsageError, match="rate"):
+            run_from_table(read, **COLUMNS, **bad)
+
+
+def test_without_time_only_the_order_counts(table):
+    """Where the first column is the input there is no time; another column may be named."""
+    read = table("u,y,t\n1,2,0\n2,3,1\n")
+    assert run_from_table(read, **COLUMNS).time_s is None
+    np.testing.assert_array_equal(run_from_table(read, **COLUMNS, time_column="t").time_s, [0, 1])
+
+
+def test_time_that_does_not_increase_names_the_line(table):
+    """A repeated and a backward time stamp, comments and blank lines counted."""
+    for stamp in ("1", "0.5"):
+        with pytest.raises(
+            DataError, match=rf"t\.csv, column t, does not increase at line 6: {stamp} s after 1 s"
+        ):
+            run_from_table(table(f"# c\nt,u,y\n0,1,2\n1,1,2\n\n{stamp},1,2\n"), **COLUMNS)
+
+
+def test_time_in_an_unknown_unit(table):
+    """Samples are no time."""
+    with pytest.raises(DataError, match="time t in 'samples'"):
+        run_from_table(table("t (samples),u,y\n0,1,2\n1,2,3\n"), **COLUMNS, time_column="t")
+
+
+def test_one_row_is_no_run(table):
+    """A run needs two samples."""
+    with pytest.raises(DataError, match="has 1 row"):
+        run_from_table(table("t,u,y\n0,1,2\n"), **COLUMNS)
+
+
+@pytest.mark.parametrize(("name", "rows"), [("bh_ferrite_mnzn_1.csv", 129), ("bh_steel_m130_27s_1.csv", 256)])
+def test_measured_records(name, rows):
+    """Real records read whole: their first and last rows are those of the file."""
+    run = run_from_table(read_table(DATA / name), **COLUMNS, input_unit="A/m", output_unit="T")
+    lines = (DATA / name).read_text().splitlines()
+    assert len(run.input) == rows == len(lines) - 1
+    for k in (0, -1):
+        expected = [float(cell) for cell in lines[1:][k].split(",")]
+        np.testing.assert_array_equal([run.time_s[k], run.input[k], run.output[k]], expected)
