@@ -157,6 +157,10 @@ def read_table(path: Path | str) -> Table:
         ) from error
     except UnicodeError as error:
         raise DataError(f"{path} is not a text file: {error}", hint="export the record as CSV") from error
+    except (csv.Error, ValueError, IndexError) as error:  # quotes that do not close, cells without end
+        raise DataError(
+            f"{path} is no table of numbers: {error}", hint="export it as CSV with one column a quantity"
+        ) from error
     return Table(
         path,
         dialect.names,

@@ -172,23 +172,13 @@ def _with_header(
         _COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row
     )
     text = [[number(cell, decimal_comma=decimal_comma) is None for cell in row] for row in rows]
-    heads = 0
-    second = text[1] if len(text) > 1 else []
-    if all(text[0]) or any(a and not b for a, b in zip(text[0], second, strict=False)):
-        heads = 1
-        if len(text) > 2 and second and all(second) and not all(text[2]):
-            heads = 2
+    heads = _heading_lines(text)
     if heads == len(rows):
         raise DataError(f"{path} is empty below its header", hint="export the record again")
     first = rows[heads]
     comments = tuple(comment for count, comment in commented if count < lines[heads][0])
     names = rows[0] if heads else _commented_names(comments, delimiter, len(first))
-    if not first[-1] and not names[-1]:  # only a delimiter at the end of the line makes that column
-        names, first = names[:-1], first[:-1]
-    elif len(names) == len(first) + 1 and not names[-1]:
-        names = names[:-1]
-    elif len(first) == len(names) + 1 and not first[-1]:
-        first = first[:-1]
+    names, first = _without_end(names, first)
     if len(names) != len(first):
         raise DataError(
             f"{path} has {len(names)} column names, but {len(first)} columns in line {lines[heads][0]}",
@@ -210,6 +200,23 @@ def _with_header(
         lines[heads][0],
         frozenset(k for k, is_text in enumerate(text[heads][: len(first)]) if is_text),
     )
+
+
+def _heading_lines(text: list[list[bool]]) -> int:
+    """Return how many lines stand above the first row: names, and units below; ``text``: cell is text."""
+    second = text[1] if len(text) > 1 else []
+    if not (all(text[0]) or any(a and not b for a, b in zip(text[0], second, strict=False))):
+        return 0
+    return 2 if len(text) > 2 and all(second) and not all(text[2]) else 1
+
+
+def _without_end(names: list[str], first: list[str]) -> tuple[list[str], list[str]]:
+    """Return header and first row without the column that only a delimiter at the end of a line makes."""
+    if not names[-1] and (not first[-1] or len(names) == len(first) + 1):
+        names = names[:-1]
+    if not first[-1] and len(first) == len(names) + 1:
+        first = first[:-1]
+    return names, first
 
 
 def _commented_names(comments: tuple[str, ...], delimiter: str | None, count: int) -> list[str]:

@@ -236,6 +236,27 @@ def test_a_column_that_does_not_exist_offers_the_nearest(table):
     assert "'current_A'" in caught.value.hint
 
 
+@settings(max_examples=300, deadline=None)
+@given(
+    lines=st.lists(
+        st.text(st.sampled_from('0123456789.,;\t "#-eENaNst()µ\x00\u2028_'), max_size=20), max_size=8
+    ),
+    raw=st.binary(max_size=4),
+)
+def test_whatever_the_bytes_it_is_a_table_or_a_data_error(lines, raw, tmp_path_factory):
+    """No bytes make the reader fail otherwise, and what it returns fits together."""
+    path = tmp_path_factory.mktemp("any") / "t.csv"
+    path.write_bytes("\n".join(lines).encode() + raw)
+    try:
+        read = read_table(path)
+    except DataError as error:
+        said = (str(path) in error.message, bool(error.hint))
+    else:
+        assert read.values.shape[1] == len(read.names)
+        said = (all(read.line_of(row) >= 1 for row in range(len(read.values))),)
+    assert all(said)
+
+
 # --- runs -------------------------------------------------------------------------------------------
 
 
