@@ -7,7 +7,7 @@
  *     give equal numbers however long the pauses between them were;
  *   - armed but not started, and while playing whenever the host has been silent for half the
  *     heartbeat (100 ms of device time), the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
- *     for at most half a second of wall time; after that it goes on at the wall clock, so that a
+ *     for at most two seconds of wall time (a loaded computer); after that it goes on at the wall clock, so that a
  *     host that is really gone trips the 200 ms heartbeat like on a real device.
  * A coil that has tripped its heat model cools only while time runs: open a new bench instead of waiting. */
 #include "app.h"
@@ -17,7 +17,7 @@
 #define BATCH 10                    /* ticks between two looks at the pty */
 #define TELEMETRY_HIGH 48           /* waiting samples: the reader is behind */
 #define SETTLE_TICKS 2000           /* after the output went off */
-#define GRACE_NS 500000000          /* wall time that a stalled device waits for its host */
+#define GRACE_NS 2000000000LL       /* wall time that a stalled device waits for its host */
 #define CATCH_UP_NS 250000000       /* a computer that slept: do not run the lost time all at once */
 
 static enum pace_speed speed;
