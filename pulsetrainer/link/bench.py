@@ -14,12 +14,13 @@ from urllib.parse import parse_qsl
 
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.link.build import firmware_executable
+from pulsetrainer.link.noise import MAX_RATE
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 _SPEEDS = ("max", "real")
-_OWN = ("ideal", "speed", "break")
+_OWN = ("ideal", "speed", "break", "wire", "wire-seed")
 _START_S = 10.0
 _LEAVE_S = 2.0
 
@@ -32,6 +33,8 @@ class BenchOptions:
     speed: str = "max"
     settings: tuple[tuple[str, str], ...] = ()
     breaks: tuple[str, ...] = ()
+    wire: float = 0.0  # damage per byte on the way between host and device
+    wire_seed: int = 1
 
     def arguments(self) -> list[str]:
         """Return the firmware process's command-line arguments."""
@@ -41,6 +44,28 @@ class BenchOptions:
         for what in self.breaks:
             words += ["--break", what]
         return words
+
+
+def _wire_rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = -1.0
+    if not 0 <= rate <= MAX_RATE:
+        raise UsageError(
+            f"bench parameter wire={text} is not a rate of damaged bytes between 0 and {MAX_RATE}",
+            hint='one byte in ten thousand: "bench:?wire=0.0001&wire-seed=3"',
+        )
+    return rate
+
+
+def _wire_seed(text: str) -> int:
+    if not re.fullmatch(r"\d{1,9}", text):
+        raise UsageError(
+            f"bench parameter wire-seed={text} is not a whole number from 0 on",
+            hint='"bench:?wire=0.0001&wire-seed=3"',
+        )
+    return int(text)
 
 
 def parse_bench(port: str) -> BenchOptions:
@@ -58,6 +83,7 @@ def parse_bench(port: str) -> BenchOptions:
             hint='like this: "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
     ideal, speed = False, "max"
+    wire, wire_seed = 0.0, 1
     settings: list[tuple[str, str]] = []
     breaks: list[str] = []
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
@@ -73,9 +99,13 @@ def parse_bench(port: str) -> BenchOptions:
             speed = value
         elif name == "break":
             breaks.append(value)
+        elif name == "wire":
+            wire = _wire_rate(value)
+        elif name == "wire-seed":
+            wire_seed = _wire_seed(value)
         else:
             settings.append((name, value))
-    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks))
+    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), wire, wire_seed)
 
 
 def _known(executable: Path) -> tuple[dict[str, tuple[str, str, str, str]], list[str]]:
@@ -122,7 +152,7 @@ class Bench:
                 "the virtual bench needs a pseudo-terminal, which this system does not have",
                 hint="use Linux, macOS or WSL for bench:, or a real device with --port COM3",
             )
-        options = parse_bench(port)
+        self.options = options = parse_bench(port)
         executable = executable or firmware_executable()
         # A session of its own: Ctrl-C in the terminal must reach the host program only, which then stops
         # the device in order. The pipe on standard input is the leash: it closes however we end.

@@ -27,6 +27,7 @@ from pulsetrainer.link.bench import Bench, BenchOptions, parse_bench
         ("bench:?ideal=1&speed=real", BenchOptions(ideal=True, speed="real")),
         ("bench:?seed=3&creep=0.05", BenchOptions(settings=(("seed", "3"), ("creep", "0.05")))),
         ("bench:?break=reset@2", BenchOptions(breaks=("reset@2",))),
+        ("bench:?wire=1e-4&wire-seed=3", BenchOptions(wire=1e-4, wire_seed=3)),
     ],
 )
 def test_ports_that_make_sense(port, options):
@@ -34,7 +35,19 @@ def test_ports_that_make_sense(port, options):
     assert parse_bench(port) == options
 
 
-@pytest.mark.parametrize("port", ["bench", "bench:ideal", "bench:?speed=fast", "bench:?ideal=yes"])
+@pytest.mark.parametrize(
+    "port",
+    [
+        "bench",
+        "bench:ideal",
+        "bench:?speed=fast",
+        "bench:?ideal=yes",
+        "bench:?wire=much",
+        "bench:?wire=0.2",
+        "bench:?wire=nan",
+        "bench:?wire-seed=-1",
+    ],
+)
 def test_ports_that_do_not(port):
     """What cannot be understood is a usage error with an example."""
     with pytest.raises(UsageError) as caught:
@@ -46,7 +59,7 @@ def test_ports_that_do_not(port):
     ("port", "message", "hint"),
     [
         ("bench:?crep=1", "no parameter 'crep'", "creep"),
-        ("bench:?zzzz=1", "no parameter 'zzzz'", "there are: ideal, speed, break, seed"),
+        ("bench:?zzzz=1", "no parameter 'zzzz'", "there are: ideal, speed, break, wire, wire-seed, seed"),
         ("bench:?creep=7", "creep=7 is outside its range: 0..0.5", "creep:"),
         ("bench:?creep=lots", "creep=lots is outside its range", ""),
         ("bench:?creep=", "creep= is outside its range", ""),
