@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,3 +84,88 @@ def conditioning(low: float, high: float, *, speed: float, rate_Hz: float, rest_
     """Samples of one major loop low -> high -> low and a rest: it leaves a known memory behind."""
     loop = through(np.asarray([low, high, low]), speed, rate_Hz)
     return np.concatenate((loop, np.full(round(rest_s * rate_Hz), low)))
+
+
+# Speeds of the diagnostic signal in ranges per second: 14 to 1, so that what grows with rate shows.
+_RATES = (0.7, 2.0, 5.0, 10.0)
+# The order in which the rates come: not monotone, so that rate and time cannot be taken for one another.
+_ORDER = (2, 0, 3, 1, 3, 2, 1, 0, 2, 3)
+# Two lists of turning points in shares of the range: nested loops towards the middle, and reversal curves
+# from both ends; each begins and ends at the bottom.
+_LISTS = (
+    (0.0, 0.92, 0.12, 0.81, 0.22, 0.70, 0.33, 0.60, 0.43, 0.54, 0.0),
+    (0.0, 1.0, 0.62, 1.0, 0.35, 0.75, 0.0, 0.38, 0.0, 0.55, 0.18, 0.0),
+)
+_HOLD_LEVELS = (0.8, 0.3, 0.6, 0.45, 0.9, 0.2, 0.7, 0.5, 1.0, 0.0)
+_HOLD_S = (1.2, 1.2, 2.4, 1.2, 1.2, 2.4, 1.2, 1.2, 6.0, 6.0)
+_BIASES = (0.2, 0.35, 0.5, 0.65, 0.8)
+_LOOP_RATE = 2.0  # of the reference loops and of the way to a hold
+
+
+def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
+    """Ninety seconds in which the causes of a model's error look different from one another.
+
+    Ten blocks; each starts with the same major loop (a reference that repeats, and wipes the memory out),
+    then plays one of two lists of reversals at one of four rates spanning 14 to 1, in an order that is
+    not sorted, then holds: on the way up in even blocks, on the way down in odd ones. In between come
+    equal minor loops at five biases reached from below and from above, and twenty equal cycles at two
+    rates. The last two holds are a heating at the top and a rest at the bottom. Parts of reversal curves
+    between all these fill the plane, so that the weights can be fitted together with a cause.
+
+    Parameters
+    ----------
+    low, high
+        Range of the input; the signal begins and ends at ``low``.
+    rate_Hz
+        Sample rate of the reference.
+
+    Raises
+    ------
+    ArgumentError
+        An empty range, or a rate that is not positive.
+    """
+    if not (rate_Hz > 0 and high > low):
+        raise ArgumentError(
+            f"the range must have low < high and the rate must be positive, got {low:g}, {high:g}, {rate_Hz:g}",
+            hint="0, 1.5 and 1000 Hz suit the solenoid",
+        )
+    parts: list[FloatArray] = []
+
+    def go(points: tuple[float, ...], ranges_per_s: float) -> None:
+        parts.append(through(np.asarray(points), ranges_per_s, rate_Hz)[1:])
+
+    def hold(level: float, seconds: float) -> None:
+        parts.append(np.full(round(seconds * rate_Hz), level))
+
+    for block, rate in enumerate(_ORDER):
+        go((0.0, 1.0, 0.0), _LOOP_RATE)
+        go(_LISTS[block % 2], _RATES[rate])
+        go(_curves(block), _RATES[1 + block % 3])
+        level = _HOLD_LEVELS[block]
+        approach = (0.0, level) if block % 2 == 0 else (0.0, 1.0, level)
+        if block == 3:
+            _bias_loops(go)
+        if block == 6:
+            go((0.0, *(0.7, 0.3) * 20, 0.0), _RATES[2])
+            go((0.0, *(0.7, 0.3) * 20, 0.0), _RATES[3])
+        go(approach, _RATES[3] if block % 4 < 2 else _LOOP_RATE)
+        hold(level, _HOLD_S[block])
+        go((level, 0.0), _LOOP_RATE)
+    value = np.concatenate((np.zeros(1), *parts))
+    return Signal(low + (high - low) * value, rate_Hz, "diagnostic")
+
+
+def _curves(block: int) -> tuple[float, ...]:
+    """Turning points of some reversal curves, in shares of the range; the ten blocks interleave."""
+    down = tuple((block + 0.5) / 10.0 * 0.2 + 0.2 * k for k in range(5))
+    turns: list[float] = [0.0]
+    for k, bottom in enumerate(down):
+        turns += [1.0 if k % 2 == 0 else 0.96 - 0.03 * block, bottom]
+    return (*turns, 0.0)
+
+
+def _bias_loops(go: Callable[[tuple[float, ...], float], None]) -> None:
+    """Equal minor loops around several biases, each reached from below and from above."""
+    for bias in _BIASES:
+        loop = (bias, bias + 0.12, bias, bias + 0.12, bias)
+        go((0.0, *loop, 1.0, *loop, 0.0), _RATES[2])

@@ -1,1 +1,1 @@
-"""What the model gets wrong, and why."""
+"""Diagnosis: what a model gets wrong, the cause by name, the extended model, and how it is inverted."""

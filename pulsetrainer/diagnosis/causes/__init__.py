@@ -1,0 +1,39 @@
+"""The library of causes: every module of this folder that defines a ``Cause`` is in it."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+from functools import cache
+
+from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.errors import DataError
+
+
+@cache
+def library() -> dict[str, Cause]:
+    """All causes by id, in the order of the chain."""
+    found: list[Cause] = []
+    for module in pkgutil.iter_modules(__path__):
+        loaded = importlib.import_module(f"{__name__}.{module.name}")
+        for _, kind in inspect.getmembers(loaded, inspect.isclass):
+            if issubclass(kind, Cause) and kind is not Cause and kind.__module__.endswith(f".{module.name}"):
+                found.append(kind())
+    return {cause.id: cause for cause in sorted(found, key=lambda c: c.order)}
+
+
+def cause_named(name: str) -> Cause:
+    """Return a cause.
+
+    Raises
+    ------
+    DataError
+        This version knows no cause of that name.
+    """
+    if name not in library():
+        raise DataError(
+            f"the model is extended by {name!r}, a cause that this version does not know",
+            hint="update pulsetrainer, or extend the model again",
+        )
+    return library()[name]

@@ -1,0 +1,48 @@
+"""the loops drift over repeated cycles: (y + a LP(y; path of u)) / (1 + a)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, settled
+
+
+class Accommodation(Cause):
+    """A low-pass of the output along the path of the input."""
+
+    id = "accommodation"
+    title = "the loops drift over repeated cycles"
+    formula = "(y + a LP(y; path of u)) / (1 + a)"
+    signature = "the loop moves with the count of cycles, not with time"
+    excitation = "twenty equal cycles at two rates"
+    source = "Della Torre, Magnetic Hysteresis, 1999, chapter 5: accommodation"
+    stage = "output"
+    order = 60
+    family = "slow memory"
+    parameters = (
+        Quantity("amplitude", "1", -0.5, 1.0, 0.002),
+        Quantity("path", "{u}", 0.5, 1000.0, 0.5),
+    )
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.05, path * frames[0].reach)] for path in (7.0, 20.0, 60.0)]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        turned = settled(frame.input, 0.004 * frame.reach)
+        share = np.append(0.0, np.abs(np.diff(turned))) / values[1]
+        done = np.cumsum(share)
+        # LP(y) = exp(-s) (y0 + integral of y exp(s') ds'), with exp kept small by an origin per stretch
+        slow = np.empty_like(y)
+        last, begin = float(y[0]), 0
+        while begin < y.size:
+            origin = done[begin - 1] if begin else 0.0
+            end = max(int(np.searchsorted(done, origin + 200.0)), begin + 1)
+            grown = np.exp(done[begin:end] - origin)
+            slow[begin:end] = (last + np.cumsum(y[begin:end] * grown * -np.expm1(-share[begin:end]))) / grown
+            last, begin = float(slow[end - 1]), end
+        return (y + values[0] * slow) / (1.0 + values[0])

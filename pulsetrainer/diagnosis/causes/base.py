@@ -1,0 +1,104 @@
+"""What a cause is: one file in this folder defines one class derived from ``Cause``.
+
+The extended model is a chain: the measured input passes the causes of stage ``input`` in their order, then
+the Preisach operator, then the causes of stage ``output``. A cause of stage ``record`` is found on the raw
+data by ``gates`` and changes no model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+from scipy import signal
+
+from pulsetrainer.core.plane import FloatArray
+
+Stage = Literal["input", "output", "record"]
+Values = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One parameter of a cause; units may name the output and input unit as ``{y}`` and ``{u}``."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    small: float  # a step that matters little: for differences
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a cause may know of a record besides the signal that passes it."""
+
+    dt_s: float
+    input: FloatArray  # (n,) measured input
+    span: float  # of the output, output unit
+    reach: float  # range of the input, input unit
+    record: int = 0  # which record of how many
+    records: int = 1
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Time since the first sample (n,)."""
+        return np.arange(self.input.size) * self.dt_s
+
+
+class Cause:
+    """A reason why a static Preisach model is wrong, with the operator that repairs it."""
+
+    id: ClassVar[str]
+    title: ClassVar[str]  # in words a technician understands
+    formula: ClassVar[str]
+    signature: ClassVar[str]  # what it looks like, and what no other cause looks like
+    excitation: ClassVar[str]  # what must be in a record for it to be told apart
+    source: ClassVar[str]
+    stage: ClassVar[Stage]
+    order: ClassVar[int]  # place in the chain
+    family: ClassVar[str]  # causes of one family are easily taken for one another
+    parameters: ClassVar[tuple[Quantity, ...]] = ()
+    strengths: ClassVar[int] = 1  # so many leading parameters enter almost linearly
+    lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model
+    feeds_back: ClassVar[bool] = False  # needs the output to compute the input
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try; the columns of a block are fitted together."""
+        raise NotImplementedError
+
+    def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Input (n,) that the hysteresis sees, for the applied ``u`` (n,) and the output ``y`` (n,)."""
+        raise NotImplementedError
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause, for the output ``y`` (n,) before it."""
+        raise NotImplementedError
+
+
+def low_pass(x: FloatArray, tau_s: float, dt_s: float) -> FloatArray:
+    """Solve tau x' + x = input for an input that is straight between samples, from rest at x[0].
+
+    Exact: y+ = a y + (1 - a) u + (1 - (tau/dt)(1 - a)) (u+ - u) with a = exp(-dt/tau).
+    """
+    if tau_s <= 1e-9:
+        return x
+    a = np.exp(-dt_s / tau_s)
+    slope = 1.0 - tau_s / dt_s * (1.0 - a)
+    b = np.asarray([slope, 1.0 - a - slope])
+    state = signal.lfiltic(b, np.asarray([1.0, -a]), y=[x[0]], x=[x[0]])
+    # the filter's first step must see the first value as its past
+    filtered, _ = signal.lfilter(b, np.asarray([1.0, -a]), x, zi=state)
+    return np.asarray(filtered)
+
+
+def settled(values: FloatArray, width: float) -> FloatArray:
+    """Path (n,) of a point dragged by ``values`` with play ``width``: wiggles smaller than it are no path."""
+    at = float(values[0])
+    path = []
+    for value in values.tolist():
+        at = min(max(at, value - width), value + width)
+        path.append(at)
+    return np.asarray(path)

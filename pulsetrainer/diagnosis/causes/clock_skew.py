@@ -1,0 +1,35 @@
+"""the clocks of input and output run at different rates: y(t (1 + e))."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class ClockSkew(Cause):
+    """A relative error of the output's clock."""
+
+    id = "clock-skew"
+    title = "the clocks of input and output run at different rates"
+    formula = "y(t (1 + e))"
+    signature = "the output runs ahead or behind ever more as the record goes on"
+    excitation = "fast reversals at the beginning and at the end"
+    source = "Ljung, System Identification, 1999, section 14.1"
+    stage = "output"
+    order = 150
+    family = "skew"
+    parameters = (Quantity("skew", "1", -0.01, 0.01, 1e-6),)
+    lasting = False
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(1e-5,)], [(1e-4,)]]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        t = frame.time_s
+        return np.interp(t * (1.0 + values[0]), t, y)

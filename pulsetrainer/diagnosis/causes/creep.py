@@ -1,0 +1,35 @@
+"""The output goes on creeping under a constant input: a bank of low-passes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
+
+
+class Creep(Cause):
+    """Slow relaxation, as three low-passes on a logarithmic grid of time constants."""
+
+    id = "creep"
+    title = "the output goes on creeping under a constant input"
+    formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau"
+    signature = "relaxation towards a new value during holds, over several decades of time"
+    excitation = "holds of three time constants after reversals, on several levels"
+    source = "Kuhnen and Krejci, IEEE Trans. Automatic Control 54, 2009: creep as a bank of low-passes"
+    stage = "output"
+    order = 80
+    family = "slow memory"
+    parameters = (
+        Quantity("amplitude", "1", -0.3, 0.6, 0.002),
+        Quantity("tau", "s", 0.04, 20.0, 0.02),
+    )
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.03, tau)] for tau in (0.1, 0.3, 1.0, 3.0)]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        slow = sum(low_pass(y, values[1] * ratio, frame.dt_s) for ratio in (0.25, 1.0, 4.0))
+        return (y + values[0] * slow / 3.0) / (1.0 + values[0])

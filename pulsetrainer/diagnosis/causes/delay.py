@@ -1,0 +1,36 @@
+"""the output comes a fixed time late: P[u(t - d)]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class Delay(Cause):
+    """A pure transport delay."""
+
+    id = "delay"
+    title = "the output comes a fixed time late"
+    formula = "P[u(t - d)]"
+    signature = (
+        "dead time after every stop or jump, then an exact copy; the phase falls in proportion to frequency"
+    )
+    excitation = "fast reversals followed by holds"
+    source = "Ljung, System Identification, 1999, section 4.2"
+    stage = "input"
+    order = 10
+    family = "lag"
+    parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005),)
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.002,)], [(0.01,)], [(0.03,)]]
+
+    def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Input (n,) that the hysteresis sees."""
+        t = frame.time_s
+        return np.interp(t - values[0], t, u)

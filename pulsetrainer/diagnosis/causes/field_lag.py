@@ -1,0 +1,31 @@
+"""the magnetic field follows the current late (eddy currents): P[v], tau v' + v = u."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
+
+
+class FieldLag(Cause):
+    """A first-order lag before the hysteresis."""
+
+    id = "field-lag"
+    title = "the magnetic field follows the current late (eddy currents)"
+    formula = "P[v], tau v' + v = u"
+    signature = "the tips of minor loops shrink as the rate rises; an exponential tail after a stop"
+    excitation = "reversals at three rates or more, spanning ten to one, with stops"
+    source = "Bertotti, Hysteresis in Magnetism, 1998, chapter 12"
+    stage = "input"
+    order = 20
+    family = "lag"
+    parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005),)
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.002,)], [(0.01,)], [(0.03,)]]
+
+    def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Input (n,) that the hysteresis sees."""
+        return low_pass(u, values[0], frame.dt_s)

@@ -1,0 +1,32 @@
+"""the effective input moves with the output: P[u + k y]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class LoadDependence(Cause):
+    """The moving Preisach model."""
+
+    id = "load-dependence"
+    title = "the effective input moves with the output"
+    formula = "P[u + k y]"
+    signature = "equal minor loops at different bias are not congruent"
+    excitation = "equal minor loops at five biases"
+    source = "Della Torre, Magnetic Hysteresis, 1999, chapter 4: the moving model"
+    stage = "input"
+    order = 40
+    family = "load"
+    parameters = (Quantity("coefficient", "{u}/{y}", -0.1, 0.1, 2e-4),)
+    feeds_back = True
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.01 * frames[0].reach / frames[0].span,)]]
+
+    def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Input (n,) that the hysteresis sees."""
+        return u + values[0] * y

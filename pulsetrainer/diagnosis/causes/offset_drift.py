@@ -1,0 +1,32 @@
+"""the zero moves slowly with time: y + b t."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class OffsetDrift(Cause):
+    """A zero that moves in proportion to time."""
+
+    id = "offset-drift"
+    title = "the zero moves slowly with time"
+    formula = "y + b t"
+    signature = "equal states give different outputs, and the difference grows with time"
+    excitation = "the same loop at the beginning, in the middle and at the end"
+    source = "Ljung, System Identification, 1999, section 14.1"
+    stage = "output"
+    order = 140
+    family = "drift"
+    parameters = (Quantity("rate", "{y}/s", -1e6, 1e6, 1e-4),)
+    lasting = False
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.01 * frames[0].span / (frames[0].time_s[-1] + frames[0].dt_s),)]]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        return y + values[0] * frame.time_s

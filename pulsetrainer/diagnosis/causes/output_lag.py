@@ -1,0 +1,33 @@
+"""the sensor or its filter smooths the output: tau y' + y = P[u]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
+
+
+class OutputLag(Cause):
+    """A first-order lag after the hysteresis."""
+
+    id = "output-lag"
+    title = "the sensor or its filter smooths the output"
+    formula = "tau y' + y = P[u]"
+    signature = (
+        "the loop widens in proportion to rate; an exponential tail after a stop, of the output itself"
+    )
+    excitation = "reversals at three rates or more, spanning ten to one, with stops"
+    source = "Ljung, System Identification, 1999, section 4.2"
+    stage = "output"
+    order = 100
+    family = "lag"
+    parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005),)
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.002,)], [(0.01,)], [(0.03,)]]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        return low_pass(y, values[0], frame.dt_s)

@@ -1,0 +1,49 @@
+"""a disturbance at a fixed frequency (mains, fan): y + A sin(2 pi f t) + B cos(2 pi f t)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import ndimage
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class Periodic(Cause):
+    """A sine of fixed frequency, locked to the clock."""
+
+    id = "periodic"
+    title = "a disturbance at a fixed frequency (mains, fan)"
+    formula = "y + A sin(2 pi f t) + B cos(2 pi f t)"
+    signature = "one line in the spectrum of the residual, at rest and in motion alike"
+    excitation = "a rest of a few periods"
+    source = "Kay, Fundamentals of Statistical Signal Processing, 1993, example 4.2"
+    stage = "output"
+    order = 130
+    family = "periodic"
+    strengths = 2
+    parameters = (
+        Quantity("sine", "{y}", -1e6, 1e6, 1e-3),
+        Quantity("cosine", "{y}", -1e6, 1e6, 1e-3),
+        Quantity("frequency", "Hz", 0.3, 500.0, 1e-4),
+    )
+    lasting = False
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        frame, one = frames[0], residual[0]
+        power = np.abs(np.fft.rfft(one * np.hanning(one.size))) ** 2
+        frequency = np.fft.rfftfreq(one.size, frame.dt_s * frame.input.size / one.size)
+        power[frequency < 0.4] = 0.0
+        # against its surroundings: a line, not the slope of a spectrum
+        around = ndimage.median_filter(power, size=61) + 1e-12 * power.max(initial=0.0) + 1e-300
+        k = int(np.argmax(power / around * (power > 0.02 * power.max(initial=0.0))))
+        size = 0.003 * frame.span
+        return [[(size, 0.0, float(frequency[k])), (0.0, size, float(frequency[k]))]]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        phase = 2.0 * np.pi * values[2] * frame.time_s
+        return y + values[0] * np.sin(phase) + values[1] * np.cos(phase)

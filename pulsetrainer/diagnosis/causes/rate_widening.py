@@ -1,0 +1,45 @@
+"""the loop widens with the root of the rate (excess loss): P[v], u - v = k sgn(v') sqrt(abs v')."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class RateWidening(Cause):
+    """Excess loss: the field trails by the root of its rate."""
+
+    id = "rate-widening"
+    title = "the loop widens with the root of the rate (excess loss)"
+    formula = "P[v], u - v = k sgn(v') sqrt(abs v')"
+    signature = "the loop widens with the root of the rate, not in proportion to it"
+    excitation = "reversals at four rates or more"
+    source = "Bertotti, Hysteresis in Magnetism, 1998, chapter 12: excess loss"
+    stage = "input"
+    order = 30
+    family = "lag"
+    parameters = (Quantity("coefficient", "({u} s)^0.5", 0.0, 0.2, 5e-4),)
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.005 * frames[0].reach ** 0.5,)], [(0.015 * frames[0].reach ** 0.5,)]]
+
+    def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Input (n,) that the hysteresis sees."""
+        k = values[0]
+        if k <= 1e-9:
+            return u
+        # v' = sgn(e) (e/k)^2 with e = u - v: exact over a sample with u held at its middle value
+        per_step = frame.dt_s / k**2
+        middles = (0.5 * (u[1:] + u[:-1])).tolist()
+        inner = float(u[0])
+        path = [inner]
+        for middle in middles:
+            excess = middle - inner
+            inner = middle - excess / (1.0 + abs(excess) * per_step)
+            path.append(inner)
+        return np.asarray(path)

@@ -1,0 +1,48 @@
+"""the mechanics ring after a jump: y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import linalg, signal
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class Resonance(Cause):
+    """A second-order oscillator driven by the output."""
+
+    id = "resonance"
+    title = "the mechanics ring after a jump"
+    formula = "y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f"
+    signature = "a decaying oscillation of one frequency after every stop, whatever the rate before it"
+    excitation = "fast stops"
+    source = "Ogata, Modern Control Engineering, section 5.3"
+    stage = "output"
+    order = 70
+    family = "resonance"
+    strengths = 0
+    parameters = (
+        Quantity("frequency", "Hz", 1.0, 200.0, 0.1),
+        Quantity("damping", "1", 0.01, 2.0, 0.005),
+    )
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        fastest = 0.2 / frames[0].dt_s
+        return [[(f, 0.15)] for f in (4.0, 8.0, 12.0, 18.0, 26.0, 40.0, 70.0) if f < fastest]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        turn = 2.0 * np.pi * values[0]
+        # one exact step of the free oscillation towards an equilibrium held over the sample
+        system = np.asarray([[0.0, 1.0], [-(turn**2), -2.0 * values[1] * turn]])
+        step = linalg.expm(system * frame.dt_s)
+        held = (np.eye(2) - step) @ np.asarray([1.0, 0.0])
+        # transfer from y to position: C (zI - A)^-1 B as coefficients
+        b = np.asarray([0.0, held[0], step[0, 1] * held[1] - step[1, 1] * held[0]])
+        a = np.asarray([1.0, -np.trace(step), np.linalg.det(step)])
+        state = signal.lfilter_zi(b, a) * y[0]
+        return np.asarray(signal.lfilter(b, a, y, zi=state)[0])

@@ -1,0 +1,43 @@
+"""the offset or the gain changed suddenly: y (1 + g) + b after t0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class Step(Cause):
+    """A sudden change of offset and gain."""
+
+    id = "step"
+    title = "the offset or the gain changed suddenly"
+    formula = "y (1 + g) + b after t0"
+    signature = "all loops after one moment differ from those before by one gain and offset"
+    excitation = "the same loop in every tenth of the record"
+    source = "Basseville and Nikiforov, Detection of Abrupt Changes, 1993, chapter 2"
+    stage = "output"
+    order = 120
+    family = "drift"
+    strengths = 2
+    parameters = (
+        Quantity("offset", "{y}", -1e6, 1e6, 1e-3),
+        Quantity("gain", "1", -0.9, 0.9, 1e-4),
+        Quantity("time", "s", 0.0, 1e6, 0.01),
+    )
+    lasting = False
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        end = frames[0].time_s[-1]
+        size = 0.003 * frames[0].span
+        return [[(size, 0.0, t), (0.0, 0.003, t)] for t in (np.arange(1, 20) / 20.0 * end).tolist()]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        # between samples the change is shared out, so that the error falls smoothly with the time
+        after = np.clip((frame.time_s - values[2]) / (20.0 * frame.dt_s) + 0.5, 0.0, 1.0)
+        return y + after * (values[0] + values[1] * y)

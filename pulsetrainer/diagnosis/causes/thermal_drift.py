@@ -1,0 +1,40 @@
+"""the force falls as the coil heats: y (1 - k h), tau h' = u^2 - h."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
+
+
+class ThermalDrift(Cause):
+    """A gain that falls with heat."""
+
+    id = "thermal-drift"
+    title = "the force falls as the coil heats"
+    formula = "y (1 - k h), tau h' = u^2 - h"
+    signature = (
+        "the error is proportional to the output, follows the filtered square of the input "
+        "and recovers on cooling"
+    )
+    excitation = "a long heating, a long rest, and the same loop before and after"
+    source = "Incropera, Fundamentals of Heat and Mass Transfer, chapter 5: lumped capacitance"
+    stage = "output"
+    order = 50
+    family = "slow gain"
+    parameters = (
+        Quantity("coefficient", "1/({u})^2", -0.5, 0.5, 0.001),
+        Quantity("tau", "s", 1.0, 300.0, 0.5),
+    )
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        return [[(0.01, tau)] for tau in (5.0, 15.0, 40.0)]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        heat = low_pass(np.append(0.0, frame.input**2), values[1], frame.dt_s)[1:]
+        return y * (1.0 - values[0] * heat)

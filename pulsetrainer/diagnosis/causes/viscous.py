@@ -1,0 +1,34 @@
+"""a force proportional to the speed of the input: y + c u'."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+
+class Viscous(Cause):
+    """A term proportional to the rate of the input."""
+
+    id = "viscous"
+    title = "a force proportional to the speed of the input"
+    formula = "y + c u'"
+    signature = "the output jumps at once when the rate changes at equal input, without a tail"
+    excitation = "changes of rate at equal input"
+    source = "Bouc, Acustica 24, 1971; Ikhouane and Rodellar, 2007"
+    stage = "output"
+    order = 90
+    family = "viscous"
+    parameters = (Quantity("coefficient", "{y} s/{u}", -1e6, 1e6, 1e-4),)
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try."""
+        speed = max(float(np.std(np.gradient(f.input, f.dt_s))) for f in frames)
+        return [[(0.01 * frames[0].span / max(speed, 1e-12),)]]
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        return y + values[0] * np.gradient(frame.input, frame.dt_s)

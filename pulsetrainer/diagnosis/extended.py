@@ -1,0 +1,165 @@
+"""The extended model: causes around a static Preisach operator, forwards and backwards.
+
+    M(u) = (output causes) o P o (input causes) (u)
+
+One inverse serves every extension. With P^-1 the exact inverse of the static part iterate
+
+    r <- r + 0.8 F[y_ref - M(u)],   u <- P^-1(r),   from r = y_ref,
+
+F a zero-phase low-pass at the band of the reference: what the causes do faster than the reference asks
+for cannot be undone and would make the iteration diverge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from pulsetrainer.core import inversion
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes import cause_named
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
+
+STEP = 0.8
+_FEEDBACK_PASSES = 4  # each multiplies the error of the fed back output by k dP/du, some per cent
+
+
+@dataclass(frozen=True)
+class Term:
+    """A cause with its parameter values."""
+
+    cause: Cause
+    values: Values
+
+
+def in_order(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Terms in the order of the chain."""
+    return tuple(sorted(terms, key=lambda term: term.cause.order))
+
+
+def seen_input(terms: Sequence[Term], y: FloatArray, frame: Frame) -> FloatArray:
+    """Input (n,) that reaches the hysteresis, for the output ``y`` (n,) where a term feeds it back."""
+    u = frame.input
+    for term in terms:
+        if term.cause.stage == "input":
+            u = term.cause.on_input(u, y, term.values, frame)
+    return u
+
+
+def shown_output(terms: Sequence[Term], y: FloatArray, frame: Frame) -> FloatArray:
+    """Output (n,) of the chain for the output ``y`` (n,) of the hysteresis."""
+    for term in terms:
+        if term.cause.stage == "output":
+            y = term.cause.on_output(y, term.values, frame)
+    return y
+
+
+def chain(
+    terms: Sequence[Term],
+    static: Callable[[FloatArray], FloatArray],
+    frame: Frame,
+    y: FloatArray | None = None,
+) -> FloatArray:
+    """Output (n,) of the whole chain; ``y`` is a first guess of it for a term that feeds it back."""
+    feeds_back = any(term.cause.feeds_back for term in terms)
+    if not feeds_back:
+        return shown_output(terms, static(seen_input(terms, frame.input, frame)), frame)
+    inner = static(frame.input) if y is None else y
+    for _ in range(_FEEDBACK_PASSES):
+        inner = static(seen_input(terms, inner, frame))
+    return shown_output(terms, inner, frame)
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """The input found for a target, and what the model says it gives."""
+
+    input: FloatArray  # (n,)
+    predicted: FloatArray  # (n,)
+    clipped: int
+    steps: int  # of the iteration, to the best iterate
+    rms: float  # of target less prediction over the scored samples, output unit
+    rms_static: float  # the same of the static inverse
+
+
+@dataclass(frozen=True)
+class Extended:
+    """An identified model with its extensions."""
+
+    static: Preisach
+    terms: tuple[Term, ...] = ()
+
+    @classmethod
+    def of(cls, static: Preisach, extensions: Sequence[tuple[str, Values]]) -> Extended:
+        """Build from stored names and values.
+
+        Raises
+        ------
+        DataError
+            A cause is unknown.
+        """
+        return cls(static, in_order([Term(cause_named(name), values) for name, values in extensions]))
+
+    def frame(self, u: FloatArray, dt_s: float) -> Frame:
+        """What the causes are told of an input."""
+        plane = self.static.plane
+        return Frame(dt_s, u, 2.0 * self.static.total, plane.high - plane.low)
+
+    def __call__(self, u: FloatArray, dt_s: float) -> FloatArray:
+        """Output (n,) for an input (n,) at even steps, from negative saturation and rest."""
+        if not self.terms:
+            return self.static(u)
+        return chain(self.terms, self.static, self.frame(u, dt_s))
+
+    def invert(
+        self,
+        target: FloatArray,
+        dt_s: float,
+        *,
+        lead: FloatArray,
+        band_Hz: float | None = None,
+        steps: int = 16,
+    ) -> Tracked:
+        """Input (n,) whose output is ``target`` (n,), after the input ``lead`` (m,) has been played.
+
+        The best iterate is kept; where none is better than the static inverse, that one is.
+
+        Raises
+        ------
+        ArgumentError
+            The target is not a finite vector, or the static part cannot be inverted.
+        """
+        state = self.static.run(lead)[1] if lead.size else None
+        smooth = _low_pass(band_Hz, dt_s)
+        wanted, best = target, None
+        for k in range(steps + 1):
+            found = inversion.invert(self.static, wanted, state)
+            predicted = self(np.concatenate((lead, found.input)), dt_s)[lead.size :]
+            error = target - predicted
+            rms = float(np.sqrt(np.mean(error**2)))
+            if best is None:
+                best = Tracked(found.input, predicted, found.clipped, 0, rms, rms)
+            elif rms < best.rms:
+                best = Tracked(found.input, predicted, found.clipped, k, rms, best.rms_static)
+            elif k > best.steps + 3:
+                break
+            wanted = wanted + STEP * smooth(error)
+        assert best is not None
+        return best
+
+
+def _low_pass(band_Hz: float | None, dt_s: float) -> Callable[[FloatArray], FloatArray]:
+    """A zero-phase low-pass, or nothing where the band is as wide as the samples allow."""
+    if band_Hz is None or band_Hz * dt_s >= 0.4:
+        return lambda x: x
+    b, a = signal.butter(2, 2.0 * band_Hz * dt_s)
+
+    def smooth(x: FloatArray) -> FloatArray:
+        pad = min(x.size - 1, round(3.0 / (band_Hz * dt_s)))
+        return np.asarray(signal.filtfilt(b, a, x, padlen=pad))
+
+    return smooth

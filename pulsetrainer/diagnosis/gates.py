@@ -1,0 +1,152 @@
+"""Gates on the raw data, before any model: what fires is a finding, and its samples are masked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.design import Measured
+
+BoolArray = NDArray[np.bool_]
+
+_OUTLIER_SIGMAS = 8.0  # of Gaussian noise one sample in 10^15
+_TRACKING_SHARE = 0.02  # of the input's range
+_OUTSIDE_SHARE = 0.01
+
+
+@dataclass(frozen=True)
+class Firing:
+    """One gate that fired."""
+
+    cause: str
+    text: str
+    share: float  # of the samples
+    value: float  # the size of it
+    unit: str  # "y", "u" or "1"
+    mask: BoolArray | None = None  # samples to leave out
+
+
+def noise_of(y: FloatArray) -> float:
+    """White noise (rms) of a record from its third differences, robust against jumps.
+
+    A smooth output hardly has any; of white noise they have twenty times the variance.
+    """
+    if y.size < 8:
+        return 0.0
+    third = np.diff(y, 3)
+    return float(np.median(np.abs(third - np.median(third))) / 0.6745 / np.sqrt(20.0))
+
+
+def spacing_of(y: FloatArray) -> float:
+    """Distance of the distinct values of ``y``: the step of its converter."""
+    values = np.unique(y)
+    return float(np.median(np.diff(values))) if values.size > 1 else 0.0
+
+
+def check(record: Measured, low: float, high: float) -> list[Firing]:
+    """All gates on one record; ``low`` and ``high`` are the range that was identified."""
+    found = [
+        _saturated(record),
+        _outliers(record),
+        _quantised(record),
+        _tracking(record, high - low),
+        _outside(record, low, high),
+    ]
+    return [one for one in found if one is not None]
+
+
+def _saturated(record: Measured) -> Firing | None:
+    """Maxima, or minima, that repeat exactly far more often than the values just inside them."""
+    y, span = record.output, float(np.ptp(record.output))
+    step = spacing_of(y)
+    for rail, side in ((float(y.max()), 1.0), (float(y.min()), -1.0)):
+        at = np.abs(y - rail) <= 0.5 * step
+        # a pile at the end of a distribution: noise makes a tail there instead
+        inside = (np.abs(y - rail) <= 10.5 * step) & ~at & (np.abs(y - rail) < 0.02 * span)
+        moving = np.count_nonzero(at) > 20 and np.count_nonzero(at) > 2.0 * np.count_nonzero(inside)
+        if moving and noise_of(y) > 0.5 * step and side > 0:
+            share = float(at.mean())
+            return Firing(
+                "saturation",
+                f"{np.count_nonzero(at)} samples sit at exactly {rail:.4g}: the output is cut off there",
+                share,
+                rail,
+                "y",
+                ndimage.binary_dilation(at, iterations=3),
+            )
+    return None
+
+
+def _outliers(record: Measured) -> Firing | None:
+    """Samples far from the median of their neighbours that no neighbour follows."""
+    y = record.output
+    sigma = max(noise_of(y), 0.3 * spacing_of(y))
+    distance = y - ndimage.median_filter(y, size=7)
+    far = np.abs(distance) > _OUTLIER_SIGMAS * max(sigma, 1e-12 * float(np.ptp(y)))
+    labels, count = ndimage.label(far)
+    if count < 3:
+        return None
+    short = np.bincount(labels.ravel())[labels] <= 2
+    wild = far & short
+    if np.count_nonzero(wild) < 3:
+        return None
+    return Firing(
+        "outliers",
+        f"{np.count_nonzero(wild)} samples lie more than {_OUTLIER_SIGMAS:g} standard deviations "
+        "from both neighbours",
+        float(wild.mean()),
+        float(np.abs(distance[wild]).max()),
+        "y",
+        wild,
+    )
+
+
+def _quantised(record: Measured) -> Firing | None:
+    y = record.output
+    step, span = spacing_of(y), float(np.ptp(y))
+    if span == 0 or step < 0.004 * span:
+        return None
+    return Firing(
+        "quantisation",
+        f"the output comes in steps of {step:.4g}, {100 * step / span:.2g} % of its span",
+        1.0,
+        step,
+        "y",
+    )
+
+
+def _tracking(record: Measured, reach: float) -> Firing | None:
+    if record.reference is None:
+        return None
+    error = np.abs(record.input - record.reference)
+    worst = float(np.quantile(error, 0.99))
+    if worst <= _TRACKING_SHARE * reach:
+        return None
+    return Firing(
+        "current-tracking",
+        f"the input differs from its reference by {worst:.3g} or more in one sample of a hundred",
+        float(np.mean(error > _TRACKING_SHARE * reach)),
+        worst,
+        "u",
+    )
+
+
+def _outside(record: Measured, low: float, high: float) -> Firing | None:
+    slack = _OUTSIDE_SHARE * (high - low)
+    outside = (record.input < low - slack) | (record.input > high + slack)
+    if not outside.any():
+        return None
+    beyond = float(np.max(np.maximum(low - record.input, record.input - high)))
+    return Firing(
+        "out-of-range",
+        f"{np.count_nonzero(outside)} samples of the input lie outside {low:.4g} .. {high:.4g}, "
+        f"by up to {beyond:.3g}",
+        float(outside.mean()),
+        beyond,
+        "u",
+        outside,
+    )

@@ -1,0 +1,164 @@
+"""The fast screen: how much of a residual each cause could explain, and how much it would by chance.
+
+For every start value of every cause not yet in the model: the change of the output that it makes, less
+what the weights can do, is a column; the score is the fall of the sum of squares when the column (or the
+few columns of one block) is fitted to the residual. That is a linearisation around the fitted model: it
+ranks in a second, but shrinks strong causes; ``fitting.refit`` gives the figures.
+
+The null distribution is that of the largest score over the whole library on noise that looks like the
+residual: an autoregressive process fitted to what no cause can explain, drawn again and again and
+projected the same way. Exact in it: the projection, the maximum over the library, the refit of the
+offset and of all weights that are positive. Not exact: weights at zero stay there, and parameters
+that enter nonlinearly are taken on the grid of start values instead of being refitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg, signal
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Cause, Values
+from pulsetrainer.diagnosis.extended import Term, in_order
+from pulsetrainer.diagnosis.fitting import Fitted, Problem, slopes
+
+DRAWS = 199
+_AR_ORDER = 10
+
+
+@dataclass(frozen=True)
+class Score:
+    """The best block of one cause on one residual."""
+
+    cause: Cause
+    gain: float  # fall of the sum of squares
+    start: Values  # where a joint refit should start
+    p_value: float
+    basis: FloatArray  # (count, k) orthonormal columns of the best block, weights projected off
+
+
+@dataclass(frozen=True)
+class Screen:
+    """Scores of all causes, best first, and the noise they were judged against."""
+
+    scores: tuple[Score, ...]
+    null: FloatArray  # (draws,) largest score on noise alone, sorted
+    draws: FloatArray  # (count, draws) that noise, weights projected off
+
+    def critical(self, level: float) -> float:
+        """Score that noise alone exceeds with probability ``level``."""
+        return float(np.quantile(self.null, 1.0 - level))
+
+
+@dataclass(frozen=True)
+class _Block:
+    """One block of columns, made orthonormal."""
+
+    cause: Cause
+    values: tuple[Values, ...]
+    basis: FloatArray  # (count, k)
+    back: FloatArray  # (k, k) from coordinates along the basis to coefficients of the columns
+    one_sided: bool  # the strength must not be negative
+
+    def gains(self, signals: FloatArray) -> FloatArray:
+        """Falls of the sum of squares (m,) for signals (count, m)."""
+        along = self.basis.T @ signals
+        gain = np.sum(along**2, axis=0)
+        if self.one_sided:
+            gain = np.where((self.back @ along)[0] > 0, gain, 0.0)
+        return np.asarray(gain)
+
+
+def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: int = DRAWS) -> Screen:
+    """Score every cause that is not in the model yet."""
+    project = fitted.projector()
+    residual = project(fitted.residual[:, None])[:, 0]
+    blocks = _blocks(problem, fitted, residual)
+    everything = np.hstack([b.basis for b in blocks]) if blocks else np.empty((residual.size, 0))
+    noise = coloured(_unexplained(residual, everything), draws, rng)
+    noise = project(noise)
+    best: dict[str, tuple[float, _Block]] = {}
+    largest = np.zeros(draws)
+    for block in blocks:
+        gain = float(block.gains(residual[:, None])[0])
+        if block.cause.id not in best or gain > best[block.cause.id][0]:
+            best[block.cause.id] = gain, block
+        largest = np.maximum(largest, block.gains(noise))
+    null = np.sort(largest)
+    scores = [
+        Score(
+            block.cause,
+            gain,
+            _start(block, residual),
+            (1.0 + float(np.sum(null >= gain))) / (draws + 1.0),
+            block.basis,
+        )
+        for gain, block in best.values()
+    ]
+    return Screen(tuple(sorted(scores, key=lambda s: -s.gain)), null, noise)
+
+
+def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Block]:
+    """All blocks of columns, weights and the causes already in the model projected off."""
+    project = fitted.projector()
+    own = project(slopes(problem, fitted))
+    known = linalg.orth(own) if own.shape[1] else own
+    found: list[_Block] = []
+    parts = [residual[problem.bins.record == k] for k in range(len(problem.records))]
+    for cause in library().values():
+        if cause.stage == "record" or cause.id in fitted.names:
+            continue
+        for values in cause.starts(problem.frames, parts):
+            columns = np.stack(
+                [
+                    fitted.simulator(in_order((*fitted.terms, Term(cause, one)))) - fitted.predicted
+                    for one in values
+                ],
+                axis=1,
+            )
+            free = project(columns)
+            free -= known @ (known.T @ free)
+            size = np.linalg.norm(free, axis=0)
+            if not np.all(np.isfinite(size)) or np.any(size <= 1e-6 * np.linalg.norm(columns, axis=0)):
+                continue  # the weights can do all of it: it cannot be seen on these data
+            basis, upper = np.linalg.qr(free)
+            one_sided = cause.strengths == 0 or (len(values) == 1 and cause.parameters[0].low >= 0)
+            found.append(_Block(cause, tuple(values), basis, np.linalg.inv(upper), one_sided))
+    return found
+
+
+def _start(block: _Block, residual: FloatArray) -> Values:
+    """Parameter values scaled by the fitted strengths, within a factor of five of the grid's."""
+    strength = block.back @ (block.basis.T @ residual)
+    values = list(block.values[0])
+    for j in range(block.cause.strengths):
+        one = block.values[j][j] * float(strength[j])
+        if block.cause.parameters[j].low >= 0:
+            one = min(max(one, 0.2 * block.values[j][j]), 5.0 * block.values[j][j])
+        values[j] = min(max(one, block.cause.parameters[j].low), block.cause.parameters[j].high)
+    return tuple(float(v) for v in values)
+
+
+def _unexplained(residual: FloatArray, columns: FloatArray) -> FloatArray:
+    """The residual less all that any cause could explain: what is left is taken for noise."""
+    if columns.shape[1] == 0:
+        return residual
+    left, size, _ = linalg.svd(columns, full_matrices=False, check_finite=False)
+    left = left[:, size > 1e-3 * size[0]]
+    return residual - left @ (left.T @ residual)
+
+
+def coloured(like: FloatArray, draws: int, rng: np.random.Generator) -> FloatArray:
+    """Noise (count, draws) with the spectrum of ``like`` (count,): an autoregression (Yule-Walker)."""
+    lags = np.asarray([like[: like.size - k] @ like[k:] for k in range(_AR_ORDER + 1)]) / like.size
+    if lags[0] <= 0:
+        return np.zeros((like.size, draws))
+    lags[0] *= 1.0 + 1e-9
+    phi = linalg.solve_toeplitz(lags[:-1], lags[1:])
+    power = max(float(lags[0] - phi @ lags[1:]), 0.0)
+    warm = 20 * _AR_ORDER
+    white = rng.standard_normal((like.size + warm, draws)) * np.sqrt(power)
+    return np.asarray(signal.lfilter([1.0], np.concatenate(([1.0], -phi)), white, axis=0)[warm:])
