@@ -1,7 +1,6 @@
 /* The integer PID on the simulated solenoid for 100 000 ticks: prints one hash of every PWM value, ADC
- * reading and reference. Any compiler, any optimisation, any machine must print the same. */
-#include <stdio.h>
-
+ * reading and reference. Any compiler, any optimisation, any machine must print the same, for the same
+ * precision of the plant. */
 #include "hal.h"
 #include "pid.h"
 #include "protocol.h"
@@ -37,7 +36,7 @@ static int16_t sample(uint32_t k)
     return (int16_t)((k / 800u) % 3u == 2u && v > 9000 ? 9000 : v);
 }
 
-int main(void)
+static uint32_t trace(void)
 {
     struct pid pid;
     uint32_t total = TICKS / 10u + 1u;
@@ -70,6 +69,24 @@ int main(void)
         mix(duty);
         solenoid_step(&plant, duty, HAL_PWM_PERIOD);
     }
-    printf("%08lx\n", (unsigned long)hash);
+    return hash;
+}
+
+#if __STDC_HOSTED__
+#include <stdio.h>
+
+int main(void)
+{
+    printf("%08lx\n", (unsigned long)trace());
     return 0;
 }
+#else
+#include "semihost.h"
+
+int main(void)
+{
+    semihost_hex(trace());
+    semihost_say("\n");
+    semihost_exit(0);
+}
+#endif
