@@ -96,7 +96,6 @@ static bool read_host(void)
             (void)close(slave);
             slave = -1;
         }
-        pace_heard();
         board_receive(bytes, (int32_t)n);
         return true;
     }

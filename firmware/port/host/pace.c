@@ -5,9 +5,9 @@
  * the device nor a host that is merely slow:
  *   - disarmed, time stands still once the coil has settled: nothing can happen, and two equal captures
  *     give equal numbers however long the pauses between them were;
- *   - armed but not started, and while playing whenever the host has been silent for half the
+ *   - armed but not started, and while playing or ramping down whenever the host has been silent for half the
  *     heartbeat (100 ms of device time), the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
- *     for at most two seconds of wall time (a loaded computer); after that it goes on at the wall clock, so that a
+ *     for at most half a second of wall time; after that it goes on at the wall clock, so that a
  *     host that is really gone trips the 200 ms heartbeat like on a real device.
  * A coil that has tripped its heat model cools only while time runs: open a new bench instead of waiting. */
 #include "app.h"
@@ -17,14 +17,13 @@
 #define BATCH 10                    /* ticks between two looks at the pty */
 #define TELEMETRY_HIGH 48           /* waiting samples: the reader is behind */
 #define SETTLE_TICKS 2000           /* after the output went off */
-#define GRACE_NS 2000000000LL       /* wall time that a stalled device waits for its host */
+#define GRACE_NS 500000000          /* wall time that a stalled device waits for its host */
 #define CATCH_UP_NS 250000000       /* a computer that slept: do not run the lost time all at once */
 
 static enum pace_speed speed;
 static int64_t epoch_ns;       /* real: when tick 0 was due; max: since when device time has been stalled */
 static int64_t epoch_ticks;    /* ticks run since then */
 static bool stalled;
-static int32_t silent_ticks;   /* device time since a byte came from the host */
 static int32_t settle_ticks;
 
 void pace_init(enum pace_speed chosen, int64_t now_ns)
@@ -33,13 +32,7 @@ void pace_init(enum pace_speed chosen, int64_t now_ns)
     epoch_ns = now_ns;
     epoch_ticks = 0;
     stalled = false;
-    silent_ticks = 0;
     settle_ticks = 0;
-}
-
-void pace_heard(void)
-{
-    silent_ticks = 0;
 }
 
 static bool output_off(void)
@@ -72,8 +65,11 @@ static bool must_wait(void)
     case PT_STATE_RUNNING:
         if (board_hangs()) /* nobody to wait for: the watchdog has to see time pass */
             return false;
-        return silent_ticks >= app.safety.heartbeat_ticks / 2 || wave_ticks_left(&app.wave) < 2 * BATCH ||
+        /* By commands, not by bytes: a damaged one must not let the rest of the heartbeat run off. */
+        return app.safety.silent_ticks >= app.safety.heartbeat_ticks / 2 || wave_ticks_left(&app.wave) < 2 * BATCH ||
                telemetry_waiting(&app.telemetry) >= TELEMETRY_HIGH;
+    case PT_STATE_RAMPING: /* after the last sample the heartbeat still counts; after a fault nobody is asked */
+        return app.fault == PT_FAULT_NONE && app.safety.silent_ticks >= app.safety.heartbeat_ticks / 2;
     case PT_STATE_ARMED:
         return true;
     default:
@@ -93,7 +89,6 @@ static int32_t max_ticks(int64_t now_ns)
     settle_ticks = SETTLE_TICKS;
     if (!must_wait()) {
         stalled = false;
-        silent_ticks += BATCH;
         return BATCH;
     }
     if (!stalled) {
@@ -101,9 +96,7 @@ static int32_t max_ticks(int64_t now_ns)
         epoch_ns = now_ns + GRACE_NS;
         epoch_ticks = 0;
     }
-    int32_t n = due(now_ns);
-    silent_ticks += n;
-    return n;
+    return due(now_ns);
 }
 
 int32_t pace_ticks(int64_t now_ns)

@@ -24,7 +24,6 @@ uint64_t board_ticks(void);                     /* since power-on */
 /* pace.c: how many ticks may run now. */
 enum pace_speed { PACE_REAL, PACE_MAX };
 void pace_init(enum pace_speed speed, int64_t now_ns);
-void pace_heard(void);                                 /* a byte came from the host */
 int32_t pace_ticks(int64_t now_ns);                    /* may run at once */
 int32_t pace_wait_ms(int64_t now_ns);                  /* when pace_ticks is 0: until it may change; -1: for ever */
 
