@@ -1,4 +1,4 @@
-"""The bench's firmware, compiled on first use and kept in the user's cache."""
+"""The firmware for the bench and for the emulator, compiled on first use and kept in the user's cache."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 from platformdirs import user_cache_dir
@@ -16,11 +17,40 @@ from platformdirs import user_cache_dir
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.resources import firmware_dir
 
-_FOLDERS = ("core", "plant", "port/host")
-_INCLUDES = ("core", "hal", "plant", "port/host")
 _NOT_IN_A_PORT = {"harness.c"}  # programs of their own
 # -ffp-contract=off: the plant promises the same bits everywhere.
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-D_XOPEN_SOURCE=700")
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+_HOST = (*_FLAGS, "-D_XOPEN_SOURCE=700")
+_MPS2 = (*_FLAGS, "-ffreestanding", "-DPLANT_REAL=float", "-nostdlib")  # doubles are too slow for its FPU
+_CORTEX_M4F = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
+_ZIG_CORTEX_M4F = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
+DEBIAN_PACKAGES = "gcc-arm-none-eabi qemu-system-arm"
+
+
+@dataclass(frozen=True, slots=True)
+class _Image:
+    """What is compiled: a port of the firmware with one compiler."""
+
+    port: str
+    command: tuple[str, ...]
+    libraries: tuple[str, ...]
+    remedy: str
+
+    @property
+    def folders(self) -> tuple[str, ...]:
+        return ("core", "hal", "plant", f"port/{self.port}")
+
+    def sources(self, root: Path) -> list[Path]:
+        """C and assembly files."""
+        return self._files(root, "*.c", "*.S")
+
+    def parts(self, root: Path) -> list[Path]:
+        """Everything that changes the result: sources, headers, the linker's script."""
+        return self._files(root, "*.c", "*.S", "*.h", "*.ld")
+
+    def _files(self, root: Path, *patterns: str) -> list[Path]:
+        found = (p for folder in self.folders for pattern in patterns for p in (root / folder).glob(pattern))
+        return sorted(p for p in found if p.name not in _NOT_IN_A_PORT)
 
 
 def find_compiler() -> list[str]:
@@ -43,21 +73,14 @@ def find_compiler() -> list[str]:
     )
 
 
-def _sources(root: Path) -> list[Path]:
-    return sorted(
-        p for folder in _FOLDERS for p in (root / folder).glob("*.c") if p.name not in _NOT_IN_A_PORT
-    )
-
-
-def _digest(root: Path, command: list[str]) -> str:
+def _digest(root: Path, image: _Image) -> str:
     """Return a hash of sources, headers, compiler and flags."""
     h = hashlib.sha256()
-    headers = (p for folder in _INCLUDES for p in (root / folder).glob("*.h"))
-    for path in sorted([*_sources(root), *headers]):
+    for path in image.parts(root):
         h.update(f"{path.relative_to(root)}\0{path.stat().st_size}\0".encode())
         h.update(path.read_bytes())
-    h.update("\0".join(command).encode())
-    which = shutil.which(command[0])
+    h.update("\0".join(image.command + image.libraries).encode())
+    which = shutil.which(image.command[0])
     if which:
         real = Path(which).resolve()
         stat = real.stat()
@@ -70,11 +93,44 @@ def firmware_executable(defines: tuple[str, ...] = ()) -> Path:
 
     ``defines`` are extra ``-D`` flags, such as another protocol version in a test.
     """
+    remedy = "name another compiler in the environment variable CC, or `pip install ziglang`"
+    return _compiled(_Image("host", (*find_compiler(), *_HOST, *defines), (), remedy))
+
+
+def firmware_image(defines: tuple[str, ...] = ()) -> Path:
+    """Return the emulated Cortex-M4F's image, compiled now unless the cache has it."""
+    compiler = find_arm_compiler()
+    libraries: tuple[str, ...] = ("-T", str(firmware_dir() / "port" / "mps2" / "mps2.ld"))
+    if "ziglang" not in compiler:  # zig brings its own
+        libraries = (*libraries, "-lgcc")
+    remedy = f"use the compiler that it was tried with: `sudo apt install {DEBIAN_PACKAGES}`"
+    return _compiled(_Image("mps2", (*compiler, *_MPS2, *defines), libraries, remedy))
+
+
+def find_arm_compiler() -> list[str]:
+    """Return the command of a C compiler for the Cortex-M4F: ``arm-none-eabi-gcc``, or ziglang.
+
+    Raises
+    ------
+    DeviceError
+        if there is none.
+    """
+    if shutil.which("arm-none-eabi-gcc"):
+        return ["arm-none-eabi-gcc", *_CORTEX_M4F]
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", *_ZIG_CORTEX_M4F]
+    raise DeviceError(
+        "the emulated device needs a C compiler for Arm once, and arm-none-eabi-gcc is not there",
+        hint=f"install compiler and emulator: `sudo apt install {DEBIAN_PACKAGES}`",
+    )
+
+
+def _compiled(image: _Image) -> Path:
+    """Return the image's file in the cache, compiled now unless it is there."""
     root = firmware_dir()
-    command = [*find_compiler(), *_FLAGS, *defines]
-    digest = _digest(root, command)
+    digest = _digest(root, image)
     folder = Path(user_cache_dir("pulsetrainer")) / "firmware"
-    target = folder / f"host-{digest[:20]}"
+    target = folder / f"{image.port}-{digest[:20]}"
     if target.exists():
         return target
     try:
@@ -87,14 +143,15 @@ def firmware_executable(defines: tuple[str, ...] = ()) -> Path:
             hint="set XDG_CACHE_HOME to a writable folder",
         ) from error
     os.close(handle)
-    words = [*command, f"-DPT_BUILD_HASH=0x{digest[:8]}u", *(f"-I{root / i}" for i in _INCLUDES)]
-    words += [str(p) for p in _sources(root)]
+    words = [*image.command, f"-DPT_BUILD_HASH=0x{digest[:8]}u", *(f"-I{root / i}" for i in image.folders)]
+    words += [*(str(p) for p in image.sources(root)), *image.libraries, "-o", temporary]
     try:
-        done = subprocess.run([*words, "-o", temporary], capture_output=True, text=True, check=False)
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise DeviceError(
-                f"the firmware does not compile with {' '.join(command[:4])}:\n{done.stderr.strip()[-2000:]}",
-                hint="name another compiler in the environment variable CC, or `pip install ziglang`",
+                f"the firmware does not compile with {' '.join(image.command[:4])}:\n"
+                f"{done.stderr.strip()[-2000:]}",
+                hint=image.remedy,
             )
         Path(temporary).chmod(0o755)
         Path(temporary).replace(target)

@@ -15,11 +15,13 @@ from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 from pulsetrainer.link import codes
 from pulsetrainer.link import messages as m
 from pulsetrainer.link.bench import Bench
+from pulsetrainer.link.noise import NoisyTransport
 from pulsetrainer.link.player import Player, describe_fault
 from pulsetrainer.link.ports import find_device_port
+from pulsetrainer.link.qemu import Emulator
 from pulsetrainer.link.recording import Block, FloatArray, Recording
 from pulsetrainer.link.session import Session
-from pulsetrainer.link.transport import SerialTransport
+from pulsetrainer.link.transport import SerialTransport, Transport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,8 +78,8 @@ class Device:
     def __init__(
         self,
         session: Session,
-        transport: SerialTransport,
-        bench: Bench | None,
+        transport: Transport,
+        bench: Bench | Emulator | None,
         *,
         monotonic: Callable[[], float],
         sleep: Callable[[float], None],
@@ -309,17 +311,28 @@ def open_device(
         if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
     """
     port = port or os.environ.get(PORT_VARIABLE) or DEFAULT_PORT
-    bench = Bench(port) if port.startswith("bench:") else None
-    transport: SerialTransport | None = None
+    machine: Bench | Emulator | None = None
+    transport: Transport | None = None
     try:
-        path = bench.path if bench is not None else find_device_port() if port == "auto" else port
-        name = DEFAULT_PORT if bench is not None else path
-        transport = SerialTransport(path, name)
+        name = port
+        if port.startswith("bench:"):
+            machine = bench = Bench(port)
+            name = DEFAULT_PORT
+            transport = SerialTransport(bench.path, name)
+            if bench.options.wire:
+                rate, seed = bench.options.wire, bench.options.wire_seed
+                transport = NoisyTransport(transport, rate, seed, monotonic=monotonic)
+        elif port.startswith("qemu:"):
+            machine = emulator = Emulator(port)
+            transport = emulator.transport
+        else:
+            name = find_device_port() if port == "auto" else port
+            transport = SerialTransport(name)
         session = Session(transport, name, monotonic=monotonic)
-        return Device(session, transport, bench, monotonic=monotonic, sleep=sleep)
+        return Device(session, transport, machine, monotonic=monotonic, sleep=sleep)
     except BaseException:
         if transport is not None:
             transport.close()
-        if bench is not None:
-            bench.close()
+        if machine is not None:
+            machine.close()
         raise

@@ -58,7 +58,7 @@ class SerialTransport:
         except ValueError as error:
             raise DeviceError(
                 f"{port!r} is not a port: {error}",
-                hint="a port is bench:, /dev/ttyUSB0, COM3 or socket://host:port",
+                hint="a port is bench:, qemu:, /dev/ttyUSB0, COM3 or socket://host:port",
             ) from error
 
     def _lost(self, error: Exception) -> PortLostError:
