@@ -20,7 +20,8 @@ MAX_RATE = 0.1
 KINDS = ("drop", "flip", "insert", "duplicate", "delay", "cut")
 _LONGEST_INSERT = 8
 _LONGEST_DUPLICATE = 160  # more than a whole frame: what repeats may be valid
-_LONGEST_CUT = 300
+_LONGEST_CUT = 300  # bytes, and no longer than they take at the wire's speed: a loose contact
+_BYTE_S = 10 / 921_600
 _DELAY_S = (0.005, 0.060)  # longer than the patience of a first try
 
 
@@ -32,6 +33,7 @@ class NoisyLine:
         self._rng = np.random.default_rng(seed)
         self._until_next = self._gap()
         self._to_cut = 0
+        self._cut_until_s = 0.0
         self._recent = b""
         self._waiting: deque[tuple[float, bytes]] = deque()
         self._delay_s = 0.0
@@ -43,6 +45,8 @@ class NoisyLine:
     def push(self, data: bytes, now_s: float) -> None:
         """Take in bytes at a moment."""
         at = 0
+        if now_s > self._cut_until_s:
+            self._to_cut = 0
         while at < len(data):
             lost = min(self._to_cut, len(data) - at)
             self._to_cut -= lost
@@ -53,10 +57,10 @@ class NoisyLine:
             at += intact
             if at < len(data):
                 self._until_next = self._gap()
-                self._deliver(self._event(data[at]), now_s)
+                self._deliver(self._event(data[at], now_s), now_s)
                 at += 1
 
-    def _event(self, byte: int) -> bytes:
+    def _event(self, byte: int, now_s: float) -> bytes:
         """Return what comes out instead of ``byte``."""
         rng = self._rng
         kind = KINDS[rng.integers(len(KINDS))]
@@ -77,6 +81,7 @@ class NoisyLine:
                 return intact
             case _:
                 self._to_cut = int(rng.integers(_LONGEST_CUT))
+                self._cut_until_s = now_s + self._to_cut * _BYTE_S
                 return b""
 
     def _deliver(self, data: bytes, now_s: float) -> None:

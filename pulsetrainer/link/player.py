@@ -64,6 +64,7 @@ class Player:
         self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
         self._play_session = -1
         self._tick = 0  # latest known tick of the device
+        self._recorded_tick = -1  # of the last sample received
         self._tick_at_send = 0
         self._last_block = False
         # A plain list: appending is atomic, and a Ctrl-C in the reader's thread can lose nothing of it.
@@ -94,8 +95,14 @@ class Player:
     def _take(self, block: m.Telemetry) -> None:
         if block.session != self._play_session:
             return  # stale bytes of an earlier play
+        last_tick = block.first_tick + (block.count - 1) * self.decimation
         if block.count:
-            self._tick = max(self._tick, block.first_tick + (block.count - 1) * self.decimation)
+            if block.first_tick <= self._recorded_tick or block.first_tick % self.decimation:
+                return  # a wire that repeats itself
+            if last_tick > (len(self._samples) - 1) * self._ticks_per_sample:
+                return  # no such sample was asked for: damage that happens to fit the checksum
+            self._recorded_tick = last_tick
+            self._tick = max(self._tick, last_tick)
         self._last_block = self._last_block or bool(block.flags & codes.FLAG_LAST)
         self.received.append(block)
 
