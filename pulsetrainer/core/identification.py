@@ -2,10 +2,10 @@
 
     minimise  sum_t v_t (y_t - y0 - r_t . m)^2   over masses m = mu A >= 0 and a free offset y0
 
-A row r_t is a short sum of Everett nodes, so the normal matrix is assembled sparsely in node space,
-branch by branch, and carried to the cells by cumulative sums: the n x n_q design matrix never exists.
-The offset is eliminated exactly by centring. Carneiro, Abreu, Restivo (2018) alternate instead between
-the offset and the weights; that is ``method="alternating"`` and ends at the same point.
+``equations`` makes the sums over samples. The offset is eliminated exactly by centring. Carneiro, Abreu,
+Restivo (2018) alternate instead between the offset and the weights; that is ``method="alternating"`` and
+ends at the same point. With non-negativity the problem stays well posed with fewer samples than cells:
+weights that the data do not ask for are zero.
 """
 
 from __future__ import annotations
@@ -15,73 +15,34 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
+from numpy.typing import NDArray
 
-from pulsetrainer.core import nnls
-from pulsetrainer.core.memory import State, Trace
-from pulsetrainer.core.operator import Preisach, base_rows, follow, steps
-from pulsetrainer.core.plane import FloatArray, Plane, Reading, finite_vector
+from pulsetrainer.core import large, nnls
+from pulsetrainer.core.coverage import coverage
+from pulsetrainer.core.equations import NormalEquations, Record, node_sums, normal_equations
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.core.smoothing import choose, penalty, smoothed
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
+__all__ = [
+    "Identified",
+    "Method",
+    "NormalEquations",
+    "Record",
+    "Smoothing",
+    "coverage",
+    "identify",
+    "normal_equations",
+    "polarity_of",
+]
+
 Method = Literal["joint", "alternating"]
+Smoothing = float | Literal["auto"]
 
-_CHUNK = 200_000  # samples whose sparse rows are held at one time
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One record to be fitted: input, output and, if some samples count less, their weights."""
-
-    input: FloatArray  # (n,)
-    output: FloatArray  # (n,)
-    weight: FloatArray | None = None  # (n,) 0 masks a sample out of the fit, not out of the memory
-    start: State | None = None  # None: negative saturation
-
-    def __post_init__(self) -> None:
-        u = finite_vector("input", self.input, at_least=2)
-        v = np.ones(u.size) if self.weight is None else finite_vector("weight", self.weight)
-        y = np.asarray(self.output, dtype=np.float64)
-        if y.shape != u.shape or v.shape != u.shape:
-            raise ArgumentError(
-                f"input, output and weight must have one length, got {u.shape}, {y.shape} and {v.shape}",
-                hint="cut the record to the samples that have both",
-            )
-        if np.any(v < 0):
-            raise ArgumentError(f"weight must not be negative, got {v.min():g}", hint="0 masks a sample")
-        finite_vector("output", y[v > 0])  # masked samples may be anything
-
-
-@dataclass(frozen=True, slots=True)
-class NormalEquations:
-    """Everything the fit needs to know of the data: sums over all samples, in mass space."""
-
-    plane: Plane
-    gram: FloatArray  # (n_q, n_q) sum v r r'
-    moment: FloatArray  # (n_q,) sum v r y
-    row_sum: FloatArray  # (n_q,) sum v r
-    weight: float  # sum v
-    output_sum: float  # sum v y
-    output_square: float  # sum v y^2
-
-    def centred(self) -> tuple[FloatArray, FloatArray]:
-        """Gram matrix and right side with the offset eliminated: rows and outputs minus their means."""
-        gram = self.gram - np.outer(self.row_sum, self.row_sum / self.weight)
-        return gram, self.moment - self.row_sum * (self.output_sum / self.weight)
-
-    def offset(self, masses: FloatArray) -> float:
-        """Best offset y0 for given masses (n_q,)."""
-        return float(self.output_sum - self.row_sum @ masses) / self.weight
-
-    def sum_of_squares(self, masses: FloatArray, offset: float) -> float:
-        """Weighted sum of squared residuals, from the sums alone (rounding: about 1e-12 of sum v y^2)."""
-        return float(
-            self.output_square
-            - 2 * (self.moment @ masses + offset * self.output_sum)
-            + masses @ self.gram @ masses
-            + 2 * offset * (self.row_sum @ masses)
-            + offset**2 * self.weight
-        )
+# The dense path holds about ten matrices of n_q^2 numbers at its peak; above this it goes matrix-free.
+DENSE_BYTES = 1_000_000_000
+_DENSE_COPIES = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,57 +53,9 @@ class Identified:
     method: Method
     iterations: int
     kkt: float  # largest violation of the optimality conditions, relative
-
-
-def _node_sums(
-    plane: Plane, path: Trace, y: FloatArray, v: FloatArray
-) -> tuple[sparse.csr_array, FloatArray]:
-    """Node-space sums of one record: sum v r r' (n_q, n_q) sparse, and (3, n_q): sum v r, sum v r y, zeros.
-
-    r = own + base: own rows have at most four entries; base rows are shared by all samples of an anchor,
-    so they enter once per anchor with the sums of its own rows.
-    """
-    base = base_rows(plane, path)
-    nodes = path.node_value.size
-    gram = sparse.csr_array((plane.n_q, plane.n_q))
-    by_anchor = sparse.csr_array((nodes, plane.n_q))  # sum of v own over the samples of an anchor
-    own_sum, own_y = np.zeros(plane.n_q), np.zeros(plane.n_q)
-    origin = path.node_value[path.anchor]
-    for begin in range(0, y.size, _CHUNK):
-        part = slice(begin, begin + _CHUNK)
-        own = steps(plane, path.value[part], origin[part])
-        scaled = own.multiply(v[part, None]).tocsr()
-        gram = gram + own.T @ scaled
-        size = own.shape[0]
-        gather = sparse.csr_array((np.ones(size), (path.anchor[part], np.arange(size))), shape=(nodes, size))
-        by_anchor = by_anchor + gather @ scaled
-        own_sum += scaled.sum(axis=0)
-        own_y += scaled.T @ y[part]
-    count = np.bincount(path.anchor, weights=v, minlength=nodes)
-    count_y = np.bincount(path.anchor, weights=v * y, minlength=nodes)
-    cross = base.T @ by_anchor
-    gram = gram + cross + cross.T + base.T @ base.multiply(count[:, None]).tocsr()
-    sums = np.stack((own_sum + base.T @ count, own_y + base.T @ count_y))
-    return gram, sums
-
-
-def normal_equations(plane: Plane, records: Sequence[Record], reading: Reading) -> NormalEquations:
-    """Assemble the normal equations of all records in mass space; relays are -1 or +1."""
-    gram = sparse.csr_array((plane.n_q, plane.n_q))
-    sums = np.zeros((2, plane.n_q))
-    weight, output, square = 0.0, 0.0, 0.0
-    for record in records:
-        v = np.ones(record.input.size) if record.weight is None else record.weight
-        y = np.where(v > 0, record.output, 0.0)
-        path = follow(plane, record.input, record.start, reading)
-        part, part_sums = _node_sums(plane, path, y, v)
-        gram, sums = gram + part, sums + part_sums
-        weight, output, square = weight + float(v.sum()), output + float(v @ y), square + float(v @ (y * y))
-    cells = plane.adjoint(plane.adjoint(gram.toarray()).T.copy())
-    row_sum, moment = plane.adjoint(sums)
-    # so far rows rise from 0, all relays down, to 2: subtract the constant 1 from each
-    cells += weight - row_sum[:, None] - row_sum[None, :]
-    return NormalEquations(plane, cells, moment - output, row_sum - weight, weight, output, square)
+    smoothing: float = 0.0  # s, share of the input's range; see ``core.smoothing``
+    tried: tuple[tuple[float, float], ...] = ()  # (s, held-out rms) when it was chosen, output unit
+    samples: int = 0  # with weight; fewer than cells: what the data do not ask for is zero
 
 
 def polarity_of(records: Sequence[Record]) -> int:
@@ -152,6 +65,11 @@ def polarity_of(records: Sequence[Record]) -> int:
     return -1 if float(np.mean((u - u.mean()) * (y - y.mean()))) < 0 else 1
 
 
+def fits_dense(plane: Plane) -> bool:
+    """Tell whether the dense path stays within ``DENSE_BYTES``."""
+    return _DENSE_COPIES * 8 * plane.n_q**2 <= DENSE_BYTES
+
+
 def identify(
     records: Sequence[Record],
     plane: Plane,
@@ -159,8 +77,12 @@ def identify(
     reading: Reading = "continuous",
     method: Method = "joint",
     polarity: int | None = None,
+    smoothing: Smoothing = 0.0,
 ) -> Identified:
     """Fit weights mu >= 0 and a free offset to one or several records.
+
+    Planes whose dense matrices would take more than ``DENSE_BYTES`` (above 82 levels) are solved by
+    ``large.solve``, which needs none.
 
     Parameters
     ----------
@@ -170,43 +92,101 @@ def identify(
         The levels; inputs outside are clipped.
     polarity
         1, -1, or None to detect it.
+    smoothing
+        Length s, share of the input's range, below which features of the density are smoothed away; 0 for
+        none; "auto" to choose it by held-out blocks (see ``core.smoothing``).
 
     Raises
     ------
     ArgumentError
-        No records, or an output that does not vary.
+        No records, no weight, an input or an output that does not vary, fewer samples than levels, an
+        unknown method, a smoothing out of range, or ``method="alternating"`` on a plane too large for it.
     ConvergenceError
         The fit did not settle.
     """
-    if not records or sum(float(np.sum(_weights(r))) for r in records) == 0:
-        raise ArgumentError("identify needs at least one sample with weight, got none", hint="record a run")
+    samples = _check(records, plane, method, smoothing)
     sign = polarity_of(records) if polarity is None else polarity
-    turned = [Record(r.input, sign * np.asarray(r.output), r.weight, r.start) for r in records]
-    equations = normal_equations(plane, turned, reading)
-    mean = equations.output_sum / equations.weight
-    if equations.output_square / equations.weight - mean**2 <= 1e-24 * max(mean**2, np.finfo(float).tiny):
+    turned = [Record(r.input, sign * r.output, r.weight, r.start) for r in records]
+    tried: tuple[tuple[float, float], ...] = ()
+    if smoothing == "auto":
+        choice = choose(turned, plane, reading)
+        smoothing, tried = choice.smoothing, choice.tried
+    fit = _fit_dense if fits_dense(plane) else _fit_large
+    masses, offset, iterations, kkt = fit(turned, plane, reading, method, smoothing)
+    operator = Preisach(plane, masses / plane.areas, sign * offset, reading, polarity=sign)
+    return Identified(operator, method, iterations, kkt, smoothing, tried, samples)
+
+
+def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: Smoothing) -> int:
+    """Return the number of samples with weight, or raise ArgumentError when they cannot be fitted."""
+    samples = sum(int(np.count_nonzero(r.weights)) for r in records)
+    if samples == 0:
         raise ArgumentError(
-            f"the output does not vary: it is {sign * mean:g} in all samples",
-            hint="check the sensor's wiring",
+            f"records must hold at least one sample with weight, got {len(records)} records without any",
+            hint="record a run, or give some sample a weight above 0",
         )
+    if method not in ("joint", "alternating"):
+        raise ArgumentError(f"method must be 'joint' or 'alternating', got {method!r}", hint="use 'joint'")
+    if isinstance(smoothing, str) and smoothing != "auto":
+        raise ArgumentError(
+            f"smoothing must be 'auto' or a number in 0..1, got {smoothing!r}", hint="use 'auto'"
+        )
+    for name, parts in (
+        ("input", [np.clip(r.input, plane.low, plane.high) for r in records]),
+        ("output", [r.output[r.weights > 0] for r in records]),
+    ):
+        values = np.concatenate(parts)
+        if np.ptp(values) <= 1e-12 * np.abs(values).max(initial=0.0):
+            raise ArgumentError(
+                f"{name} must vary, got {values[0]:g} in all of its {values.size} samples "
+                f"(clipped to {plane.low:g} .. {plane.high:g})"
+                if name == "input"
+                else f"the output does not vary: it is {values[0]:g} in all {values.size} samples",
+                hint="check the wiring, and that the run sweeps the range of the levels",
+            )
+    if samples < plane.n_h:
+        raise ArgumentError(
+            f"records must hold at least one sample for each of the {plane.n_h} levels, got {samples}",
+            hint="use fewer levels or a longer record",
+        )
+    return samples
+
+
+_Fitted = tuple[FloatArray, float, int, float]  # masses, offset, iterations, relative KKT violation
+
+
+def _fit_dense(
+    records: Sequence[Record], plane: Plane, reading: Reading, method: Method, smoothing: float
+) -> _Fitted:
+    """Fit with the Gram matrix of the cells in memory."""
+    equations = normal_equations(plane, records, reading)
+    gram, rhs = smoothed(equations, smoothing)
     if method == "joint":
-        gram, rhs = equations.centred()
         found = nnls.solve(gram, rhs)
         masses, offset, iterations = found.x, equations.offset(found.x), found.iterations
-    elif method == "alternating":
-        masses, offset, iterations = _alternate(equations)
     else:
-        raise ArgumentError(f"method must be 'joint' or 'alternating', got {method!r}", hint="use 'joint'")
-    gram, rhs = equations.centred()
-    operator = Preisach(plane, masses / plane.areas, sign * offset, reading, polarity=sign)
-    return Identified(operator, method, iterations, nnls.kkt_violation(gram, rhs, masses))
+        extra = penalty(plane, np.diagonal(gram).copy(), smoothing).toarray() if smoothing else 0.0
+        masses, offset, iterations = _alternate(equations, equations.gram + extra)
+    return masses, offset, iterations, nnls.kkt_violation(gram, rhs, masses)
 
 
-def _weights(record: Record) -> FloatArray:
-    return np.ones(record.input.size) if record.weight is None else record.weight
+def _fit_large(
+    records: Sequence[Record], plane: Plane, reading: Reading, method: Method, smoothing: float
+) -> _Fitted:
+    """Fit without any dense matrix."""
+    if method != "joint":
+        raise ArgumentError(
+            f"method='alternating' needs dense matrices of {plane.n_q} x {plane.n_q} cells, more than "
+            f"{DENSE_BYTES / 1e9:.0f} GB",
+            hint="use the joint method: it ends at the same point",
+        )
+    found = large.solve(node_sums(plane, records, reading), smoothing)
+    return found.masses, found.offset, found.iterations, found.kkt
 
 
-def _alternate(equations: NormalEquations, limit: int = 200) -> tuple[FloatArray, float, int]:
+def _alternate(
+    equations: NormalEquations, gram: FloatArray, limit: int = 200
+) -> tuple[FloatArray, float, int]:
     """Alternate between the offset and the weights until neither moves (Carneiro et al. 2018, section 3).
 
     The plain alternation creeps: ten thousand rounds at 48 levels. Its moves are a piecewise linear
@@ -217,7 +197,7 @@ def _alternate(equations: NormalEquations, limit: int = 200) -> tuple[FloatArray
     passive: NDArray[np.bool_] | None = None
     before: tuple[float, float] | None = None
     for iteration in range(1, limit + 1):
-        found = nnls.solve(equations.gram, equations.moment - offset * equations.row_sum, passive=passive)
+        found = nnls.solve(gram, equations.moment - offset * equations.row_sum, passive=passive)
         passive = found.passive
         moved = equations.offset(found.x) - offset
         if abs(moved) <= 1e-12 * spread:
@@ -230,20 +210,3 @@ def _alternate(equations: NormalEquations, limit: int = 200) -> tuple[FloatArray
     raise ConvergenceError(
         f"offset and weights still moved after {limit} alternations", hint="use the joint method"
     )
-
-
-def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:
-    """Tell for every cell (n_q,) whether some input switched it on and, later, off.
-
-    Cell (i, j) is switched on at the first input >= the middle of band i, and off when the input
-    then falls below the middle of band j.
-    """
-    done = np.zeros(plane.n_q, dtype=bool)
-    i, j = plane.cell_indices
-    for values in inputs:
-        u = finite_vector("input", values)
-        highest = np.maximum.accumulate(u)
-        first = np.searchsorted(highest, plane.thresholds, side="left")  # (n_h,) n where never
-        lowest_after = np.append(np.minimum.accumulate(u[::-1])[::-1], np.inf)[first]
-        done |= lowest_after[i] < plane.thresholds[j]
-    return done

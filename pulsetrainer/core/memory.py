@@ -11,7 +11,6 @@ points; a sample needs to know only the node it moves away from, its anchor.
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,53 +104,66 @@ def turning_points(path: FloatArray) -> IntArray:
 
 
 def trace(values: FloatArray, start: State, low: float, high: float) -> Trace:
-    """Follow ``values`` (n,), clipped to [low, high], from ``start``.
+    """Follow ``values`` (n,), clipped to [low, high], from ``start``."""
+    return trace_after(np.asarray(start.extremes), values, low, high)
+
+
+def trace_after(past: FloatArray, values: FloatArray, low: float, high: float) -> Trace:
+    """Follow ``values`` (n,), clipped to [low, high], after a ``past`` (p,) that begins with all relays down.
 
     One pass over the turning points, each of which is pushed and wiped out at most once: linear in n.
     """
-    u = np.clip(values, low, high)
-    past = np.clip(start.extremes, low, high)
-    past[0] = low  # whatever plane the state came from, it begins with every relay down
-    path = np.concatenate((past, u))
-    node_value, parent, stack = [low], [0], [0]
-    piece_end: list[int] = []  # index into path one past the last sample of a piece
-    piece_anchor: list[int] = []
+    path = np.concatenate((past, values))
+    np.clip(path, low, high, out=path)
+    path[0] = low  # whatever plane the past came from, it begins with every relay down
     turns = turning_points(path)
-    samples = path.tolist() if turns.size * 8 > path.size else path  # element access: lists are faster
-    begin = 1
-    for end, value in zip(turns.tolist(), path[turns].tolist(), strict=True):
-        anchor = stack[-1]
-        rising = value > node_value[anchor]
+    turn_value = path[turns]
+    # the remembered turning points, their numbers and values, above a value that no input passes
+    stack, height = [-1, 0], [np.inf, low]
+    anchors: list[int] = []  # of each piece of a branch; one more piece begins at each wiping-out
+    pieces: list[int] = []  # number of pieces up to the end of each branch
+    count, rising = 0, True
+    for value in turn_value.tolist():
         # wiping-out: pass the older extremes of the same kind, the nearest first
-        while len(stack) > 1:
-            older = node_value[stack[-2]]
-            if (value < older) if rising else (value > older):
+        while (value >= height[-2]) if rising else (value <= height[-2]):
+            anchors.append(stack.pop())
+            height.pop()
+            if len(stack) == 2:  # all relays are down again
                 break
-            cut = _first_past(samples, older, begin, end + 1, rising)
-            piece_end.append(cut)
-            piece_anchor.append(anchor)
-            begin = cut
             stack.pop()
-            if len(stack) > 1:
-                stack.pop()
-            anchor = stack[-1]
-        piece_end.append(end + 1)
-        piece_anchor.append(anchor)
-        begin = end + 1
-        if value != node_value[anchor]:
-            node_value.append(value)
-            parent.append(anchor)
-            stack.append(len(node_value) - 1)
-    piece_end.append(path.size)  # samples that rest at the last value
-    piece_anchor.append(stack[-1])
-    begins = np.asarray([1, *piece_end], dtype=np.int64)
-    anchor_of = np.repeat(np.asarray(piece_anchor, dtype=np.int64), begins[1:] - begins[:-1])[past.size - 1 :]
-    final = State(tuple(node_value[k] for k in stack))
-    return Trace(u, anchor_of, np.asarray(node_value), np.asarray(parent, dtype=np.int64), final)
+            height.pop()
+        anchors.append(stack[-1])
+        pieces.append(len(anchors))
+        if value != height[-1]:
+            count += 1
+            stack.append(count)
+            height.append(value)
+        rising = not rising
+    anchor = np.fromiter(anchors, np.int64, len(anchors))
+    last = np.fromiter(pieces, np.int64, len(pieces)) - 1  # piece of each branch that reaches the turn
+    pushed = turn_value != low
+    node_value = np.append(low, turn_value[pushed])
+    parent = np.append(0, anchor[last[pushed]])
+    level = node_value[parent[anchor]]  # that ends a piece: the extreme before its anchor is passed
+    level[last] = np.where(np.arange(last.size) % 2 == 0, np.inf, -np.inf)
+    ends = _piece_ends(path, turns, level, last)
+    length = np.diff(np.concatenate(([1], ends, [path.size])))  # at last, samples that rest
+    of_sample = np.repeat(np.append(anchor, stack[-1]), length)[past.size - 1 :]
+    return Trace(path[past.size :], of_sample, node_value, parent, State(tuple(height[1:])))
 
 
-def _first_past(samples: FloatArray | list[float], level: float, begin: int, end: int, rising: bool) -> int:
-    """Return the first index in [begin, end) of a monotone branch whose sample has reached ``level``."""
-    if rising:
-        return bisect_left(samples, level, begin, end)
-    return bisect_left(samples, -level, begin, end, key=lambda v: -v)
+def _piece_ends(path: FloatArray, turns: IntArray, level: FloatArray, last: IntArray) -> IntArray:
+    """Index into ``path`` of the first sample, on each piece's branch, that has reached its ``level``.
+
+    Branches are monotone, the even ones rising: bisection of all pieces at once.
+    """
+    branch = np.repeat(np.arange(turns.size), np.diff(last, prepend=-1))
+    begin = np.concatenate(([1], turns + 1))[branch]
+    end = turns[branch] + 1
+    direction = np.where(branch % 2 == 0, 1.0, -1.0)
+    level = direction * level
+    while np.any(begin < end):
+        middle = (begin + end) // 2
+        reached = direction * path[np.minimum(middle, path.size - 1)] >= level
+        begin, end = np.where(reached, (begin, middle), (np.minimum(middle + 1, end), end))
+    return end

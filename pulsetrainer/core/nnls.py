@@ -20,6 +20,8 @@ from pulsetrainer.errors import ConvergenceError
 
 # A pivot below this share of the largest diagonal entry is rounding noise of the sums that made G.
 _RELATIVE_RIDGE = 1e-13
+# Variables whose diagonal entry is below this share of the largest never appear in the data.
+SMALLEST_DIAGONAL = 1e-14
 # Some ten units in the last place of a sum of a thousand terms.
 _ROUNDING = 1e-14
 # Full exchanges that may fail to reduce the infeasibilities before descent takes over.
@@ -81,7 +83,7 @@ class _Problem:
         self.gram, self.rhs, self.size = gram, rhs, np.abs(gram)
         diagonal = np.diagonal(gram)
         self.scale = float(diagonal.max(initial=0.0))
-        self.usable = diagonal > 1e-14 * self.scale
+        self.usable = diagonal > SMALLEST_DIAGONAL * self.scale
 
     def minimise_over(self, free: NDArray[np.bool_]) -> FloatArray:
         return _solve_free(self.gram, self.rhs, free, self.scale)

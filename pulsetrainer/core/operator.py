@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from pulsetrainer.core.memory import State, Trace, negative_saturation, trace
-from pulsetrainer.core.plane import FloatArray, Plane, Reading, finite_vector
+from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading, finite_vector
 from pulsetrainer.errors import ArgumentError
 
 
@@ -126,12 +126,33 @@ class Preisach:
 
     @cached_property
     def _signed(self) -> FloatArray:
-        return self.plane.signed_everett(self.nodes)
+        return 2.0 * self.plane.signed_everett(self.nodes)
 
     def step(self, to: FloatArray, origin: FloatArray) -> FloatArray:
         """Signed output steps (n,), polarity 1, when the input goes straight from ``origin`` to ``to``."""
-        corner, weight = self.plane.corners(to, origin)
-        return 2.0 * np.einsum("kn,kn->n", weight, self._signed[corner])
+        return self._step(*self.plane.bands(to), *self.plane.bands(origin))
+
+    def _step(self, i: IntArray, s: FloatArray, j: IntArray, t: FloatArray) -> FloatArray:
+        """Steps (n,) from fraction ``t`` of band ``j`` to fraction ``s`` of band ``i``: bilinear, in place."""
+        row = self.plane.n_h + 1
+        corner = i * row
+        corner += j
+        y = self._signed.take(corner)
+        corner += 1
+        beside = self._signed.take(corner)
+        corner += row
+        opposite = self._signed.take(corner)
+        corner -= 1
+        above = self._signed.take(corner)
+        # along t on both sides of the cell, then along s between them
+        for side, end in ((y, beside), (above, opposite)):
+            end -= side
+            end *= t
+            side += end
+        above -= y
+        above *= s
+        y += above
+        return y
 
     def __call__(self, values: ArrayLike, start: State | None = None) -> FloatArray:
         """Output (n,) for an input (n,) from negative saturation, or from ``start``."""
@@ -146,9 +167,14 @@ class Preisach:
             The input is empty, not one-dimensional or not finite.
         """
         path = follow(self.plane, values, start, self.reading)
-        turning = path.along_tree(self.step(path.node_value, path.node_value[path.parent])) - self.total
-        y = turning[path.anchor] + self.step(path.value, path.node_value[path.anchor])
-        return self.offset + self.polarity * y, path.final
+        band, fraction = self.plane.bands(path.node_value)
+        turning = path.along_tree(self._step(band, fraction, band[path.parent], fraction[path.parent]))
+        turning -= self.total
+        y = self._step(*self.plane.bands(path.value), band[path.anchor], fraction[path.anchor])
+        y += turning[path.anchor]
+        y *= self.polarity
+        y += self.offset
+        return y, path.final
 
 
 def outputs(

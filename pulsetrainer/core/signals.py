@@ -126,7 +126,7 @@ def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
     """
     if not (rate_Hz > 0 and high > low):
         raise ArgumentError(
-            f"the range must have low < high and the rate must be positive, got {low:g}, {high:g}, {rate_Hz:g}",
+            f"low < high and a positive rate are needed, got {low:g}, {high:g} and {rate_Hz:g} Hz",
             hint="0, 1.5 and 1000 Hz suit the solenoid",
         )
     parts: list[FloatArray] = []

@@ -1,0 +1,118 @@
+"""Coverage: which relays of the plane a signal has switched, and in words, which it has not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pulsetrainer.core.plane import Plane, finite_vector
+from pulsetrainer.errors import ArgumentError
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """The largest region of the plane that the signal never switched: alpha > ``alpha``, beta < ``beta``...
+
+    The region is a rectangle cut by the diagonal: relays switching up in ``alpha_low`` .. ``alpha_high`` and
+    down in ``beta_low`` .. ``beta_high``, input unit.
+    """
+
+    alpha_low: float
+    alpha_high: float
+    beta_low: float
+    beta_high: float
+    share: float  # of the area of the plane
+    uncovered: float  # share of the area that is uncovered altogether
+
+    def words(self, plane: Plane, unit: str) -> str:
+        """Name the region in one line: "never switched: relays with ... (18 % of the plane)"."""
+        parts = []
+        if self.alpha_low > plane.low:
+            parts.append(f"alpha above {self.alpha_low:.3g} {unit}")
+        if self.alpha_high < plane.high:
+            parts.append(f"alpha below {self.alpha_high:.3g} {unit}")
+        # beta never exceeds alpha, so a limit at alpha's own end says nothing new
+        if self.beta_low > plane.low:
+            parts.append(f"beta above {self.beta_low:.3g} {unit}")
+        if self.beta_high < min(self.alpha_high, plane.high):
+            parts.append(f"beta below {self.beta_high:.3g} {unit}")
+        which = f"relays with {' and '.join(parts)}" if parts else "all relays"
+        rest = self.uncovered - self.share
+        more = f"; {100 * rest:.0f} % more lies elsewhere" if rest >= 0.005 else ""
+        return f"never switched: {which} ({100 * self.share:.0f} % of the plane{more})"
+
+
+def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:
+    """Tell for every cell (n_q,) whether some input switched it on and, later, off.
+
+    Cell (i, j) is switched on at the first input >= the middle of band i, and off when the input
+    then falls below the middle of band j.
+
+    Raises
+    ------
+    ArgumentError
+        An input is no finite vector.
+    """
+    done = np.zeros(plane.n_q, dtype=bool)
+    i, j = plane.cell_indices
+    for values in inputs:
+        u = finite_vector("input", values)
+        highest = np.maximum.accumulate(u)
+        first = np.searchsorted(highest, plane.thresholds, side="left")  # (n_h,) n where never
+        lowest_after = np.append(np.minimum.accumulate(u[::-1])[::-1], np.inf)[first]
+        done |= lowest_after[i] < plane.thresholds[j]
+    return done
+
+
+def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:
+    """Return the largest rectangle, cut by the diagonal, of cells that are not ``covered`` (n_q,).
+
+    Every rectangle of bands is tried whose cells below the diagonal are all uncovered; the one of the
+    largest area is named. None when all cells are covered.
+
+    Raises
+    ------
+    ArgumentError
+        ``covered`` has not one entry for each cell.
+    """
+    if covered.shape != (plane.n_q,):
+        raise ArgumentError(
+            f"covered must have shape ({plane.n_q},), got {covered.shape}",
+            hint="coverage and levels must come from the same model",
+        )
+    if np.all(covered):
+        return None
+    n, whole = plane.n_h, float(plane.areas.sum())
+    bad = np.zeros((n + 1, n + 1))
+    bad[1:, 1:] = np.cumsum(np.cumsum(plane.unpack(covered.astype(np.float64)), axis=0), axis=1)
+    area = np.zeros((n + 1, n + 1))
+    area[1:, 1:] = np.cumsum(np.cumsum(plane.unpack(plane.areas), axis=0), axis=1)
+    best, where = -1.0, (0, 0, 0, 0)
+    for low in range(n):  # first band of alpha
+        for high in range(low + 1, n + 1):  # one past its last band
+            # blank cells above the diagonal count as free, so a beta range may run past them
+            inside = bad[high] - bad[low]
+            sizes = area[high] - area[low]
+            left = _longest_free(inside)
+            size = sizes - sizes[left]
+            right = int(np.argmax(size))
+            if size[right] > best * (1 + 1e-12):
+                best, where = float(size[right]), (low, high, int(left[right]), right)
+    low, high, left_band, right_band = where
+    levels = plane.levels
+    return Gap(
+        alpha_low=float(levels[max(low, left_band)]),
+        alpha_high=float(levels[high]),
+        beta_low=float(levels[left_band]),
+        beta_high=float(levels[right_band]),
+        share=best / whole,
+        uncovered=float(plane.areas[~covered].sum()) / whole,
+    )
+
+
+def _longest_free(total: NDArray[np.float64]) -> NDArray[np.int64]:
+    """For each end, the first start from which the running ``total`` (n + 1,) has not grown."""
+    return np.searchsorted(total, total, side="left").astype(np.int64)

@@ -1,0 +1,224 @@
+"""What the fit needs to know of the data: sums over samples, small and additive.
+
+A design row r_t is a signed sum of a few Everett nodes, so sum v r r' is sparse in node space.
+``NodeSums`` holds it there; sums of parts of a record add up to those of the whole, so that leaving out a
+block, or drawing blocks again, needs no second look at the data. ``NodeSums.dense`` carries them to the
+cells by cumulative sums: the n x n_q design matrix never exists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from pulsetrainer.core.memory import State, Trace
+from pulsetrainer.core.operator import base_rows, follow, steps
+from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading, finite_vector
+from pulsetrainer.errors import ArgumentError
+
+_CHUNK = 200_000  # samples whose sparse rows are held at one time
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One record to be fitted: input, output and, if some samples count less, their weights."""
+
+    input: FloatArray  # (n,)
+    output: FloatArray  # (n,)
+    weight: FloatArray | None = None  # (n,) 0 masks a sample out of the fit, not out of the memory
+    start: State | None = None  # None: negative saturation
+
+    def __post_init__(self) -> None:
+        u = finite_vector("input", self.input, at_least=2)
+        v = np.ones(u.size) if self.weight is None else finite_vector("weight", self.weight)
+        y = np.asarray(self.output, dtype=np.float64)
+        if y.shape != u.shape or v.shape != u.shape:
+            raise ArgumentError(
+                f"input, output and weight must have one length, got {u.shape}, {y.shape} and {v.shape}",
+                hint="cut the record to the samples that have both",
+            )
+        if np.any(v < 0):
+            raise ArgumentError(f"weight must not be negative, got {v.min():g}", hint="0 masks a sample")
+        finite_vector("output", y[v > 0], at_least=0)  # masked samples may be anything
+        object.__setattr__(self, "input", u)
+        object.__setattr__(self, "output", y)
+
+    @property
+    def weights(self) -> FloatArray:
+        """Weight of every sample (n,): ones unless given."""
+        return np.ones(self.input.size) if self.weight is None else np.asarray(self.weight, dtype=np.float64)
+
+    @property
+    def fitted_output(self) -> FloatArray:
+        """The output (n,), zero where it has no weight: what is masked may be anything, NaN too."""
+        return np.where(self.weights > 0, self.output, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class NormalEquations:
+    """Sums over all samples in the coordinates of the cells' masses; relays are -1 or +1."""
+
+    plane: Plane
+    gram: FloatArray  # (n_q, n_q) sum v r r'
+    moment: FloatArray  # (n_q,) sum v r y
+    row_sum: FloatArray  # (n_q,) sum v r
+    weight: float  # sum v
+    output_sum: float  # sum v y
+    output_square: float  # sum v y^2
+
+    def centred(self) -> tuple[FloatArray, FloatArray]:
+        """Gram matrix and right side with the offset eliminated: rows and outputs minus their means."""
+        gram = self.gram - np.outer(self.row_sum, self.row_sum / self.weight)
+        return gram, self.moment - self.row_sum * (self.output_sum / self.weight)
+
+    def offset(self, masses: FloatArray) -> float:
+        """Best offset y0 for given masses (n_q,)."""
+        return float(self.output_sum - self.row_sum @ masses) / self.weight
+
+    def sum_of_squares(self, masses: FloatArray, offset: float) -> float:
+        """Weighted sum of squared residuals, from the sums alone (rounding: about 1e-12 of sum v y^2)."""
+        return float(
+            self.output_square
+            - 2 * (self.moment @ masses + offset * self.output_sum)
+            + masses @ self.gram @ masses
+            + 2 * offset * (self.row_sum @ masses)
+            + offset**2 * self.weight
+        )
+
+    def __sub__(self, part: NormalEquations) -> NormalEquations:
+        """Sums over the samples that are not in ``part``."""
+        return NormalEquations(
+            self.plane,
+            self.gram - part.gram,
+            self.moment - part.moment,
+            self.row_sum - part.row_sum,
+            self.weight - part.weight,
+            self.output_sum - part.output_sum,
+            self.output_square - part.output_square,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class NodeSums:
+    """Sums over samples in the coordinates of the Everett nodes.
+
+    Here a row rises from 0, all relays down, to 2 E(high, low), all up; the constant -W is left out.
+    """
+
+    plane: Plane
+    gram: sparse.csr_array  # (n_q, n_q) sum v r r'
+    moment: FloatArray  # (n_q,) sum v r y
+    row_sum: FloatArray  # (n_q,) sum v r
+    weight: float  # sum v
+    output_sum: float  # sum v y
+    output_square: float  # sum v y^2
+
+    @classmethod
+    def nothing(cls, plane: Plane) -> NodeSums:
+        """Sums over no samples."""
+        zero = np.zeros(plane.n_q)
+        return cls(plane, sparse.csr_array((plane.n_q, plane.n_q)), zero, zero, 0.0, 0.0, 0.0)
+
+    def __add__(self, other: NodeSums) -> NodeSums:
+        """Sums over both sets of samples."""
+        return NodeSums(
+            self.plane,
+            self.gram + other.gram,
+            self.moment + other.moment,
+            self.row_sum + other.row_sum,
+            self.weight + other.weight,
+            self.output_sum + other.output_sum,
+            self.output_square + other.output_square,
+        )
+
+    def dense(self) -> NormalEquations:
+        """Carry the sums to the cells: two cumulative sums on each side."""
+        plane = self.plane
+        cells = plane.adjoint(plane.adjoint(self.gram.toarray()).T.copy())
+        row_sum, moment = plane.adjoint(self.row_sum), plane.adjoint(self.moment)
+        # so far rows rise from 0, all relays down, to 2: subtract the constant 1 from each
+        cells += self.weight - row_sum[:, None] - row_sum[None, :]
+        return NormalEquations(
+            plane,
+            cells,
+            moment - self.output_sum,
+            row_sum - self.weight,
+            self.weight,
+            self.output_sum,
+            self.output_square,
+        )
+
+
+def _part_sums(
+    plane: Plane, path: Trace, base: sparse.csr_array, samples: IntArray, y: FloatArray, v: FloatArray
+) -> NodeSums:
+    """Node-space sums of the chosen samples of one record.
+
+    r = own + base: own rows have at most four entries; base rows are shared by all samples of an anchor,
+    so they enter once per anchor with the sums of its own rows.
+    """
+    used, anchors = np.unique(path.anchor[samples], return_inverse=True)
+    base, nodes = base[used], used.size
+    gram = sparse.csr_array((plane.n_q, plane.n_q))
+    by_anchor = sparse.csr_array((nodes, plane.n_q))  # sum of v own over the samples of an anchor
+    own_sum, own_y = np.zeros(plane.n_q), np.zeros(plane.n_q)
+    for begin in range(0, samples.size, _CHUNK):
+        part = samples[begin : begin + _CHUNK]
+        anchor = anchors[begin : begin + _CHUNK]
+        own = steps(plane, path.value[part], path.node_value[path.anchor[part]])
+        scaled = own.multiply(v[part, None]).tocsr()
+        gram = gram + own.T @ scaled
+        size = own.shape[0]
+        gather = sparse.csr_array((np.ones(size), (anchor, np.arange(size))), shape=(nodes, size))
+        by_anchor = by_anchor + gather @ scaled
+        own_sum += scaled.sum(axis=0)
+        own_y += scaled.T @ y[part]
+    v, y = v[samples], y[samples]
+    count = np.bincount(anchors, weights=v, minlength=nodes)
+    count_y = np.bincount(anchors, weights=v * y, minlength=nodes)
+    cross = base.T @ by_anchor
+    gram = gram + cross + cross.T + base.T @ base.multiply(count[:, None]).tocsr()
+    return NodeSums(
+        plane,
+        gram.tocsr(),
+        own_y + base.T @ count_y,
+        own_sum + base.T @ count,
+        float(v.sum()),
+        float(v @ y),
+        float(v @ (y * y)),
+    )
+
+
+def node_sums(plane: Plane, records: Sequence[Record], reading: Reading) -> NodeSums:
+    """Sums over all samples of all records, in node space."""
+    total = NodeSums.nothing(plane)
+    for record in records:
+        path = follow(plane, record.input, record.start, reading)
+        every = np.arange(record.input.size)
+        part = _part_sums(plane, path, base_rows(plane, path), every, record.fitted_output, record.weights)
+        total = total + part
+    return total
+
+
+def parted_sums(
+    plane: Plane, records: Sequence[Record], reading: Reading, parts: Sequence[IntArray], count: int
+) -> list[NodeSums]:
+    """Sums of ``count`` parts of the records, each record followed once, from its start.
+
+    ``parts`` holds for each record the number of the part, in 0..count - 1, of each of its samples (n,).
+    """
+    sums = [NodeSums.nothing(plane) for _ in range(count)]
+    for record, part in zip(records, parts, strict=True):
+        path = follow(plane, record.input, record.start, reading)
+        base, y, v = base_rows(plane, path), record.fitted_output, record.weights
+        for k in range(count):
+            sums[k] = sums[k] + _part_sums(plane, path, base, np.flatnonzero(part == k), y, v)
+    return sums
+
+
+def normal_equations(plane: Plane, records: Sequence[Record], reading: Reading) -> NormalEquations:
+    """Assemble the normal equations of all records in mass space; relays are -1 or +1."""
+    return node_sums(plane, records, reading).dense()

@@ -1,0 +1,164 @@
+"""Noise in the measured input: how large it is, and how to take the false reversals out.
+
+A Preisach operator has no defence against input noise: every wiggle is a reversal that it remembers.
+The noise is read off fourth differences, whose standard deviation is sqrt(70) times that of white noise
+while a smooth or straight input leaves next to nothing in them; the median makes real turns harmless.
+
+A turn is real when the input swings back by more than the noise of n samples can,
+h = 2 sigma sqrt(2 ln n) (Donoho and Johnstone, Biometrika 81 (1994) 425-455). Each piece between real
+turns is filtered by local parabolas of zero phase (Savitzky and Golay, Anal. Chem. 36 (1964) 1627-1639), then
+made monotone: the mean of its running maximum from the left and its running minimum from the right,
+which lags on neither side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.signal import savgol_filter
+
+from pulsetrainer.core.memory import turning_points
+from pulsetrainer.core.plane import FloatArray, IntArray, finite_vector
+
+_FOURTH = np.asarray([1.0, -4.0, 6.0, -4.0, 1.0])  # squares add up to 70
+_MEDIAN_TO_SIGMA = 1.4826  # of the absolute value of a normal variable
+# A dead-band wider than this share of the range would remove motion: the record is too coarse to tell.
+_WIDEST = 0.1
+# Samples of the local parabolas, the widest first.
+_WINDOWS = (31, 21, 15, 9, 5)
+# What a filter takes away is noise alone as long as it is not larger than this times what noise would be.
+_NOISE_ONLY = 1.1
+
+
+@dataclass(frozen=True, slots=True)
+class Cleaned:
+    """An input without its false reversals."""
+
+    input: FloatArray  # (n,) input unit; the very input where nothing was removed
+    sigma: float  # standard deviation of the noise, input unit; NaN where the record cannot tell
+    dead_band: float  # h: swings up to here are noise, input unit
+    removed: int  # reversals that are gone
+    kept: int  # reversals that are left
+
+
+def estimate(values: ArrayLike) -> float:
+    """Standard deviation of white noise on a slowly moving input (n,), input unit.
+
+    sigma = 1.4826 median |fourth differences| / sqrt(70). NaN below 16 samples, and where the dead-band
+    it would ask for exceeds a tenth of the range: there the samples are too coarse to tell noise
+    from motion.
+
+    Raises
+    ------
+    ArgumentError
+        The input is no finite vector.
+    """
+    u = finite_vector("input", values)
+    if u.size < 16:
+        return float("nan")
+    moving = np.convolve(u, _FOURTH, mode="valid")
+    sigma = _MEDIAN_TO_SIGMA * float(np.median(np.abs(moving))) / np.sqrt(70.0)
+    scale = float(np.abs(u).max())
+    if sigma <= 8 * np.finfo(float).eps * scale:  # the rounding of the differences themselves
+        return 0.0
+    return sigma if dead_band(sigma, u.size) <= _WIDEST * float(np.ptp(u)) else float("nan")
+
+
+def dead_band(sigma: float, n: int) -> float:
+    """Largest swing h = 2 sigma sqrt(2 ln n) that noise makes among ``n`` samples, input unit."""
+    return 2.0 * sigma * float(np.sqrt(2.0 * np.log(max(n, 2))))
+
+
+def real_turns(values: FloatArray, band: float) -> IntArray:
+    """Places (k,) of the extremes between which ``values`` (n,) swings by more than ``band``, in order.
+
+    Each is the first sample of its extreme value; extremes alternate between maxima and minima. One pass over
+    all turning points.
+    """
+    places = np.concatenate(([0], turning_points(values)))
+    heights = values[places].tolist()
+    turns: list[int] = []
+    high = low = 0  # numbers of the extremes since the last real turn
+    direction = 0
+    for k, height in enumerate(heights):
+        if height > heights[high]:
+            high = k
+        if height < heights[low]:
+            low = k
+        if direction >= 0 and heights[high] - height > band:
+            turns.append(high)
+            direction, low, high = -1, k, k
+        elif direction <= 0 and height - heights[low] > band:
+            turns.append(low)
+            direction, low, high = 1, k, k
+    return places[np.asarray(turns, dtype=np.int64)]
+
+
+def clean(values: ArrayLike, sigma: float | None = None) -> Cleaned:
+    """Return the input (n,) without reversals that are smaller than its own noise.
+
+    Parameters
+    ----------
+    sigma
+        Standard deviation of the noise, input unit; None to read it off the record.
+
+    Raises
+    ------
+    ArgumentError
+        The input is no finite vector.
+    """
+    u = finite_vector("input", values)
+    noise = estimate(u) if sigma is None else sigma
+    reversals = max(turning_points(u).size - 1, 0)
+    if not noise > 0:
+        return Cleaned(u, noise, 0.0, 0, reversals)
+    band = dead_band(noise, u.size)
+    turns = real_turns(u, band)
+    if turns.size >= reversals:  # every turn is a real one
+        return Cleaned(u, noise, band, 0, reversals)
+    smooth = _smooth_between(u, turns, noise)
+    left = max(turning_points(smooth).size - 1, 0)
+    if left >= reversals:
+        return Cleaned(u, noise, band, 0, reversals)
+    return Cleaned(smooth, noise, band, reversals - left, left)
+
+
+def _smooth_between(u: FloatArray, turns: IntArray, sigma: float) -> FloatArray:
+    """Replace each piece between turns by a smooth monotone path; a turn gets the mean of its two sides.
+
+    Pieces are filtered one by one, so that a turn is never rounded off: at its end a piece is continued by
+    the polynomial of its own last samples.
+    """
+    total, count = np.zeros(u.size), np.zeros(u.size)
+    ends = np.unique(np.concatenate(([0], turns, [u.size - 1]))).tolist()
+    for a, b in pairwise(ends):
+        total[a : b + 1] += _local_polynomial(u[a : b + 1], sigma, u.size)
+        count[a : b + 1] += 1.0
+    smooth = total / count
+    for a, b in pairwise(ends):
+        smooth[a : b + 1] = _monotone(smooth[a : b + 1])
+    return smooth
+
+
+def _local_polynomial(piece: FloatArray, sigma: float, n: int) -> FloatArray:
+    """Filter a piece with the widest window that leaves noise of size ``sigma`` behind, and no more."""
+    for window in _WINDOWS:
+        if window <= piece.size:
+            path = savgol_filter(piece, window, 2)
+            rest = piece - path
+            noise_only = np.std(rest) <= _NOISE_ONLY * sigma
+            if noise_only and np.abs(rest).max() <= 0.5 * _NOISE_ONLY * dead_band(sigma, n):
+                return path
+    return piece
+
+
+def _monotone(piece: FloatArray) -> FloatArray:
+    """Mean of the running maximum from the left and the running minimum from the right, or the mirror."""
+    sign = 1.0 if piece[-1] >= piece[0] else -1.0
+    rising = sign * piece
+    left = np.maximum.accumulate(rising)
+    right = np.minimum.accumulate(rising[::-1])[::-1]
+    return sign * 0.5 * (left + right)
