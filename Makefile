@@ -15,10 +15,10 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo test lint bench bounds clean help
+.PHONY: demo test lint bench bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
 
 demo: $(D)/report.html  ## capture, identify, invert, play, evaluate: two pulses, two methods, one report
 	@$(PT) evaluate $(PLAYED)
@@ -73,6 +73,12 @@ lint: $(VENV)/installed-test  ## style, types, import contracts
 
 bench: $(VENV)/installed-test  ## speed and memory, as ratios in one run
 	$(BIN)/python -m pytest benchmarks -p no:xdist --timeout=0 -s
+
+firmware-mps2:  ## the firmware for the emulated Cortex-M4F (Debian: gcc-arm-none-eabi, qemu-system-arm)
+	$(MAKE) -C firmware mps2
+
+firmware-cost:  ## cycles of the control interrupt, RAM and flash, on the emulated Cortex-M4F
+	$(MAKE) -C firmware cost
 
 clean:  ## remove what was built
 	rm -rf build $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
