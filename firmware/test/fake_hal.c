@@ -57,6 +57,13 @@ bool fake_output_on(void)
     return fake.pwm_enabled && fake.pwm > 0;
 }
 
+void fake_receive(const uint8_t *bytes, uint16_t count)
+{
+    for (uint16_t k = 0; k < count; k++)
+        rx[rx_head++ % sizeof rx] = bytes[k];
+    app_poll();
+}
+
 struct frame fake_command_seq(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_t length)
 {
     uint8_t wire[FRAME_MAX_ENCODED];

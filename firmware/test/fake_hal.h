@@ -27,6 +27,8 @@ void fake_ticks(uint32_t n);            /* n ticks, the main loop after each */
 void fake_ticks_without_main(uint32_t n);
 bool fake_output_on(void);
 
+void fake_receive(const uint8_t *bytes, uint16_t count); /* raw bytes, at most 270 */
+
 /* Sends a command and returns the reply (its payload valid until the next call); type 0: none came. */
 struct frame fake_command(uint8_t type, const uint8_t *payload, uint8_t length);
 struct frame fake_command_seq(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_t length);

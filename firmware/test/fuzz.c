@@ -1,0 +1,327 @@
+/* Damaged frames into the decoder, wild commands into the whole core, under the sanitizers.
+ *
+ *   fuzz SEED FRAMES SEQUENCES    a loop of our own, the same everywhere for the same seed
+ *   -DFUZZ_LIBFUZZER              the same sequences as a libFuzzer target (clang)
+ *
+ * Exit status 0: nothing wrong; 1: an invariant is broken. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app.h"
+#include "fake_hal.h"
+#include "hal.h"
+#include "units.h"
+
+#define REQUIRE(condition)                                                        \
+    do {                                                                          \
+        if (!(condition)) {                                                       \
+            printf("%s:%d: %s (state %u)\n", __FILE__, __LINE__, #condition, app.state); \
+            abort();                                                              \
+        }                                                                         \
+    } while (0)
+
+/* --- a sequence: bytes that are read as commands, noise and time -------------------------------- */
+
+struct tape {
+    const uint8_t *bytes;
+    size_t left;
+};
+
+static uint8_t next(struct tape *t)
+{
+    if (t->left == 0)
+        return 0;
+    t->left--;
+    return *t->bytes++;
+}
+
+static uint16_t next16(struct tape *t)
+{
+    uint16_t low = next(t);
+    return (uint16_t)(low | ((uint16_t)next(t) << 8));
+}
+
+/* Whatever was said to it, this holds. */
+static void check(void)
+{
+    REQUIRE(app.state <= PT_STATE_FAULT);
+    REQUIRE(app.fault <= PT_FAULT_STRAY_CURRENT);
+    bool may_drive = app.state == PT_STATE_RUNNING || app.state == PT_STATE_RAMPING;
+    REQUIRE(may_drive || !fake.pwm_enabled);
+    REQUIRE(fake.pwm <= HAL_PWM_PERIOD);
+    REQUIRE(app.reference >= 0 && app.reference <= app.param[PT_PARAM_CURRENT_LIMIT]);
+    REQUIRE(app.state != PT_STATE_RUNNING || app.fault == PT_FAULT_NONE);
+    REQUIRE((app.state != PT_STATE_ARMED && app.state != PT_STATE_RUNNING) || (app.wave.committed && app.greeted));
+    REQUIRE((uint16_t)(app.wave.head - app.wave.tail) <= PT_WAVE_BUFFER_SAMPLES);
+    REQUIRE(app.wave.received <= app.wave.total);
+    REQUIRE(telemetry_waiting(&app.telemetry) <= TELEMETRY_RING);
+    for (uint8_t id = 0; id < PT_PARAM_COUNT; id++)
+        REQUIRE(app.param[id] >= app_param_minimum(id) && app.param[id] <= app_param_maximum(id));
+    REQUIRE(app.safety.current_trip <= 16500 && app.safety.force_trip <= 15000);
+    REQUIRE(app.safety.heartbeat_ticks <= 2000);
+}
+
+static void wild_command(struct tape *t)
+{
+    uint8_t p[PT_MAX_PAYLOAD];
+    uint8_t type = (uint8_t)(next(t) % 16u);
+    uint8_t seq = (uint8_t)(next(t) % 8u); /* few: repetitions are common */
+    uint8_t length = (uint8_t)(next(t) % (PT_MAX_PAYLOAD + 1u));
+    for (uint8_t k = 0; k < length; k++)
+        p[k] = next(t);
+    (void)fake_command_seq(type, seq, p, length);
+}
+
+/* What brings the device on from where it is, by its place in sensible_command(). */
+static uint8_t step(void)
+{
+    if (app.fault != PT_FAULT_NONE || app.state == PT_STATE_RAMPING)
+        return 8;
+    if (!app.greeted)
+        return 0;
+    if (app.state == PT_STATE_ARMED)
+        return 6;
+    if (!app.wave.begun)
+        return 1;
+    if (app.wave.received < app.wave.total && (app.wave.received < 100u || app.state == PT_STATE_RUNNING))
+        return 2;
+    return app.state == PT_STATE_RUNNING ? 8 : app.wave.committed ? 5 : 4;
+}
+
+/* The right thing to say next, so that the deep states are reached, with a value that may be wrong. */
+static void sensible_command(struct tape *t)
+{
+    static uint32_t announced_crc;
+    uint8_t p[PT_MAX_PAYLOAD] = {0};
+    uint8_t choice = next(t);
+    switch (next(t) < 200u ? step() : choice % 9u) {
+    case 0:
+        put_u32(p + PT_HELLO_MAGIC, PT_MAGIC);
+        p[PT_HELLO_MAJOR] = (uint8_t)(choice < 250u ? PT_PROTOCOL_MAJOR : choice);
+        (void)fake_command(PT_HELLO, p, PT_HELLO_LEN);
+        break;
+    case 1: {
+        uint32_t total = next16(t) % 600u;
+        uint8_t zeros[2] = {0, 0};
+        announced_crc = 0;
+        for (uint32_t k = 0; k < total; k++)
+            announced_crc = wave_crc32(announced_crc, zeros, 2);
+        put_u32(p + PT_WAVE_BEGIN_TOTAL, total);
+        put_u16(p + PT_WAVE_BEGIN_TICKS_PER_SAMPLE, (uint16_t)(1u + next(t) % 30u));
+        put_u32(p + PT_WAVE_BEGIN_CRC32, announced_crc ^ (choice < 240u ? 0u : 1u));
+        (void)fake_command(PT_WAVE_BEGIN, p, PT_WAVE_BEGIN_LEN);
+        break;
+    }
+    case 2:
+    case 3: {
+        uint32_t missing = app.wave.total - app.wave.received;
+        uint8_t count = (uint8_t)(1u + next(t) % PT_WAVE_DATA_MAX_ITEMS);
+        if (count > missing && missing > 0)
+            count = (uint8_t)missing;
+        put_u32(p + PT_WAVE_DATA_OFFSET, app.wave.received + (choice < 230u ? 0u : choice));
+        p[PT_WAVE_DATA_COUNT] = count;
+        if (choice >= 200u) /* not what was announced */
+            for (uint8_t k = 0; k < count; k++)
+                put_u16(p + PT_WAVE_DATA_LEN + 2u * k, (uint16_t)(next(t) * 60u));
+        (void)fake_command(PT_WAVE_DATA, p, (uint8_t)(PT_WAVE_DATA_LEN + 2u * count));
+        break;
+    }
+    case 4:
+        put_u32(p + PT_WAVE_COMMIT_COUNT, app.wave.received);
+        put_u32(p + PT_WAVE_COMMIT_CRC32, app.wave.crc);
+        (void)fake_command(PT_WAVE_COMMIT, p, PT_WAVE_COMMIT_LEN);
+        break;
+    case 5:
+        put_u32(p, app.nonce);
+        (void)fake_command(PT_ARM, p, PT_ARM_LEN);
+        break;
+    case 6:
+        (void)fake_command(PT_START, NULL, 0);
+        break;
+    case 7:
+        put_u16(p, (uint16_t)(next16(t) % (PT_MAX_DECIMATION + 10u)));
+        (void)fake_command(PT_STREAM, p, PT_STREAM_LEN);
+        break;
+    default:
+        (void)fake_command(app.fault == PT_FAULT_NONE ? PT_HEARTBEAT : PT_CLEAR_FAULT, NULL, 0);
+        break;
+    }
+}
+
+static void sequence(const uint8_t *bytes, size_t count)
+{
+    struct tape t = {bytes, count};
+    uint8_t noise[256];
+    fake_reset();
+    fake.tx_space = 4096;
+    while (t.left > 0) {
+        uint8_t what = next(&t);
+        switch (what % 8u) {
+        case 0: {
+            uint16_t n = next(&t);
+            for (uint16_t k = 0; k < n; k++)
+                noise[k] = next(&t);
+            fake_receive(noise, n);
+            break;
+        }
+        case 1:
+            wild_command(&t);
+            break;
+        case 2:
+            fake_ticks(next(&t));
+            break;
+        case 3:
+            fake_ticks_without_main(next(&t));
+            break;
+        case 4: /* the world: sensors, a deaf host, a missed tick; mostly it is well */
+            if (next(&t) < 200u)
+                what = 0;
+            fake.force_force = what & 64u ? next16(&t) & 0xFFF : -1;
+            fake.force_current = what & 128u ? next16(&t) & 0xFFF : -1;
+            fake.tx_space = what & 32u ? next16(&t) % 4097u : 4096;
+            fake.overrun = next(&t) == 7u;
+            break;
+        default:
+            sensible_command(&t);
+            break;
+        }
+        check();
+    }
+}
+
+#ifdef FUZZ_LIBFUZZER
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count);
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t count)
+{
+    sequence(bytes, count);
+    return 0;
+}
+
+#else
+
+static uint64_t state;
+static uint32_t draw(uint32_t below)
+{
+    state = state * 6364136223846793005uLL + 1442695040888963407uLL;
+    return (uint32_t)(((state >> 33) * below) >> 31);
+}
+
+/* One to four hurts: flip, drop, insert, repeat, cut off; returns the new length. */
+static uint16_t damage(uint8_t *wire, uint16_t n, uint32_t hurts)
+{
+    for (uint32_t h = 0; h < hurts && n > 2; h++) {
+        uint16_t at = (uint16_t)draw(n);
+        switch (draw(5)) {
+        case 0:
+            wire[at] = (uint8_t)(wire[at] ^ (1u + draw(255)));
+            break;
+        case 1:
+            memmove(wire + at, wire + at + 1, (size_t)(n - at - 1));
+            n--;
+            break;
+        case 2:
+            memmove(wire + at + 1, wire + at, (size_t)(n - at));
+            wire[at] = (uint8_t)draw(256);
+            n++;
+            break;
+        case 3: {
+            uint16_t piece = (uint16_t)(1u + draw((uint32_t)(n - at)));
+            memmove(wire + at + piece, wire + at, (size_t)(n - at));
+            n = (uint16_t)(n + piece);
+            break;
+        }
+        default:
+            n = (uint16_t)(at + 1u);
+            break;
+        }
+    }
+    return n;
+}
+
+/* Bytes that a payload of this type must have, given its counted tail; 0xFF: no such type. */
+static uint8_t exact_length(uint8_t type, const uint8_t *payload, uint8_t length)
+{
+    static const uint8_t rows[][3] = {
+#define ROW(name, item) {PT_##name, PT_##name##_LEN, item},
+        PT_COMMANDS(ROW)
+        ROW(TELEMETRY, PT_TELEMETRY_ITEM)
+#undef ROW
+    };
+    for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
+        if (rows[k][0] != type)
+            continue;
+        uint8_t fixed = rows[k][1];
+        if (rows[k][2] == 0 || length < fixed)
+            return fixed;
+        return (uint8_t)(fixed + rows[k][2] * payload[fixed - 1u]);
+    }
+    return 0xFFu;
+}
+
+/* Frames of every kind with one to four hurts; returns how many came out as something that was not sent. */
+static uint32_t frames(uint32_t count, uint32_t *intact)
+{
+    static uint8_t wire[FRAME_MAX_ENCODED * 16u + 16u];
+    uint8_t payload[PT_MAX_PAYLOAD];
+    struct frame_decoder d;
+    struct frame f;
+    uint32_t wrong = 0;
+    frame_decoder_init(&d);
+    for (uint32_t k = 0; k < count; k++) {
+        uint8_t type = (uint8_t)(draw(14) ? 1u + draw(13) : PT_TELEMETRY);
+        uint8_t seq = (uint8_t)draw(256);
+        for (uint8_t j = 0; j < PT_MAX_PAYLOAD; j++)
+            payload[j] = (uint8_t)(draw(3) ? draw(256) : 0u);
+        payload[PT_WAVE_DATA_COUNT] = (uint8_t)(1u + draw(PT_WAVE_DATA_MAX_ITEMS));
+        payload[PT_TELEMETRY_COUNT] = (uint8_t)(1u + draw(PT_TELEMETRY_MAX_ITEMS));
+        uint8_t length = exact_length(type, payload, PT_MAX_PAYLOAD);
+        uint16_t n = frame_encode(wire, type, seq, payload, length, draw(2) != 0);
+        n = damage(wire, n, 1u + draw(4));
+        wire[n++] = 0;
+        for (uint16_t j = 0; j < n; j++) {
+            if (!frame_decode(&d, wire[j], &f) || f.length != exact_length(f.type, f.payload, f.length))
+                continue;
+            bool same = f.type == type && f.seq == seq && f.length == length &&
+                        memcmp(f.payload, payload, length) == 0;
+            *intact += same;
+            wrong += !same;
+        }
+    }
+    return wrong;
+}
+
+int main(int argc, char **argv)
+{
+    static uint8_t bytes[600];
+    if (argc != 4) {
+        fprintf(stderr, "usage: fuzz SEED FRAMES SEQUENCES\n");
+        return 2;
+    }
+    state = strtoull(argv[1], NULL, 10) * 0x9E3779B97F4A7C15uLL + 1u;
+    uint32_t frame_count = (uint32_t)strtoul(argv[2], NULL, 10);
+    uint32_t sequence_count = (uint32_t)strtoul(argv[3], NULL, 10);
+
+    uint32_t intact = 0;
+    uint32_t wrong = frames(frame_count, &intact);
+    printf("frames %u intact %u wrong %u\n", frame_count, intact, wrong);
+    /* A checksum of 16 bits lets one in 65536 of what is wholly scrambled through; single hurts none. */
+    if (wrong > frame_count / 65536u + 10u)
+        return 1;
+
+    uint32_t runs = 0;
+    uint32_t faults = 0;
+    for (uint32_t k = 0; k < sequence_count; k++) {
+        size_t n = 1u + draw(sizeof bytes);
+        for (size_t j = 0; j < n; j++)
+            bytes[j] = (uint8_t)draw(256);
+        sequence(bytes, n);
+        runs += app.session != 0;
+        faults += app.fault != PT_FAULT_NONE;
+    }
+    printf("sequences %u that ran %u that ended in a fault %u\n", sequence_count, runs, faults);
+    return 0;
+}
+
+#endif

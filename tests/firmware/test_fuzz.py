@@ -1,0 +1,61 @@
+"""Damaged frames and wild commands under the sanitizers, briefly; `make -C firmware fuzz` takes longer."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pulsetrainer.resources import firmware_dir
+
+FIRMWARE = firmware_dir()
+FRAMES = 1_000_000
+SEQUENCES = 15_000
+
+
+def _built(what: str, folder: Path) -> str:
+    words = ["make", "-s", "-C", str(FIRMWARE), f"{folder}/{what}", f"BUILD={folder}"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return str(folder / what)
+
+
+def test_a_million_damaged_frames_and_wild_sequences(tmp_path):
+    """No sanitizer speaks, no invariant breaks, next to no damaged frame passes checksum and exact length.
+
+    With one to four hurts a frame, often scrambled as a whole, one in some millions passes: 2^-16 of those
+    whose length still fits.
+    """
+    program = _built("fuzz", tmp_path)
+    words = [program, "1", str(FRAMES), str(SEQUENCES)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    frames, intact, wrong = map(int, re.findall(r"frames (\d+) intact (\d+) wrong (\d+)", done.stdout)[0])
+    sequences, ran, faults = map(int, re.findall(r"(\d+)", done.stdout.splitlines()[1]))
+    assert frames == FRAMES
+    assert intact > 10_000  # some hurts only add zeros between frames: the reader is not deaf
+    assert wrong <= 2
+    assert sequences == SEQUENCES
+    assert ran > 500  # the wild commands do reach the deep states
+    assert faults > 10
+
+
+@pytest.mark.skipif(not shutil.which("clang"), reason="needs clang: apt-get install clang libclang-rt-14-dev")
+def test_libfuzzer_finds_nothing_in_seconds(tmp_path):
+    """The same sequences led by coverage; skipped where clang has no fuzzer library."""
+    probe = tmp_path / "probe.c"
+    probe.write_text(
+        "#include <stddef.h>\n#include <stdint.h>\n"
+        "int LLVMFuzzerTestOneInput(const uint8_t *d, size_t n) { (void)d; (void)n; return 0; }\n",
+        encoding="utf-8",
+    )
+    words = ["clang", "-fsanitize=fuzzer", str(probe), "-o", str(tmp_path / "probe")]
+    if subprocess.run(words, capture_output=True, check=False).returncode != 0:
+        pytest.skip("this clang has no fuzzer library: apt-get install libclang-rt-14-dev")
+    program = _built("fuzz-clang", tmp_path)
+    words = [program, "-seed=1", "-max_len=1024", "-runs=20000", "-rss_limit_mb=1024"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
