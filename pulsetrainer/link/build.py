@@ -101,8 +101,7 @@ def firmware_image(defines: tuple[str, ...] = ()) -> Path:
     """Return the emulated Cortex-M4F's image, compiled now unless the cache has it."""
     compiler = find_arm_compiler()
     libraries: tuple[str, ...] = ("-T", str(firmware_dir() / "port" / "mps2" / "mps2.ld"))
-    if "ziglang" not in compiler:  # zig brings its own
-        libraries = (*libraries, "-lgcc")
+    libraries = (*libraries, "-lcompiler_rt" if "ziglang" in compiler else "-lgcc")
     remedy = f"use the compiler that it was tried with: `sudo apt install {DEBIAN_PACKAGES}`"
     return _compiled(_Image("mps2", (*compiler, *_MPS2, *defines), libraries, remedy))
 

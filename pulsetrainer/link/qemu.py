@@ -65,7 +65,8 @@ class SocketTransport:
 
     def _lost(self, why: str) -> PortLostError:
         return PortLostError(
-            f"the port {self._name} is gone: {why}", hint="open it again; a fresh device starts switched off"
+            f"the port {self._name} is gone: {self._last_words() or why}",
+            hint="open it again; a fresh device starts switched off",
         )
 
     def read(self) -> bytes:
@@ -79,7 +80,7 @@ class SocketTransport:
         except (OSError, ValueError) as error:  # ValueError: closed by another thread
             raise self._lost(str(error)) from error
         if not data:
-            raise self._lost(self._last_words() or "the emulator has ended")
+            raise self._lost("the emulator has ended")
         return data
 
     def write(self, data: bytes) -> None:
@@ -154,8 +155,11 @@ class Emulator:
         return self._process.pid
 
     def _last_words(self) -> str:
+        if self._said.closed:
+            return ""
         self._said.seek(0)
-        return self._said.read().decode(errors="replace").strip()
+        lines = self._said.read().decode(errors="replace").splitlines()
+        return " ".join(line for line in lines if not line.startswith("Warning: The guest is now"))
 
     def close(self) -> None:
         """End the emulator."""

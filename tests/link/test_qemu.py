@@ -1,0 +1,250 @@
+"""The emulated Cortex-M4F behind ``--port qemu:``."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.link import build, open_device
+from pulsetrainer.link.build import DEBIAN_PACKAGES
+
+RANGE_A = 1.5
+needs_emulator = pytest.mark.skipif(
+    not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
+    reason=f"needs apt-get install -y --no-install-recommends {DEBIAN_PACKAGES}",
+)
+group = pytest.mark.xdist_group("qemu")
+
+
+def strokes(seconds: float) -> np.ndarray:
+    """Four full strokes a second at 1 kHz, A."""
+    return 0.75 - 0.75 * np.cos(2 * np.pi * 4 * np.arange(round(seconds * 1000)) / 1000)
+
+
+def emulators(session: int) -> list[str]:
+    """Emulators of this process session that are still running."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            name, _, rest = stat.read_text(encoding="utf-8").rpartition(")")
+        except OSError:
+            continue
+        state, _, _, in_session = rest.split()[:4]
+        if int(in_session) == session and state != "Z":
+            found.append(name)
+    return found
+
+
+def gone(session: int, seconds: float = 5.0) -> bool:
+    """Whether nothing of the process session is left within a time."""
+    deadline = time.monotonic() + seconds
+    while emulators(session):
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+# --- without an emulator ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("port", ["qemu:?creep=0.05", "qemu:fast", "qemu:?"])
+def test_parameters_are_refused_with_the_port_that_takes_them(port):
+    """The image is built once, without parameters; the bench has them."""
+    with pytest.raises(UsageError, match="takes no parameters") as caught:
+        open_device(port)
+    assert "bench:?" in caught.value.hint
+
+
+@pytest.mark.parametrize("missing", ["qemu-system-arm", "arm-none-eabi-gcc"])
+def test_what_is_missing_is_named_with_its_packages(monkeypatch, missing):
+    """Neither emulator nor compiler comes with the package: which one, and how to get both."""
+    monkeypatch.setattr(shutil, "which", lambda name: None if name == missing else f"/usr/bin/{name}")
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(DeviceError, match=missing) as caught:
+        open_device("qemu:")
+    assert caught.value.exit_code == 4
+    assert DEBIAN_PACKAGES in caught.value.hint
+
+
+def test_ziglang_stands_in_for_the_arm_compiler(monkeypatch):
+    """Without root: the compiler from the package index builds the image too."""
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda _: object())
+    assert build.find_arm_compiler()[:4] == [sys.executable, "-m", "ziglang", "cc"]
+
+
+# --- with one -----------------------------------------------------------------------------------
+
+
+@needs_emulator
+@group
+def test_two_starts_are_told_apart():
+    """It says who it is and why it started; the boot nonce differs from start to start."""
+    nonces = set()
+    for _ in range(2):
+        with open_device("qemu:") as device:
+            assert (device.info.serial, device.info.reset_cause) == ("QEMU-0", "power")
+            assert device.info.build != "00000000"
+            nonces.add(device._hello.boot_nonce)
+    assert len(nonces) == 2
+
+
+def measure_pace() -> float:
+    """Play strokes for some ten seconds and return ticks over wall time; everything else must be right."""
+    arrivals: list[tuple[float, int]] = []
+    with open_device("qemu:") as device:
+        recording = device.play(
+            strokes(10.5), 1000, on_block=lambda b: arrivals.append((time.monotonic(), int(b.tick[-1])))
+        )
+    # Some blocks after the start: the emulator has caught up by then.
+    (first_s, first), (last_s, last) = arrivals[10], arrivals[-1]
+    ratio = (last - first) / 10_000 / (last_s - first_s)
+    error = np.abs(recording.current_A - recording.reference_A).max() / RANGE_A
+    print(
+        f"ticks/wall {ratio:.4f} over {last_s - first_s:.1f} s, lost {recording.dropped_samples}, "
+        f"tracking error {100 * error:.2f} % of the range"
+    )
+    assert last_s - first_s > 9.9
+    assert recording.complete, recording.fault  # a missed tick would be a fault
+    assert recording.dropped_samples == 0
+    np.testing.assert_array_equal(recording.tick, 10 * np.arange(len(recording.tick)))
+    assert error < 0.01
+    return ratio
+
+
+@needs_emulator
+@group
+def test_ten_seconds_of_strokes_at_the_pace_of_the_wall_clock():
+    """Ticks over wall time 0.99 to 1.01 with telemetry on, no tick or sample lost, tracking under 1 %."""
+    ratios: list[float] = []
+    while len(ratios) < 3:  # a computer busy with something else may take the emulator's time away
+        ratios.append(measure_pace())
+        if 0.99 < ratios[-1] < 1.01:
+            return
+    pytest.fail(f"ticks/wall {ratios}")
+
+
+@needs_emulator
+@group
+def test_reference_is_the_one_of_the_bench():
+    """The same core plays the same reference: equal at every tick, whatever the processor."""
+    with open_device("qemu:") as device:
+        emulated = device.play(strokes(1), 1000, decimation=1)
+    with open_device("bench:") as device:
+        native = device.play(strokes(1), 1000, decimation=1)
+    assert emulated.complete
+    received = np.isin(native.tick, emulated.tick)
+    np.testing.assert_array_equal(emulated.reference_A, native.reference_A[received])
+    # Noise of its own, and the plant in single precision: 2 counts of current.
+    assert np.abs(emulated.current_A - native.current_A[received]).max() < 0.005
+    for name, recording in (("host", native), ("cortex-m4f", emulated)):
+        error = np.abs(recording.current_A - recording.reference_A).max() / RANGE_A
+        print(f"{name}: 4 Hz full strokes, tracking error at 10 kHz {100 * error:.2f} % of the range")
+        assert error < 0.01
+
+
+@needs_emulator
+@group
+def test_step_settles_quickly():
+    """A step of two thirds of the range: settled into 1 % of the range soon after the slew limit lets it."""
+    at, low, high = 500, 0.2, 1.2
+    slewed_s = (high - low) / 150  # 15 mA a tick
+    reference = np.where(np.arange(1500) < at, low, high)
+    for port in ("bench:", "qemu:"):
+        with open_device(port) as device:
+            recording = device.play(reference, 10_000, decimation=1)
+        assert recording.complete
+        after = recording.current_A[recording.tick >= at]
+        outside = np.flatnonzero(np.abs(after - high) > 0.01 * RANGE_A)
+        settling_s = (outside.max() + 1) / 10_000
+        overshoot = (after.max() - high) / (high - low)
+        print(
+            f"{port} step of {high - low:g} A: settling {1000 * settling_s:.1f} ms "
+            f"({1000 * slewed_s:.1f} of it the slew limit), overshoot {100 * overshoot:.2f} % of the step"
+        )
+        assert settling_s < slewed_s + 0.0035
+        # The current filter is late: at the corner of the ramp the loop still believes to be behind.
+        assert overshoot < 0.05
+
+
+@needs_emulator
+@group
+def test_an_emulator_that_dies_leaves_what_was_recorded():
+    """Killed in mid-play: the recording is kept, incomplete, and says why."""
+    with open_device("qemu:") as device:
+        session = device._bench.pid
+
+        def kill(block):
+            if block.tick[-1] > 2000:
+                os.killpg(session, signal.SIGKILL)
+
+        recording = device.play(strokes(5), 1000, on_block=kill)
+    assert not recording.complete
+    assert "the port qemu: is gone" in recording.fault
+    assert 200 <= len(recording.tick) < 4000
+    assert gone(session)
+
+
+@needs_emulator
+@group
+def test_an_emulator_that_will_not_start_is_quoted(monkeypatch):
+    """What the emulator complained about reaches the user."""
+    monkeypatch.setattr("pulsetrainer.link.qemu._REAL_TIME", "shift=nonsense")
+    with pytest.raises(DeviceError, match="shift"):
+        open_device("qemu:")
+
+
+HOST = """
+import sys
+from pulsetrainer.link import open_device
+device = open_device("qemu:")
+print(device._bench.pid, flush=True)
+device.play([0.5] * 60_000, 1000)
+"""
+
+
+@needs_emulator
+@group
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
+@pytest.mark.parametrize("how", ["close", "SIGKILL", "SIGTERM"])
+def test_no_emulator_is_left_behind(how):
+    """However the host program ends, its emulator ends too."""
+    if how == "close":
+        with open_device("qemu:") as device:
+            session = device._bench.pid
+            assert any("qemu" in name for name in emulators(session))
+    else:
+        host = subprocess.Popen([sys.executable, "-c", HOST], stdout=subprocess.PIPE, text=True)
+        assert host.stdout is not None
+        session = int(host.stdout.readline())
+        assert any("qemu" in name for name in emulators(session))
+        host.send_signal(signal.Signals[how])
+        host.communicate()
+    assert gone(session)
+
+
+@needs_emulator
+@group
+def test_commands_take_the_port_unchanged(tmp_path):
+    """`pulsetrainer capture FILE.csv --port qemu:` and `show` of what it wrote."""
+    table = tmp_path / "strokes.csv"
+    rows = "".join(f"{k / 1000:.3f},{value:.4f}\n" for k, value in enumerate(strokes(1)))
+    table.write_text("time_s,current_A\n" + rows, encoding="utf-8")
+    program = [sys.executable, "-m", "pulsetrainer"]
+    words = ["capture", str(table), "--port", "qemu:", "-o", "run.h5"]
+    for command in (words, ["show", "run.h5"]):
+        done = subprocess.run(
+            [*program, *command], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+        )
+        assert done.returncode == 0, done.stderr
+    assert "QEMU-0" in done.stdout
