@@ -95,12 +95,15 @@ def turning_points(path: FloatArray) -> IntArray:
 
     A turn is placed on the first sample of the extreme value.
     """
-    moves = np.flatnonzero(np.diff(path) != 0)  # path[k + 1] differs from path[k]
-    if moves.size == 0:
+    rising = path[1:] > path[:-1]
+    moving = rising | (path[1:] < path[:-1])
+    moves = None if moving.all() else np.flatnonzero(moving)  # path[k + 1] differs from path[k]
+    if moves is not None:
+        rising = rising[moves]
+    if rising.size == 0:
         return np.zeros(0, dtype=np.int64)
-    rising = path[moves + 1] > path[moves]
-    turn = np.flatnonzero(rising[1:] != rising[:-1])
-    return np.append(moves[turn] + 1, moves[-1] + 1).astype(np.int64)
+    turn = np.append(np.flatnonzero(rising[1:] != rising[:-1]), rising.size - 1)
+    return (turn if moves is None else moves[turn]) + 1
 
 
 def trace(values: FloatArray, start: State, low: float, high: float) -> Trace:

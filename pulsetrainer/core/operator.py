@@ -22,6 +22,8 @@ from pulsetrainer.core.memory import State, Trace, negative_saturation, trace
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading, finite_vector
 from pulsetrainer.errors import ArgumentError
 
+_CHUNK = 4096  # samples at a time: their arrays stay in the cache
+
 
 class Rows(NamedTuple):
     """Design rows in node space: row of sample t = own[t] + base[anchor[t]], the constant -W is left out."""
@@ -133,26 +135,24 @@ class Preisach:
         return self._step(*self.plane.bands(to), *self.plane.bands(origin))
 
     def _step(self, i: IntArray, s: FloatArray, j: IntArray, t: FloatArray) -> FloatArray:
-        """Steps (n,) from fraction ``t`` of band ``j`` to fraction ``s`` of band ``i``: bilinear, in place."""
+        """Steps (n,) to fraction ``s`` of band ``i`` from fraction ``t`` of band ``j``; bilinear, in place."""
         row = self.plane.n_h + 1
         corner = i * row
         corner += j
-        y = self._signed.take(corner)
-        corner += 1
-        beside = self._signed.take(corner)
+        here, beside = self._signed.take(corner), self._signed.take(corner + 1)
         corner += row
-        opposite = self._signed.take(corner)
-        corner -= 1
-        above = self._signed.take(corner)
+        above, opposite = self._signed.take(corner), self._signed.take(corner + 1)
         # along t on both sides of the cell, then along s between them
-        for side, end in ((y, beside), (above, opposite)):
-            end -= side
-            end *= t
-            side += end
-        above -= y
+        beside -= here
+        beside *= t
+        here += beside
+        opposite -= above
+        opposite *= t
+        above += opposite
+        above -= here
         above *= s
-        y += above
-        return y
+        here += above
+        return here
 
     def __call__(self, values: ArrayLike, start: State | None = None) -> FloatArray:
         """Output (n,) for an input (n,) from negative saturation, or from ``start``."""
@@ -170,8 +170,13 @@ class Preisach:
         band, fraction = self.plane.bands(path.node_value)
         turning = path.along_tree(self._step(band, fraction, band[path.parent], fraction[path.parent]))
         turning -= self.total
-        y = self._step(*self.plane.bands(path.value), band[path.anchor], fraction[path.anchor])
-        y += turning[path.anchor]
+        y = np.empty(path.value.size)
+        for begin in range(0, y.size, _CHUNK):
+            part = slice(begin, begin + _CHUNK)
+            anchor = path.anchor[part]
+            step = self._step(*self.plane.bands(path.value[part]), band[anchor], fraction[anchor])
+            step += turning[anchor]
+            y[part] = step
         y *= self.polarity
         y += self.offset
         return y, path.final

@@ -196,11 +196,15 @@ class Plane:
 
     def bands(self, values: FloatArray) -> tuple[IntArray, FloatArray]:
         """Band index and fraction in [0, 1] of each input value; values outside are clipped to the edges."""
-        clipped = np.clip(values, self.low, self.high)
-        band = np.searchsorted(self.levels, clipped, side="right") - 1
-        band = np.clip(band, 0, self.n_h - 1)
-        left = self.levels[band]
-        return band.astype(np.int64), (clipped - left) / (self.levels[band + 1] - left)
+        fraction = np.clip(values, self.low, self.high)
+        band = self.levels[1:-1].searchsorted(fraction, side="right")
+        fraction -= self.levels[band]
+        fraction /= self._steps[band]
+        return band, fraction
+
+    @cached_property
+    def _steps(self) -> FloatArray:
+        return np.diff(self.levels)
 
     def round_to_nodes(self, values: FloatArray) -> FloatArray:
         """Round each value to a level, as the relays of the paper's reading see it.
