@@ -140,10 +140,11 @@ def condition(device: Device, high_A: float, rate_Hz: float) -> None:
     loop = signals.conditioning(
         0.0, high_A, speed=CONDITIONING_SPEED_A_PER_S, rate_Hz=rate_Hz, rest_s=CONDITIONING_REST_S
     )
-    check_ended(device.play(loop, rate_Hz).fault, "conditioning", "")
+    recording = device.play(loop, rate_Hz)
+    check_ended(recording.fault, "conditioning", "", recording.remedy)
 
 
-def check_ended(fault: str, what: str, kept: str) -> None:
+def check_ended(fault: str, what: str, kept: str, remedy: str) -> None:
     """Raise what a play that did not reach its end has to say.
 
     Raises
@@ -156,7 +157,7 @@ def check_ended(fault: str, what: str, kept: str) -> None:
     if fault:
         raise DeviceError(
             f"the device stopped during {what}: {fault}{kept}",
-            hint="remove the cause; the next command clears the fault",
+            hint=remedy or "remove the cause; the next command clears the fault",
         )
 
 
@@ -190,7 +191,7 @@ def _record(options: Options, signal: Signal, device: Device, context: Context) 
         recording = device.play(signal.value, options.rate_Hz, decimation=decimation, on_block=keep)
         recorder.finish(complete=recording.complete, dropped_samples=recording.dropped_samples)
     kept = f"; {recording.tick.size} samples were kept in {options.output} (complete=false)"
-    check_ended(recording.fault, "the capture", kept)
+    check_ended(recording.fault, "the capture", kept, recording.remedy)
     current, force = recording.current_A, recording.force_N
     plane = Plane.uniform(0.0, float(signal.value.max()), options.levels)
     covered = coverage(plane, [recording.reference_A])

@@ -73,7 +73,7 @@ def run(options: Options, context: Context) -> Result:
             hint="identify and invert a run that was captured on the device",
         )
     with open_device(options.port) as device:
-        playback, fault = _play(waveform, options.repeats, device, context)
+        playback, (fault, remedy) = _play(waveform, options.repeats, device, context)
         info = device.info
     header = provenance.make_header(
         f"{waveform.name} by {waveform.inversion} inversion, played on {info.serial}",
@@ -89,7 +89,7 @@ def run(options: Options, context: Context) -> Result:
     if played:
         store.write(options.output, playback, header, force=options.force)
     kept = f"; {played} of {options.repeats} repeats were kept in {options.output}" if played else ""
-    check_ended(fault, "the playback", kept)
+    check_ended(fault, "the playback", kept, remedy)
     return Result(
         output=options.output,
         name=waveform.name,
@@ -104,18 +104,20 @@ def run(options: Options, context: Context) -> Result:
     )
 
 
-def _play(waveform: Waveform, repeats: int, device: Device, context: Context) -> tuple[Playback, str]:
-    """Play the drives alternately; on a fault return the whole repeats so far and the fault."""
+def _play(
+    waveform: Waveform, repeats: int, device: Device, context: Context
+) -> tuple[Playback, tuple[str, str]]:
+    """Play the drives alternately; return the whole repeats so far, and a fault with its remedy."""
     rate = 1.0 / float(np.median(np.diff(waveform.time_s)))
     decimation = round(device.info.tick_rate_Hz / rate)
     drives = {"compensated": waveform.compensated, "scaled": waveform.scaled}
     kept: dict[str, list[FloatArray]] = {name: [] for name in DRIVES}
-    dropped, fault = 0, ""
+    dropped, fault, remedy = 0, "", ""
     for number in range(repeats * len(DRIVES)):
         name = DRIVES[number % len(DRIVES)]
         recording = device.play(drives[name], rate, decimation=decimation)
         dropped += recording.dropped_samples
-        fault = recording.fault
+        fault, remedy = recording.fault, recording.remedy
         if fault:
             break
         kept[name].append(_on_grid(recording, waveform.time_s.size, decimation))
@@ -130,7 +132,7 @@ def _play(waveform: Waveform, repeats: int, device: Device, context: Context) ->
         input_range=float(np.ptp(model.levels)) if model else float(np.ptp(waveform.scaled)),
         complete=not fault,
         dropped_samples=dropped,
-    ), fault
+    ), (fault, remedy)
 
 
 def _on_grid(recording: Recording, samples: int, decimation: int) -> FloatArray:

@@ -244,6 +244,7 @@ class Device:
             # Interrupted even if it came during the last ramp: the user wants out.
             complete=outcome.played_to_end and not interrupted,
             fault=outcome.fault or (_INTERRUPTED if interrupted else ""),
+            remedy=outcome.remedy,
         )
 
     def _ticks_per_sample(self, rate_Hz: float) -> int:

@@ -38,6 +38,17 @@ class Outcome:
     produced: int  # samples the device made, -1: it could not be asked
     played_to_end: bool
     fault: str
+    remedy: str = ""  # what to do about the fault, where something better than finding its cause is known
+
+
+# Faults whose cause is not in the device.
+_REMEDY = {
+    codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
+    codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
+    codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",
+    codes.Fault.ON_TIME: "play it in several pieces",
+    codes.Fault.WAVE_CRC: "check the cable, then run the command again",
+}
 
 
 class Player:
@@ -211,7 +222,7 @@ class Player:
                 return self._judge(self._finish(), refused.message)
             return self._judge(self._finish(), "")
         except (PortLostError, NoAnswerError) as error:
-            return Outcome(-1, played_to_end=False, fault=error.message)
+            return Outcome(-1, played_to_end=False, fault=error.message, remedy=error.hint)
         finally:
             self._leave()
 
@@ -226,7 +237,10 @@ class Player:
         if status.boot_nonce != self._hello.boot_nonce:
             cause = codes.ResetCause(status.reset_cause).name.lower().replace("_", " ")
             return Outcome(
-                -1, played_to_end=False, fault=f"the device restarted in mid-play (cause: {cause})"
+                -1,
+                played_to_end=False,
+                fault=f"the device restarted in mid-play (cause: {cause})",
+                remedy="check its power supply and cable; nothing was started again",
             )
         last_tick = (len(self._samples) - 1) * self._ticks_per_sample
         fault = describe_fault(status, self._hello.tick_rate_Hz) or self._stop_reason
@@ -235,7 +249,8 @@ class Player:
             fault = refused or "the device ended the play early"
         # Refused before it started: the numbers in the status are those of an earlier play.
         produced = status.produced if status.session == self._play_session else 0
-        return Outcome(produced, to_end, fault)
+        known = {int(f): text for f, text in _REMEDY.items()}
+        return Outcome(produced, to_end, fault, known.get(status.fault, ""))
 
 
 def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:

@@ -56,6 +56,7 @@ class Recording:
     dropped_samples: int
     complete: bool  # the reference was played to its end
     fault: str  # why not: the device's first cause, or "interrupted"; empty when complete
+    remedy: str = ""  # what to do about it, where that is known
 
     @property
     def time_s(self) -> FloatArray:

@@ -1,0 +1,216 @@
+"""Trouble with the device at the command line: a message and remedy of its own, the recorded part kept."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import threading
+import time
+import tty
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from program import PROGRAM, pulsetrainer
+
+from pulsetrainer.link import open_device
+from pulsetrainer.link.build import firmware_executable
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="the bench needs a pty")
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    """A folder with ten seconds of a slow wave to capture."""
+    t = np.arange(0, 10, 0.05)
+    table = np.column_stack([t, 0.5 - 0.4 * np.cos(2 * np.pi * t / 2)])
+    np.savetxt(tmp_path / "wave.csv", table, delimiter=",", header="t_s,current_A", comments="")
+    return tmp_path
+
+
+def capture(port: str, *more: str) -> list[str]:
+    """Return the words of a capture without conditioning."""
+    return ["capture", "wave.csv", "--port", port, "--no-condition", "-o", "run.h5", *more]
+
+
+@pytest.fixture
+def firmware():
+    """A firmware process on a pty of its own, as a foreign device would be; call with flags and options."""
+    running: list[subprocess.Popen[str]] = []
+
+    def start(*options: str, defines: tuple[str, ...] = ()) -> tuple[str, subprocess.Popen[str]]:
+        words = [str(firmware_executable(defines)), "--leash", *options]
+        process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        running.append(process)
+        assert process.stdout is not None
+        return process.stdout.readline().strip(), process
+
+    yield start
+    for process in running:
+        process.kill()
+        process.communicate()
+
+
+def refused(folder: Path, port: str, *said: str) -> None:
+    """Capture must fail before it begins: exit 4, these words, a next step, no file."""
+    done = pulsetrainer(folder, *capture(port))
+    assert done.code == 4, done
+    for words in said:
+        assert words in done.err, done.err
+    assert "\n  try: " in done.err
+    assert sorted(p.name for p in folder.iterdir()) == ["wave.csv"]
+
+
+def kept(folder: Path, least: int) -> int:
+    """The run was kept: readable, complete=false, nothing else left behind; return its samples."""
+    assert sorted(p.name for p in folder.iterdir()) == ["run.h5", "wave.csv"]
+    with h5py.File(folder / "run.h5") as file:
+        assert not file.attrs["complete"]
+        time_s = file["time"][:]
+    assert len(time_s) >= least
+    assert np.all(np.diff(time_s) > 0)
+    shown = pulsetrainer(folder, "show", "run.h5", "--json")
+    assert shown.json["facts"]["complete"] is False
+    assert shown.json["facts"]["samples"] == len(time_s)
+    return len(time_s)
+
+
+def _recording_began(folder: Path, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 60
+    while not any(p.suffix != ".csv" and p.stat().st_size > 60_000 for p in folder.iterdir()):
+        assert time.monotonic() < deadline
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+
+
+def _started(folder: Path, port: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*PROGRAM, *capture(port)], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+@pytest.mark.parametrize(
+    ("major", "older", "remedy"),
+    [(0, "the device is older", "flash the firmware"), (2, "the program is older", "pip install --upgrade")],
+)
+def test_another_protocol_names_both_versions_and_who_is_older(folder, firmware, major, older, remedy):
+    """Exit 4 before anything moves."""
+    port, _ = firmware(defines=(f"-DPT_PROTOCOL_MAJOR={major}u",))
+    refused(folder, port, f"speaks protocol {major}.0", "this program 1.0", older, remedy)
+
+
+def test_a_device_that_is_not_ours(folder):
+    """Something talks behind the port, but not our protocol."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    os.set_blocking(ours, False)
+    stop = threading.Event()
+
+    def talk() -> None:
+        while not stop.wait(0.02):
+            try:
+                os.write(ours, b"$GPGGA,123519,4807.038,N*47\r\n")
+            except BlockingIOError:
+                continue
+
+    talker = threading.Thread(target=talk, daemon=True)
+    talker.start()
+    try:
+        refused(folder, os.ttyname(theirs), "not a pulsetrainer device", "pulsetrainer ports")
+    finally:
+        stop.set()
+        talker.join()
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_a_second_program_on_the_port(folder, firmware):
+    """The port is busy, and the one that has it is not disturbed."""
+    port, _ = firmware()
+    with open_device(port) as device:
+        refused(folder, port, "is busy: another program has it open", "close the other program")
+        assert device.play([0.1, 0.2], 1000).complete
+
+
+def test_a_port_that_vanishes_in_mid_capture(folder, firmware):
+    """The device pulled out: told as such, what came until then is kept."""
+    port, device = firmware("--speed", "real")
+    process = _started(folder, port)
+    _recording_began(folder, process)
+    time.sleep(1.0)
+    device.kill()
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 4, err
+    assert "is gone" in err or "did not answer" in err
+    assert "switches its output off by itself" in err or "output goes off by itself" in err
+    assert "kept in run.h5 (complete=false)" in err
+    assert kept(folder, 900) < 10_000
+
+
+def test_a_host_that_is_stopped_finds_the_device_off(folder):
+    """Asleep for a second, buffers full: the device switched off by itself, says why, the part is kept."""
+    process = _started(folder, "bench:?speed=real")
+    _recording_began(folder, process)
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(1.5)
+    process.send_signal(signal.SIGCONT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 4, err
+    assert "heard nothing from the host" in err
+    assert "kept in run.h5 (complete=false)" in err
+    assert "keep it from sleeping" in err
+    kept(folder, 100)
+
+
+@pytest.mark.parametrize(
+    ("what", "says"),
+    [
+        ("force-high@2", "force above its limit"),
+        ("current-rail@2", "current above its hard limit"),
+        ("force-frozen@2", "force reading frozen"),
+        ("tick-overrun@2", "missed its tick"),
+        ("reset@2", "restarted in mid-play (cause: external)"),
+        ("hang@2", "restarted in mid-play (cause: watchdog)"),
+    ],
+)
+def test_what_breaks_in_mid_capture_is_told_and_the_part_kept(folder, what, says):
+    """The device's first cause is the message; two seconds are in the file."""
+    wave = np.column_stack([[0, 1, 2, 3, 4, 5], [0, 1.5, 0, 1.5, 0, 1.5]])
+    np.savetxt(folder / "wave.csv", wave, delimiter=",", header="t_s,current_A", comments="")
+    done = pulsetrainer(folder, *capture(f"bench:?break={what}"))
+    assert done.code == 4, done
+    assert says in done.err
+    assert "kept in run.h5 (complete=false)" in done.err
+    assert ("power supply" in done.err) == ("restarted" in says)
+    assert 1900 < kept(folder, 1900) < 4600
+
+
+def test_losses_on_a_bad_wire_are_in_the_file(folder):
+    """A capture through a bad wire is complete, and says how many samples it lacks."""
+    done = pulsetrainer(folder, *capture("bench:?wire=0.0005&wire-seed=4", "--json"))
+    assert done.code == 0, done
+    with h5py.File(folder / "run.h5") as file:
+        assert file.attrs["complete"]
+        dropped = int(file.attrs["dropped_samples"])
+        samples = file["time"].shape[0]
+        header = str(dict(file.attrs))
+    assert dropped > 0
+    assert samples + dropped == 9951
+    assert "wire" not in header
+    shown = pulsetrainer(folder, "show", "run.h5", "--json").json
+    assert shown["facts"]["dropped_samples"] == dropped
+
+
+def test_a_stranger_that_holds_the_port_open_is_no_hang(folder):
+    """Nobody behind the port: an answer within seconds."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    try:
+        begun = time.monotonic()
+        refused(folder, os.ttyname(theirs), "nobody answers", "has power")
+        assert time.monotonic() - begun < 20
+    finally:
+        os.close(ours)
+        os.close(theirs)
