@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import UnivariateSpline
 
-from pulsetrainer.core.memory import State, negative_saturation, trace
+from pulsetrainer.core.memory import State, negative_saturation, trace, trace_after
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, finite_vector
 from pulsetrainer.errors import ArgumentError
@@ -81,9 +81,8 @@ def invert(operator: Preisach, target: ArrayLike, start: State | None = None) ->
     state = start or negative_saturation(operator.plane.low)
     clipped, worst, y = _into_reach(operator, wanted)
     # the memory in terms of outputs: what the operator gives at each remembered extreme
-    heights = _heights(operator, state)
-    bottom, top = -operator.total, operator.total
-    path = trace(y, State(tuple(heights)), bottom, top)
+    heights = np.asarray(_heights(operator, state))
+    path = trace_after(heights, y, -operator.total, operator.total)
     value = np.empty(path.node_value.size)
     value[0] = operator.plane.low
     branches: dict[int, tuple[FloatArray, FloatArray]] = {}
@@ -106,7 +105,8 @@ def invert(operator: Preisach, target: ArrayLike, start: State | None = None) ->
         node = int(path.anchor[piece[0]])
         inputs, outputs = branch(node, rising=bool(path.value[piece[0]] > path.node_value[node]))
         u[piece] = _on_branch(inputs, outputs, path.value[piece])
-    final = trace(u[-1:], State(tuple(_inputs_of(operator, path.final))), *_range(operator)).final
+    # heights that differ by rounding alone may stand for one input: the trace merges them
+    final = trace_after(np.asarray(_inputs_of(operator, path.final)), u[-1:], *_range(operator)).final
     return Inverse(u, clipped, worst, final)
 
 
@@ -167,15 +167,15 @@ class InverseStream:
     start: State | None = None
     clipped: int = 0
     _stack: list[tuple[float, float, tuple[FloatArray, FloatArray] | None]] = field(default_factory=list)
-    _present: float = 0.0
 
     def __post_init__(self) -> None:
         _check_invertible(self.operator)
         state = self.start or negative_saturation(self.operator.plane.low)
-        heights = _heights(self.operator, state)
-        inputs = _inputs_of(self.operator, State(tuple(heights)))
-        self._stack = [(h, u, None) for h, u in zip(heights, inputs, strict=True)]
-        self._present = heights[-1]
+        past = np.asarray(_heights(self.operator, state))
+        # extremes between which no relay has weight give equal outputs: the trace leaves them out
+        memory = trace_after(past, past[-1:], -self.operator.total, self.operator.total).final
+        inputs = _inputs_of(self.operator, memory)
+        self._stack = [(h, u, None) for h, u in zip(memory.extremes, inputs, strict=True)]
 
     def step(self, target: float) -> float:
         """Return the input for the next target.
