@@ -234,6 +234,96 @@ static void over_force_kills_at_the_third_sample(void)
     CHECK_EQUAL(app.fault, PT_FAULT_OVER_FORCE);
 }
 
+/* Off, latched, told, refused until cleared: the same for every fault. */
+static void is_off_latched_and_told(uint8_t fault)
+{
+    CHECK(!fake.pwm_enabled);
+    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    struct frame f = plain(PT_STATUS);
+    CHECK_EQUAL(f.type, PT_STATUS_REPLY);
+    CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT], fault);
+    CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT_STATE], PT_STATE_RUNNING);
+    CHECK_EQUAL(plain(PT_HEARTBEAT).payload[PT_ACK_FAULT], fault);
+    fake.force_current = fake.force_force = -1;
+    fake_ticks(3000); /* the cause is gone, the fault is not */
+    CHECK_EQUAL(app.fault, fault);
+    CHECK_EQUAL(nak_of(begin(10, 10, 0)), PT_NAK_CODE_FAULT);
+    CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_FAULT);
+    CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE);
+    CHECK(!fake.pwm_enabled);
+    CHECK_EQUAL(state_of(plain(PT_CLEAR_FAULT)), PT_STATE_IDLE);
+}
+
+static void a_broken_sensor_is_off_within_its_time_and_told(void)
+{
+    static const struct {
+        int32_t current; /* what the converter reads from the start on; -1: the truth */
+        int32_t force;
+        uint8_t fault;
+        uint32_t ticks; /* at most until the output is off */
+    } rows[] = {
+        {-1, 0, PT_FAULT_FORCE_RAIL, 3},        {-1, 4095, PT_FAULT_OVER_FORCE, 3},
+        {4095, -1, PT_FAULT_OVER_CURRENT, 1},   {0, -1, PT_FAULT_NO_CURRENT, 150},
+        {500, -1, PT_FAULT_CURRENT_FROZEN, 110}, {-1, 500, PT_FAULT_FORCE_FROZEN, 150},
+    };
+    for (uint16_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
+        running(15000, 1000);
+        fake.force_current = rows[k].current;
+        fake.force_force = rows[k].force;
+        uint32_t ticks = 0;
+        while (ticks < 1000 && app.fault == PT_FAULT_NONE) {
+            fake_ticks(1);
+            ticks++;
+        }
+        CHECK(ticks <= rows[k].ticks);
+        is_off_latched_and_told(rows[k].fault);
+    }
+}
+
+static void full_current_without_any_force_is_off_within_600_ms(void)
+{
+    running(14000, 1000);
+    uint32_t ticks = 0;
+    for (; ticks < 10000 && app.fault == PT_FAULT_NONE; ticks++) {
+        fake.force_force = 228 + (int32_t)(ticks & 1u); /* nothing, but alive */
+        fake_ticks(1);
+        if (ticks % 500 == 0)
+            (void)plain(PT_HEARTBEAT);
+    }
+    CHECK(ticks <= 6000);
+    is_off_latched_and_told(PT_FAULT_NO_FORCE);
+}
+
+static void every_ramping_fault_is_off_within_100_ms_and_told(void)
+{
+    running(15000, 1000); /* silence */
+    alive_ticks(1000);
+    CHECK(off_after(2001u + APP_RAMP_TICKS) <= 2001u + APP_RAMP_TICKS);
+    is_off_latched_and_told(PT_FAULT_HEARTBEAT);
+
+    ready(15000, 10, 2u * SAMPLES); /* underrun */
+    (void)arm(fake.nonce);
+    (void)plain(PT_START);
+    alive_ticks(10u * (SAMPLES - 1u) + 1u);
+    CHECK(off_after(2000) <= APP_RAMP_TICKS);
+    is_off_latched_and_told(PT_FAULT_UNDERRUN);
+
+    running(15000, 1000); /* on-time */
+    alive_ticks(1000);
+    app.safety.on_ticks_limit = 1500;
+    alive_ticks(501);
+    CHECK(off_after(2000) <= APP_RAMP_TICKS);
+    is_off_latched_and_told(PT_FAULT_ON_TIME);
+
+    running(15000, 1000); /* heat */
+    alive_ticks(1000);
+    app.safety.heat = SAFETY_HEAT_LIMIT + 1000000;
+    fake_ticks(1);
+    CHECK(off_after(2000) <= APP_RAMP_TICKS);
+    app.safety.heat = 0;
+    is_off_latched_and_told(PT_FAULT_COIL_HEAT);
+}
+
 static void a_force_while_only_armed_trips_too(void)
 {
     ready(100, 10, SAMPLES);
@@ -452,6 +542,9 @@ int main(void)
     RUN(garbage_is_no_sign_of_life);
     RUN(over_current_kills_in_the_same_tick);
     RUN(over_force_kills_at_the_third_sample);
+    RUN(a_broken_sensor_is_off_within_its_time_and_told);
+    RUN(full_current_without_any_force_is_off_within_600_ms);
+    RUN(every_ramping_fault_is_off_within_100_ms_and_told);
     RUN(a_force_while_only_armed_trips_too);
     RUN(a_missed_tick_is_a_fault);
     RUN(an_underrun_ramps_down_and_faults);
