@@ -18,9 +18,9 @@ from pulsetrainer.link.bench import Bench
 from pulsetrainer.link.noise import NoisyTransport
 from pulsetrainer.link.player import Player, describe_fault
 from pulsetrainer.link.ports import find_device_port
-from pulsetrainer.link.qemu import Emulator
+from pulsetrainer.link.qemu import QEMU_TIMEOUTS_S, Emulator
 from pulsetrainer.link.recording import Block, FloatArray, Recording
-from pulsetrainer.link.session import Session
+from pulsetrainer.link.session import TIMEOUTS_S, Session
 from pulsetrainer.link.transport import SerialTransport, Transport
 
 if TYPE_CHECKING:
@@ -329,7 +329,8 @@ def open_device(
         else:
             name = find_device_port() if port == "auto" else port
             transport = SerialTransport(name)
-        session = Session(transport, name, monotonic=monotonic)
+        timeouts_s = QEMU_TIMEOUTS_S if isinstance(machine, Emulator) else TIMEOUTS_S
+        session = Session(transport, name, monotonic=monotonic, timeouts_s=timeouts_s)
         return Device(session, transport, machine, monotonic=monotonic, sleep=sleep)
     except BaseException:
         if transport is not None:

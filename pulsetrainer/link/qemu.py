@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 QEMU_PORT = "qemu:"
+# The line loses nothing but is slow, some 10 kB/s and less on a busy computer: a command repeated early
+# would only make it slower.
+QEMU_TIMEOUTS_S = (0.5, 0.5, 1.0)
 _SLICE_S = 0.01
 _GATHER_S = 0.001  # the emulator sends byte by byte: without a pause each would wake this process
 _WRITE_S = 2.0

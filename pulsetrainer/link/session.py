@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pulsetrainer.link.transport import Transport
 
 # Five quick tries; the last wait is long because a busy computer may just have been away.
-_TIMEOUTS_S = (0.05, 0.05, 0.05, 0.05, 0.05, 0.5)
+TIMEOUTS_S = (0.05, 0.05, 0.05, 0.05, 0.05, 0.5)
 _HELLO_S = 3.0
 _HELLO_TRY_S = 0.2
 _NAMES = {c.TYPE: c.__name__ for c in COMMANDS}
@@ -52,10 +52,18 @@ class RefusedError(DeviceError):
 class Session:
     """One command at a time; telemetry goes to ``on_telemetry`` whenever it comes."""
 
-    def __init__(self, transport: Transport, port: str, *, monotonic: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        port: str,
+        *,
+        monotonic: Callable[[], float],
+        timeouts_s: tuple[float, ...] = TIMEOUTS_S,
+    ) -> None:
         self._transport = transport
         self._port = port
         self._monotonic = monotonic
+        self._timeouts_s = timeouts_s
         self._reader = FrameReader()
         # Not always from the same number: a late reply to an earlier program must not fit.
         self._seq = int(monotonic() * 1000) & 0xFF
@@ -117,7 +125,7 @@ class Session:
             if the device said no.
         """
         self._seq = (self._seq + 1) & 0xFF
-        for timeout_s in _TIMEOUTS_S:
+        for timeout_s in self._timeouts_s:
             self._send(command, self._seq)
             reply = self._reply(self._seq, timeout_s)
             if isinstance(reply, Nak):
@@ -126,7 +134,7 @@ class Session:
                 return reply
         raise NoAnswerError(
             f"the device on {self._port} did not answer {type(command).__name__} "
-            f"({len(_TIMEOUTS_S)} tries, {sum(_TIMEOUTS_S):g} s)",
+            f"({len(self._timeouts_s)} tries, {sum(self._timeouts_s):g} s)",
             hint="its output goes off by itself; check cable and power, then open it again",
         )
 
