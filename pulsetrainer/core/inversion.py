@@ -12,15 +12,18 @@ spline that takes its steps off.
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import UnivariateSpline
 
 from pulsetrainer.core.memory import State, negative_saturation, trace, trace_after
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, finite_vector
+from pulsetrainer.core.plane import FloatArray, IntArray, finite_vector
 from pulsetrainer.errors import ArgumentError
 
 
@@ -34,34 +37,82 @@ class Inverse:
     final: State  # memory after the last sample
 
 
-def _branch(operator: Preisach, origin: float, *, rising: bool) -> tuple[FloatArray, FloatArray]:
-    """Inputs and outputs (k,) along the branch that leaves the turning point ``origin``.
+class _Branches:
+    """How far the input must go from a turning point until the output has moved by so much.
 
-    Outputs are those of polarity 1 relative to the turning point; both arrays run away from it. The
-    points are the turning point and all levels beyond it, between which the branch is linear.
+    Along a branch the rise at level l is (1 - t) R[k, l] + t R[k + 1, l], for a turn at the fraction t
+    of band k, with R twice the Everett function, continued symmetrically. It never falls (sums of masses,
+    rounded monotonically), and is linear between levels. ``reach`` and ``reach_all`` round alike.
     """
-    plane, grid = operator.plane, operator.grid
-    band, fraction = plane.bands(np.asarray([origin]))
-    k, t = int(band[0]), float(fraction[0])
-    if rising:
-        rise = (1.0 - t) * grid[k + 1 :, k] + t * grid[k + 1 :, k + 1]
-        return np.append(origin, plane.levels[k + 1 :]), np.append(0.0, 2.0 * rise)
-    fall = ((1.0 - t) * grid[k, : k + 1] + t * grid[k + 1, : k + 1])[::-1]
-    return np.append(origin, plane.levels[k::-1]), np.append(0.0, -2.0 * fall)
 
+    def __init__(self, operator: Preisach) -> None:
+        self.plane = operator.plane
+        self.rises = 2.0 * (operator.grid + operator.grid.T)
+        self.rows: list[list[float]] = self.rises.tolist()
+        self.levels: list[float] = operator.plane.levels.tolist()
 
-def _on_branch(inputs: FloatArray, outputs: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Inputs (n,) at which a branch reaches ``wanted`` (n,); on a flat part the end nearest to the turn.
+    def reach(self, origin: float, need: float, *, rising: bool) -> float:
+        """Input at which the branch from ``origin`` has moved by ``need``; where it is flat, the nearest."""
+        levels, n_h = self.levels, self.plane.n_h
+        k = bisect_right(levels, origin, 1, n_h) - 1
+        t = (origin - levels[k]) / (levels[k + 1] - levels[k])
+        near, far = self.rows[k], self.rows[k + 1]
+        first, step, last = (k + 1, 1, n_h - k - 1) if rising else (k, -1, k)
 
-    ``outputs`` runs away from its first value, rising or falling.
-    """
-    if outputs[-1] < outputs[0]:
-        outputs, wanted = -outputs, -wanted
-    k = np.clip(np.searchsorted(outputs, wanted, side="left"), 1, outputs.size - 1)
-    before, after = outputs[k - 1], outputs[k]
-    gap = after - before
-    share = np.divide(wanted - before, gap, out=np.zeros_like(wanted), where=gap > 0)
-    return inputs[k - 1] + np.clip(share, 0.0, 1.0) * (inputs[k] - inputs[k - 1])
+        def rise(steps: int) -> float:
+            level = first + step * steps
+            return (1.0 - t) * near[level] + t * far[level]
+
+        need = min(need, rise(last))
+        begin, end = 0, last  # the first level at which the rise is enough
+        while begin < end:
+            middle = (begin + end) // 2
+            if rise(middle) >= need:
+                end = middle
+            else:
+                begin = middle + 1
+        after, beyond = rise(begin), levels[first + step * begin]
+        before, u = (rise(begin - 1), levels[first + step * (begin - 1)]) if begin else (0.0, origin)
+        if after > before:
+            u += (need - before) / (after - before) * (beyond - u)
+        return min(u, beyond) if rising else max(u, beyond)
+
+    def reach_all(self, origin: FloatArray, need: FloatArray, rising: NDArray[np.bool_]) -> FloatArray:
+        """The same for many samples (n,) at once, by bisection of all of them."""
+        levels, n_h = self.plane.levels, self.plane.n_h
+        k, t = self.plane.bands(origin)
+        near = self.rises.ravel()
+        far = self.rises[1:].ravel()
+        up = rising.astype(np.int64)
+        first, step = k + up, 2 * up - 1
+        row = k * (n_h + 1) + first
+        begin, end = np.zeros_like(k), np.where(rising, n_h - k - 1, k)
+
+        def rise(steps: IntArray) -> FloatArray:
+            level = row + step * steps
+            return (1.0 - t) * near.take(level) + t * far.take(level)
+
+        need = np.minimum(need, rise(end))
+        while np.any(begin < end):
+            middle = (begin + end) // 2
+            enough = rise(middle) >= need
+            end = np.where(enough, middle, end)
+            begin = np.where(enough, begin, np.minimum(middle + 1, end))
+        inside = begin > 0
+        after, beyond = rise(begin), levels[first + step * begin]
+        previous = np.where(inside, begin - 1, 0)
+        before = np.where(inside, rise(previous), 0.0)
+        u = np.where(inside, levels[first + step * previous], origin)
+        gap = after - before
+        u += np.divide(need - before, gap, out=np.zeros_like(u), where=gap > 0) * (beyond - u)
+        return np.where(rising, np.minimum(u, beyond), np.maximum(u, beyond))
+
+    def inputs_of(self, heights: Sequence[float]) -> list[float]:
+        """Inputs at the remembered extremes of a memory given as outputs."""
+        inputs = [self.plane.low]
+        for before, height in pairwise(heights):
+            inputs.append(self.reach(inputs[-1], abs(height - before), rising=height > before))
+        return inputs
 
 
 def invert(operator: Preisach, target: ArrayLike, start: State | None = None) -> Inverse:
@@ -78,40 +129,19 @@ def invert(operator: Preisach, target: ArrayLike, start: State | None = None) ->
     """
     wanted = finite_vector("target", target)
     _check_invertible(operator)
-    state = start or negative_saturation(operator.plane.low)
     clipped, worst, y = _into_reach(operator, wanted)
-    # the memory in terms of outputs: what the operator gives at each remembered extreme
-    heights = np.asarray(_heights(operator, state))
-    path = trace_after(heights, y, -operator.total, operator.total)
-    value = np.empty(path.node_value.size)
-    value[0] = operator.plane.low
-    branches: dict[int, tuple[FloatArray, FloatArray]] = {}
-
-    def branch(node: int, *, rising: bool) -> tuple[FloatArray, FloatArray]:
-        if node not in branches:  # all branches of a turning point leave it in one direction
-            inputs, rise = _branch(operator, float(value[node]), rising=rising)
-            branches[node] = inputs, path.node_value[node] + rise
-        return branches[node]
-
-    for node in range(1, value.size):
-        parent = int(path.parent[node])
-        height = path.node_value[node]
-        inputs, outputs = branch(parent, rising=bool(height > path.node_value[parent]))
-        value[node] = _on_branch(inputs, outputs, np.asarray([height]))[0]
-    u = value[path.anchor]  # samples that rest on a turning point
-    moving = np.flatnonzero(path.value != path.node_value[path.anchor])
-    cuts = np.flatnonzero(np.diff(path.anchor[moving])) + 1
-    for piece in np.split(moving, cuts) if moving.size else []:
-        node = int(path.anchor[piece[0]])
-        inputs, outputs = branch(node, rising=bool(path.value[piece[0]] > path.node_value[node]))
-        u[piece] = _on_branch(inputs, outputs, path.value[piece])
-    # heights that differ by rounding alone may stand for one input: the trace merges them
-    final = trace_after(np.asarray(_inputs_of(operator, path.final)), u[-1:], *_range(operator)).final
+    # the memory in terms of outputs turns where the memory of inputs turns
+    path = trace_after(_heights(operator, start), y, -operator.total, operator.total)
+    branches = _Branches(operator)
+    value = [operator.plane.low]
+    rises = path.node_value - path.node_value[path.parent]
+    for parent, rise in zip(path.parent[1:].tolist(), rises[1:].tolist(), strict=True):
+        value.append(branches.reach(value[parent], abs(rise), rising=rise > 0))
+    rise = path.value - path.node_value[path.anchor]
+    u = branches.reach_all(np.asarray(value)[path.anchor], np.abs(rise), rise > 0)
+    remembered = np.asarray(branches.inputs_of(path.final.extremes))
+    final = trace_after(remembered, u[-1:], operator.plane.low, operator.plane.high).final
     return Inverse(u, clipped, worst, final)
-
-
-def _range(operator: Preisach) -> tuple[float, float]:
-    return operator.plane.low, operator.plane.high
 
 
 def _check_invertible(operator: Preisach) -> None:
@@ -138,44 +168,42 @@ def _into_reach(operator: Preisach, wanted: FloatArray) -> tuple[int, float, Flo
     )
 
 
-def _heights(operator: Preisach, state: State) -> list[float]:
-    """Outputs (polarity 1, no offset) at the remembered extremes of a state."""
-    extremes = np.clip(state.extremes, *_range(operator))
-    extremes[0] = operator.plane.low
-    rise = operator.step(extremes[1:], extremes[:-1]) if extremes.size > 1 else np.zeros(0)
-    return (-operator.total + np.append(0.0, np.cumsum(rise))).tolist()
-
-
-def _inputs_of(operator: Preisach, state: State) -> list[float]:
-    """Inputs at the remembered extremes of a memory given as outputs: the inverse of ``_heights``."""
-    inputs = [operator.plane.low]
-    for before, height in zip(state.extremes, state.extremes[1:], strict=False):
-        along, rise = _branch(operator, inputs[-1], rising=height > before)
-        inputs.append(float(_on_branch(along, before + rise, np.asarray([height]))[0]))
-    return inputs
+def _heights(operator: Preisach, start: State | None) -> FloatArray:
+    """Outputs (polarity 1, no offset) at the remembered extremes of a state; equal ones where it is flat."""
+    plane = operator.plane
+    extremes = np.clip((plane.low,) if start is None else start.extremes, plane.low, plane.high)
+    extremes[0] = plane.low
+    rise = operator.step(extremes[1:], extremes[:-1])
+    return np.append(0.0, np.cumsum(rise)) - operator.total
 
 
 @dataclass
 class InverseStream:
-    """The exact inverse one sample at a time, with the same result as ``invert``.
+    """The exact inverse one sample at a time, with the same result as ``invert``, to the last digit.
 
-    The stack holds (output, input, branch) of every remembered turning point; each call costs one
-    interpolation, plus what the memory pushes or wipes out.
+    The stack holds output and input of every remembered turning point; a call costs one bisection, plus
+    what the memory pushes or wipes out.
     """
 
     operator: Preisach
     start: State | None = None
     clipped: int = 0
-    _stack: list[tuple[float, float, tuple[FloatArray, FloatArray] | None]] = field(default_factory=list)
+    _branches: _Branches = field(init=False, repr=False)
+    _heights: list[float] = field(init=False, repr=False)  # of the turning points
+    _inputs: list[float] = field(init=False, repr=False)
+    _present: tuple[float, float] = field(init=False, repr=False)  # height and input now
+    _rising: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         _check_invertible(self.operator)
-        state = self.start or negative_saturation(self.operator.plane.low)
-        past = np.asarray(_heights(self.operator, state))
-        # extremes between which no relay has weight give equal outputs: the trace leaves them out
-        memory = trace_after(past, past[-1:], -self.operator.total, self.operator.total).final
-        inputs = _inputs_of(self.operator, memory)
-        self._stack = [(h, u, None) for h, u in zip(memory.extremes, inputs, strict=True)]
+        self._branches = _Branches(self.operator)
+        heights = _heights(self.operator, self.start)
+        total = self.operator.total
+        extremes = trace_after(heights, heights[-1:], -total, total).final.extremes
+        inputs = self._branches.inputs_of(extremes)
+        self._present = extremes[-1], inputs[-1]
+        self._rising = len(extremes) % 2 == 0
+        self._heights, self._inputs = list(extremes[:-1] or extremes), inputs[:-1] or inputs
 
     def step(self, target: float) -> float:
         """Return the input for the next target.
@@ -187,28 +215,20 @@ class InverseStream:
         """
         outside, _, wanted = _into_reach(self.operator, finite_vector("target", [target]))
         self.clipped += outside
-        height, stack = float(wanted[0]), self._stack
-        if (
-            len(stack) > 1
-            and (height > stack[-1][0]) == (stack[-1][0] > stack[-2][0])
-            and height != stack[-1][0]
-        ):
-            stack.pop()  # going on in the same direction: the present value was no turning point
-        rising = height > stack[-1][0]
-        while len(stack) > 1 and ((height >= stack[-2][0]) if rising else (height <= stack[-2][0])):
-            if height == stack[-1][0]:
-                break
-            del stack[-2 if len(stack) > 2 else -1 :]
-        if height == stack[-1][0]:
-            return stack[-1][1]
-        origin, value, branch = stack[-1]
-        if branch is None:
-            along, rise = _branch(self.operator, value, rising=rising)
-            branch = along, origin + rise
-            stack[-1] = origin, value, branch
-        u = float(_on_branch(*branch, np.asarray([height]))[0])
-        stack.append((height, u, None))
-        return u
+        height, heights, inputs = float(wanted[0]), self._heights, self._inputs
+        if height == self._present[0]:
+            return self._present[1]
+        rising = height > self._present[0]
+        if rising != self._rising and self._present[0] != heights[-1]:  # the present value is a turning point
+            heights.append(self._present[0])
+            inputs.append(self._present[1])
+        self._rising = rising
+        while len(heights) > 1 and ((height >= heights[-2]) if rising else (height <= heights[-2])):
+            last = max(len(heights) - 2, 1)  # the root stays
+            del heights[last:], inputs[last:]
+        need = height - heights[-1]
+        self._present = height, self._branches.reach(inputs[-1], abs(need), rising=need > 0)
+        return self._present[1]
 
 
 def closest_match(operator: Preisach, target: ArrayLike, start: State | None = None) -> Inverse:

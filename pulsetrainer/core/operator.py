@@ -135,7 +135,7 @@ class Preisach:
         return self._step(*self.plane.bands(to), *self.plane.bands(origin))
 
     def _step(self, i: IntArray, s: FloatArray, j: IntArray, t: FloatArray) -> FloatArray:
-        """Steps (n,) to fraction ``s`` of band ``i`` from fraction ``t`` of band ``j``; bilinear, in place."""
+        """Steps (n,) to fraction ``s`` of band ``i`` from fraction ``t`` of band ``j``: bilinear."""
         row = self.plane.n_h + 1
         corner = i * row
         corner += j
