@@ -8,7 +8,20 @@ from typing import Annotated
 import typer
 
 from pulsetrainer import __version__
-from pulsetrainer.cli import capture, evaluate, guard, identify, import_, invert, play, plot, ports, show
+from pulsetrainer.cli import (
+    capture,
+    diagnose,
+    evaluate,
+    extend,
+    guard,
+    identify,
+    import_,
+    invert,
+    play,
+    plot,
+    ports,
+    show,
+)
 
 # Plain help: drawing it with rich would cost a third of the time until it shows.
 app = typer.Typer(
@@ -25,6 +38,8 @@ app.command("identify")(identify.identify)
 app.command("invert")(invert.invert)
 app.command("play")(play.play)
 app.command("evaluate")(evaluate.evaluate)
+app.command("diagnose")(diagnose.diagnose)
+app.command("extend")(extend.extend)
 app.command("show")(show.show)
 app.command("plot")(plot.plot)
 app.command("ports")(ports.ports)

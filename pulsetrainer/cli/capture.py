@@ -12,7 +12,8 @@ from pulsetrainer.cli.options import AsJson, Force, Out, Port
 
 def capture(
     signal: Annotated[
-        str, typer.Argument(help="identification, or a CSV file with the columns t_s and current_A.")
+        str,
+        typer.Argument(help="identification, diagnostic, or a CSV file with the columns t_s and current_A."),
     ],
     out: Out,
     port: Port = None,

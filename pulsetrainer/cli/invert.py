@@ -17,6 +17,7 @@ class Inversion(StrEnum):
 
     continuous = "continuous"
     closest_match = "closest-match"
+    extended = "extended"
 
 
 def invert(
@@ -27,7 +28,10 @@ def invert(
     out: Out,
     method: Annotated[
         Inversion | None,
-        typer.Option(help="continuous (default), or closest-match as in the paper.", show_default=False),
+        typer.Option(
+            help="continuous (default), closest-match as in the paper, or extended (default if it is).",
+            show_default=False,
+        ),
     ] = None,
     force_min: Annotated[
         float | None,

@@ -79,7 +79,7 @@ class Tracked:
     """The input found for a target, and what the model says it gives."""
 
     input: FloatArray  # (n,)
-    predicted: FloatArray  # (n,)
+    predicted: FloatArray  # (n,) polarity 1
     clipped: int
     steps: int  # of the iteration, to the best iterate
     rms: float  # of target less prediction over the scored samples, output unit
@@ -88,10 +88,11 @@ class Tracked:
 
 @dataclass(frozen=True)
 class Extended:
-    """An identified model with its extensions."""
+    """An identified model with its extensions; ``static`` has polarity 1, ``polarity`` turns the output."""
 
     static: Preisach
     terms: tuple[Term, ...] = ()
+    polarity: int = 1
 
     @classmethod
     def of(cls, static: Preisach, extensions: Sequence[tuple[str, Values]]) -> Extended:
@@ -102,7 +103,10 @@ class Extended:
         DataError
             A cause is unknown.
         """
-        return cls(static, in_order([Term(cause_named(name), values) for name, values in extensions]))
+        sign = static.polarity
+        upright = Preisach(static.plane, static.weights, sign * static.offset, static.reading)
+        terms = in_order([Term(cause_named(name), values) for name, values in extensions])
+        return cls(upright, terms, sign)
 
     def frame(self, u: FloatArray, dt_s: float) -> Frame:
         """What the causes are told of an input."""
@@ -111,9 +115,7 @@ class Extended:
 
     def __call__(self, u: FloatArray, dt_s: float) -> FloatArray:
         """Output (n,) for an input (n,) at even steps, from negative saturation and rest."""
-        if not self.terms:
-            return self.static(u)
-        return chain(self.terms, self.static, self.frame(u, dt_s))
+        return self.polarity * chain(self.terms, self.static, self.frame(u, dt_s))
 
     def invert(
         self,
@@ -133,12 +135,14 @@ class Extended:
         ArgumentError
             The target is not a finite vector, or the static part cannot be inverted.
         """
+        upright = Extended(self.static, self.terms)
+        target = self.polarity * np.asarray(target)
         state = self.static.run(lead)[1] if lead.size else None
         smooth = _low_pass(band_Hz, dt_s)
         wanted, best = target, None
         for k in range(steps + 1):
             found = inversion.invert(self.static, wanted, state)
-            predicted = self(np.concatenate((lead, found.input)), dt_s)[lead.size :]
+            predicted = upright(np.concatenate((lead, found.input)), dt_s)[lead.size :]
             error = target - predicted
             rms = float(np.sqrt(np.mean(error**2)))
             if best is None:

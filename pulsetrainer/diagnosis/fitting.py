@@ -22,6 +22,7 @@ from pulsetrainer.diagnosis.design import Bins, Design, Measured, Projector
 from pulsetrainer.diagnosis.extended import Term, chain, in_order, seen_input, shown_output
 
 _ROUNDS = 6
+_PASSES = 2
 _ENOUGH = 2e-3  # relative fall of the sum of squares below which the refit ends
 
 
@@ -42,6 +43,7 @@ class Fitted:
     """A jointly fitted model."""
 
     terms: tuple[Term, ...]
+    built: tuple[Term, ...]  # the input causes in the rows of the design
     simulator: Simulator
     added: FloatArray  # (count,) what the output causes add to the hysteresis
     design: Design
@@ -89,25 +91,32 @@ class Simulator:
         return self.problem.bins.average(self.full(terms))
 
 
-def weights_for(problem: Problem, terms: Sequence[Term], near: Fitted | None) -> Fitted:
-    """Best weights for given causes: two passes, as the output causes depend on the weights a little."""
-    before = [t for t in terms if t.cause.stage == "input"]
-    same = near is not None and before == [t for t in near.terms if t.cause.stage == "input"]
-    if near is not None and same:
-        design = near.design
-    else:
+def weights_for(
+    problem: Problem, terms: Sequence[Term], near: Fitted | None, *, rebuild: bool = False
+) -> Fitted:
+    """Best weights for given causes.
+
+    The rows are those of ``near``; what the causes make of them is subtracted from the output, with the
+    weights of the pass before: m <- fit(y - (M(m) - D m)). The passes contract by the relative size
+    of the causes, some per cent. ``rebuild`` makes new rows for the input that the hysteresis now sees, so
+    that nothing of an input cause is left to be subtracted.
+    """
+    if near is None or rebuild:
+        built = tuple(t for t in terms if t.cause.stage == "input")
         inputs = [
-            seen_input(before, record.output, frame)
+            seen_input(built, record.output, frame)
             for record, frame in zip(problem.records, problem.frames, strict=True)
         ]
         design = Design.build(problem.plane, problem.bins, inputs, problem.smoothing)
-    added = np.zeros(problem.bins.count)
-    after = any(t.cause.stage == "output" for t in terms)
+    else:
+        design, built = near.design, near.built
     passive = None if near is None else near.passive
-    simulator = None if near is None else Simulator(problem, near.simulator.operator)
-    for _ in range(3 if after and near is None else 2 if after else 1):
-        if simulator is not None and after:
-            added = simulator(terms) - simulator(before)
+    simulator = None if near is None else near.simulator
+    added = np.zeros(problem.bins.count)
+    exact = tuple(terms) == built
+    for _ in range(1 if exact else 3 if near is None else _PASSES):
+        if simulator is not None and not exact:
+            added = simulator(terms) - simulator(built)
         wanted = problem.measured - added
         found = design.fit(wanted, passive)
         passive = found.passive
@@ -117,9 +126,8 @@ def weights_for(problem: Problem, terms: Sequence[Term], near: Fitted | None) ->
     assert passive is not None
     predicted = simulator(terms)
     residual = problem.measured - predicted
-    return Fitted(
-        tuple(terms), simulator, added, design, passive, predicted, residual, float(residual @ residual)
-    )
+    squares = float(residual @ residual)
+    return Fitted(tuple(terms), built, simulator, added, design, passive, predicted, residual, squares)
 
 
 def slopes(problem: Problem, fitted: Fitted) -> FloatArray:
@@ -142,9 +150,16 @@ def _difference(term: Term, j: int) -> float:
     return max(quantity.small, 0.02 * abs(term.values[j]))
 
 
-def refit(problem: Problem, terms: Sequence[Term], near: Fitted | None, rounds: int = _ROUNDS) -> Fitted:
+def refit(
+    problem: Problem,
+    terms: Sequence[Term],
+    near: Fitted | None,
+    rounds: int = _ROUNDS,
+    *,
+    rebuild: bool = False,
+) -> Fitted:
     """Joint refit from the parameter values in ``terms``."""
-    fitted = weights_for(problem, in_order(terms), near)
+    fitted = weights_for(problem, in_order(terms), near, rebuild=rebuild)
     damping = 0.0
     for _ in range(rounds):
         columns = slopes(problem, fitted)

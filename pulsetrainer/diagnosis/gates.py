@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,12 @@ def noise_of(y: FloatArray) -> float:
     return float(np.median(np.abs(third - np.median(third))) / 0.6745 / np.sqrt(20.0))
 
 
+def coarse_step(y: FloatArray) -> float:
+    """Step of the output where it is coarse against its noise, else 0: its error does not average out."""
+    step = spacing_of(y)
+    return step if step > 1.5 * noise_of(y) else 0.0
+
+
 def spacing_of(y: FloatArray) -> float:
     """Distance of the distinct values of ``y``: the step of its converter."""
     values = np.unique(y)
@@ -49,10 +55,17 @@ def spacing_of(y: FloatArray) -> float:
 
 def check(record: Measured, low: float, high: float) -> list[Firing]:
     """All gates on one record; ``low`` and ``high`` are the range that was identified."""
+    wild = _outliers(record)
+    calm = record
+    if wild is not None and wild.mask is not None:  # wild samples pile up at the converter's end
+        good = np.flatnonzero(~wild.mask)
+        calm = replace(record, output=np.interp(np.arange(wild.mask.size), good, record.output[good]))
+    cut = _saturated(calm)
     found = [
-        _saturated(record),
-        _outliers(record),
+        cut,
+        wild,
         _quantised(record),
+        None if cut is not None else _sticking(calm, high - low),
         _tracking(record, high - low),
         _outside(record, low, high),
     ]
@@ -82,26 +95,56 @@ def _saturated(record: Measured) -> Firing | None:
 
 
 def _outliers(record: Measured) -> Firing | None:
-    """Samples far from the median of their neighbours that no neighbour follows."""
+    """Samples far from both neighbours, on the same side of both, farther than fast turns go."""
     y = record.output
-    sigma = max(noise_of(y), 0.3 * spacing_of(y))
-    distance = y - ndimage.median_filter(y, size=7)
-    far = np.abs(distance) > _OUTLIER_SIGMAS * max(sigma, 1e-12 * float(np.ptp(y)))
-    labels, count = ndimage.label(far)
-    if count < 3:
-        return None
-    short = np.bincount(labels.ravel())[labels] <= 2
-    wild = far & short
+    step = np.diff(y)
+    # a turn at full speed also stands out from both neighbours, by one step of the fast branches
+    usual = 4.0 * float(np.quantile(np.abs(step), 0.95))
+    limit = max(_OUTLIER_SIGMAS * np.sqrt(2.0) * noise_of(y), usual, 2.0 * spacing_of(y))
+    left, right = step[:-1], -step[1:]
+    wild = np.zeros(y.size, dtype=bool)
+    wild[1:-1] = (left * right > 0) & (np.minimum(np.abs(left), np.abs(right)) > limit)
     if np.count_nonzero(wild) < 3:
         return None
+    size = float(np.minimum(np.abs(left), np.abs(right))[wild[1:-1]].max())
     return Firing(
         "outliers",
-        f"{np.count_nonzero(wild)} samples lie more than {_OUTLIER_SIGMAS:g} standard deviations "
-        "from both neighbours",
+        f"{np.count_nonzero(wild)} samples stand out from both their neighbours by more than {limit:.3g}",
         float(wild.mean()),
-        float(np.abs(distance[wild]).max()),
+        size,
         "y",
         wild,
+    )
+
+
+def _sticking(record: Measured, reach: float) -> Firing | None:
+    """Jumps that last, while the input moves slowly: far more than noise or a smooth branch makes."""
+    y, sigma = record.output, noise_of(record.output)
+    wide = max(3, round(0.006 / record.dt_s))
+    if y.size < 20 * wide or coarse_step(y) > 0:
+        return None
+    total = np.concatenate(([0.0], np.cumsum(y)))
+    at = np.arange(y.size) + 1  # the first sample after a jump
+    ahead = (total[np.minimum(at + wide, y.size)] - total[at]) / np.maximum(
+        np.minimum(at + wide, y.size) - at, 1
+    )
+    behind = (total[at] - total[np.maximum(at - wide, 0)]) / (at - np.maximum(at - wide, 0))
+    jump = np.abs(np.append(np.diff(y), 0.0))
+    moved = np.abs(ndimage.uniform_filter1d(np.gradient(record.input, record.dt_s), 5 * wide)) / reach
+    slow = (moved > 0.1) & (moved < 3.0)
+    lasting = (jump > 0.6 * np.abs(ahead - behind)) & (jump > 6.0 * np.sqrt(2.0) * sigma)
+    usual = 8.0 * float(np.median(jump[slow])) if slow.any() else np.inf
+    # both sides must be flat: on a smooth branch the steps next to a jump are like it
+    found = slow & lasting & (jump > usual) & (np.abs(ahead - behind) > 0.5 * jump)
+    if np.count_nonzero(found) < 15:
+        return None
+    size = float(np.median(jump[found]))
+    return Firing(
+        "stick-slip",
+        f"{np.count_nonzero(found)} jumps of about {size:.3g} between flat runs while the input moves slowly",
+        float(found.mean()),
+        size,
+        "y",
     )
 
 

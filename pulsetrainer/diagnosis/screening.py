@@ -62,10 +62,14 @@ class _Block:
     basis: FloatArray  # (count, k)
     back: FloatArray  # (k, k) from coordinates along the basis to coefficients of the columns
     one_sided: bool  # the strength must not be negative
+    as_it_is: bool  # no strength to be fitted: the column is inserted whole
 
     def gains(self, signals: FloatArray) -> FloatArray:
         """Falls of the sum of squares (m,) for signals (count, m)."""
         along = self.basis.T @ signals
+        if self.as_it_is:
+            size = 1.0 / float(self.back[0, 0])
+            return np.asarray(2.0 * size * along[0] - size**2)
         gain = np.sum(along**2, axis=0)
         if self.one_sided:
             gain = np.where((self.back @ along)[0] > 0, gain, 0.0)
@@ -125,8 +129,9 @@ def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Blo
             if not np.all(np.isfinite(size)) or np.any(size <= 1e-6 * np.linalg.norm(columns, axis=0)):
                 continue  # the weights can do all of it: it cannot be seen on these data
             basis, upper = np.linalg.qr(free)
-            one_sided = cause.strengths == 0 or (len(values) == 1 and cause.parameters[0].low >= 0)
-            found.append(_Block(cause, tuple(values), basis, np.linalg.inv(upper), one_sided))
+            whole = cause.strengths == 0
+            one_sided = not whole and len(values) == 1 and cause.parameters[0].low >= 0
+            found.append(_Block(cause, tuple(values), basis, np.linalg.inv(upper), one_sided, whole))
     return found
 
 

@@ -37,6 +37,8 @@ SPAN_SHARE = 0.0005  # a smaller effect than this is irrelevant on any device
 MOST = 5
 TRIED = 3  # candidates refitted in each round
 FOLD_BLOCKS = 20
+# These leave a residual that no refit can take away: what is left is theirs.
+_JAGGED = ("stick-slip", "quantisation")
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,10 @@ def diagnose(
     progress(0.05)
     baseline = weights_for(problem, (), None)
     noise = float(np.sqrt(np.mean([gates.noise_of(r.output) ** 2 for r in records])))
-    white = noise * float(np.sqrt(np.mean(1.0 / problem.bins.sizes)))
+    coarse_step = max(gates.coarse_step(r.output) for r in records)
+    jump = max((f.value for _, f in firings if f.cause == "stick-slip"), default=0.0)
+    held = (coarse_step**2 + jump**2) / 12.0  # does not average out
+    white = float(np.sqrt(noise**2 * np.mean(1.0 / problem.bins.sizes) + held))
     coarse = problem_for(records, low, high, COARSE_LEVELS)
     search = _Search(problem, coarse, baseline, white, rng, progress)
     search.measure_discretisation(baseline)
@@ -324,7 +329,12 @@ class _Search:
             gain = self.held_out_gain(current, trial)
             if np.isfinite(gain) and gain < HELD_OUT_MIN:
                 continue
-            return refit(self.problem, trial.terms, trial), score.cause.id, score.p_value
+            changes_input = any(t.cause.stage == "input" for t in trial.terms)
+            return (
+                refit(self.problem, trial.terms, trial, rebuild=changes_input),
+                score.cause.id,
+                score.p_value,
+            )
         return None
 
     def _eliminate(self, current: Fitted) -> Fitted:
@@ -389,7 +399,7 @@ class _Search:
     def _rivals(self, fitted: Fitted, without: Fitted, term: Term, gain: float) -> tuple[str, ...]:
         """Causes that repair the same data as well, within the noise of the comparison."""
         scores = screen(self.problem, without, self.rng, draws=20)
-        margin = max(self.relevant * 0.5, 0.02 * gain, 12.0 * fitted.squares / self.count)
+        margin = max(0.05 * gain, 12.0 * fitted.squares / self.count)
         rivals = []
         for score in scores.scores[:3]:
             if score.cause.id in (term.cause.id, *fitted.names) or score.gain < 0.5 * gain:
@@ -421,6 +431,8 @@ class _Search:
             verdict = found[0].cause.id
         elif gated:
             verdict = gated[0].cause.id
+        if unexplained and any(f.cause.id in _JAGGED for f in gated):
+            verdict = next(f.cause.id for f in gated if f.cause.id in _JAGGED)
         named = {f.cause.id for f in gated}
         missing = [
             Finding(c, False, 1.0, 0.0)

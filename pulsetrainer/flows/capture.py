@@ -11,7 +11,7 @@ import numpy as np
 from pulsetrainer.artefacts import output, provenance, table
 from pulsetrainer.artefacts.recorder import RunRecorder
 from pulsetrainer.core import signals
-from pulsetrainer.core.identification import coverage
+from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.signals import Signal
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError, Interrupted, UsageError
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
     from pulsetrainer.link import Block, Device
 
-EXCITATIONS = ("identification",)
+EXCITATIONS = ("identification", "diagnostic")
 CONDITIONING_SPEED_A_PER_S = 3.0
 CONDITIONING_REST_S = 0.2
 
@@ -70,7 +70,7 @@ def plan(options: Options) -> Signal:
     DataError
         The file cannot be used.
     """
-    if options.signal in EXCITATIONS:
+    if options.signal == "identification":
         return signals.identification(
             0.0,
             options.current_max_A,
@@ -78,6 +78,8 @@ def plan(options: Options) -> Signal:
             speed=options.speed_A_per_s,
             rate_Hz=options.rate_Hz,
         )
+    if options.signal == "diagnostic":
+        return signals.diagnostic(0.0, options.current_max_A, rate_Hz=options.rate_Hz)
     path = Path(options.signal)
     if path.suffix.lower() != ".csv" and not path.exists():
         raise UsageError(

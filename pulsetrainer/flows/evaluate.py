@@ -24,7 +24,7 @@ from pulsetrainer.artefacts.kinds import (
 from pulsetrainer.core import metrics
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import DataError, QualityError, UsageError
-from pulsetrainer.flows.modelling import known_from, operator_of
+from pulsetrainer.flows.modelling import known_from, operator_of, predict, step_of
 from pulsetrainer.report import html
 
 if TYPE_CHECKING:
@@ -216,7 +216,7 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
             )
         operator = operator_of(model)
         known = known_from(one.input, operator.plane.low, operator.plane.high)
-        predicted = operator(one.input)[known:]
+        predicted = predict(model, one.input, step_of(one))[known:]
         errors = metrics.prediction(one.output[known:], predicted)
         thin = slice(None, None, max(1, predicted.size // _TRACE_SAMPLES))
         found.append(

@@ -14,17 +14,18 @@ from pulsetrainer.core import inversion, signals
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.waveforms import Shape, train
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.flows.modelling import operator_of
+from pulsetrainer.flows.modelling import extended_of, operator_of, predict
 from pulsetrainer.resources import waveforms_dir
 
 if TYPE_CHECKING:
     from pulsetrainer.core.operator import Preisach
     from pulsetrainer.flows.context import Context
 
-Inversion = Literal["continuous", "closest-match"]
+Inversion = Literal["continuous", "closest-match", "extended"]
 
 CONDITIONING_TIME_S = 0.5  # for each way of the major loop that comes first
 REST_S = 0.2
+EXTENDED_BAND_HZ = 30.0  # an arterial pulse holds little above
 RAMP_S = 0.4  # from rest to the first target, and back after the last
 
 
@@ -109,14 +110,20 @@ def run(options: Options, context: Context) -> Result:
     shape, path = read_shape(options.waveform)
     operator = operator_of(model)
     low, high = _force_range(options, operator, model.output_unit)
-    method = options.inversion or ("closest-match" if operator.reading == "relay" else "continuous")
-    if method == "continuous" and operator.reading == "relay":
+    usual: Inversion = "closest-match" if operator.reading == "relay" else "continuous"
+    method = options.inversion or ("extended" if model.extensions else usual)
+    if method == "extended" and not model.extensions:
+        raise UsageError(
+            f"{options.model} has no extensions, so there is no extended inverse",
+            hint="pulsetrainer diagnose RUN.h5 --model model.h5 -o diagnosis.h5, then extend",
+        )
+    if method in ("continuous", "extended") and operator.reading == "relay":
         raise UsageError(
             f"{options.model} was identified with the relay operator, which has no continuous inverse",
             hint="give --method closest-match, or identify with --operator continuous",
         )
     context.progress(0.2)
-    waveform = _drives(shape, operator, model, method, (low, high), options)
+    waveform = _drives(shape, operator, model, method, (low, high), options, context)
     header = provenance.make_header(
         f"{shape.name} by {method} inversion",
         argv=context.argv,
@@ -179,6 +186,7 @@ def _drives(
     method: Inversion,
     forces: tuple[float, float],
     options: Options,
+    context: Context,
 ) -> Waveform:
     """Lay out conditioning, ramp, beats and ramp back, and find the currents for them."""
     rate = options.rate_Hz
@@ -196,7 +204,10 @@ def _drives(
     wanted = np.concatenate(
         (rest + (beats[0] - rest) * ramp, beats, beats[0] + (rest - beats[0]) * ramp, [rest])
     )
-    exact, clipped = _compensated(operator, method, wanted, rate)
+    if method == "extended":
+        exact, clipped = _tracked(model, wanted, lead, rate, context)
+    else:
+        exact, clipped = _compensated(operator, method, wanted, rate)
     current = inversion.slew_limited(exact, rate, options.slew_A_per_s)
     body = slice(ramp.size, ramp.size + beats.size)
     ends = sorted((float(current[body].min()), float(current[body].max())), reverse=operator.polarity < 0)
@@ -214,7 +225,7 @@ def _drives(
         target=np.concatenate((operator(lead), wanted)),
         compensated=compensated,
         scaled=scaled,
-        predicted=operator(compensated),
+        predicted=predict(model, compensated, 1.0 / rate),
         scored=scored,
         name=shape.name,
         source=shape.source,
@@ -238,3 +249,17 @@ def _compensated(
     step = float(np.diff(plane.levels).mean())
     time_s = np.arange(wanted.size) / rate
     return inversion.smoothed(steps.input, time_s, step, plane.low, plane.high), steps.clipped
+
+
+def _tracked(
+    model: Model, wanted: FloatArray, lead: FloatArray, rate: float, context: Context
+) -> tuple[FloatArray, int]:
+    """Return the input that makes the extended model give ``wanted`` after ``lead``, and what was clipped."""
+    found = extended_of(model).invert(wanted, 1.0 / rate, lead=lead, band_Hz=EXTENDED_BAND_HZ)
+    context.note(
+        f"by the extended model the rms tracking error is {found.rms:.3g} {model.output_unit} "
+        f"after {found.steps} steps, {found.rms_static:.3g} with the static inverse"
+    )
+    if found.steps == 0:
+        context.note("no step improved on the static inverse, which is kept")
+    return found.input, found.clipped

@@ -8,18 +8,59 @@ from pulsetrainer.artefacts.kinds import Model, Run
 from pulsetrainer.core.identification import Record
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.diagnosis.extended import Extended
 from pulsetrainer.errors import DataError
 
 
-def operator_of(model: Model) -> Preisach:
-    """Return the Preisach operator of a stored model.
+def extended_of(model: Model) -> Extended:
+    """Return a stored model with its extensions, ready to predict and to be inverted.
 
     Raises
     ------
     ArgumentError
         Levels or weights are not those of a Preisach plane.
     DataError
-        The model was extended by causes that this version cannot compute.
+        The model was extended by causes that this version does not know.
+    """
+    named = [(one.cause, tuple(p.value for p in one.parameters)) for one in model.extensions]
+    return Extended.of(operator_of(model), named)
+
+
+def predict(model: Model, inputs: FloatArray, dt_s: float | None) -> FloatArray:
+    """Output (n,) that a stored model predicts for an input (n,) at even steps.
+
+    Raises
+    ------
+    DataError
+        The model has extensions, but the time step is unknown; or as ``extended_of``.
+    """
+    if not model.extensions:
+        return operator_of(model)(inputs)
+    if dt_s is None:
+        raise DataError(
+            f"the model is extended by {', '.join(e.cause for e in model.extensions)}, which need to know "
+            "the time, and the run has none",
+            hint="import the run again with --time COLUMN or --rate HZ",
+        )
+    return extended_of(model)(inputs, dt_s)
+
+
+def step_of(run: Run) -> float | None:
+    """Time step of a run, s; None where it has no time."""
+    if run.time_s is None or run.time_s.size < 2:
+        return None
+    return float(np.median(np.diff(run.time_s)))
+
+
+def operator_of(model: Model) -> Preisach:
+    """Return the static Preisach operator of a stored model, without its extensions.
+
+    Raises
+    ------
+    ArgumentError
+        Levels or weights are not those of a Preisach plane.
+    DataError
+        The model's operator is unknown.
     """
     if model.operator not in ("continuous", "relay"):
         raise DataError(

@@ -41,12 +41,12 @@ def render_evaluation(
     played = [(one, f"waveform-{k}") for k, one in enumerate(evaluation.waveforms, start=1)]
     beside = published or {}
     return (
-        _environment()
+        environment()
         .get_template("evaluation.html.j2")
         .render(
             title=title,
             created=created,
-            provenance=_indented(provenance_json),
+            provenance=indented(provenance_json),
             history=tuple(history),
             readouts=[views.readout(one, identifier) for one, identifier in played],
             overview=views.overview(played, beside),
@@ -59,7 +59,8 @@ def render_evaluation(
 
 
 @lru_cache(maxsize=1)
-def _environment() -> Environment:
+def environment() -> Environment:
+    """Return the template environment of the reports."""
     return Environment(
         loader=PackageLoader("pulsetrainer.report"),
         autoescape=True,
@@ -70,7 +71,7 @@ def _environment() -> Environment:
     )
 
 
-def _indented(text: str) -> str:
+def indented(text: str) -> str:
     """Return JSON in lines for a reader; what is not JSON is shown as it is."""
     try:
         return json.dumps(json.loads(text), indent=2, ensure_ascii=False)

@@ -78,6 +78,7 @@ def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None) -> Any:
         "level": level,
         "cell": level * (level - 1) // 2,
         "repeat": draw(st.integers(0, 3)),
+        "group": draw(st.integers(0, 6)),
     }
     values = {}
     for plan in plans:

@@ -45,7 +45,7 @@ class Frame:
     @property
     def time_s(self) -> FloatArray:
         """Time since the first sample (n,)."""
-        return np.arange(self.input.size) * self.dt_s
+        return np.asarray(np.arange(self.input.size) * self.dt_s, dtype=np.float64)
 
 
 class Cause:

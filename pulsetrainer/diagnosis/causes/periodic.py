@@ -35,15 +35,25 @@ class Periodic(Cause):
         """Blocks of parameter values to try."""
         frame, one = frames[0], residual[0]
         power = np.abs(np.fft.rfft(one * np.hanning(one.size))) ** 2
-        frequency = np.fft.rfftfreq(one.size, frame.dt_s * frame.input.size / one.size)
+        dt_s = frame.dt_s * frame.input.size / one.size
+        frequency = np.fft.rfftfreq(one.size, dt_s)
         power[frequency < 0.4] = 0.0
         # against its surroundings: a line, not the slope of a spectrum
         around = ndimage.median_filter(power, size=61) + 1e-12 * power.max(initial=0.0) + 1e-300
         k = int(np.argmax(power / around * (power > 0.02 * power.max(initial=0.0))))
+        best = _refined(one, float(frequency[k]), float(frequency[1]), dt_s)
         size = 0.003 * frame.span
-        return [[(size, 0.0, float(frequency[k])), (0.0, size, float(frequency[k]))]]
+        return [[(size, 0.0, best), (0.0, size, best)]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
         phase = 2.0 * np.pi * values[2] * frame.time_s
         return y + values[0] * np.sin(phase) + values[1] * np.cos(phase)
+
+
+def _refined(residual: FloatArray, frequency: float, width: float, dt_s: float) -> float:
+    """Frequency of the largest line within a ``width`` of ``frequency``: a spectrum's bins are too coarse."""
+    near = frequency + width * np.linspace(-1.0, 1.0, 41)
+    turn = -2j * np.pi * dt_s * (np.arange(residual.size) + 0.5)
+    power = [abs(np.sum(residual * np.exp(turn * one))) for one in near.tolist()]
+    return float(near[int(np.argmax(power))])

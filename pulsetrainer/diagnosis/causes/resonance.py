@@ -26,13 +26,14 @@ class Resonance(Cause):
     strengths = 0
     parameters = (
         Quantity("frequency", "Hz", 1.0, 200.0, 0.1),
-        Quantity("damping", "1", 0.01, 2.0, 0.005),
+        Quantity("damping", "1", 0.01, 0.7, 0.005),
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
         fastest = 0.2 / frames[0].dt_s
-        return [[(f, 0.15)] for f in (4.0, 8.0, 12.0, 18.0, 26.0, 40.0, 70.0) if f < fastest]
+        grid = np.geomspace(3.0, 80.0, 28).tolist()
+        return [[(f, zeta)] for f in grid if f < fastest for zeta in (0.05, 0.15, 0.4)]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -34,7 +34,7 @@ class Step(Cause):
         """Blocks of parameter values to try."""
         end = frames[0].time_s[-1]
         size = 0.003 * frames[0].span
-        return [[(size, 0.0, t), (0.0, 0.003, t)] for t in (np.arange(1, 20) / 20.0 * end).tolist()]
+        return [[(size, 0.0, t), (0.0, 0.003, t)] for t in (np.arange(1, 10) / 10.0 * end).tolist()]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

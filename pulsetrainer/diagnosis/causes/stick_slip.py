@@ -1,46 +1,24 @@
-"""the output sticks, then jumps: y held until |P[u] - y| > F, then a jump that leaves r F."""
+"""The output sticks, then jumps: found on the raw data.
+
+Where the output is stuck follows from the exact moment of the last jump, so that no model of the jumps can
+be fitted sample by sample; what repeats is their size.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
-from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause
 
 
 class StickSlip(Cause):
-    """A stuck output that lets go at a threshold."""
+    """Flat runs and jumps of one size; see ``gates``."""
 
     id = "stick-slip"
     title = "the output sticks, then jumps"
-    formula = "y held until |P[u] - y| > F, then a jump that leaves r F"
-    signature = "flat runs and then jumps of equal size on slow ramps"
+    formula = "y is held until |P[u] - y| > F, then jumps"
+    signature = "flat runs and then jumps of about equal size while the input moves slowly"
     excitation = "slow ramps"
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994"
-    stage = "output"
-    order = 65
+    stage = "record"
+    order = 5
     family = "stick-slip"
-    strengths = 0
-    parameters = (
-        Quantity("force", "{y}", 0.0, 1e6, 0.01),
-        Quantity("remainder", "1", 0.0, 0.95, 0.05),
-    )
-
-    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
-        return [[(share * frames[0].span, 0.4)] for share in (0.005, 0.01, 0.02, 0.04)]
-
-    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
-        force, kept = values[0], values[0] * values[1]
-        stuck = float(y[0])
-        path = []
-        for wanted in y.tolist():
-            if wanted - stuck > force:
-                stuck = wanted - kept
-            elif stuck - wanted > force:
-                stuck = wanted + kept
-            path.append(stuck)
-        return np.asarray(path)
+    lasting = False

@@ -1,0 +1,103 @@
+"""Where a residual is: against rate, level, direction, time and frequency."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.diagnosis.fitting import Problem
+
+_RATE_EDGES = np.asarray([0.0, 0.05, 0.3, 1.0, 3.0, 7.0, np.inf])  # ranges per second; below the first: rest
+_GROUPS = 10
+
+
+@dataclass(frozen=True)
+class Group:
+    """The groups of one quantity: their middles, and the group of every average."""
+
+    name: str
+    unit: str  # "{u}" stands for the input's unit
+    at: FloatArray
+    number: IntArray  # (count,)
+
+
+def rates(problem: Problem) -> FloatArray:
+    """Signed rate of the input (count,), ranges per second, averaged like the output."""
+    reach = problem.plane.high - problem.plane.low
+    per_record = []
+    for record in problem.records:
+        width = max(3, round(0.01 / record.dt_s))
+        even = np.convolve(np.pad(record.input, width, mode="edge"), np.ones(width) / width, "same")
+        per_record.append(np.gradient(even[width:-width], record.dt_s) / reach)
+    return problem.bins.average(per_record)
+
+
+def groups(problem: Problem) -> list[Group]:
+    """How the averages are grouped."""
+    rate = rates(problem)
+    level = problem.bins.average([r.input for r in problem.records])
+    reach = problem.plane.high - problem.plane.low
+    speed = np.abs(rate)
+    by_rate = np.digitize(speed, _RATE_EDGES[1:-1]).astype(np.int64)
+    at_rate = np.asarray(
+        [np.median(speed[by_rate == k]) if np.any(by_rate == k) else np.nan for k in range(by_rate.max() + 1)]
+    )
+    share = (level - problem.plane.low) / reach
+    by_level = np.clip((share * _GROUPS).astype(np.int64), 0, _GROUPS - 1)
+    at_level = problem.plane.low + (np.arange(_GROUPS) + 0.5) / _GROUPS * reach
+    count = speed.size
+    by_time = np.arange(count) * _GROUPS // count
+    ends = np.cumsum([0.0] + [r.input.size * r.dt_s for r in problem.records])
+    time = problem.bins.time_s + ends[problem.bins.record]
+    at_time = np.asarray([time[by_time == k].mean() for k in range(_GROUPS)])
+    direction = np.sign(np.where(speed < _RATE_EDGES[1], 0.0, rate)).astype(np.int64) + 1
+    return [
+        Group("rate", "ranges/s", at_rate, by_rate),
+        Group("level", "{u}", at_level, by_level),
+        Group("direction", "1", np.asarray([-1.0, 0.0, 1.0]), direction),
+        Group("time", "s", at_time, by_time),
+    ]
+
+
+def rms_by(group: Group, residual: FloatArray) -> FloatArray:
+    """The rms residual of each group; NaN where a group is empty."""
+    size = np.bincount(group.number, minlength=group.at.size)
+    total = np.bincount(group.number, weights=residual**2, minlength=group.at.size)
+    return np.sqrt(np.divide(total, size, out=np.full(size.size, np.nan), where=size > 0))
+
+
+def spectrum(problem: Problem, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Frequencies (Hz) and the rms of the residual in third-octave bands around them, first record."""
+    one = residual[problem.bins.record == 0]
+    time = problem.bins.time_s[problem.bins.record == 0]
+    step = float(np.median(np.diff(time)))
+    frequency, density = signal.welch(one, 1.0 / step, nperseg=min(one.size, 4096))
+    edges = frequency[1] * 2.0 ** (np.arange(0.0, np.log2(frequency[-1] / frequency[1]) + 1 / 3, 1 / 3))
+    band = np.digitize(frequency, edges)
+    power = np.bincount(band, weights=density, minlength=edges.size + 1) * (frequency[1] - frequency[0])
+    used = np.bincount(band, minlength=edges.size + 1)[1:-1] > 0
+    return np.sqrt(edges[1:] * edges[:-1])[used], np.sqrt(power[1:-1])[used]
+
+
+def excitation_limits(problem: Problem) -> list[str]:
+    """What the records lack for causes to be told apart, in words; empty when nothing."""
+    speed = np.abs(rates(problem))
+    moving = speed[speed > _RATE_EDGES[1]]
+    lacks = []
+    slow, fast = np.quantile(moving, [0.1, 0.9]) if moving.size > 20 else (1.0, 1.0)
+    if fast < 3.0 * slow:
+        lacks.append("one single rate")
+    rest, longest = speed <= _RATE_EDGES[1], 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], rest.astype(np.int64), [0]))))
+    if edges.size:
+        inside = edges.reshape(-1, 2)
+        duration = problem.bins.time_s[inside[:, 1] - 1] - problem.bins.time_s[inside[:, 0]]
+        longest = float(duration.max())
+    if longest < 0.8:
+        lacks.append("no holds")
+    if problem.bins.time_s.max() < 20.0:
+        lacks.append("a short record")
+    return lacks

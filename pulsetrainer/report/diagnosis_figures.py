@@ -1,0 +1,99 @@
+"""The figures of a diagnosis: measured against model, where the residual is, and the ranking of causes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from pulsetrainer.report import panels
+from pulsetrainer.report.style import (
+    BLUE,
+    COLUMN_IN,
+    ERROR,
+    GROUND,
+    GUIDE,
+    MODEL,
+    MUTED,
+    VERMILION,
+    label,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts.kinds import Diagnosis
+
+_MOST_BARS = 10
+
+
+@styled
+def course(found: Diagnosis) -> Figure:
+    """Return the measured output with the static model, and the residuals before and after extension."""
+    figure = Figure(figsize=(2 * COLUMN_IN, 5.4), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1.0))
+    panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
+    panels.trace(above, found.time_s, found.before, **MODEL, label="static model, refitted")
+    above.set_ylabel(label("output", found.output_unit))
+    panels.headroom(above)
+    panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="static")
+    if not found.quick:
+        panels.trace(below, found.time_s, found.output - found.after, **MODEL, label="extended")
+    below.axhline(0.0, **GUIDE)
+    below.set_ylabel(label("residual", found.output_unit))
+    below.set_xlabel(label("time, runs one after another", "s"))
+    panels.headroom(below)
+    return figure
+
+
+@styled
+def profiles(found: Diagnosis) -> Figure:
+    """Return the rms residual against rate, level, direction, time and frequency, before and after."""
+    count = len(found.profiles)
+    rows = -(-count // 3)
+    figure = Figure(figsize=(2 * COLUMN_IN, 2.5 * rows), layout="constrained")
+    cells = figure.subplots(rows, 3, squeeze=False).ravel()
+    for axes in cells[count:]:
+        axes.set_axis_off()
+    for axes, one in zip(cells, found.profiles, strict=False):
+        known = np.isfinite(one.before)
+        axes.plot(one.at[known], one.before[known], color=VERMILION, marker="o", markersize=3, label="static")
+        if not found.quick:
+            axes.plot(one.at[known], one.after[known], color=BLUE, marker="s", markersize=3, label="extended")
+        if one.name in ("rate", "frequency"):
+            axes.set_xscale("log" if one.name == "frequency" else "symlog")
+        if one.name == "direction":
+            axes.set_xticks([-1, 0, 1], ["falling", "rest", "rising"])
+        axes.set_xlabel(one.name if one.name == "direction" else label(one.name, one.unit))
+        axes.set_ylabel(label("rms residual", one.output_unit))
+        axes.set_ylim(bottom=0.0)
+    cells[0].legend(loc="upper left")
+    return figure
+
+
+@styled
+def ranking(found: Diagnosis) -> Figure:
+    """Return how much of what can be explained each cause explains, with its p-value."""
+    shown = [one for one in found.causes if one.found or one.explains_percent > 0][:_MOST_BARS][::-1]
+    figure = Figure(figsize=(COLUMN_IN, 0.7 + 0.34 * max(len(shown), 1)), layout="constrained")
+    axes = figure.add_subplot()
+    share = [max(one.explains_percent, 1e-3) for one in shown]
+    axes.barh(
+        [one.cause for one in shown],
+        share,
+        color=[BLUE if one.found else MUTED for one in shown],
+        height=0.62,
+    )
+    for k, one in enumerate(shown):
+        axes.annotate(
+            f"p = {one.p_value:.3f}",
+            (max(one.explains_percent, 1e-3), k),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=8.5,
+        )
+    axes.set_xlim(0.0, 1.25 * max([*share, 1.0]))
+    axes.set_xlabel("explains [% of what can be explained]")
+    axes.grid(visible=False, axis="y")
+    return figure
