@@ -101,9 +101,9 @@ def run(options: Options, context: Context) -> Result:
     )
     store.write(options.output, diagnosis, header, force=options.force)
     if options.html is not None:
-        from pulsetrainer.report import diagnosis_html
+        from pulsetrainer.report.diagnosis_html import render_diagnosis
 
-        page = diagnosis_html.render_diagnosis(
+        page = render_diagnosis(
             diagnosis,
             title=header.title,
             created=header.created,

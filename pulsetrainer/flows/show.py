@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pulsetrainer.artefacts import store
-from pulsetrainer.artefacts.kinds import Evaluation, Model, Playback, Run, Waveform
+from pulsetrainer.artefacts.kinds import Diagnosis, Evaluation, Model, Playback, Run, Waveform
 from pulsetrainer.artefacts.provenance import Header
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray
@@ -67,6 +67,8 @@ def facts(artefact: Any) -> dict[str, Any]:
         }
     if isinstance(artefact, Evaluation):
         return dict(metrics_of(artefact))
+    if isinstance(artefact, Diagnosis):
+        return _diagnosis(artefact)
     return {field.name: getattr(artefact, field.name) for field in fields(artefact)}
 
 
@@ -119,4 +121,22 @@ def _waveform(waveform: Waveform) -> dict[str, Any]:
         "compensated drive": _span(waveform.compensated, waveform.input_unit),
         "clipped_samples": waveform.clipped_samples,
         "source": waveform.source,
+    }
+
+
+def _diagnosis(found: Diagnosis) -> dict[str, Any]:
+    return {
+        "verdict": found.verdict,
+        "quick": found.quick,
+        "found": [
+            f"{one.cause} ({', '.join(f'{p.name} {p.value:.4g} {p.unit}' for p in one.parameters)})"
+            for one in found.causes
+            if one.found
+        ],
+        "rms_percent": found.rms_percent,
+        "noise_percent": found.noise_percent,
+        "static_percent": found.static_percent,
+        "extended_percent": found.extended_percent,
+        "floor_percent": found.floor_percent,
+        "next": found.next_experiment,
     }

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from pulsetrainer.artefacts.kinds import Evaluation, Model, Playback, Run, Waveform
+from pulsetrainer.artefacts.kinds import Diagnosis, Evaluation, Model, Playback, Run, Waveform
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import panels
+from pulsetrainer.report import diagnosis_figures, panels
 from pulsetrainer.report.style import (
     COLUMN_IN,
     COMPENSATED,
@@ -176,7 +176,7 @@ def evaluation(errors: Evaluation) -> Figure:
     return figure
 
 
-def draw(artefact: Run | Model | Waveform | Playback | Evaluation) -> Figure:
+def draw(artefact: Run | Model | Waveform | Playback | Evaluation | Diagnosis) -> Figure:
     """Return the figure of an artefact, chosen by its kind.
 
     Raises
@@ -195,8 +195,10 @@ def draw(artefact: Run | Model | Waveform | Playback | Evaluation) -> Figure:
             return playback(artefact)
         case Evaluation():
             return evaluation(artefact)
+        case Diagnosis():
+            return diagnosis_figures.course(artefact)
     raise DataError(
         f"there is no figure for a {getattr(artefact, 'kind', type(artefact).__name__)}: "
-        "expected a run, model, waveform, playback or evaluation",
+        "expected a run, model, waveform, playback, evaluation or diagnosis",
         hint="pulsetrainer show FILE.h5 tells what a file holds",
     )

@@ -7,7 +7,10 @@ import sys
 
 import pytest
 
-COMMANDS = ("capture", "import", "identify", "invert", "play", "evaluate", "diagnose", "extend", "show", "plot", "ports")
+COMMANDS = (
+    *("capture", "import", "identify", "invert", "play", "evaluate", "diagnose", "extend"),
+    *("show", "plot", "ports"),
+)
 HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich")
 
 

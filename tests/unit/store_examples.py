@@ -58,7 +58,21 @@ def playback(n: int = 20, repeats: int = 2) -> kinds.Playback:
     return kinds.Playback(np.arange(n) / 100, waveform(n, model=model()), measured, measured, 1.5)
 
 
+def diagnosis(m: int = 12) -> kinds.Diagnosis:
+    """Return a diagnosis that found one cause."""
+    time, ones, group = np.arange(m) / 200, np.ones(m), np.ones(3)
+    tau = kinds.Parameter("tau", 0.008, "s", 0.007, 0.009)
+    cause = kinds.Cause("output-lag", True, 0.005, 98.0, 97.0, (tau,), ("delay",), "the sensor is slow")
+    extended = model(extensions=(kinds.Extension("output-lag", (tau,)),))
+    profile = kinds.Profile("rate", "ranges/s", group, group, group)
+    numbers = (0.1, 1.0, 0.3, 0.9, 0.2, 0.2)
+    return kinds.Diagnosis(
+        "output-lag", False, *numbers, (cause,), ("why",), "next", (profile,), time, *(ones,) * 4, extended
+    )
+
+
 EXAMPLES = {
+    "diagnosis": diagnosis,
     "run": run,
     "model": model,
     "waveform": waveform,

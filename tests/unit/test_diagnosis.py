@@ -1,0 +1,202 @@
+"""The parts of the diagnosis: library, low-passes, extended model and its inverse, gates, null."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pulsetrainer.core import signals
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.diagnosis import gates, screening
+from pulsetrainer.diagnosis.causes import cause_named, library
+from pulsetrainer.diagnosis.causes.base import Frame, low_pass
+from pulsetrainer.diagnosis.design import Measured
+from pulsetrainer.diagnosis.extended import Extended
+from pulsetrainer.diagnosis.selection import diagnose
+from pulsetrainer.errors import DataError
+
+DT = 1e-3
+VOCABULARY = (
+    *("delay", "output-lag", "field-lag", "rate-widening", "viscous", "creep", "thermal-drift"),
+    *("offset-drift", "resonance", "periodic", "step", "saturation", "load-dependence", "stick-slip"),
+    *("quantisation", "outliers", "clock-skew", "current-tracking", "condition-change", "out-of-range"),
+    "accommodation",
+)
+# values that matter, and the values at which a cause does nothing
+STRENGTHS = {
+    "delay": ((0.01,), (0.0,)),
+    "field-lag": ((0.01,), (0.0,)),
+    "output-lag": ((0.01,), (0.0,)),
+    "rate-widening": ((0.01,), (0.0,)),
+    "viscous": ((0.02,), (0.0,)),
+    "creep": ((0.05, 1.0), (0.0, 1.0)),
+    "thermal-drift": ((0.02, 5.0), (0.0, 5.0)),
+    "offset-drift": ((0.01,), (0.0,)),
+    "periodic": ((0.1, 0.1, 7.0), (0.0, 0.0, 7.0)),
+    "step": ((0.1, 0.02, 1.0), (0.0, 0.0, 1.0)),
+    "clock-skew": ((1e-3,), (0.0,)),
+    "load-dependence": ((0.005,), (0.0,)),
+    "accommodation": ((0.1, 10.0), (0.0, 10.0)),
+}
+
+
+def _operator(n_h: int = 24) -> Preisach:
+    plane = Plane.uniform(0.0, 1.5, n_h)
+    i, j = plane.cell_indices
+    weights = 1.0 + np.exp(-(((i - j) / n_h - 0.25) ** 2) / 0.02)
+    return Preisach(plane, weights * 7.0 / float((weights * plane.areas).sum()), 7.0)
+
+
+def test_the_library_is_the_vocabulary():
+    """All ids of the contract, no other, each described in full."""
+    assert sorted(library()) == sorted(VOCABULARY)
+    for cause in library().values():
+        for text in (cause.title, cause.formula, cause.signature, cause.excitation, cause.source):
+            assert len(text) > 2
+        assert all(q.low <= q.high and q.small > 0 for q in cause.parameters)
+
+
+def test_an_unknown_cause_is_refused():
+    """A model of a newer version is not read as something else."""
+    with pytest.raises(DataError, match="does not know"):
+        cause_named("ghost")
+
+
+def test_the_low_pass_follows_a_ramp_exactly():
+    """Tau x' + x = t from rest at 0 is t - tau + tau exp(-t/tau)."""
+    t = np.arange(500) * DT
+    tau = 0.037
+    np.testing.assert_allclose(low_pass(t, tau, DT), t - tau + tau * np.exp(-t / tau), atol=1e-12)
+
+
+def test_the_resonance_rings_at_its_frequency_and_settles_at_its_input():
+    """Step response: overshoot exp(-pi zeta / sqrt(1 - zeta^2)), final value 1."""
+    y = np.concatenate((np.zeros(100), np.ones(3000)))
+    frame = Frame(DT, y, 1.0, 1.0)
+    out = library()["resonance"].on_output(y, (6.0, 0.2), frame)
+    assert out[-1] == pytest.approx(1.0, abs=1e-4)
+    assert out.max() - 1.0 == pytest.approx(np.exp(-np.pi * 0.2 / np.sqrt(1 - 0.04)), rel=0.01)
+
+
+@pytest.mark.parametrize("name", sorted(STRENGTHS))
+def test_a_cause_without_strength_does_nothing(name):
+    """At zero strength the extended model is the static one; with strength it is not."""
+    u = signals.diagnostic(0.0, 1.5, rate_Hz=1 / DT).value[:8000]
+    operator = _operator()
+    strong, none = STRENGTHS[name]
+    np.testing.assert_allclose(Extended.of(operator, [(name, none)])(u, DT), operator(u), atol=1e-9)
+    assert np.abs(Extended.of(operator, [(name, strong)])(u, DT) - operator(u)).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    "extensions",
+    [
+        [("output-lag", (0.008,))],
+        [("field-lag", (0.01,))],
+        [("delay", (0.01,))],
+        [("creep", (0.07, 1.0))],
+        [("thermal-drift", (0.02, 10.0))],
+        [("field-lag", (0.003,)), ("creep", (0.03, 1.0)), ("thermal-drift", (0.006, 20.0))],
+    ],
+)
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_the_one_inverse_compensates_every_extension(extensions, polarity):
+    """Five times less tracking error than the static inverse, whatever the extension and the polarity."""
+    upright = _operator()
+    static = Preisach(upright.plane, upright.weights, upright.offset, polarity=polarity)
+    model = Extended.of(static, extensions)
+    t = np.arange(3000) * DT
+    target = 7.0 + 4.0 * np.sin(2 * np.pi * t) + 1.0 * np.sin(6 * np.pi * t)
+    lead = signals.conditioning(0.0, 1.5, speed=3.0, rate_Hz=1 / DT, rest_s=0.2)
+    rest = model(lead, DT)[-1]
+    target = rest + (target - rest) * np.minimum(t / 0.5, 1.0)
+    found = model.invert(target, DT, lead=lead, band_Hz=30.0)
+    assert found.rms < 0.2 * found.rms_static
+    np.testing.assert_allclose(
+        polarity * model(np.concatenate((lead, found.input)), DT)[lead.size :], found.predicted
+    )
+
+
+def test_the_diagnostic_signal_has_what_the_causes_need():
+    """Ninety seconds, in range, every cell switched, four rates over ten to one, holds, a rest."""
+    from pulsetrainer.core.coverage import coverage
+
+    signal = signals.diagnostic(0.2, 1.4, rate_Hz=1000.0)
+    u = signal.value
+    assert 85 < signal.duration_s < 95
+    assert u.min() == pytest.approx(0.2)
+    assert u.max() == pytest.approx(1.4)
+    assert u[0] == u[-1] == pytest.approx(0.2)
+    assert coverage(Plane.uniform(0.2, 1.4, 48), [u]).all()
+    speed = np.abs(np.diff(u)) * 1000.0 / 1.2
+    counts, edges = np.histogram(speed[speed > 0.1], bins=np.geomspace(0.5, 12.0, 40))
+    peaks = edges[:-1][counts > 1000]
+    assert peaks.max() / peaks.min() > 10
+    assert np.sum(speed < 1e-9) > 15_000
+    with pytest.raises(ValueError, match="low < high"):
+        signals.diagnostic(1.0, 1.0, rate_Hz=1000.0)
+
+
+def _record(y: np.ndarray, u: np.ndarray | None = None, reference: np.ndarray | None = None) -> Measured:
+    return Measured(DT, np.linspace(0, 1.5, y.size) if u is None else u, y, np.ones(y.size), reference)
+
+
+def _fired(record: Measured) -> dict:
+    return {f.cause: f for f in gates.check(record, 0.0, 1.5)}
+
+
+def test_gates_fire_on_what_they_are_for_and_not_otherwise():
+    """Each fault alone in a noisy record."""
+    rng = np.random.default_rng(1)
+    t = np.arange(20_000) * DT
+    u = 0.75 - 0.75 * np.cos(2 * np.pi * 0.5 * t)
+    clean = np.round(6 * u + 0.03 * rng.standard_normal(t.size), 3)
+    assert _fired(_record(clean, u)) == {}
+    assert set(_fired(_record(np.minimum(clean, 8.0), u))) == {"saturation"}
+    wild = clean.copy()
+    wild[rng.choice(t.size, 20, replace=False)] += 3.0
+    fired = _fired(_record(wild, u))
+    assert set(fired) == {"outliers"}
+    assert 15 <= np.count_nonzero(fired["outliers"].mask) <= 20
+    assert set(_fired(_record(np.round(clean / 0.2) * 0.2, u))) == {"quantisation"}
+    assert set(_fired(_record(clean, u, u - 0.1 * (u > 1)))) == {"current-tracking"}
+    assert set(_fired(_record(clean, 1.1 * u))) == {"out-of-range"}
+    held, stuck = [], 0.0
+    for wanted in (6 * u).tolist():
+        if abs(wanted - stuck) > 1.0:
+            stuck = wanted - 0.2 * np.sign(wanted - stuck)
+        held.append(stuck)
+    assert set(_fired(_record(np.asarray(held) + 0.02 * rng.standard_normal(t.size), u))) == {"stick-slip"}
+
+
+def test_noise_is_measured_without_a_model():
+    """Third differences see the noise on any smooth course."""
+    rng = np.random.default_rng(2)
+    y = 5 * np.sin(np.arange(20_000) / 300) + 0.04 * rng.standard_normal(20_000)
+    assert gates.noise_of(y) == pytest.approx(0.04, rel=0.03)
+
+
+def test_simulated_noise_has_the_spectrum_of_its_model():
+    """Variance and first correlations of an autoregression come back."""
+    rng = np.random.default_rng(3)
+    like = screening.signal.lfilter([1.0], [1.0, -0.8], rng.standard_normal(20_000))
+    drawn = screening.coloured(like, 5, rng)
+    assert np.std(drawn) == pytest.approx(np.std(like), rel=0.08)
+    for lag in (1, 3):
+        assert np.corrcoef(drawn[:-lag, 0], drawn[lag:, 0])[0, 1] == pytest.approx(0.8**lag, abs=0.06)
+
+
+@pytest.mark.parametrize("constant", ["input", "output"])
+def test_what_does_not_vary_is_refused(constant):
+    """A clear error, not a verdict."""
+    u = signals.diagnostic(0.0, 1.5, rate_Hz=200.0).value
+    y = _operator()(u)
+    record = Measured(
+        0.005,
+        np.full_like(u, 0.7) if constant == "input" else u,
+        np.full_like(y, 3.0) if constant == "output" else y,
+        np.ones(u.size),
+    )
+    with pytest.raises(DataError, match=f"the {constant} does not vary"):
+        diagnose([record], 0.0, 1.5, rng=np.random.default_rng(0))
