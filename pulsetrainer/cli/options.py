@@ -14,7 +14,7 @@ Port = Annotated[
     str | None,
     typer.Option(
         "--port",
-        help="bench: (default), bench:?seed=3, /dev/ttyUSB0, COM3 or socket://host:port.",
+        help="bench: (default), bench:?seed=3, qemu:, /dev/ttyUSB0, COM3 or socket://host:port.",
         envvar="PULSETRAINER_PORT",
         show_default=False,
     ),
