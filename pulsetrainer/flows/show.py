@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,23 +54,23 @@ def run(options: Options, context: Context) -> Result:
 
 def facts(artefact: Any) -> dict[str, Any]:
     """Return the main figures of an artefact."""
-    if isinstance(artefact, Run):
-        return _run(artefact)
-    if isinstance(artefact, Model):
-        return _model(artefact)
-    if isinstance(artefact, Waveform):
-        return _waveform(artefact)
-    if isinstance(artefact, Playback):
-        return _waveform(artefact.waveform) | {
-            "repeats": artefact.compensated.output.shape[0],
-            "complete": artefact.complete,
-            "dropped_samples": artefact.dropped_samples,
-        }
-    if isinstance(artefact, Evaluation):
-        return dict(metrics_of(artefact))
-    if isinstance(artefact, Diagnosis):
-        return _diagnosis(artefact)
-    return {field.name: getattr(artefact, field.name) for field in fields(artefact)}
+    summaries: dict[type, Callable[[Any], dict[str, Any]]] = {
+        Run: _run,
+        Model: _model,
+        Waveform: _waveform,
+        Playback: _playback,
+        Evaluation: metrics_of,
+        Diagnosis: _diagnosis,
+    }
+    return dict(summaries[type(artefact)](artefact))
+
+
+def _playback(played: Playback) -> dict[str, Any]:
+    return _waveform(played.waveform) | {
+        "repeats": played.compensated.output.shape[0],
+        "complete": played.complete,
+        "dropped_samples": played.dropped_samples,
+    }
 
 
 def _span(values: FloatArray, unit: str) -> str:
