@@ -63,7 +63,8 @@ bounds: $(D)/report.html tests/regression/bounds.toml  ## hold the demo's figure
 
 # --- checks -------------------------------------------------------------------------------------------
 test: $(VENV)/installed-test  ## all tests
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -m realtime
+	$(BIN)/python -m pytest -m "not realtime" -n 2 --dist loadgroup
 
 lint: $(VENV)/installed-test  ## style, types, import contracts
 	$(BIN)/ruff check --output-format=concise .

@@ -17,6 +17,7 @@ from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.link import build, open_device
 from pulsetrainer.link.build import DEBIAN_PACKAGES
 
+pytestmark = pytest.mark.realtime
 RANGE_A = 1.5
 needs_emulator = pytest.mark.skipif(
     not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
