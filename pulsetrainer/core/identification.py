@@ -131,13 +131,17 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
         raise ArgumentError(
             f"smoothing must be 'auto' or a number in 0..1, got {smoothing!r}", hint="use 'auto'"
         )
-    inputs = np.concatenate([np.clip(r.input, plane.low, plane.high) for r in records])
-    outputs = np.concatenate([r.output[r.weights > 0] for r in records])
-    for name, values in (("input", inputs), ("output", outputs)):
-        if np.ptp(values) <= 1e-12 * np.abs(values).max():
+    for name, parts in (
+        ("input", [np.clip(r.input, plane.low, plane.high) for r in records]),
+        ("output", [r.output[r.weights > 0] for r in records]),
+    ):
+        values = np.concatenate(parts)
+        if np.ptp(values) <= 1e-12 * np.abs(values).max(initial=0.0):
             raise ArgumentError(
-                f"the {name} does not vary: it is {values[0]:g} in all of its {values.size} samples "
-                f"(levels are {plane.low:g} .. {plane.high:g})",
+                f"{name} must vary, got {values[0]:g} in all of its {values.size} samples "
+                f"(clipped to {plane.low:g} .. {plane.high:g})"
+                if name == "input"
+                else f"the output does not vary: it is {values[0]:g} in all {values.size} samples",
                 hint="check the wiring, and that the run sweeps the range of the levels",
             )
     if samples < plane.n_h:
