@@ -127,6 +127,7 @@ class Fit:
     input: Annotated[FloatArray, Data("@input_unit", "input", "time")]
     output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
     predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
+    smoothing: float = 0.0  # length below which the density was smoothed, share of the input's range
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -34,6 +34,14 @@ def identify(
         Operator, typer.Option(help="continuous, or relay as in the paper.")
     ] = Operator.continuous,
     method: Annotated[Method, typer.Option(help="joint, or alternating as in the paper.")] = Method.joint,
+    smoothing: Annotated[
+        str | None,
+        typer.Option(
+            metavar="auto|0|NUMBER",
+            help="Length below which the density is smoothed, share of the input range; "
+            "auto: by held-out blocks (default; 0 with relay).",
+        ),
+    ] = None,
     force: Force = False,
     json: AsJson = False,
 ) -> None:
@@ -44,7 +52,9 @@ def identify(
     from pulsetrainer.flows import identify as flow
 
     screen = Screen("identify", as_json=json)
-    options = flow.Options(tuple(runs), out, levels, operator.value, method.value, force)
+    options = flow.Options(
+        tuple(runs), out, levels, operator.value, method.value, _smoothing(smoothing), force
+    )
     with screen.working("fitting") as context:
         result = flow.run(options, context)
     screen.result(plain(result))
@@ -56,7 +66,21 @@ def identify(
             "fit rms": f"{result.fit_rms:.4g} {unit}",
             "offset y0": f"{result.offset:.4g} {unit}",
             "cells switched": f"{result.coverage_percent:.1f} %",
+            "smoothing": f"{result.smoothing:.3g} of the range" if result.smoothing else "none",
             "loop": "falling" if result.polarity < 0 else "rising",
             "took": f"{result.seconds:.2f} s, {result.iterations} iterations",
         },
     )
+
+
+def _smoothing(text: str | None) -> float | Literal["auto"] | None:
+    """Read --smoothing: auto, or a number in 0..1."""
+    if text is None or text == "auto":
+        return None if text is None else "auto"
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0 <= value <= 1:
+        raise typer.BadParameter(f"must be auto or a number in 0..1, got {text!r}", param_hint="--smoothing")
+    return value

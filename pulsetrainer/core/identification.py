@@ -22,7 +22,7 @@ from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.equations import NormalEquations, Record, node_sums, normal_equations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
-from pulsetrainer.core.smoothing import choose, penalty, smoothed
+from pulsetrainer.core.smoothing import choose, smoothed
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
 __all__ = [
@@ -131,17 +131,13 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
         raise ArgumentError(
             f"smoothing must be 'auto' or a number in 0..1, got {smoothing!r}", hint="use 'auto'"
         )
-    for name, parts in (
-        ("input", [np.clip(r.input, plane.low, plane.high) for r in records]),
-        ("output", [r.output[r.weights > 0] for r in records]),
-    ):
-        values = np.concatenate(parts)
-        if np.ptp(values) <= 1e-12 * np.abs(values).max(initial=0.0):
+    inputs = np.concatenate([np.clip(r.input, plane.low, plane.high) for r in records])
+    outputs = np.concatenate([r.output[r.weights > 0] for r in records])
+    for name, values in (("input", inputs), ("output", outputs)):
+        if np.ptp(values) <= 1e-12 * np.abs(values).max():
             raise ArgumentError(
-                f"{name} must vary, got {values[0]:g} in all of its {values.size} samples "
-                f"(clipped to {plane.low:g} .. {plane.high:g})"
-                if name == "input"
-                else f"the output does not vary: it is {values[0]:g} in all {values.size} samples",
+                f"the {name} does not vary: it is {values[0]:g} in all of its {values.size} samples "
+                f"(levels are {plane.low:g} .. {plane.high:g})",
                 hint="check the wiring, and that the run sweeps the range of the levels",
             )
     if samples < plane.n_h:
@@ -165,8 +161,8 @@ def _fit_dense(
         found = nnls.solve(gram, rhs)
         masses, offset, iterations = found.x, equations.offset(found.x), found.iterations
     else:
-        extra = penalty(plane, np.diagonal(gram).copy(), smoothing).toarray() if smoothing else 0.0
-        masses, offset, iterations = _alternate(equations, equations.gram + extra)
+        penalty = gram - equations.centred()[0]
+        masses, offset, iterations = _alternate(equations, equations.gram + penalty)
     return masses, offset, iterations, nnls.kkt_violation(gram, rhs, masses)
 
 

@@ -23,7 +23,7 @@ from scipy.interpolate import UnivariateSpline
 
 from pulsetrainer.core.memory import State, negative_saturation, trace, trace_after
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, IntArray, finite_vector
+from pulsetrainer.core.plane import FloatArray, IntArray, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
 
 
@@ -150,6 +150,10 @@ def _check_invertible(operator: Preisach) -> None:
             "the relay reading has no continuous inverse: its output is a staircase",
             hint="use closest_match, or read the weights as continuous",
         )
+    _check_not_empty(operator)
+
+
+def _check_not_empty(operator: Preisach) -> None:
     if operator.total <= 0:
         raise ArgumentError(
             "a model whose weights are all zero cannot be inverted", hint="identify it on a run that moves"
@@ -241,9 +245,10 @@ def closest_match(operator: Preisach, target: ArrayLike, start: State | None = N
     Raises
     ------
     ArgumentError
-        The target is not a finite vector.
+        The target is not a finite vector, or all weights are zero.
     """
     wanted = finite_vector("target", target)
+    _check_not_empty(operator)
     clipped, worst, y = _into_reach(operator, wanted)
     grid, levels, top = operator.grid, operator.plane.levels, operator.plane.n_h
     state = start or negative_saturation(operator.plane.low)
@@ -295,7 +300,7 @@ class _LevelMemory:
         return _LevelMemory(self.grid, stack)
 
 
-def smoothed(inputs: FloatArray, time_s: FloatArray, step: float, low: float, high: float) -> FloatArray:
+def smoothed(inputs: ArrayLike, time_s: ArrayLike, step: float, low: float, high: float) -> FloatArray:
     """Return a staircase of levels ``step`` apart as a cubic smoothing spline, kept within [low, high].
 
     The spline may differ from the staircase by the rounding error of the levels and no more: its
@@ -304,18 +309,22 @@ def smoothed(inputs: FloatArray, time_s: FloatArray, step: float, low: float, hi
     Raises
     ------
     ArgumentError
-        Fewer than five samples, or time does not increase.
+        Fewer than five samples, one that is not finite, times that do not increase, a step that is not
+        positive, or an empty range.
     """
-    if inputs.size < 5 or not np.all(np.diff(time_s) > 0):
+    u, t = finite_vector("inputs", inputs, at_least=5), finite_vector("time", time_s)
+    if t.shape != u.shape or not np.all(np.diff(t) > 0):
         raise ArgumentError(
-            f"a smoothing spline needs at least 5 samples in increasing time, got {inputs.size}",
-            hint="use a longer waveform",
+            f"time must increase from input to input, got times of shape {t.shape} for inputs of {u.shape}",
+            hint="give one time for each input, in order",
         )
-    spline = UnivariateSpline(time_s, inputs, k=3, s=inputs.size * step**2 / 12.0)
-    return np.clip(spline(time_s), low, high)
+    positive(step=step)
+    ascending(low, high)
+    spline = UnivariateSpline(t, u, k=3, s=u.size * step**2 / 12.0)
+    return np.clip(spline(t), low, high)
 
 
-def slew_limited(inputs: FloatArray, rate_Hz: float, slew: float) -> FloatArray:
+def slew_limited(inputs: ArrayLike, rate_Hz: float, slew: float) -> FloatArray:
     """Nearest input (n,) that moves at most ``slew`` input units per second: jumps become ramps.
 
     Where cells have no weight the exact inverse jumps, and a coil cannot. The mean of the highest
@@ -325,12 +334,9 @@ def slew_limited(inputs: FloatArray, rate_Hz: float, slew: float) -> FloatArray:
     Raises
     ------
     ArgumentError
-        ``slew`` or ``rate_Hz`` is not positive.
+        ``slew`` or ``rate_Hz`` is not positive, or an input is not finite.
     """
-    if not (slew > 0 and rate_Hz > 0):
-        raise ArgumentError(
-            f"slew and rate must be positive, got {slew:g} and {rate_Hz:g}", hint="30 A/s suits the solenoid"
-        )
+    positive(slew=slew, rate=rate_Hz)
     u = finite_vector("inputs", inputs)
     ramp = np.arange(u.size) * (slew / rate_Hz)
 

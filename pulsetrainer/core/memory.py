@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.plane import FloatArray, IntArray, ascending, float_array
 from pulsetrainer.errors import ArgumentError
 
 
@@ -26,7 +26,7 @@ class State:
     extremes: tuple[float, ...]  # alternating: low, max, min, max, ...; the last one is the present input
 
     def __post_init__(self) -> None:
-        path = np.asarray(self.extremes, dtype=np.float64)
+        path = float_array("extremes of a memory state", self.extremes)
         if path.ndim != 1 or path.size < 1 or not np.all(np.isfinite(path)):
             raise ArgumentError(
                 f"a memory state needs at least one finite extreme, got {self.extremes}",
@@ -58,7 +58,16 @@ def positive_saturation(low: float, high: float) -> State:
 
 
 def demagnetised(low: float, high: float, swings: int = 200) -> State:
-    """Return the state after ``swings`` ever smaller swings around the middle of [low, high]."""
+    """Return the state after ``swings`` ever smaller swings around the middle of [low, high].
+
+    Raises
+    ------
+    ArgumentError
+        An empty range or no swings.
+    """
+    ascending(low, high)
+    if swings < 1:
+        raise ArgumentError(f"swings must be at least 1, got {swings}", hint="200 swings demagnetise well")
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     shrink = 1.0 - np.arange(swings) / swings
     turns = middle + half * shrink * np.where(np.arange(swings) % 2 == 0, 1.0, -1.0)

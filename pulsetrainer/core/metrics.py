@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import FloatArray, finite_vector, float_array
 from pulsetrainer.errors import ArgumentError
 
 
@@ -18,16 +19,22 @@ class Tracking(NamedTuple):
     rms_percent: float
 
 
-def tracking(target: FloatArray, measured: FloatArray, full: float) -> Tracking:
+def tracking(target: ArrayLike, measured: ArrayLike, full: float) -> Tracking:
     """Errors of every finite sample of ``measured`` (..., n) against ``target`` (n,).
 
     Raises
     ------
     ArgumentError
-        Nothing was measured, or ``full`` is not positive.
+        Nothing was measured, the shapes do not fit, or ``full`` is not positive.
     """
-    error = (measured - target)[np.isfinite(measured)]
-    if error.size == 0 or not full > 0:
+    wanted, got = finite_vector("target", target), float_array("measured", measured)
+    if got.shape[-1:] != wanted.shape:
+        raise ArgumentError(
+            f"measured must have shape (..., {wanted.size}) like the target, got {got.shape}",
+            hint="compare at the same samples",
+        )
+    error = (got - wanted)[np.isfinite(got)]
+    if error.size == 0 or not (full > 0 and np.isfinite(full)):
         raise ArgumentError(
             f"no error can be given for {error.size} measured samples and a full force of {full:g}",
             hint="play the waveform again",
@@ -36,16 +43,34 @@ def tracking(target: FloatArray, measured: FloatArray, full: float) -> Tracking:
     return Tracking(float(size.mean()), float(size.max()), float(np.sqrt(np.mean(size**2))))
 
 
-def loop_area(x: FloatArray, y: FloatArray) -> float:
-    """Area enclosed by the closed curve (x, y): |closed integral of y dx|, by the shoelace formula."""
-    return abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))) / 2.0
+def loop_area(x: ArrayLike, y: ArrayLike) -> float:
+    """Area enclosed by the closed curve (x, y): |closed integral of y dx|, by the shoelace formula.
+
+    Raises
+    ------
+    ArgumentError
+        x and y are not finite vectors of one length.
+    """
+    a, b = _pair("x", x, "y", y)
+    return abs(float(np.sum(a * np.roll(b, -1) - np.roll(a, -1) * b))) / 2.0
 
 
-def repeat_spread(measured: FloatArray) -> float:
-    """Standard deviation of single measurements around their mean over repeats (r, n); 0 for one repeat."""
-    if measured.shape[0] < 2:
+def repeat_spread(measured: ArrayLike) -> float:
+    """Standard deviation of single measurements around their mean over repeats (r, n); 0 for one repeat.
+
+    Raises
+    ------
+    ArgumentError
+        There is no axis of repeats.
+    """
+    repeats = float_array("measured", measured)
+    if repeats.ndim != 2:
+        raise ArgumentError(
+            f"measured must have shape (r, n), got {repeats.shape}", hint="one row for each repeat"
+        )
+    if repeats.shape[0] < 2:
         return 0.0
-    return float(np.sqrt(np.nanmean(np.nanvar(measured, axis=0, ddof=1))))
+    return float(np.sqrt(np.nanmean(np.nanvar(repeats, axis=0, ddof=1))))
 
 
 class Prediction(NamedTuple):
@@ -57,17 +82,33 @@ class Prediction(NamedTuple):
     max_percent: float
 
 
-def prediction(measured: FloatArray, predicted: FloatArray) -> Prediction:
+def prediction(measured: ArrayLike, predicted: ArrayLike) -> Prediction:
     """Errors of ``predicted`` (n,) against ``measured`` (n,).
 
     Raises
     ------
     ArgumentError
-        The measured output does not vary, so that no percentage exists.
+        They are not finite vectors of one length, or the measured output does not vary, so that no
+        percentage exists.
     """
-    span = float(np.ptp(measured))
+    was, said = _pair("measured", measured, "predicted", predicted)
+    span = float(np.ptp(was))
     if span == 0:
-        raise ArgumentError("the measured output does not vary", hint="check the sensor's wiring")
-    error = predicted - measured
+        raise ArgumentError(
+            f"the measured output does not vary: it is {was[0]:g} in all {was.size} samples",
+            hint="check the sensor's wiring",
+        )
+    error = said - was
     rms, worst = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
     return Prediction(rms, 100.0 * rms / span, worst, 100.0 * worst / span)
+
+
+def _pair(name: str, one: ArrayLike, other_name: str, other: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return two finite vectors of one length."""
+    a, b = finite_vector(name, one), finite_vector(other_name, other)
+    if a.shape != b.shape:
+        raise ArgumentError(
+            f"{name} and {other_name} must have one shape, got {a.shape} and {b.shape}",
+            hint="compare at the same samples",
+        )
+    return a, b

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.errors import ConvergenceError
+from pulsetrainer.core.plane import FloatArray, finite_vector
+from pulsetrainer.errors import ArgumentError, ConvergenceError
 
 # A pivot below this share of the largest diagonal entry is rounding noise of the sums that made G.
 _RELATIVE_RIDGE = 1e-13
@@ -54,9 +54,21 @@ def solve(
 
     Raises
     ------
+    ArgumentError
+        Shapes that do not fit, or numbers that are not finite.
     ConvergenceError
         More than ``max_iterations`` systems: the matrix is too far from positive definite.
     """
+    rhs = finite_vector("rhs", rhs)
+    if gram.shape != (rhs.size, rhs.size) or not np.all(np.isfinite(gram)):
+        raise ArgumentError(
+            f"gram must be finite, of shape {(rhs.size, rhs.size)} like rhs, got {gram.shape}",
+            hint="sum gram and rhs over the same finite samples",
+        )
+    if passive is not None and passive.shape != rhs.shape:
+        raise ArgumentError(
+            f"passive must have shape {rhs.shape}, got {passive.shape}", hint="one guess for each variable"
+        )
     problem = _Problem(gram, rhs)
     free = np.zeros(rhs.size, dtype=bool) if passive is None else passive & problem.usable
     fewest, patience = rhs.size + 1, _PATIENCE

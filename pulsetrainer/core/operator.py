@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from pulsetrainer.core.memory import State, Trace, negative_saturation, trace
-from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading, finite_vector
+from pulsetrainer.core.memory import State, Trace, negative_saturation, trace, trace_after
+from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading, finite_vector, float_array
 from pulsetrainer.errors import ArgumentError
 
 _CHUNK = 4096  # samples at a time: their arrays stay in the cache
@@ -52,15 +52,20 @@ def follow(plane: Plane, values: ArrayLike, start: State | None, reading: Readin
     ArgumentError
         The input is empty, not one-dimensional or not finite; the reading is unknown.
     """
+    _check_reading(reading)
     u = finite_vector("input", values)
     state = start or negative_saturation(plane.low)
     if reading == "continuous":
         return trace(u, state, plane.low, plane.high)
-    if reading == "relay":
-        extremes = plane.round_to_nodes(np.asarray(state.extremes))
-        rounded = trace(extremes, negative_saturation(plane.low), plane.low, plane.high).final
-        return trace(plane.round_to_nodes(u), rounded, plane.low, plane.high)
-    raise ArgumentError(f"reading must be 'continuous' or 'relay', got {reading!r}", hint="use 'continuous'")
+    extremes = plane.round_to_nodes(np.asarray(state.extremes))
+    return trace_after(extremes, plane.round_to_nodes(u), plane.low, plane.high)
+
+
+def _check_reading(reading: str) -> None:
+    if reading not in ("continuous", "relay"):
+        raise ArgumentError(
+            f"reading must be 'continuous' or 'relay', got {reading!r}", hint="use 'continuous'"
+        )
 
 
 def rows(plane: Plane, path: Trace) -> Rows:
@@ -100,6 +105,11 @@ class Preisach:
         object.__setattr__(self, "weights", self.plane.check_weights(self.weights))
         if self.polarity not in (-1, 1):
             raise ArgumentError(f"polarity must be 1 or -1, got {self.polarity}", hint="1: the output rises")
+        if not np.isfinite(self.offset):
+            raise ArgumentError(
+                f"offset must be finite, got {self.offset:g}", hint="identify the model again"
+            )
+        _check_reading(self.reading)
 
     @cached_property
     def masses(self) -> FloatArray:
@@ -184,8 +194,8 @@ class Preisach:
 
 def outputs(
     plane: Plane,
-    weights: FloatArray,
-    offsets: FloatArray,
+    weights: ArrayLike,
+    offsets: ArrayLike,
     values: ArrayLike,
     *,
     start: State | None = None,
@@ -198,17 +208,22 @@ def outputs(
     Raises
     ------
     ArgumentError
-        The input is not a finite vector, or the weights do not fit the plane.
+        The input is not a finite vector, the weights do not fit the plane or are negative, or weights or
+        offsets are not finite.
     """
-    if weights.ndim != 2 or weights.shape[1] != plane.n_q or offsets.shape != weights.shape[:1]:
+    mu, y0 = float_array("weights", weights), float_array("offsets", offsets)
+    if mu.ndim != 2 or mu.shape[1] != plane.n_q or y0.shape != mu.shape[:1]:
         raise ArgumentError(
-            f"weights must have shape (b, {plane.n_q}), offsets (b,), got {weights.shape}, {offsets.shape}",
+            f"weights must have shape (b, {plane.n_q}) and offsets (b,), got {mu.shape} and {y0.shape}",
             hint="one row of weights for each offset",
         )
+    for row in mu:
+        plane.check_weights(row)
+    finite_vector("offsets", y0, at_least=0)
     path = follow(plane, values, start, reading)
-    nodes = plane.everett_nodes(weights * plane.areas)  # (b, n_q)
+    nodes = plane.everett_nodes(mu * plane.areas)  # (b, n_q)
     step = steps(plane, path.node_value, path.node_value[path.parent])
     turning = path.along_tree(step @ nodes.T)  # (m, b)
     own = steps(plane, path.value, path.node_value[path.anchor])
     total = nodes[:, -plane.n_h]  # node (n_h, 0) is the whole plane
-    return ((own @ nodes.T) + turning[path.anchor]).T - total[:, None] + offsets[:, None]
+    return ((own @ nodes.T) + turning[path.anchor]).T - total[:, None] + y0[:, None]

@@ -27,6 +27,22 @@ IntArray = NDArray[np.int64]
 Reading = Literal["continuous", "relay"]
 
 
+def float_array(name: str, values: ArrayLike) -> FloatArray:
+    """Return ``values`` as an array of floats.
+
+    Raises
+    ------
+    ArgumentError
+        They are no numbers, or rows of unlike lengths.
+    """
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(
+            f"{name} must be numbers, got {error}", hint=f"pass {name} as one array of floats"
+        ) from error
+
+
 def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatArray:
     """Return ``values`` as a one-dimensional float array.
 
@@ -35,7 +51,7 @@ def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatAr
     ArgumentError
         It is not one-dimensional, is shorter than ``at_least``, or holds NaN or infinity.
     """
-    array = np.asarray(values, dtype=np.float64)
+    array = float_array(name, values)
     if array.ndim != 1 or array.size < at_least:
         raise ArgumentError(
             f"{name} must be a vector of at least {at_least} samples, got shape {array.shape}",
@@ -50,6 +66,36 @@ def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatAr
             hint=f"mask or remove the samples of {name} that are not numbers",
         )
     return array
+
+
+def positive(**named: float) -> None:
+    """Let pass numbers that are positive and finite.
+
+    Raises
+    ------
+    ArgumentError
+        One of them is not; it is named.
+    """
+    for name, number in named.items():
+        if not (number > 0 and np.isfinite(number)):
+            raise ArgumentError(
+                f"{name} must be positive and finite, got {number:g}", hint=f"give a {name} above zero"
+            )
+
+
+def ascending(low: float, high: float, *, what: str = "the input range") -> None:
+    """Let pass a range that is neither empty nor infinite.
+
+    Raises
+    ------
+    ArgumentError
+        ``low`` is not below ``high``, or their distance is not finite.
+    """
+    if not (low < high and np.isfinite(float(high) - float(low))):
+        raise ArgumentError(
+            f"{what} must have low < high, both finite, got low = {low:g}, high = {high:g}",
+            hint="record an input that moves",
+        )
 
 
 @dataclass(frozen=True)
@@ -82,13 +128,11 @@ class Plane:
         ArgumentError
             Fewer than 2 levels, or a range that is zero or not finite.
         """
-        if n_h < 2:
-            raise ArgumentError(f"n_h must be at least 2, got {n_h}", hint="48 levels suit most devices")
-        if not (np.isfinite(low) and np.isfinite(high) and high > low):
+        if n_h < 2 or n_h != int(n_h):
             raise ArgumentError(
-                f"the input range must have low < high, got low = {low:g}, high = {high:g}",
-                hint="record an input that moves",
+                f"n_h must be a whole number of at least 2, got {n_h}", hint="48 levels suit most devices"
             )
+        ascending(low, high)
         return cls(np.linspace(low, high, n_h + 1))
 
     @property
@@ -137,7 +181,7 @@ class Plane:
         ArgumentError
             The length is not n_q, or a weight is negative or not finite.
         """
-        array = np.asarray(weights, dtype=np.float64)
+        array = float_array("weights", weights)
         if array.shape != (self.n_q,):
             raise ArgumentError(
                 f"weights must have shape ({self.n_q},) for {self.n_h} levels, got {array.shape}",
@@ -152,7 +196,18 @@ class Plane:
         return array
 
     def unpack(self, packed: FloatArray) -> FloatArray:
-        """Spread (..., n_q) cell values over the lower triangle of (..., n_h, n_h) squares of zeros."""
+        """Spread (..., n_q) cell values over the lower triangle of (..., n_h, n_h) squares of zeros.
+
+        Raises
+        ------
+        ArgumentError
+            There is not one value for each cell.
+        """
+        if packed.shape[-1:] != (self.n_q,):
+            raise ArgumentError(
+                f"cell values must have shape (..., {self.n_q}) for {self.n_h} levels, got {packed.shape}",
+                hint="cell values and levels must come from the same model",
+            )
         i, j = self.cell_indices
         square = np.zeros((*packed.shape[:-1], self.n_h, self.n_h))
         square[..., i, j] = packed
@@ -188,7 +243,18 @@ class Plane:
         return square[..., i, j]
 
     def everett_grid(self, nodes: FloatArray) -> FloatArray:
-        """Everett values on the full (n_h + 1, n_h + 1) grid of nodes, zero on and above the diagonal."""
+        """Everett values on the full (n_h + 1, n_h + 1) grid of nodes, zero on and above the diagonal.
+
+        Raises
+        ------
+        ArgumentError
+            There is not one value for each node below the diagonal.
+        """
+        if nodes.shape != (self.n_q,):
+            raise ArgumentError(
+                f"node values must have shape ({self.n_q},) for {self.n_h} levels, got {nodes.shape}",
+                hint="node values and levels must come from the same model",
+            )
         grid = np.zeros((self.n_h + 1, self.n_h + 1))
         i, j = self.cell_indices
         grid[i + 1, j] = nodes

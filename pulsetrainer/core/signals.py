@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pulsetrainer.core.memory import turning_points
-from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.plane import FloatArray, Plane, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
 
 
@@ -36,8 +37,16 @@ class Signal:
         return max(turning_points(self.value).size - 1, 0)
 
 
-def through(points: FloatArray, speed: float, rate_Hz: float) -> FloatArray:
-    """Samples of a path that visits ``points`` (k,) in turn at constant ``speed``, input units per second."""
+def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
+    """Samples of a path that visits ``points`` (k,) in turn at constant ``speed``, input units per second.
+
+    Raises
+    ------
+    ArgumentError
+        No points, one that is not finite, or a speed or rate that is not positive.
+    """
+    points = finite_vector("points", points)
+    positive(speed=speed, rate=rate_Hz)
     distance = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(points)))))
     count = int(np.ceil(distance[-1] / speed * rate_Hz)) + 1
     path = np.interp(np.arange(count) * (speed / rate_Hz), distance, points)
@@ -69,10 +78,6 @@ def identification(low: float, high: float, *, n_h: int, speed: float, rate_Hz: 
     ArgumentError
         An empty range, fewer than 2 levels, or a speed or rate that is not positive.
     """
-    if not (speed > 0 and rate_Hz > 0):
-        raise ArgumentError(
-            f"speed and rate must be positive, got {speed:g} and {rate_Hz:g}", hint="0.75 A/s, 1000 Hz"
-        )
     levels = Plane.uniform(low, high, n_h).levels
     bottoms = levels[-2::-1]
     turns = np.empty(2 * n_h + 1)
@@ -81,7 +86,18 @@ def identification(low: float, high: float, *, n_h: int, speed: float, rate_Hz: 
 
 
 def conditioning(low: float, high: float, *, speed: float, rate_Hz: float, rest_s: float) -> FloatArray:
-    """Samples of one major loop low -> high -> low and a rest: it leaves a known memory behind."""
+    """Samples of one major loop low -> high -> low and a rest: it leaves a known memory behind.
+
+    Raises
+    ------
+    ArgumentError
+        An empty range, a speed or rate that is not positive, or a negative rest.
+    """
+    ascending(low, high)
+    if not rest_s >= 0:
+        raise ArgumentError(
+            f"rest must not be negative, got {rest_s:g} s", hint="one second suits the solenoid"
+        )
     loop = through(np.asarray([low, high, low]), speed, rate_Hz)
     return np.concatenate((loop, np.full(round(rest_s * rate_Hz), low)))
 
@@ -124,11 +140,8 @@ def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
     ArgumentError
         An empty range, or a rate that is not positive.
     """
-    if not (rate_Hz > 0 and high > low):
-        raise ArgumentError(
-            f"low < high and a positive rate are needed, got {low:g}, {high:g} and {rate_Hz:g} Hz",
-            hint="0, 1.5 and 1000 Hz suit the solenoid",
-        )
+    ascending(low, high)
+    positive(rate=rate_Hz)
     parts: list[FloatArray] = []
 
     def go(points: tuple[float, ...], ranges_per_s: float) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from pulsetrainer.core.plane import FloatArray, finite_vector
+from pulsetrainer.core.plane import FloatArray, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
 
 
@@ -25,7 +25,8 @@ class Shape:
         value = finite_vector("value", self.value, at_least=4)
         if t.size != value.size or not np.all(np.diff(t) > 0):
             raise ArgumentError(
-                f"the waveform {self.name} needs one value for each of its increasing times",
+                f"the waveform {self.name} needs one value for each of its increasing times, got shapes "
+                f"{t.shape} of time and {value.shape} of value",
                 hint="mend the time column",
             )
         if np.ptp(value) == 0:
@@ -52,16 +53,19 @@ def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float
     Raises
     ------
     ArgumentError
-        No periods, or an empty range.
+        No periods, an empty range, or a rate that is not positive or leaves no sample.
     """
-    if periods < 1 or not high > low:
-        raise ArgumentError(
-            f"a pulse train needs at least one period and low < high, got {periods} periods, "
-            f"{low:g} .. {high:g}",
-            hint="choose a force range inside the reach of the model",
-        )
+    if periods < 1:
+        raise ArgumentError(f"a pulse train needs at least 1 period, got {periods}", hint="12 suit a session")
+    ascending(low, high, what="the range of the pulse")
+    positive(rate=rate_Hz)
     t = shape.time_s - shape.time_s[0]
     curve = PchipInterpolator(np.append(t, shape.period_s), np.append(shape.normalised, shape.normalised[0]))
     count = round(periods * shape.period_s * rate_Hz)
+    if count < 1:
+        raise ArgumentError(
+            f"a rate of {rate_Hz:g} Hz leaves no sample in {periods * shape.period_s:g} s of pulses",
+            hint="1000 Hz suits the solenoid",
+        )
     values = np.clip(curve((np.arange(count) / rate_Hz) % shape.period_s), 0.0, 1.0)
     return low + (high - low) * values

@@ -130,8 +130,11 @@ def _sticking(record: Measured, reach: float) -> Firing | None:
     )
     behind = (total[at] - total[np.maximum(at - wide, 0)]) / (at - np.maximum(at - wide, 0))
     jump = np.abs(np.append(np.diff(y), 0.0))
-    moved = np.abs(ndimage.uniform_filter1d(np.gradient(record.input, record.dt_s), 5 * wide)) / reach
-    slow = (moved > 0.1) & (moved < 3.0)
+    rate = ndimage.uniform_filter1d(np.gradient(record.input, record.dt_s), 5 * wide) / reach
+    moved = np.abs(rate)
+    # where the input changes its rate other causes make jumps too
+    change = np.abs(np.roll(rate, -6 * wide) - np.roll(rate, 6 * wide))
+    slow = (moved > 0.1) & (moved < 3.0) & (change < 0.2 * moved)
     lasting = (jump > 0.6 * np.abs(ahead - behind)) & (jump > 6.0 * np.sqrt(2.0) * sigma)
     usual = 8.0 * float(np.median(jump[slow])) if slow.any() else np.inf
     # both sides must be flat: on a smooth branch the steps next to a jump are like it

@@ -9,14 +9,15 @@ named together.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg
 
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.plane import FloatArray, IntArray, Plane
 from pulsetrainer.core.smoothing import blocks
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.causes import library
@@ -24,6 +25,7 @@ from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.design import Measured, bins_of, frames_of
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Fitted, Problem, refit, slopes, weights_for
+from pulsetrainer.diagnosis.residual import excitation_limits
 from pulsetrainer.diagnosis.screening import Score, Screen, screen
 from pulsetrainer.errors import DataError
 
@@ -37,7 +39,11 @@ SPAN_SHARE = 0.0005  # a smaller effect than this is irrelevant on any device
 MOST = 5
 TRIED = 3  # candidates refitted in each round
 FOLD_BLOCKS = 20
+JACKKNIFE = 10
+STUDENT = 2.26  # 95 % of Student's t with nine degrees of freedom
 # These leave a residual that no refit can take away: what is left is theirs.
+# At one rate these are all a loop a little wider than it is at rest.
+_RATE_FAMILIES = ("lag", "viscous")
 _JAGGED = ("stick-slip", "quantisation")
 
 
@@ -180,6 +186,7 @@ class _Search:
         self.count = self.problem.bins.count
         self.span = float(np.ptp(self.problem.measured))
         self.folds = self._folds()
+        self.lacks = excitation_limits(self.problem)
 
     def measure_discretisation(self, fitted: Fitted) -> None:
         """Estimate the discretisation error by refitting on a coarser plane.
@@ -208,21 +215,23 @@ class _Search:
         size = max(NOISE_SHARE * self.white, self.discretisation, SPAN_SHARE * self.span)
         return float(self.count * size**2)
 
-    def _folds(self) -> FloatArray:
-        """Fold 0 or 1 of every average; the cuts are where the memory is wiped out."""
+    def _folds(self) -> IntArray:
+        """Block of every average; the cuts are where the memory is wiped out."""
         plane, bins = self.problem.plane, self.problem.bins
-        fold = np.zeros(self.count)
+        fold = np.zeros(self.count, dtype=np.int64)
         for record, number in zip(self.problem.records, bins.number, strict=True):
-            part = blocks(record.input, plane.low, plane.high, FOLD_BLOCKS) % 2
+            part = blocks(record.input, plane.low, plane.high, FOLD_BLOCKS)
             inside = number >= 0
             fold[number[inside]] = part[inside]
         return fold
 
-    def held_out(self, fitted: Fitted) -> float:
-        """Sum of squares on each half of the blocks, predicted from the other half.
+    def _without_folds(
+        self, fitted: Fitted, folds: int
+    ) -> Iterator[tuple[NDArray[np.bool_], FloatArray, FloatArray]]:
+        """For each fold: its averages, their errors, and the changes of the parameters, when it is left out.
 
-        Weights and parameters are refitted on the training half, linearised around the joint fit, with
-        the cells that are positive there.
+        Weights and parameters are refitted on the rest, linearised around the joint fit, with the cells
+        that are positive there.
         """
         design = fitted.design
         free = np.flatnonzero(fitted.passive)
@@ -235,21 +244,24 @@ class _Search:
         wanted = self.problem.measured - fitted.added
         masses = (fitted.simulator.operator.weights * self.problem.plane.areas)[free]
         start = np.concatenate((masses, np.zeros(extra.shape[1])))
-        total = 0.0
-        for fold in (0, 1):
-            train, test = self.folds != fold, self.folds == fold
+        for fold in range(folds):
+            test = self.folds % folds == fold
+            train = ~test
             if train.sum() < 2 * columns.shape[1] or not test.any():
-                return float("nan")
-            inside = columns[train] - columns[train].mean(axis=0)
+                return
+            mean = columns[train].mean(axis=0)
+            inside = columns[train] - mean
             target = wanted[train] - wanted[train].mean()
-            normal = inside.T @ inside + ridge
-            rhs = inside.T @ (target - inside @ start) - 0.5 * ridge @ start
-            found = start + linalg.solve(normal, rhs, assume_a="pos")
-            error = (
-                wanted[test] - wanted[train].mean() - (columns[test] - columns[train].mean(axis=0)) @ found
-            )
-            total += float(error @ error)
-        return total
+            share = 1.0 - 1.0 / folds
+            rhs = inside.T @ (target - inside @ start) - share * ridge @ start
+            change = linalg.solve(inside.T @ inside + share * ridge, rhs, assume_a="pos")
+            error = wanted[test] - wanted[train].mean() - (columns[test] - mean) @ (start + change)
+            yield test, error, change[free.size :]
+
+    def held_out(self, fitted: Fitted) -> float:
+        """Sum of squares on each half of the blocks, predicted from the other half."""
+        halves = list(self._without_folds(fitted, 2))
+        return sum(float(error @ error) for _, error, _ in halves) if len(halves) == 2 else float("nan")
 
     def held_out_gain(self, before: Fitted, after: Fitted) -> float:
         """Share of the reducible held-out error that the extension removes."""
@@ -353,9 +365,11 @@ class _Search:
         return current
 
     def _estimates(self, fitted: Fitted, noise: Screen) -> dict[str, tuple[Estimate, ...]]:
-        """Parameters with 95 % intervals: the joint refit, linearised, on redrawn noise.
+        """Parameters with 95 % intervals.
 
-        The model's own error is not noise: what is left of it beyond the noise widens the interval.
+        The spread is the larger of two: of the joint refit, linearised, on redrawn noise; and of the
+        jackknife over blocks (Efron and Stein, Annals of Statistics 9, 1981), which also sees what the
+        fitted model misses. To it comes the discretisation error, as if a fifth of it were aligned.
         """
         columns = fitted.projector()(slopes(self.problem, fitted))
         if columns.shape[1] == 0:
@@ -363,9 +377,12 @@ class _Search:
         size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
         drawn = np.linalg.lstsq(columns / size, noise.draws, rcond=None)[0] / size[:, None]
         spread = np.std(drawn, axis=1)
-        # bias of the discretisation, as if it were along the column in one part of five
         bias = 0.2 * self.discretisation * np.sqrt(self.count) / size
-        half = 1.96 * spread + bias
+        changes = np.asarray([change for _, _, change in self._without_folds(fitted, JACKKNIFE)])
+        if changes.shape[0] == JACKKNIFE:  # what the fitted model misses moves with the blocks
+            left_out = np.sum((changes - changes.mean(axis=0)) ** 2, axis=0)
+            spread = np.maximum(spread, np.sqrt((1.0 - 1.0 / JACKKNIFE) * left_out))
+        half = STUDENT * spread + bias
         estimates: dict[str, tuple[Estimate, ...]] = {}
         at = 0
         for term in fitted.terms:
@@ -407,6 +424,9 @@ class _Search:
             trial = refit(self.problem, (*without.terms, Term(score.cause, score.start)), without, rounds=2)
             if trial.squares - fitted.squares < margin:
                 rivals.append(score.cause.id)
+        if "one single rate" in self.lacks and term.cause.family in _RATE_FAMILIES:
+            alike = [c.id for c in library().values() if c.family in _RATE_FAMILIES and c is not term.cause]
+            rivals += [name for name in alike if name not in (*rivals, *fitted.names)]
         return tuple(rivals)
 
     def _answer(

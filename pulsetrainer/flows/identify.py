@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import BoolArray, Fit, Model, Run
-from pulsetrainer.core import metrics
-from pulsetrainer.core.identification import Identified, Method, coverage, identify
+from pulsetrainer.core import input_noise, metrics
+from pulsetrainer.core.coverage import coverage, largest_gap
+from pulsetrainer.core.identification import Identified, Method, Smoothing, identify
 from pulsetrainer.core.plane import Plane, Reading
 from pulsetrainer.errors import DataError
 from pulsetrainer.flows.modelling import known_from, record_of
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
 
 _TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
+_WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,7 @@ class Options:
     levels: int = 48
     operator: Reading = "continuous"
     method: Method = "joint"
+    smoothing: Smoothing | None = None  # None: "auto", or 0 for relays, as in the paper
     force: bool = False
 
 
@@ -50,6 +53,9 @@ class Result:
     fit_rms_percent: float
     fit_max_percent: float
     coverage_percent: float
+    smoothing: float  # share of the input's range
+    input_noise: float | None  # standard deviation, input unit; None where the records cannot tell
+    false_reversals: int  # taken out of the input before the fit
     polarity: int
     iterations: int
     seconds: float
@@ -78,14 +84,27 @@ def run(options: Options, context: Context) -> Result:
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     _check_range(options.runs, low, high, runs[0].input_unit)
     plane = Plane.uniform(low, high, options.levels)
+    cleaned = [input_noise.clean(one.input) for one in runs]
+    _note_noise(cleaned, runs[0].input_unit, context)
+    runs = [replace(one, input=clean.input) for one, clean in zip(runs, cleaned, strict=True)]
     context.progress(0.1)
+    smoothing = options.smoothing
+    if smoothing is None:
+        smoothing = 0.0 if options.operator == "relay" else "auto"
     found = identify(
-        [record_of(one, low, high) for one in runs], plane, reading=options.operator, method=options.method
+        [record_of(one, low, high) for one in runs],
+        plane,
+        reading=options.operator,
+        method=options.method,
+        smoothing=smoothing,
     )
     context.progress(0.8)
     if found.operator.polarity < 0:
         context.note("the output falls when the input rises: fitted as a falling loop")
     covered = coverage(plane, [one.input for one in runs])
+    gap = largest_gap(plane, covered)
+    if gap is not None and float(np.mean(covered)) < _WELL_COVERED:
+        context.note(gap.words(plane, runs[0].input_unit))
     model = _model(runs, found, covered)
     context.progress(0.9)
     header = provenance.make_header(
@@ -110,10 +129,30 @@ def run(options: Options, context: Context) -> Result:
         fit_rms_percent=model.fit.rms_percent,
         fit_max_percent=100.0 * model.fit.max_abs / float(np.ptp(np.concatenate([r.output for r in runs]))),
         coverage_percent=model.fit.coverage_percent,
+        smoothing=found.smoothing,
+        input_noise=_largest_noise(cleaned),
+        false_reversals=sum(clean.removed for clean in cleaned),
         polarity=model.polarity,
         iterations=model.fit.iterations,
         seconds=time.perf_counter() - begun,
     )
+
+
+def _largest_noise(cleaned: Sequence[input_noise.Cleaned]) -> float | None:
+    """Noise of the noisiest input, as far as the records can tell."""
+    known = [clean.sigma for clean in cleaned if np.isfinite(clean.sigma)]
+    return max(known) if known else None
+
+
+def _note_noise(cleaned: Sequence[input_noise.Cleaned], unit: str, context: Context) -> None:
+    """Say how many reversals were noise."""
+    removed = sum(clean.removed for clean in cleaned)
+    if removed:
+        worst = max(cleaned, key=lambda clean: clean.removed)
+        context.note(
+            f"the measured input has noise of {worst.sigma:.2g} {unit}: {removed} false reversals below "
+            f"{worst.dead_band:.2g} {unit} taken out, {sum(clean.kept for clean in cleaned)} left"
+        )
 
 
 def input_range(one: Run) -> tuple[float, float]:
@@ -173,6 +212,7 @@ def _model(runs: Sequence[Run], found: Identified, covered: BoolArray) -> Model:
         input=first.input[shown],
         output=first.output[shown],
         predicted=operator(first.input)[shown],
+        smoothing=found.smoothing,
     )
     return Model(
         levels=plane.levels,

@@ -23,6 +23,7 @@ class Verdict:
     causes: tuple[str, ...]
     found: tuple[str, ...]
     verdict: str
+    tied: tuple[str, ...]  # what the verdict could not be told from
     unique: bool  # a single name, without confounded ones
     right: bool
     in_class: bool
@@ -77,6 +78,7 @@ def judge(kind: str, seed: int) -> Verdict:
         case.causes or ((case.outside,) if case.outside else ()),
         tuple(found),
         named,
+        tuple(tied),
         named not in ("none", "unknown") and not tied,
         right,
         in_class,

@@ -186,7 +186,9 @@ def whole_numbered(draw):
     n_h = draw(st.integers(2, 7))
     steps = draw(st.lists(st.sampled_from([1.0, 2.0, 4.0]), min_size=n_h, max_size=n_h))
     plane = Plane(np.concatenate(([0.0], np.cumsum(steps))) + draw(st.integers(-8, 8)))
-    mu = np.array(draw(st.lists(st.integers(0, 5), min_size=plane.n_q, max_size=plane.n_q)), dtype=float)
+    mu = np.array(
+        draw(st.lists(st.integers(0, 5), min_size=plane.n_q, max_size=plane.n_q).filter(any)), dtype=float
+    )
     operator = Preisach(plane, mu, draw(st.sampled_from([0.0, 2.0])), "relay", draw(st.sampled_from([1, -1])))
     past = draw(st.lists(values(plane), max_size=6))
     reach = int(operator.total) + 3

@@ -1,0 +1,95 @@
+"""The five pitfalls of a pilot, each as a case in which the naive method fails and this one must not."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import hidden
+
+from pulsetrainer.core import signals
+from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.design import Measured
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.fitting import refit, weights_for
+from pulsetrainer.diagnosis.screening import coloured, screen
+from pulsetrainer.diagnosis.selection import diagnose, problem_for
+from pulsetrainer.link.device import open_device
+
+pytestmark = pytest.mark.timeout(600)
+TAU_S = 0.008
+
+
+@pytest.fixture(scope="module")
+def lagged():
+    """A bench with an output lag of 8 ms, on the diagnostic signal."""
+    record, high = hidden.measure(hidden.Case(0, (), {"output-lag": TAU_S}))
+    return problem_for([record], 0.0, high)
+
+
+def test_one_rate_is_said_to_be_one_rate():
+    """On a record of one rate the weights swallow a lag: the answer must say what is missing."""
+    value = signals.identification(0.0, 1.5, n_h=16, speed=1.5, rate_Hz=1000.0).value
+    with open_device(f"bench:?ideal&output-lag={TAU_S}") as device:
+        got = device.play(value, 1000.0)
+    record = Measured(1e-3, got.current_A, got.force_N, np.ones(got.force_N.size), got.reference_A)
+    answer = diagnose([record], 0.0, 1.5, rng=np.random.default_rng(0))
+    assert "one single rate" in residual.excitation_limits(answer.problem)
+    assert "no holds" in residual.excitation_limits(answer.problem)
+    named = [f for f in answer.findings if f.found]
+    assert all(f.confounded_with for f in named if f.cause.family == "lag")
+    # the naive statement, that what the static fit leaves is all there is, is wrong by far
+    share = np.sqrt(answer.baseline.squares / answer.problem.bins.count) / answer.floor
+    assert share < 3
+
+
+def test_discretisation_is_not_named_as_physics():
+    """Without any noise all that is left is discretisation, and it is highly significant: still 'none'."""
+    record, high = hidden.measure(hidden.Case(0, (), {"noise": 0, "current-noise": 0}))
+    answer = diagnose([record], 0.0, high, rng=np.random.default_rng(0))
+    assert answer.verdict == "none"
+    assert min(f.p_value for f in answer.findings if f.cause.stage != "record") <= 0.01
+
+
+def test_a_joint_refit_finds_the_parameter_and_a_fit_to_the_residual_does_not(lagged):
+    """Weights have swallowed part of the lag: its fit to their residual is too short."""
+    base = weights_for(lagged, (), None)
+    cause = library()["output-lag"]
+    column = base.simulator((Term(cause, (1e-3,)),)) - base.predicted
+    naive = 1e-3 * float(column @ base.residual) / float(column @ column)
+    joint = refit(lagged, (Term(cause, (0.002,)),), base).terms[0].values[0]
+    assert joint == pytest.approx(TAU_S, rel=0.05)
+    assert naive < 0.8 * TAU_S
+
+
+def test_autocorrelated_noise_does_not_alarm():
+    """Noise with memory: an F test for independent noise alarms, the simulated null does not."""
+    record, high = hidden.measure(hidden.Case(0, (), {}))
+    rng = np.random.default_rng(5)
+    problem = problem_for([record], 0.0, high)
+    model = weights_for(problem, (), None).simulator.full(())[0]
+    shape = rng.standard_normal(record.output.size)
+    wander = np.convolve(shape, np.exp(-np.arange(60) / 12.0), "same")
+    y = model + 0.02 * wander / wander.std() + 0.02 * rng.standard_normal(wander.size)
+    noisy = Measured(record.dt_s, record.input, y, record.weight, record.reference)
+    again = problem_for([noisy], 0.0, high)
+    base = weights_for(again, (), None)
+    scores = screen(again, base, np.random.default_rng(0))
+    independent = base.squares / again.bins.count
+    best = scores.scores[0]
+    assert best.gain / independent > 6.6  # the one per cent point of F(1, many)
+    assert best.p_value > 0.01
+    assert coloured(base.residual, 2, rng).shape == (again.bins.count, 2)
+
+
+def test_friction_is_held_by_the_weights_and_not_named():
+    """Coulomb friction with elastic presliding is a Preisach operator."""
+    record, high = hidden.measure(hidden.Case(0, (), {"coulomb": 0.3}))
+    answer = diagnose([record], 0.0, high, rng=np.random.default_rng(0))
+    assert answer.verdict == "none"

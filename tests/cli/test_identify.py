@@ -1,0 +1,78 @@
+"""What `identify` says of its fit: smoothing, noise in the input, and what it never saw of the plane."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+ROWS = 4000
+
+
+@pytest.fixture
+def record(run, tmp_path):
+    """Import a record of a relay-like device; return a function that takes the noise and the range."""
+
+    def make(noise=0.0, low=0.0, high=1.0):
+        rng = np.random.default_rng(1)
+        t = np.arange(ROWS) * 0.01
+        u = low + (high - low) * 0.5 * (1 - np.cos(2 * np.pi * t / 8.0) * np.linspace(1.0, 0.2, ROWS))
+        u[:2] = 0.0, 1.0  # the range of the levels
+        y = np.tanh(3 * u - 1.5)
+        measured = u + rng.normal(0.0, noise, ROWS)
+        table = np.column_stack((t, measured, y + rng.normal(0.0, 0.01, ROWS)))
+        np.savetxt(tmp_path / "run.csv", table, delimiter=",", header="t_s,u,y", comments="")
+        done = run(
+            "import", "run.csv", "--time", "t_s", "--input", "u", "--output", "y", "-o", "run.h5", "--force"
+        )
+        assert done.code == 0, done.err
+
+    return make
+
+
+def test_smoothing_is_chosen_reported_and_stored(run, record, tmp_path):
+    """By itself; as asked; none for relays, as in the paper."""
+    from pulsetrainer.artefacts import store
+    from pulsetrainer.artefacts.kinds import Model
+
+    record()
+    base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force", "--json")
+    chosen = run(*base).json["smoothing"]
+    assert 0 <= chosen <= 0.3
+    assert run(*base, "--smoothing", "auto").json["smoothing"] == chosen
+    stored = store.read(tmp_path / "model.h5", Model).fit
+    assert stored is not None
+    assert stored.smoothing == chosen
+    assert run(*base, "--smoothing", "0.04").json["smoothing"] == 0.04
+    assert run(*base, "--smoothing", "0").json["smoothing"] == 0
+    assert run(*base, "--operator", "relay").json["smoothing"] == 0
+
+
+@pytest.mark.parametrize("text", ["much", "-1", "2", "nan"])
+def test_smoothing_must_be_auto_or_a_share(run, record, text):
+    """Anything else is a usage error that says what is expected."""
+    record()
+    done = run("identify", "run.h5", "-o", "model.h5", "--smoothing", text)
+    assert done.code == 2
+    assert "auto or a number in 0..1" in done.out + done.err
+
+
+def test_false_reversals_are_counted(run, record):
+    """Noise in the input is measured, and a note says what was taken out; a clean record has neither."""
+    record(noise=0.005)
+    done = run("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--json")
+    assert done.json["input_noise"] == pytest.approx(0.005, rel=0.1)
+    assert done.json["false_reversals"] > 500
+    assert "false reversals" in done.err
+    record()
+    done = run("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force", "--json")
+    assert done.json["false_reversals"] == 0
+    assert "false reversals" not in done.err
+
+
+def test_the_missing_part_of_the_plane_is_named(run, record):
+    """Below 99 % coverage a note names the region in the input's unit."""
+    record(low=0.3, high=0.8)
+    done = run("identify", "run.h5", "--levels", "20", "-o", "model.h5", "--json")
+    assert done.json["coverage_percent"] < 99
+    assert "never switched: relays with" in done.err
+    assert "% of the plane" in done.err

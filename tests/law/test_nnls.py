@@ -1,0 +1,95 @@
+"""Laws of the non-negative solver: the optimality conditions, and equality with scipy's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import optimize
+
+from pulsetrainer.core import nnls
+
+
+@st.composite
+def problems(draw):
+    """Random matrices, tall and wide, with sparse, repeated and empty columns, in any unit; a right side."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rows, columns = draw(st.integers(1, 40)), draw(st.integers(1, 15))
+    matrix = rng.normal(size=(rows, columns)) + draw(st.sampled_from([0.0, 1.0]))
+    matrix[rng.random(matrix.shape) < draw(st.sampled_from([0.0, 0.5]))] = 0.0
+    if draw(st.booleans()) and columns > 1:
+        matrix[:, 0] = matrix[:, -1]  # cells that the data cannot tell apart
+    matrix *= draw(st.sampled_from([1e-8, 1.0, 1e5]))
+    return matrix, rng.normal(size=rows) * draw(st.sampled_from([1e-6, 1.0, 1e3]))
+
+
+@given(problems())
+def test_same_objective_as_scipy(problem):
+    """The residual is that of scipy.optimize.nnls on the matrix itself."""
+    matrix, right = problem
+    x = nnls.solve(matrix.T @ matrix, matrix.T @ right).x
+    _, norm = optimize.nnls(matrix, right, maxiter=10_000)
+    assert np.sum((matrix @ x - right) ** 2) == pytest.approx(norm**2, rel=1e-9, abs=1e-12 * (right @ right))
+
+
+@given(problems())
+def test_same_minimiser_as_scipy_where_there_is_one(problem):
+    """A well-conditioned problem has one minimiser, and both find it."""
+    matrix, right = problem
+    size = np.linalg.svd(matrix, compute_uv=False)
+    if matrix.shape[0] < matrix.shape[1] or size[-1] < 1e-3 * size[0]:
+        matrix = np.vstack((matrix, size[0] * np.eye(matrix.shape[1])))
+        right = np.append(right, np.zeros(matrix.shape[1]))
+    expected, _ = optimize.nnls(matrix, right, maxiter=10_000)
+    found = nnls.solve(matrix.T @ matrix, matrix.T @ right).x
+    assert found == pytest.approx(expected, rel=0, abs=1e-8 * np.abs(expected).max() + 1e-300)
+
+
+@given(problems())
+def test_optimality_conditions(problem):
+    """X >= 0, no descent at its zeros, a flat gradient where it is positive."""
+    matrix, right = problem
+    gram, rhs = matrix.T @ matrix, matrix.T @ right
+    found = nnls.solve(gram, rhs)
+    assert np.all(found.x >= 0)
+    assert np.all(found.x[~found.passive] == 0)
+    # the largest term that a gradient is a difference of
+    size = np.abs(rhs).max() + (np.abs(gram) @ found.x).max() + np.finfo(float).tiny
+    gradient = gram @ found.x - rhs
+    assert np.all(gradient >= -1e-9 * size)
+    assert np.all(np.abs(gradient[found.x > 0]) <= 1e-9 * size)
+
+
+@given(problems(), st.data())
+def test_the_first_guess_does_not_matter(problem, data):
+    """A guess of the positive variables changes the way, not the objective reached."""
+    matrix, right = problem
+    gram, rhs = matrix.T @ matrix, matrix.T @ right
+    guess = np.array(data.draw(st.lists(st.booleans(), min_size=rhs.size, max_size=rhs.size)))
+    one, two = nnls.solve(gram, rhs).x, nnls.solve(gram, rhs, passive=guess).x
+    squares = [np.sum((matrix @ x - right) ** 2) for x in (one, two)]
+    assert squares[0] == pytest.approx(squares[1], rel=1e-9, abs=1e-12 * (right @ right))
+
+
+@given(problems(), st.sampled_from([1e-12, 1e-3, 1e7]))
+def test_units_do_not_matter(problem, unit):
+    """Another unit of the data scales the minimiser and changes no decision."""
+    matrix, right = problem
+    gram, rhs = matrix.T @ matrix, matrix.T @ right
+    here, there = nnls.solve(gram, rhs), nnls.solve(gram * unit**2, rhs * unit)
+    squares = [np.sum((matrix @ x - right) ** 2) for x in (here.x, there.x * unit)]
+    assert squares[0] == pytest.approx(squares[1], rel=1e-9, abs=1e-12 * (right @ right))
+
+
+@given(problems())
+def test_kkt_violation_tells_right_from_wrong(problem):
+    """It is small at the solution and large at a point that is none."""
+    matrix, right = problem
+    gram, rhs = matrix.T @ matrix, matrix.T @ right
+    found = nnls.solve(gram, rhs).x
+    if rhs.max() > 1e-6 * np.abs(rhs).max():  # else the solution may be zero
+        assert nnls.kkt_violation(gram, rhs, np.zeros_like(found)) > 0
+    at_work = found + 1.0
+    expected = np.abs(gram @ at_work - rhs).max() / max(np.abs(rhs).max(), np.finfo(float).tiny)
+    assert nnls.kkt_violation(gram, rhs, at_work) == pytest.approx(expected, rel=1e-9)

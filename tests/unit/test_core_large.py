@@ -1,0 +1,122 @@
+"""Large planes: the matrix-free path ends where the dense one does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_jobs import curves, plant, random_reversals
+
+from pulsetrainer.core import identification, large, nnls
+from pulsetrainer.core.equations import Record, node_sums
+from pulsetrainer.core.identification import identify
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.smoothing import smoothed
+from pulsetrainer.errors import ConvergenceError
+
+N_H = 24
+PLANE = Plane.uniform(-1.0, 1.0, N_H)
+
+
+def signal(kind, rng, n=4000):
+    """Return reversal curves, the same with noise, random reversals, or a signal that leaves gaps."""
+    if kind == "curves":
+        return curves(n, N_H, 20)
+    if kind == "noisy":
+        return curves(n, N_H, 20) + rng.normal(0.0, 0.005, n)
+    if kind == "gaps":
+        return 0.6 * curves(n, N_H, 20)
+    return random_reversals(rng, n, n // 10)
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.05])
+@pytest.mark.parametrize("kind", ["curves", "noisy", "random", "gaps"])
+def test_same_answer_as_the_dense_path(kind, smoothing):
+    """Objective, masses, offset and output agree; optimality is as good as stated."""
+    rng = np.random.default_rng(1)
+    u = signal(kind, rng)
+    y = plant(120)(u) + rng.normal(0.0, 0.005, u.size)
+    sums = node_sums(PLANE, [Record(u, y)], "continuous")
+    equations = sums.dense()
+    gram, rhs = smoothed(equations, smoothing)
+    dense = nnls.solve(gram, rhs)
+    found = large.solve(sums, smoothing)
+
+    def objective(x):
+        return equations.sum_of_squares(x, equations.offset(x)) + x @ (gram - equations.centred()[0]) @ x
+
+    print(f"seed 1, {kind}, s = {smoothing}: {found.iterations} Newton steps, violation {found.kkt:.1e}")
+    assert objective(found.masses) == pytest.approx(objective(dense.x), rel=1e-6)
+    assert found.offset == pytest.approx(equations.offset(found.masses), abs=1e-9)
+    ours, theirs = (Preisach(PLANE, x / PLANE.areas, equations.offset(x))(u) for x in (found.masses, dense.x))
+    # at the minimum, objectives equal to 1e-6 mean outputs equal to 1e-3 of the noise
+    assert np.sqrt(np.mean((ours - theirs) ** 2)) <= 1e-3 * 0.005
+    assert nnls.kkt_violation(gram, rhs, found.masses) <= 2 * large.TOLERANCE
+    if kind != "gaps":  # there neither the offset nor the weights are unique
+        assert found.offset == pytest.approx(equations.offset(dense.x), abs=1e-5)
+        assert np.allclose(PLANE.everett_nodes(found.masses), PLANE.everett_nodes(dense.x), atol=1e-5)
+
+
+def test_the_couplings_that_are_left_out_do_not_change_the_answer(monkeypatch):
+    """With S factorised, or with its near part only: the same fit."""
+    rng = np.random.default_rng(2)
+    u = signal("random", rng)
+    sums = node_sums(PLANE, [Record(u, plant(120)(u) + rng.normal(0.0, 0.005, u.size))], "continuous")
+    whole = large.solve(sums)
+    monkeypatch.setattr(large, "_FACTORISED_ROW", 0)
+    near = large.solve(sums)
+    assert np.allclose(near.masses, whole.masses, atol=1e-5)
+
+
+def test_identify_chooses_it_when_dense_matrices_do_not_fit(monkeypatch):
+    """The same call, and the same prediction."""
+    rng = np.random.default_rng(3)
+    u = signal("curves", rng)
+    record = Record(u, plant(120)(u) + rng.normal(0.0, 0.005, u.size))
+    dense = identify([record], PLANE, smoothing=0.04)
+    monkeypatch.setattr(identification, "DENSE_BYTES", 1000)
+    free = identify([record], PLANE, smoothing=0.04)
+    unseen = random_reversals(rng, 1000, 60)
+    assert np.allclose(free.operator(unseen), dense.operator(unseen), atol=1e-5)
+    assert free.kkt <= large.TOLERANCE
+    falling = identify([Record(u, -record.output)], PLANE, smoothing=0.04)
+    assert falling.operator.polarity == -1
+    assert np.allclose(falling.operator(unseen), -free.operator(unseen), atol=1e-9)
+
+
+def test_more_levels_than_dense_allows():
+    """90 levels, 4095 cells, go the matrix-free way by themselves."""
+    rng = np.random.default_rng(4)
+    u = curves(8000, 48, 30)
+    device = plant(240)
+    clean = device(u)
+    fit = identify(
+        [Record(u, clean + rng.normal(0.0, 0.005, u.size))], Plane.uniform(-1.0, 1.0, 90), smoothing=0.05
+    )
+    unseen = random_reversals(rng, 2000, 60)
+    error = 100 * np.sqrt(np.mean((fit.operator(unseen) - device(unseen)) ** 2)) / np.ptp(clean)
+    print(f"seed 4: {fit.iterations} Newton steps, error {error:.3f} %")
+    assert error < 0.1
+
+
+def test_the_diagonal_is_that_of_the_dense_matrix():
+    """Cone sums over pairs of nodes by one cumulative sum."""
+    rng = np.random.default_rng(5)
+    u = signal("random", rng)
+    sums = node_sums(PLANE, [Record(u, u)], "continuous")
+    gram, _ = sums.dense().centred()
+    assert np.allclose(large.centred_diagonal(sums), np.diagonal(gram), atol=1e-9 * sums.weight)
+
+
+def test_the_stencil_undoes_the_cumulative_sums():
+    """D C = 1."""
+    masses = np.random.default_rng(6).random(PLANE.n_q)
+    assert np.allclose(large.difference(PLANE) @ PLANE.everett_nodes(masses), masses, atol=1e-12)
+
+
+def test_what_does_not_settle_says_so():
+    """Too few steps: the violation reached and the one wanted."""
+    u = signal("curves", np.random.default_rng(7))
+    sums = node_sums(PLANE, [Record(u, plant(120)(u))], "continuous")
+    with pytest.raises(ConvergenceError, match="did not settle within 2 Newton steps"):
+        large.solve(sums, max_iterations=2)

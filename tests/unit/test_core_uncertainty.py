@@ -1,0 +1,124 @@
+"""Uncertainty: intervals that hold the truth about as often as they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_jobs import curves, plant, random_reversals
+from scipy.signal import lfilter
+
+from pulsetrainer.core import identification, uncertainty
+from pulsetrainer.core.equations import parted_sums
+from pulsetrainer.core.identification import Record, identify
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.errors import ArgumentError
+
+N_H = 10
+PLANE = Plane.uniform(-1.0, 1.0, N_H)
+DEVICE = plant(N_H)
+INPUT = curves(2000, N_H, 20)
+CLEAN = DEVICE(INPUT)
+SIGMA = 0.01 * float(np.ptp(CLEAN))
+
+
+def noise(rng, memory):
+    """Return noise of size SIGMA whose autocorrelation falls by ``memory`` a sample."""
+    white = rng.normal(0.0, SIGMA, INPUT.size + 200)
+    return lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], white)[200:]
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8])
+def test_intervals_hold_the_truth(memory):
+    """Nominal 90 % intervals of output, offset and weights, in white and in coloured noise."""
+    unseen = random_reversals(np.random.default_rng(1), 300, 20)
+    truth = DEVICE(unseen)
+    held = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        record = Record(INPUT, CLEAN + noise(rng, memory))
+        fit = identify([record], PLANE)
+        ensemble = uncertainty.bootstrap([record], fit, rng=rng, draws=40)
+        band = ensemble.output_band(unseen)
+        weights = ensemble.weight_interval()
+        offset = ensemble.offset_interval()
+        slack = 1e-9 * DEVICE.weights.max()
+        held.append(
+            (
+                np.mean((truth >= band.lower) & (truth <= band.upper)),
+                np.mean(
+                    (DEVICE.weights >= weights.lower - slack) & (DEVICE.weights <= weights.upper + slack)
+                ),
+                float(offset.lower <= DEVICE.offset <= offset.upper),
+            )
+        )
+    output, weight, offset = np.mean(held, axis=0)
+    print(f"seeds 0..9, memory {memory}: output {output:.3f}, weights {weight:.3f}, offset {offset:.2f}")
+    assert 0.78 <= output <= 0.97
+    assert 0.75 <= weight <= 0.99
+    assert offset >= 0.6
+
+
+def test_the_same_rng_gives_the_same_ensemble():
+    """Nothing but the generator decides; a falling loop has the mirrored band."""
+    record = Record(INPUT, CLEAN + noise(np.random.default_rng(2), 0.0))
+    fit = identify([record], PLANE, smoothing=0.05)
+    one, two = (
+        uncertainty.bootstrap([record], fit, rng=np.random.default_rng(3), draws=10) for _ in range(2)
+    )
+    assert np.array_equal(one.weights, two.weights)
+    assert np.all(one.weights >= 0)
+    mirrored = Record(INPUT, -record.output)
+    turned = uncertainty.bootstrap(
+        [mirrored], identify([mirrored], PLANE, smoothing=0.05), rng=np.random.default_rng(3), draws=10
+    )
+    band, other = one.output_band(INPUT[:100]), turned.output_band(INPUT[:100])
+    assert np.allclose(other.upper, -band.lower, atol=1e-9)
+    assert np.allclose(turned.offset_interval().lower, -one.offset_interval().upper, atol=1e-9)
+
+
+def test_a_resample_is_a_refit_of_the_drawn_blocks():
+    """The weighted sum of block sums equals the sums with the drawn counts as weights."""
+    record = Record(INPUT, CLEAN)
+    part = np.arange(INPUT.size) // 100
+    stack = uncertainty._Stack(parted_sums(PLANE, [record], "continuous", [part], 20))
+    drawn = np.random.default_rng(4).multinomial(20, np.full(20, 1 / 20)).astype(float)
+    direct = identification.normal_equations(PLANE, [Record(INPUT, CLEAN, drawn[part])], "continuous")
+    mixed = stack.weighted(drawn).dense()
+    for name in ("gram", "moment", "row_sum", "weight", "output_sum", "output_square"):
+        assert np.allclose(getattr(mixed, name), getattr(direct, name), atol=1e-8), name
+
+
+def test_blocks_grow_with_the_memory_of_the_residual():
+    """White residuals take short blocks, slow ones long blocks, none at all the shortest."""
+    rng = np.random.default_rng(5)
+    white, slow = (uncertainty.block_length([noise(rng, memory)]) for memory in (0.0, 0.95))
+    assert white <= 25
+    assert slow >= 3 * white
+    assert uncertainty.block_length([np.zeros(4000)]) == 10
+
+
+def test_masked_samples_are_in_no_block():
+    """A record whose first half has no weight is resampled from its second half."""
+    weight = np.where(np.arange(INPUT.size) < 1000, 0.0, 1.0)
+    output = np.where(weight > 0, CLEAN + noise(np.random.default_rng(6), 0.0), np.nan)
+    record = Record(INPUT, output, weight)
+    ensemble = uncertainty.bootstrap(
+        [record], identify([record], PLANE), rng=np.random.default_rng(6), draws=4
+    )
+    assert np.all(np.isfinite(ensemble.weights))
+
+
+def test_bad_requests_are_named(monkeypatch):
+    """Draws, block length, level, and planes that do not fit."""
+    record = Record(INPUT, CLEAN)
+    fit = identify([record], PLANE)
+    rng = np.random.default_rng(7)
+    with pytest.raises(ArgumentError, match="draws must be at least 2"):
+        uncertainty.bootstrap([record], fit, rng=rng, draws=1)
+    with pytest.raises(ArgumentError, match="at least 2 blocks"):
+        uncertainty.bootstrap([record], fit, rng=rng, block=2000)
+    with pytest.raises(ArgumentError, match="level must be between 0 and 1"):
+        uncertainty.bootstrap([record], fit, rng=rng, draws=2).offset_interval(90)
+    monkeypatch.setattr(identification, "DENSE_BYTES", 1000)
+    with pytest.raises(ArgumentError, match="dense"):
+        uncertainty.bootstrap([record], fit, rng=rng)
