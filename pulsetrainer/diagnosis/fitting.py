@@ -114,7 +114,7 @@ def weights_for(
     simulator = None if near is None else near.simulator
     added = np.zeros(problem.bins.count)
     exact = tuple(terms) == built
-    for _ in range(1 if exact else 3 if near is None else _PASSES):
+    for _ in range(1 if exact else 3 * _PASSES if near is None else _PASSES):
         if simulator is not None and not exact:
             added = simulator(terms) - simulator(built)
         wanted = problem.measured - added

@@ -254,7 +254,9 @@ class _Search:
             target = wanted[train] - wanted[train].mean()
             share = 1.0 - 1.0 / folds
             rhs = inside.T @ (target - inside @ start) - share * ridge @ start
-            change = linalg.solve(inside.T @ inside + share * ridge, rhs, assume_a="pos")
+            normal = inside.T @ inside + share * ridge
+            factor = linalg.cho_factor(normal, lower=True, check_finite=False)
+            change = linalg.cho_solve(factor, rhs, check_finite=False)
             error = wanted[test] - wanted[train].mean() - (columns[test] - mean) @ (start + change)
             yield test, error, change[free.size :]
 
@@ -332,6 +334,8 @@ class _Search:
         for score in scores.scores:
             if len(trials) == TRIED or not self._significant(score):
                 break
+            if score.cause.family in {term.cause.family for term in current.terms}:
+                continue  # what a cause of its own kind leaves is its imperfect formula, not a second one
             trial = refit(self.problem, (*current.terms, Term(score.cause, score.start)), current, rounds=3)
             trials.append((trial, score))
         trials.sort(key=lambda pair: pair[0].squares)
@@ -416,7 +420,7 @@ class _Search:
     def _rivals(self, fitted: Fitted, without: Fitted, term: Term, gain: float) -> tuple[str, ...]:
         """Causes that repair the same data as well, within the noise of the comparison."""
         scores = screen(self.problem, without, self.rng, draws=20)
-        margin = max(0.05 * gain, 12.0 * fitted.squares / self.count)
+        margin = max(0.005 * gain, 0.3 * self.relevant, 12.0 * fitted.squares / self.count)
         rivals = []
         for score in scores.scores[:3]:
             if score.cause.id in (term.cause.id, *fitted.names) or score.gain < 0.5 * gain:
