@@ -128,6 +128,14 @@ class Fit:
     output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
     predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
     smoothing: float = 0.0  # length below which the density was smoothed, share of the input's range
+    draws: int = 0  # refits of the block bootstrap; 0: none was made
+    # 90 % band of the predicted output, without the noise of a measurement
+    predicted_lower: Annotated[
+        FloatArray | None, Data("@output_unit", "lower end of the predicted output", "time")
+    ] = None
+    predicted_upper: Annotated[
+        FloatArray | None, Data("@output_unit", "upper end of the predicted output", "time")
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +178,13 @@ class Model:
     output_quantity: str = "force"
     operator: str = "continuous"  # how the weights are read: "continuous" | "relay"
     polarity: int = 1  # -1: the output falls when the input rises
+    # 90 % interval of every weight, where a bootstrap was made
+    weights_lower: Annotated[
+        FloatArray | None, Data("@weights_unit", "lower end of the Preisach weights", "cell")
+    ] = None
+    weights_upper: Annotated[
+        FloatArray | None, Data("@weights_unit", "upper end of the Preisach weights", "cell")
+    ] = None
     fit: Fit | None = None
     extensions: tuple[Extension, ...] = ()
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import BoolArray, Fit, Model, Run
-from pulsetrainer.core import input_noise, metrics
+from pulsetrainer.core import input_noise, metrics, uncertainty
 from pulsetrainer.core.coverage import coverage, largest_gap
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify
 from pulsetrainer.core.plane import Plane, Reading
@@ -37,6 +37,8 @@ class Options:
     operator: Reading = "continuous"
     method: Method = "joint"
     smoothing: Smoothing | None = None  # None: "auto", or 0 for relays, as in the paper
+    bootstrap: int = 0  # refits to resampled blocks
+    seed: int = 0  # of the resampling
     force: bool = False
 
 
@@ -56,6 +58,7 @@ class Result:
     smoothing: float  # share of the input's range
     input_noise: float | None  # standard deviation, input unit; None where the records cannot tell
     false_reversals: int  # taken out of the input before the fit
+    output_uncertainty: float | None  # mean half width of the 90 % band of the output; None without bootstrap
     polarity: int
     iterations: int
     seconds: float
@@ -91,21 +94,28 @@ def run(options: Options, context: Context) -> Result:
     smoothing = options.smoothing
     if smoothing is None:
         smoothing = 0.0 if options.operator == "relay" else "auto"
+    records = [record_of(one, low, high) for one in runs]
     found = identify(
-        [record_of(one, low, high) for one in runs],
+        records,
         plane,
         reading=options.operator,
         method=options.method,
         smoothing=smoothing,
     )
-    context.progress(0.8)
+    context.progress(0.4 if options.bootstrap else 0.8)
+    ensemble = None
+    if options.bootstrap:
+        ensemble = uncertainty.bootstrap(
+            records, found, rng=np.random.default_rng(options.seed), draws=options.bootstrap
+        )
+        context.progress(0.8)
     if found.operator.polarity < 0:
         context.note("the output falls when the input rises: fitted as a falling loop")
     covered = coverage(plane, [one.input for one in runs])
     gap = largest_gap(plane, covered)
     if gap is not None and float(np.mean(covered)) < _WELL_COVERED:
         context.note(gap.words(plane, runs[0].input_unit))
-    model = _model(runs, found, covered)
+    model = _model(runs, found, covered, ensemble)
     context.progress(0.9)
     header = provenance.make_header(
         f"Preisach model of {', '.join(path.stem for path in options.runs)}",
@@ -132,6 +142,7 @@ def run(options: Options, context: Context) -> Result:
         smoothing=found.smoothing,
         input_noise=_largest_noise(cleaned),
         false_reversals=sum(clean.removed for clean in cleaned),
+        output_uncertainty=_half_width(model.fit),
         polarity=model.polarity,
         iterations=model.fit.iterations,
         seconds=time.perf_counter() - begun,
@@ -185,7 +196,16 @@ def _check_range(paths: Sequence[Path], low: float, high: float, unit: str) -> N
         )
 
 
-def _model(runs: Sequence[Run], found: Identified, covered: BoolArray) -> Model:
+def _half_width(fit: Fit) -> float | None:
+    """Mean half width of the band of the predicted output."""
+    if fit.predicted_lower is None or fit.predicted_upper is None:
+        return None
+    return 0.5 * float(np.mean(fit.predicted_upper - fit.predicted_lower))
+
+
+def _model(
+    runs: Sequence[Run], found: Identified, covered: BoolArray, ensemble: uncertainty.Ensemble | None
+) -> Model:
     """Return the stored form of an identified operator, with its fit."""
     operator, first = found.operator, runs[0]
     plane = operator.plane
@@ -198,6 +218,8 @@ def _model(runs: Sequence[Run], found: Identified, covered: BoolArray) -> Model:
     shown = slice(
         known_from(first.input, plane.low, plane.high), None, max(1, first.input.size // _TRACE_SAMPLES)
     )
+    band = None if ensemble is None else ensemble.output_band(first.input)
+    weights = None if ensemble is None else ensemble.weight_interval()
     fit = Fit(
         rms=errors.rms,
         max_abs=errors.max_abs,
@@ -213,6 +235,9 @@ def _model(runs: Sequence[Run], found: Identified, covered: BoolArray) -> Model:
         output=first.output[shown],
         predicted=operator(first.input)[shown],
         smoothing=found.smoothing,
+        draws=0 if ensemble is None else len(ensemble.weights),
+        predicted_lower=None if band is None else band.lower[shown],
+        predicted_upper=None if band is None else band.upper[shown],
     )
     return Model(
         levels=plane.levels,
@@ -226,5 +251,7 @@ def _model(runs: Sequence[Run], found: Identified, covered: BoolArray) -> Model:
         output_quantity=first.output_quantity,
         operator=operator.reading,
         polarity=operator.polarity,
+        weights_lower=None if weights is None else weights.lower,
+        weights_upper=None if weights is None else weights.upper,
         fit=fit,
     )
