@@ -187,7 +187,8 @@ class Session:
     def _check_version(self, reply: HelloReply) -> None:
         firmware = (reply.firmware_major, reply.firmware_minor, reply.firmware_patch)
         name = f"the device on {self._port} (firmware {_dotted(firmware)})"
-        theirs, ours = (reply.major, reply.minor), (PROTOCOL_MAJOR, PROTOCOL_MINOR)
+        theirs: tuple[int, ...] = (reply.major, reply.minor)
+        ours: tuple[int, ...] = (PROTOCOL_MAJOR, PROTOCOL_MINOR)
         if reply.major != PROTOCOL_MAJOR:
             said = f"speaks protocol {_dotted(theirs)}, this program {_dotted(ours)}"
         else:
