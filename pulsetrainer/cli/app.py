@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Annotated
 
@@ -20,6 +21,7 @@ from pulsetrainer.cli import (
     play,
     plot,
     ports,
+    settings,
     show,
 )
 
@@ -53,12 +55,27 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def root(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
+    settings_file: Annotated[
+        str | None,
+        typer.Option(
+            "--settings",
+            help="File of settings; default: pulsetrainer.toml here, or in the user's configuration.",
+            show_default=False,
+        ),
+    ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show the whole traceback of an error.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Say on stderr what is being done.")] = False,
 ) -> None:
     """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate."""
+    if context.resilient_parsing or {"--help"} & set(sys.argv):
+        return  # help and completion need no settings, and a bad file must not hide them
+    file = settings.find(settings_file, os.environ)
+    if file is not None:
+        context.default_map = settings.defaults(settings.read(file))
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ import typer
 
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.options import AsJson, Force, Out
+from pulsetrainer.cli.settings import variable
 
 
 class Operator(StrEnum):
@@ -29,7 +30,9 @@ class Method(StrEnum):
 def identify(
     runs: Annotated[list[Path], typer.Argument(help="Runs to fit together.", metavar="RUN.h5...")],
     out: Out,
-    levels: Annotated[int, typer.Option(help="Levels of the Preisach plane.")] = 48,
+    levels: Annotated[
+        int, typer.Option(help="Levels of the Preisach plane.", envvar=variable("levels"))
+    ] = 48,
     operator: Annotated[
         Operator, typer.Option(help="continuous, or relay as in the paper.")
     ] = Operator.continuous,
@@ -43,7 +46,8 @@ def identify(
         ),
     ] = None,
     bootstrap: Annotated[
-        int, typer.Option(min=0, help="Refits to resampled blocks, for 90 % intervals; 200 take about a minute.")
+        int,
+        typer.Option(min=0, help="Refits to resampled blocks, for 90 % intervals; 200 take about a minute."),
     ] = 0,
     seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
     force: Force = False,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import logging
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,15 +13,16 @@ from pulsetrainer.artefacts import output, provenance, table
 from pulsetrainer.artefacts.recorder import RunRecorder
 from pulsetrainer.core import signals
 from pulsetrainer.core.coverage import coverage
-from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.signals import Signal
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError, Interrupted, UsageError
-from pulsetrainer.link import open_device, redact
+from pulsetrainer.link import DEFAULT_PORT, Limits, open_device, redact
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
     from pulsetrainer.link import Block, Device
 
+_LOG = logging.getLogger(__name__)
 EXCITATIONS = ("identification", "diagnostic")
 CONDITIONING_SPEED_A_PER_S = 3.0
 CONDITIONING_REST_S = 0.2
@@ -38,6 +40,8 @@ class Options:
     speed_A_per_s: float = 0.75
     rate_Hz: float = 1000.0
     condition: bool = True  # one unrecorded major loop first
+    limits: Limits = field(default_factory=Limits)  # put in force on the device before anything is played
+    dry_run: bool = False  # plan only
     force: bool = False
 
 
@@ -60,7 +64,51 @@ class Result:
     firmware: str
 
 
-def plan(options: Options) -> Signal:
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What would be played."""
+
+    signal: str
+    samples: int
+    seconds: float  # the conditioning loop included
+    rate_Hz: float
+    reversals: int
+    coverage_percent: float
+    peak_current_A: float
+    rms_current_A: float
+    port: str
+    output: Path
+    dry_run: bool = True
+
+
+def plan(options: Options) -> Plan:
+    """Return what ``run`` would play; nothing is opened or written.
+
+    Raises
+    ------
+    UsageError, DataError
+        As ``reference``; also when the output exists.
+    """
+    output.check_output(options.output, options.force)
+    signal = reference(options)
+    top = float(signal.value.max())
+    first = conditioning_loop(top, options.rate_Hz).size / options.rate_Hz if options.condition else 0.0
+    covered = coverage(Plane.uniform(0.0, top, options.levels), [signal.value]) if top > 0 else np.zeros(1)
+    return Plan(
+        signal=signal.name,
+        samples=signal.value.size,
+        seconds=signal.duration_s + first,
+        rate_Hz=options.rate_Hz,
+        reversals=signal.reversals,
+        coverage_percent=100.0 * float(covered.mean()),
+        peak_current_A=float(np.abs(signal.value).max()),
+        rms_current_A=float(np.sqrt(np.mean(signal.value**2))),
+        port=redact(options.port or DEFAULT_PORT),
+        output=options.output,
+    )
+
+
+def reference(options: Options) -> Signal:
     """Return the reference to be played.
 
     Raises
@@ -122,9 +170,10 @@ def run(options: Options, context: Context) -> Result:
         Ctrl-C: the output was stopped first, then what was recorded was kept.
     """
     output.check_output(options.output, options.force)
-    signal = plan(options)
-    with open_device(options.port) as device:
+    signal = reference(options)
+    with open_device(options.port, limits=options.limits) as device:
         if options.condition:
+            _LOG.info("conditioning: once around the major loop")
             condition(device, float(signal.value.max()), options.rate_Hz)
         return _record(options, signal, device, context)
 
@@ -137,13 +186,20 @@ def condition(device: Device, high_A: float, rate_Hz: float) -> None:
     DeviceError, Interrupted
         The loop could not be completed.
     """
-    if high_A <= 0:
+    loop = conditioning_loop(high_A, rate_Hz)
+    if loop.size == 0:
         return
-    loop = signals.conditioning(
-        0.0, high_A, speed=CONDITIONING_SPEED_A_PER_S, rate_Hz=rate_Hz, rest_s=CONDITIONING_REST_S
-    )
     recording = device.play(loop, rate_Hz)
     check_ended(recording.fault, "conditioning", "", recording.remedy)
+
+
+def conditioning_loop(high_A: float, rate_Hz: float) -> FloatArray:
+    """Samples (n,) of the major loop that comes first; none for a signal that stays at zero."""
+    if high_A <= 0:
+        return np.zeros(0)
+    return signals.conditioning(
+        0.0, high_A, speed=CONDITIONING_SPEED_A_PER_S, rate_Hz=rate_Hz, rest_s=CONDITIONING_REST_S
+    )
 
 
 def check_ended(fault: str, what: str, kept: str, remedy: str) -> None:
@@ -176,7 +232,9 @@ def _record(options: Options, signal: Signal, device: Device, context: Context) 
         argv=context.argv,
         now=context.now(),
         parameters={
-            key: value for key, value in asdict(options).items() if key not in ("port", "output", "force")
+            key: value
+            for key, value in asdict(options).items()
+            if key not in ("port", "output", "force", "dry_run")
         },
         inputs=provenance.digests([] if signal.name in EXCITATIONS else [options.signal]),
         device=provenance.Device(info.serial, info.firmware, redact(options.port or "")),
@@ -190,6 +248,7 @@ def _record(options: Options, signal: Signal, device: Device, context: Context) 
             measured.append(block)
             context.progress(float(block.tick[-1]) / info.tick_rate_Hz / signal.duration_s)
 
+        _LOG.info("playing %d samples at %g Hz", signal.value.size, options.rate_Hz)
         recording = device.play(signal.value, options.rate_Hz, decimation=decimation, on_block=keep)
         recorder.finish(complete=recording.complete, dropped_samples=recording.dropped_samples)
     kept = f"; {recording.tick.size} samples were kept in {options.output} (complete=false)"

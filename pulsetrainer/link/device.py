@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import threading
 import time
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+_LOG = logging.getLogger(__name__)
 PORT_VARIABLE = "PULSETRAINER_PORT"
 DEFAULT_PORT = "bench:"
 _INTERRUPTED = "interrupted"
@@ -70,6 +72,14 @@ class DeviceInfo:
             reset_cause=codes.ResetCause(hello.reset_cause).name.lower(),
             latched_fault=latched_fault,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Limits that shall be in force; None leaves the device's own. They can only be lowered."""
+
+    current_A: float | None = None
+    force_N: float | None = None
 
 
 class Device:
@@ -147,6 +157,29 @@ class Device:
             raise DeviceError(f"the device did not take {name}={value}", hint="flash the firmware again")
         self._greet()  # the limits in force have changed
         return reply.value
+
+    def lower(self, limits: Limits) -> None:
+        """Put limits in force that are stricter than the device's own.
+
+        Raises
+        ------
+        ArgumentError
+            if a limit is not positive, or above the device's own.
+        """
+        info = self.info
+        for what, parameter, wanted, own, quantum, unit in (
+            ("current", "current_limit", limits.current_A, info.current_limit_A, codes.CURRENT_UNIT_A, "A"),
+            ("force", "force_trip", limits.force_N, info.force_limit_N, codes.FORCE_UNIT_N, "N"),
+        ):
+            if wanted is None:
+                continue
+            if not 0 < wanted <= own:
+                raise ArgumentError(
+                    f"a {what} limit of {wanted:g} {unit} was asked for; the device's own is {own:g} {unit}",
+                    hint="a limit can only be lowered",
+                )
+            self.set_parameter(parameter, round(wanted / quantum))
+            _LOG.info("%s limit lowered from %g to %g %s", what, own, wanted, unit)
 
     def play(
         self,
@@ -299,6 +332,7 @@ def redact(port: str) -> str:
 def open_device(
     port: str | None,
     *,
+    limits: Limits | None = None,
     monotonic: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> Device:
@@ -308,6 +342,8 @@ def open_device(
     ------
     UsageError
         if the port's text makes no sense.
+    ArgumentError
+        if a limit is beyond the device's own.
     DeviceError
         if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
     """
@@ -331,7 +367,14 @@ def open_device(
             transport = SerialTransport(name)
         timeouts_s = QEMU_TIMEOUTS_S if isinstance(machine, Emulator) else TIMEOUTS_S
         session = Session(transport, name, monotonic=monotonic, timeouts_s=timeouts_s)
-        return Device(session, transport, machine, monotonic=monotonic, sleep=sleep)
+        device = Device(session, transport, machine, monotonic=monotonic, sleep=sleep)
+        _LOG.info(
+            "%s: %s, firmware %s, protocol %s, limits %g A and %g N",
+            *(redact(port), device.info.serial, device.info.firmware, device.info.protocol),
+            *(device.info.current_limit_A, device.info.force_limit_N),
+        )
+        device.lower(limits or Limits())
+        return device  # noqa: TRY300 - what fails up to here closes the port
     except BaseException:
         if transport is not None:
             transport.close()
