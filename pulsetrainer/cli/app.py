@@ -11,7 +11,9 @@ import typer
 from pulsetrainer import __version__
 from pulsetrainer.cli import (
     capture,
+    compare,
     diagnose,
+    doctor,
     evaluate,
     extend,
     guard,
@@ -40,11 +42,13 @@ app.command("identify")(identify.identify)
 app.command("invert")(invert.invert)
 app.command("play")(play.play)
 app.command("evaluate")(evaluate.evaluate)
+app.command("compare")(compare.compare)
 app.command("diagnose")(diagnose.diagnose)
 app.command("extend")(extend.extend)
 app.command("show")(show.show)
 app.command("plot")(plot.plot)
 app.command("ports")(ports.ports)
+app.command("doctor")(doctor.doctor)
 
 
 def _version(wanted: bool) -> None:
