@@ -42,7 +42,8 @@ def draw(labels: Sequence[str], values: Mapping[str, Sequence[float | None]]) ->
                 place, known, color=next(colours), linestyle=line, marker=marker, markersize=4, label=stem
             )
         axes.set_title(_NAMES[metric])
-        axes.set_ylim(bottom=0.0)
+        top = max((v for row in rows.values() for v in row if v is not None), default=1.0)
+        axes.set_ylim(0.0, 1.1 * top if top > 0 else 1.0)
         axes.yaxis.set_major_locator(MaxNLocator(5))
         axes.margins(x=0.08)
     axes_of[0].legend(loc="best")
