@@ -16,6 +16,8 @@ import pytest
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.link import build, open_device
 from pulsetrainer.link.build import DEBIAN_PACKAGES
+from pulsetrainer.link.qemu import QemuOptions, parse_qemu
+from pulsetrainer.link.simulated import Wire
 
 pytestmark = pytest.mark.realtime
 RANGE_A = 1.5
@@ -58,12 +60,33 @@ def gone(session: int, seconds: float = 5.0) -> bool:
 # --- without an emulator ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("port", ["qemu:?creep=0.05", "qemu:fast", "qemu:?"])
-def test_parameters_are_refused_with_the_port_that_takes_them(port):
-    """The image is built once, without parameters; the bench has them."""
-    with pytest.raises(UsageError, match="takes no parameters") as caught:
+@pytest.mark.parametrize(
+    ("port", "says", "hint"),
+    [
+        ("qemu:?creep=0.05", "no parameter 'creep'", "bench:?"),
+        ("qemu:fast", "not a port", "qemu:?break"),
+        ("qemu:?", "not a port", "qemu:?break"),
+        ("qemu:?break=leg@1", "cannot break 'leg@1'", "current-rail"),
+        ("qemu:?break=hag", "did you mean hang", "break=WHAT@SECONDS"),
+        ("qemu:?break=hang@soon", "cannot break 'hang@soon'", "break=WHAT@SECONDS"),
+        ("qemu:?break=hang@", "cannot break 'hang@'", "break=WHAT@SECONDS"),
+        ("qemu:?break=hang@1e9", "cannot break", "break=WHAT@SECONDS"),
+        ("qemu:?wire=1", "qemu parameter wire=1 is not a rate", "wire-seed"),
+        ("qemu:?wire-seed=x", "qemu parameter wire-seed=x", "wire-seed"),
+    ],
+)
+def test_parameters_that_make_no_sense_teach(port, says, hint):
+    """The plant of the image has no parameters, the bench's has; the rest is explained."""
+    with pytest.raises(UsageError, match=says) as caught:
         open_device(port)
-    assert "bench:?" in caught.value.hint
+    assert hint in caught.value.hint
+
+
+def test_parameters_that_make_sense():
+    """Breaks and a bad wire, in any number and order."""
+    assert parse_qemu("qemu:") == parse_qemu("qemu://") == QemuOptions()
+    port = "qemu:?break=reset@1.5&wire=1e-4&break=hang&wire-seed=7"
+    assert parse_qemu(port) == QemuOptions(((8, 1.5), (9, 0.0)), Wire(1e-4, 7))
 
 
 @pytest.mark.parametrize("missing", ["qemu-system-arm", "arm-none-eabi-gcc"])
