@@ -18,7 +18,7 @@ from pulsetrainer.link.bench import Bench
 from pulsetrainer.link.noise import NoisyTransport
 from pulsetrainer.link.player import Player, describe_fault
 from pulsetrainer.link.ports import find_device_port
-from pulsetrainer.link.qemu import QEMU_PORT, QEMU_TIMEOUTS_S, Emulator
+from pulsetrainer.link.qemu import QEMU_BAD_WIRE_TIMEOUTS_S, QEMU_PORT, QEMU_TIMEOUTS_S, Emulator
 from pulsetrainer.link.recording import Block, FloatArray, Recording
 from pulsetrainer.link.session import TIMEOUTS_S, Session
 from pulsetrainer.link.simulated import Wire
@@ -322,6 +322,7 @@ def open_device(
     transport: Transport | None = None
     try:
         name = port
+        timeouts_s: tuple[float, ...] = TIMEOUTS_S
         if port.startswith("bench:"):
             machine = bench = Bench(port)
             name = DEFAULT_PORT
@@ -331,10 +332,10 @@ def open_device(
             machine = emulator = Emulator(port)
             name = QEMU_PORT
             transport = _through(emulator.options.wire, emulator.transport, monotonic)
+            timeouts_s = QEMU_BAD_WIRE_TIMEOUTS_S if emulator.options.wire.rate else QEMU_TIMEOUTS_S
         else:
             name = find_device_port() if port == "auto" else port
             transport = SerialTransport(name)
-        timeouts_s = QEMU_TIMEOUTS_S if isinstance(machine, Emulator) else TIMEOUTS_S
         session = Session(transport, name, monotonic=monotonic, timeouts_s=timeouts_s)
         return Device(session, transport, machine, monotonic=monotonic, sleep=sleep)
     except BaseException:

@@ -30,6 +30,8 @@ QEMU_PORT = "qemu:"
 # The line loses nothing but is slow, some 10 kB/s and less on a busy computer: a command repeated early
 # would only make it slower.
 QEMU_TIMEOUTS_S = (0.5, 0.5, 1.0)
+# Behind a bad wire a lost command must come again before the device takes its host for gone.
+QEMU_BAD_WIRE_TIMEOUTS_S = (0.06, 0.06, 0.06, 0.1, 0.5, 1.0)
 _SLICE_S = 0.01
 _GATHER_S = 0.001  # the emulator sends byte by byte: without a pause each would wake this process
 _WRITE_S = 2.0
