@@ -75,6 +75,14 @@ lint: $(VENV)/installed-test  ## style, types, import contracts
 bench: $(VENV)/installed-test  ## speed and memory, as ratios in one run
 	$(BIN)/python -m pytest benchmarks -p no:xdist --timeout=0 -s
 
+ARM_TOOLS := arm-none-eabi-gcc qemu-system-arm
+firmware-mps2 firmware-cost: arm-tools
+
+.PHONY: arm-tools
+arm-tools:
+	@for tool in $(ARM_TOOLS); do command -v $$tool > /dev/null || { echo "$$tool is not there; on Debian:" \
+	"sudo apt-get install -y --no-install-recommends gcc-arm-none-eabi qemu-system-arm" >&2; exit 1; }; done
+
 firmware-mps2:  ## the firmware for the emulated Cortex-M4F (Debian: gcc-arm-none-eabi, qemu-system-arm)
 	$(MAKE) -C firmware mps2
 

@@ -19,9 +19,10 @@ from pulsetrainer.link.bench import Bench
 from pulsetrainer.link.noise import NoisyTransport
 from pulsetrainer.link.player import Player, describe_fault
 from pulsetrainer.link.ports import find_device_port
-from pulsetrainer.link.qemu import QEMU_TIMEOUTS_S, Emulator
+from pulsetrainer.link.qemu import QEMU_BAD_WIRE_TIMEOUTS_S, QEMU_PORT, QEMU_TIMEOUTS_S, Emulator
 from pulsetrainer.link.recording import Block, FloatArray, Recording
 from pulsetrainer.link.session import TIMEOUTS_S, Session
+from pulsetrainer.link.simulated import Wire
 from pulsetrainer.link.transport import SerialTransport, Transport
 
 if TYPE_CHECKING:
@@ -329,6 +330,11 @@ def redact(port: str) -> str:
     return DEFAULT_PORT if port.startswith("bench:") else port
 
 
+def _through(wire: Wire, transport: Transport, monotonic: Callable[[], float]) -> Transport:
+    """Return the transport as it is at the other end of a wire that may be bad."""
+    return NoisyTransport(transport, wire.rate, wire.seed, monotonic=monotonic) if wire.rate else transport
+
+
 def open_device(
     port: str | None,
     *,
@@ -352,20 +358,20 @@ def open_device(
     transport: Transport | None = None
     try:
         name = port
+        timeouts_s: tuple[float, ...] = TIMEOUTS_S
         if port.startswith("bench:"):
             machine = bench = Bench(port)
             name = DEFAULT_PORT
             transport = SerialTransport(bench.path, name)
-            if bench.options.wire:
-                rate, seed = bench.options.wire, bench.options.wire_seed
-                transport = NoisyTransport(transport, rate, seed, monotonic=monotonic)
+            transport = _through(bench.options.wire, transport, monotonic)
         elif port.startswith("qemu:"):
             machine = emulator = Emulator(port)
-            transport = emulator.transport
+            name = QEMU_PORT
+            transport = _through(emulator.options.wire, emulator.transport, monotonic)
+            timeouts_s = QEMU_BAD_WIRE_TIMEOUTS_S if emulator.options.wire.rate else QEMU_TIMEOUTS_S
         else:
             name = find_device_port() if port == "auto" else port
             transport = SerialTransport(name)
-        timeouts_s = QEMU_TIMEOUTS_S if isinstance(machine, Emulator) else TIMEOUTS_S
         session = Session(transport, name, monotonic=monotonic, timeouts_s=timeouts_s)
         device = Device(session, transport, machine, monotonic=monotonic, sleep=sleep)
         _LOG.info(

@@ -83,6 +83,7 @@ class Player:
         self.ended = threading.Event()
         self._stop = threading.Event()
         self._stop_reason = ""
+        self._stop_remedy = ""
         self.taken_at_s = monotonic()
         self.outcome: Outcome | None = None
         self.error: BaseException | None = None
@@ -182,6 +183,7 @@ class Player:
         """Keep the buffer full until the play ends, whoever ends it."""
         while self._ack.state == codes.State.RUNNING and not self._last_block:
             if self._monotonic() - self.taken_at_s > _TAKER_S:
+                self._stop_remedy = "the disk is too slow: write elsewhere, close other programs"
                 self.stop(f"the program did not take its data for {_TAKER_S:g} s")
             if self._stop.is_set():
                 self._request(m.Stop())
@@ -250,7 +252,7 @@ class Player:
         # Refused before it started: the numbers in the status are those of an earlier play.
         produced = status.produced if status.session == self._play_session else 0
         known = {int(f): text for f, text in _REMEDY.items()}
-        return Outcome(produced, to_end, fault, known.get(status.fault, ""))
+        return Outcome(produced, to_end, fault, known.get(status.fault, self._stop_remedy))
 
 
 def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:

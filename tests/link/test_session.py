@@ -26,6 +26,39 @@ def test_greeting_gets_through_garbage(wire):
     assert one.session.hello().magic == MAGIC
 
 
+def test_a_program_killed_in_mid_upload_leaves_nothing_behind(wire):
+    """Half a reference, half a frame and unread replies: the next program greets and plays as if alone."""
+    one = wire("bench:")
+    one.session.hello()
+    one.ask(m.WaveBegin(5000, 10, 1))
+    for at in range(0, 610, 61):
+        one.ask(m.WaveData(at, 61, bytes(122)))
+    for seq in range(5):
+        one.transport.write(encode(Frame(m.Status.TYPE, seq, b"")))  # nobody reads the answers
+    one.transport.write(encode(Frame(m.WaveData.TYPE, 7, m.WaveData(610, 61, bytes(122)).pack()))[:70])
+    one.session = Session(one.transport, "bench:", monotonic=time.monotonic)
+    one.session.on_telemetry = one.telemetry.append
+    one.start(np.full(200, 3000, dtype=np.int16))
+    assert one.wait_for(State.IDLE).fault == Fault.NONE
+    while not one.telemetry or not one.telemetry[-1].flags & 1:
+        one.session.receive()
+    assert sum(b.count for b in one.telemetry) == 200
+
+
+def test_the_whole_firmware_under_the_sanitizers(wire):
+    """Garbage, a play, a fault and a stop: neither address nor undefined-behaviour sanitizer has a word."""
+    sanitized = firmware_executable(("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"))
+    one = wire("bench:?break=force-high@0.2", sanitized)
+    one.transport.write(np.random.default_rng(4).bytes(3000))
+    one.start((5000 - 5000 * np.cos(np.arange(900) / 50)).astype(np.int16), decimation=1)
+    assert one.wait_for(State.FAULT).fault == Fault.OVER_FORCE
+    one.ask(m.ClearFault())
+    one.start(np.full(300, 3000, dtype=np.int16))
+    one.ask(m.Stop())
+    one.wait_for(State.IDLE)
+    assert one.bench._process.poll() is None  # a sanitizer that finds something ends the process
+
+
 def test_a_repeated_command_is_done_once(wire):
     """The same sequence number again: the same answer, from memory."""
     one = wire("bench:")
