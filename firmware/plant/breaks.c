@@ -11,6 +11,7 @@ const char *const breaks_names[BREAKS_COUNT] = {
 static uint32_t sets_in[BREAKS_COUNT]; /* tick of the play plus 1; 0: never */
 static bool playing;
 static uint32_t now;
+static bool has_read;
 static uint16_t last_current;
 static uint16_t last_force;
 static uint16_t dither;
@@ -41,10 +42,12 @@ bool breaks_once(enum breaks_what what)
 
 void breaks_sensors(uint16_t *current, uint16_t *force)
 {
-    if (breaks_is(BREAKS_CURRENT_FROZEN))
+    /* Frozen is what was read last; the very first reading has nothing before it. */
+    if (breaks_is(BREAKS_CURRENT_FROZEN) && has_read)
         *current = last_current;
-    if (breaks_is(BREAKS_FORCE_FROZEN))
+    if (breaks_is(BREAKS_FORCE_FROZEN) && has_read)
         *force = last_force;
+    has_read = true;
     last_current = *current;
     last_force = *force;
     dither ^= 1u;

@@ -19,7 +19,13 @@ from pulsetrainer.link.bench import Bench
 from pulsetrainer.link.noise import NoisyTransport
 from pulsetrainer.link.player import Player, describe_fault
 from pulsetrainer.link.ports import find_device_port
-from pulsetrainer.link.qemu import QEMU_BAD_WIRE_TIMEOUTS_S, QEMU_PORT, QEMU_TIMEOUTS_S, Emulator
+from pulsetrainer.link.qemu import (
+    QEMU_BAD_WIRE_TIMEOUTS_S,
+    QEMU_PIECE_S,
+    QEMU_PORT,
+    QEMU_TIMEOUTS_S,
+    Emulator,
+)
 from pulsetrainer.link.recording import Block, FloatArray, Recording
 from pulsetrainer.link.session import TIMEOUTS_S, Session
 from pulsetrainer.link.simulated import Wire
@@ -94,7 +100,9 @@ class Device:
         *,
         monotonic: Callable[[], float],
         sleep: Callable[[float], None],
+        piece_s: float = np.inf,
     ) -> None:
+        self._piece_s = piece_s  # of the reference in one frame while it plays
         self._session = session
         self._transport = transport
         self._bench = bench
@@ -213,7 +221,13 @@ class Device:
                 hint="10 gives 1000 samples a second",
             )
         player = Player(
-            self._session, wire, ticks_per_sample, decimation, hello=self._hello, monotonic=self._monotonic
+            self._session,
+            wire,
+            ticks_per_sample,
+            decimation,
+            hello=self._hello,
+            monotonic=self._monotonic,
+            piece_s=self._piece_s,
         )
         self._player = player
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
@@ -373,7 +387,8 @@ def open_device(
             name = find_device_port() if port == "auto" else port
             transport = SerialTransport(name)
         session = Session(transport, name, monotonic=monotonic, timeouts_s=timeouts_s)
-        device = Device(session, transport, machine, monotonic=monotonic, sleep=sleep)
+        piece_s = QEMU_PIECE_S if isinstance(machine, Emulator) else np.inf
+        device = Device(session, transport, machine, monotonic=monotonic, sleep=sleep, piece_s=piece_s)
         _LOG.info(
             "%s: %s, firmware %s, protocol %s, limits %g A and %g N",
             *(redact(port), device.info.serial, device.info.firmware, device.info.protocol),

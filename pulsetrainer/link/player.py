@@ -63,6 +63,7 @@ class Player:
         *,
         hello: m.HelloReply,
         monotonic: Callable[[], float],
+        piece_s: float = np.inf,
     ) -> None:
         self._session = session
         self._samples = reference
@@ -71,6 +72,8 @@ class Player:
         self.decimation = decimation
         self._hello = hello
         self._monotonic = monotonic
+        self._piece_s = piece_s
+        self._short = m.WaveData.MAX_ITEMS  # samples a frame while the buffer is well filled
         self._sent = 0
         self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
         self._play_session = -1
@@ -158,7 +161,8 @@ class Player:
 
     def _send_chunk(self, credit: int) -> bool:
         """Send the next samples if the device has room for a whole frame of them."""
-        count = min(m.WaveData.MAX_ITEMS, len(self._samples) - self._sent)
+        most = self._short if credit < self._hello.wave_buffer // 2 else m.WaveData.MAX_ITEMS
+        count = min(most, len(self._samples) - self._sent)
         if count == 0 or credit < count:
             return False
         at = self._sent
@@ -181,6 +185,8 @@ class Player:
 
     def _stream(self) -> None:
         """Keep the buffer full until the play ends, whoever ends it."""
+        in_piece = self._piece_s * self._hello.tick_rate_Hz / self._ticks_per_sample
+        self._short = int(min(m.WaveData.MAX_ITEMS, max(1, in_piece)))
         while self._ack.state == codes.State.RUNNING and not self._last_block:
             if self._monotonic() - self.taken_at_s > _TAKER_S:
                 self._stop_remedy = "the disk is too slow: write elsewhere, close other programs"

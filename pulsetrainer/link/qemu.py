@@ -30,6 +30,9 @@ QEMU_PORT = "qemu:"
 # The line loses nothing but is slow, some 10 kB/s and less on a busy computer: a command repeated early
 # would only make it slower.
 QEMU_TIMEOUTS_S = (0.5, 0.5, 1.0)
+# A long frame takes 10 ms on an idle computer and 200 ms on a crowded one, and the device takes it for a sign
+# of life only when it is whole: short ones, while the buffer is well filled.
+QEMU_PIECE_S = 0.02
 # Behind a bad wire a lost command must come again before the device takes its host for gone.
 QEMU_BAD_WIRE_TIMEOUTS_S = (0.06, 0.06, 0.06, 0.1, 0.5, 1.0)
 _SLICE_S = 0.01

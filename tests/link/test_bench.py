@@ -153,9 +153,10 @@ def _gone(pid: int, seconds: float = 10.0) -> bool:
 
 
 HOST = """
-import sys
+import signal
 import numpy as np
 from pulsetrainer.link import open_device
+signal.signal(signal.SIGINT, signal.default_int_handler)  # tests run in the background have it ignored
 device = open_device("bench:?speed=real")
 def tell(block):
     print(device._bench.pid, block.tick[-1], flush=True)
