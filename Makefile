@@ -15,7 +15,7 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo test lint bench bounds firmware-mps2 firmware-cost clean help
+.PHONY: demo test lint bench docs bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -82,6 +82,10 @@ firmware-mps2 firmware-cost: arm-tools
 arm-tools:
 	@for tool in $(ARM_TOOLS); do command -v $$tool > /dev/null || { echo "$$tool is not there; on Debian:" \
 	"sudo apt-get install -y --no-install-recommends gcc-arm-none-eabi qemu-system-arm" >&2; exit 1; }; done
+
+docs: $(VENV)/installed  ## the reference pages, off the code; the figures of the theory
+	$(BIN)/python docs/make.py
+	$(BIN)/python docs/figures.py
 
 firmware-mps2:  ## the firmware for the emulated Cortex-M4F (Debian: gcc-arm-none-eabi, qemu-system-arm)
 	$(MAKE) -C firmware mps2
