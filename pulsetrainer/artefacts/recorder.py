@@ -24,7 +24,7 @@ from pulsetrainer.artefacts.lease import Lease, is_abandoned, sweep
 from pulsetrainer.artefacts.output import cannot_write, check_output, publish
 from pulsetrainer.artefacts.schema import plan_of
 from pulsetrainer.artefacts.seal import append_seal
-from pulsetrainer.artefacts.store import LIBVER, read_samples, write_root
+from pulsetrainer.artefacts.store import LIBVER, read, read_samples, write_root
 from pulsetrainer.errors import ArgumentError, DataError, PulsetrainerError
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class RunRecorder:
         self._finished = False
         self._at_seam = False
         self._lease: Lease | None = None
-        self._superseded: Path | None = None
+        self._superseded: list[Path] = []
         self.dropped_samples = 0  # set it as losses become known: an interrupted run tells them too
         empty = np.zeros(0)
         values: dict[str, Any] = dict.fromkeys(_COLUMNS, empty) | {
@@ -130,6 +130,11 @@ class RunRecorder:
     def samples(self) -> int:
         """How many samples are safe on disk."""
         return self._samples
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last sample."""
+        return self._last_time
 
     def append(self, time_s: ArrayLike, reference: ArrayLike, input: ArrayLike, output: ArrayLike) -> None:  # noqa: A002 - the field's name
         """Append a batch; when this returns, it survives the death of the program.
@@ -180,7 +185,9 @@ class RunRecorder:
         self._at_seam = self._samples > 0
 
     def take_over(self, path: Path | str, run: Run) -> None:
-        """Begin with the samples of an interrupted recording; it is removed when this one has its name.
+        """Begin with the samples of an interrupted recording.
+
+        When this one has its name, that one is removed, and what it had been begun with.
 
         Raises
         ------
@@ -195,7 +202,7 @@ class RunRecorder:
             for start in range(0, part.input.size, _COPIED_SAMPLES):
                 self.append(*(array[start : start + _COPIED_SAMPLES] for array in arrays))
         self.dropped_samples = run.dropped_samples
-        self._superseded = Path(path)
+        self._superseded = [Path(path), *(left for left, _ in interrupted(self._final) if _begins(run, left))]
 
     def _check_batch(self, arrays: dict[str, FloatArray]) -> int:
         """Return the length of a batch that can be appended."""
@@ -272,9 +279,10 @@ class RunRecorder:
             raise self._kept(error) from error
         finally:
             self._end_lease()
-        if self._superseded is not None and self._superseded != self._final:
-            with contextlib.suppress(OSError):
-                self._superseded.unlink(missing_ok=True)
+        for path in self._superseded:
+            if path != self._final:
+                with contextlib.suppress(OSError):
+                    path.unlink(missing_ok=True)
         return self._final
 
     def _end_lease(self) -> None:
@@ -336,6 +344,19 @@ def interrupted(final: Path | str) -> list[tuple[Path, int]]:
             else:
                 sweep(path)
     return sorted(found, key=lambda pair: -pair[1])
+
+
+def _begins(run: Run, path: Path) -> bool:
+    """Whether a run begins with all the samples of this recording."""
+    with contextlib.suppress(DataError):
+        part = read(path, Run)
+        size = part.input.size
+        return (
+            size <= run.input.size
+            and np.array_equal(part.input, run.input[:size], equal_nan=True)
+            and np.array_equal(part.output, run.output[:size], equal_nan=True)
+        )
+    return False
 
 
 def _claim_partial(final: Path) -> Path:
