@@ -32,6 +32,10 @@ def capture(
     ] = 0.75,
     rate: Annotated[float, typer.Option(help="Samples a second, Hz.", envvar=variable("rate_Hz"))] = 1000.0,
     condition: Annotated[bool, typer.Option(help="Go around the major loop once before recording.")] = True,
+    repeats: Annotated[int, typer.Option(help="How often the signal is played, without a pause.")] = 1,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the recording into this output that was cut off.")
+    ] = False,
     limit_current: LimitCurrent = None,
     limit_force: LimitForce = None,
     dry_run: DryRun = False,
@@ -48,7 +52,19 @@ def capture(
     screen = Screen("capture", as_json=json)
     limits = Limits(limit_current, limit_force)
     options = flow.Options(
-        signal, out, port, levels, current_max, speed, rate, condition, limits, dry_run, force
+        signal,
+        out,
+        port,
+        levels,
+        current_max,
+        speed,
+        rate,
+        condition,
+        repeats,
+        resume,
+        limits,
+        dry_run,
+        force,
     )
     if dry_run:
         _show(screen, flow.plan(options))
@@ -66,6 +82,7 @@ def capture(
             "current": f"{current[0]:.3f} .. {current[1]:.3f} A",
             "force": f"{force_range[0]:.3f} .. {force_range[1]:.3f} N",
             "reversals": result.reversals,
+            **({"parts": result.parts} if result.parts > 1 else {}),
             "cells switched": f"{result.coverage_percent:.1f} %",
         },
     )

@@ -20,7 +20,7 @@ from pulsetrainer.diagnosis.extended import seen_input
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.selection import Answer, diagnose, problem_for
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.flows.modelling import known_from, predict, step_of
+from pulsetrainer.flows.modelling import known_from, parts_of, predict, step_of
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.selection import Finding
@@ -78,7 +78,7 @@ def run(options: Options, context: Context) -> Result:
     records = []
     for path, one in zip(options.runs, runs, strict=True):
         _check_fits(path, one, options.model, model)
-        records.append(measured_of(path, one, model.polarity, low, high))
+        records += [measured_of(path, part, model.polarity, low, high) for part in parts_of(one)]
         if not one.complete:
             context.note(f"{path} is incomplete; diagnosing the {one.input.size} samples it has")
     answer = diagnose(

@@ -24,7 +24,7 @@ from pulsetrainer.artefacts.kinds import (
 from pulsetrainer.core import metrics
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import DataError, QualityError, UsageError
-from pulsetrainer.flows.modelling import known_from, operator_of, predict, step_of
+from pulsetrainer.flows.modelling import known_from, operator_of, parts_of, predict, step_of
 from pulsetrainer.report import html
 
 if TYPE_CHECKING:
@@ -215,9 +215,14 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 hint="use a model of the same device, in the same units",
             )
         operator = operator_of(model)
-        known = known_from(one.input, operator.plane.low, operator.plane.high)
-        predicted = predict(model, one.input, step_of(one))[known:]
-        errors = metrics.prediction(one.output[known:], predicted)
+        parts = parts_of(one)
+        known = [known_from(part.input, operator.plane.low, operator.plane.high) for part in parts]
+        step_s = step_of(one)
+        predicted = np.concatenate(
+            [predict(model, part.input, step_s)[k:] for part, k in zip(parts, known, strict=True)]
+        )
+        measured = np.concatenate([part.output[k:] for part, k in zip(parts, known, strict=True)])
+        errors = metrics.prediction(measured, predicted)
         thin = slice(None, None, max(1, predicted.size // _TRACE_SAMPLES))
         found.append(
             ModelEvaluation(
@@ -226,13 +231,19 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 rms_percent=errors.rms_percent,
                 max_percent=errors.max_percent,
                 gain_percent=100.0 * (1.0 - errors.rms / found[0].rms) if found else 0.0,
-                time_s=None if one.time_s is None else one.time_s[known:][thin],
-                output=one.output[known:][thin],
+                time_s=_times(parts, known, thin),
+                output=measured[thin],
                 predicted=predicted[thin],
                 output_unit=one.output_unit,
             )
         )
     return Evaluation(models=tuple(found), model=model)
+
+
+def _times(parts: Sequence[Run], known: Sequence[int], thin: slice) -> FloatArray | None:
+    """Times of the samples after ``known`` of each part, thinned; None where the run has no time."""
+    times = [part.time_s[k:] for part, k in zip(parts, known, strict=True) if part.time_s is not None]
+    return np.concatenate(times)[thin] if times else None
 
 
 def metrics_of(evaluation: Evaluation) -> dict[str, float]:

@@ -16,7 +16,7 @@ from pulsetrainer.core.coverage import coverage, largest_gap
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify
 from pulsetrainer.core.plane import Plane, Reading
 from pulsetrainer.errors import DataError
-from pulsetrainer.flows.modelling import known_from, record_of
+from pulsetrainer.flows.modelling import known_from, parts_of, record_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,6 +83,7 @@ def run(options: Options, context: Context) -> Result:
     for path, one in zip(options.runs, runs, strict=True):
         if not one.complete:
             context.note(f"{path} is incomplete; fitting the {one.input.size} samples it has")
+    runs = [part for one in runs for part in parts_of(one)]
     ranges = [input_range(one) for one in runs]
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     _check_range(options.runs, low, high, runs[0].input_unit)

@@ -13,7 +13,7 @@ from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import DrivePlayback, Playback, Waveform
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.flows.capture import check_ended
+from pulsetrainer.flows.recording import check_ended
 from pulsetrainer.link import DEFAULT_PORT, Limits, open_device, redact
 
 if TYPE_CHECKING:

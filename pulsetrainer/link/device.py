@@ -132,6 +132,11 @@ class Device:
             if self._bench is not None:
                 self._bench.close()
 
+    @property
+    def longest_play_s(self) -> float:
+        """Longest reference that the device plays in one go, s."""
+        return self.info.on_time_limit_s - _RAMP_S
+
     def stop(self) -> None:
         """Ramp the current to zero and disarm; from another thread it ends a play."""
         if self._player is not None:
@@ -197,14 +202,17 @@ class Device:
         *,
         decimation: int = 10,
         on_block: Callable[[Block], None] | None = None,
+        keep: bool = True,
         should_stop: Callable[[], bool] | None = None,
     ) -> Recording:
         """Play a coil current and return what the device measured meanwhile.
 
         The reference, shape (n,) in A at ``rate_Hz``, is interpolated linearly to the device's tick; its
         first sample is tick 0. Telemetry is one sample every ``decimation`` ticks. ``on_block`` gets it
-        in pieces as it comes. Ctrl-C, ``should_stop`` or a fault of the device stop the output first;
-        what was recorded until then is returned with ``complete=False``. The device ends disarmed.
+        in pieces as it comes; without ``keep`` that is all there is of it: the recording that is returned
+        has counts only, and memory stays flat. Ctrl-C, ``should_stop`` or a fault of the device stop the
+        output first; what was recorded until then is returned with ``complete=False``. The device ends
+        disarmed.
 
         Raises
         ------
@@ -234,7 +242,7 @@ class Device:
         thread.start()
         interrupted = False
         try:
-            interrupted = self._follow(player, on_block, should_stop)
+            interrupted = self._follow(player, on_block, should_stop, keep=keep)
         finally:
             player.stop(_STOPPED)
             while thread.is_alive():  # it is stopping the device: not to be interrupted, and soon over
@@ -252,9 +260,11 @@ class Device:
         player: Player,
         on_block: Callable[[Block], None] | None,
         should_stop: Callable[[], bool] | None,
+        *,
+        keep: bool,
     ) -> bool:
         """Hand over the telemetry as it comes until the play has ended; True if Ctrl-C hastened the end."""
-        passed = 0
+        passed = forgotten = 0
         ended = interrupted = False
         while not ended:
             try:
@@ -264,6 +274,9 @@ class Device:
                 player.taken_at_s = self._monotonic()
                 if on_block is not None and any(b.count for b in fresh):
                     on_block(Block.from_wire(fresh, player.decimation))
+                if not keep:
+                    player.forget(forgotten, passed)
+                    forgotten = passed
                 if should_stop is not None and should_stop():
                     player.stop(_STOPPED)
                 if not ended:
@@ -277,11 +290,11 @@ class Device:
         outcome = player.outcome
         block = Block.from_wire(player.received, player.decimation)
         assert outcome is not None
-        received = len(block.tick)
+        received = player.samples
         if outcome.produced >= 0:
             dropped = outcome.produced - received
         else:  # the device is gone: what is missing between the samples that came
-            dropped = int(block.tick[-1]) // player.decimation + 1 - received if received else 0
+            dropped = player.last_tick // player.decimation + 1 - received if received else 0
         return Recording(
             tick=block.tick,
             reference_A=block.reference_A,
@@ -292,6 +305,7 @@ class Device:
             # Interrupted even if it came during the last ramp: the user wants out.
             complete=outcome.played_to_end and not interrupted,
             fault=outcome.fault or (_INTERRUPTED if interrupted else ""),
+            samples=received,
             remedy=outcome.remedy,
         )
 
@@ -330,7 +344,7 @@ class Device:
                 hint="scale the waveform into the range",
             )
         seconds = (reference.size - 1) * ticks_per_sample / self.info.tick_rate_Hz
-        if seconds > self.info.on_time_limit_s - _RAMP_S:
+        if seconds > self.longest_play_s:
             raise ArgumentError(
                 f"the reference is {seconds:g} s long; the device stays on for at most "
                 f"{self.info.on_time_limit_s:g} s",

@@ -41,6 +41,8 @@ class Outcome:
     remedy: str = ""  # what to do about the fault, where something better than finding its cause is known
 
 
+NOTHING = m.Telemetry(0, 0, 0, 0, 0, b"")  # in the place of a block that nobody needs any more
+
 # Faults whose cause is not in the device.
 _REMEDY = {
     codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
@@ -83,6 +85,7 @@ class Player:
         self._last_block = False
         # A plain list: appending is atomic, and a Ctrl-C in the reader's thread can lose nothing of it.
         self.received: list[m.Telemetry] = []
+        self.samples = 0  # received so far
         self.ended = threading.Event()
         self._stop = threading.Event()
         self._stop_reason = ""
@@ -90,6 +93,16 @@ class Player:
         self.taken_at_s = monotonic()
         self.outcome: Outcome | None = None
         self.error: BaseException | None = None
+
+    @property
+    def last_tick(self) -> int:
+        """Tick of the last sample received; -1 before the first."""
+        return self._recorded_tick
+
+    def forget(self, start: int, stop: int) -> None:
+        """Let go of the samples of these blocks: a long play must not fill the memory."""
+        for number in range(start, stop):
+            self.received[number] = NOTHING
 
     def stop(self, reason: str) -> None:
         """Ask for the output to be stopped at once; the first reason counts."""
@@ -120,6 +133,7 @@ class Player:
             self._tick = max(self._tick, last_tick)
         self._last_block = self._last_block or bool(block.flags & codes.FLAG_LAST)
         self.received.append(block)
+        self.samples += block.count
 
     def _request(self, command: m.Message) -> m.Ack:
         self._tick_at_send = self._tick
