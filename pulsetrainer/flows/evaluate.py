@@ -22,6 +22,7 @@ from pulsetrainer.artefacts.kinds import (
     WaveformEvaluation,
 )
 from pulsetrainer.core import metrics
+from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import DataError, QualityError, UsageError
 from pulsetrainer.flows.modelling import known_from, operator_of, predict, step_of
@@ -40,6 +41,7 @@ PUBLISHED: dict[str, dict[str, float]] = {
 METRICS = ("mean_abs_error_percent", "max_abs_error_percent", "rms_error_percent", "hysteresis_percent",
            "current_tracking_max_percent")  # fmt: skip
 _TRACE_SAMPLES = 6000
+_BEYOND = 0.005  # of the model's range: an input further out than this was never identified
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +104,7 @@ def run(options: Options, context: Context) -> Result:
         )
     elif len(artefacts) == 1 and options.models:
         evaluation = _of_run(options.inputs[0], artefacts[0], options.models)
+        _note_limits(options.inputs[0], evaluation, context)
     else:
         raise UsageError(
             "evaluate takes playbacks, or one run together with the models to compare on it",
@@ -215,9 +218,14 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 hint="use a model of the same device, in the same units",
             )
         operator = operator_of(model)
-        known = known_from(one.input, operator.plane.low, operator.plane.high)
-        predicted = predict(model, one.input, step_of(one))[known:]
+        low, high = operator.plane.low, operator.plane.high
+        known = known_from(one.input, low, high)
+        start, state = _start(model, one, known)
+        predicted = predict(model, one.input, step_of(one), start)[known:]
         errors = metrics.prediction(one.output[known:], predicted)
+        shift = float(np.mean(one.output[known:] - predicted))
+        own = metrics.prediction(one.output[known:], predicted + shift)
+        outside = (one.input < low - _BEYOND * (high - low)) | (one.input > high + _BEYOND * (high - low))
         thin = slice(None, None, max(1, predicted.size // _TRACE_SAMPLES))
         found.append(
             ModelEvaluation(
@@ -225,6 +233,10 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 rms=errors.rms,
                 rms_percent=errors.rms_percent,
                 max_percent=errors.max_percent,
+                offset=shift,
+                shape_rms_percent=own.rms_percent,
+                start=state,
+                outside_percent=100.0 * float(np.mean(outside)),
                 gain_percent=100.0 * (1.0 - errors.rms / found[0].rms) if found else 0.0,
                 time_s=None if one.time_s is None else one.time_s[known:][thin],
                 output=one.output[known:][thin],
@@ -233,6 +245,42 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
             )
         )
     return Evaluation(models=tuple(found), model=model)
+
+
+def _note_limits(path: Path, evaluation: Evaluation, context: Context) -> None:
+    """Say where a run leaves the range of a model, and which state before the run was assumed."""
+    for found in evaluation.models:
+        if found.outside_percent > 0:
+            context.note(
+                f"{found.outside_percent:.1f} % of the input of {path} is outside the range of {found.name}, "
+                "where it predicts its outermost values"
+            )
+        if found.start != "known":
+            context.note(f"{path} does not reach the ends of {found.name}; state before it: {found.start}")
+
+
+def _start(model: Model, one: Run, known: int) -> tuple[State | None, str]:
+    """Return the state from which a run is followed, and what it is called.
+
+    A run that never reaches an end of the model's range leaves open what came before it. Tried are both
+    saturations and the demagnetised state; the one that predicts best is taken.
+    """
+    low, high = float(model.levels[0]), float(model.levels[-1])
+    near = 0.01 * (high - low)
+    if np.any((one.input <= low + near) | (one.input >= high - near)):
+        return None, "known"
+    states = {
+        "negative saturation": negative_saturation(low),
+        "demagnetised": demagnetised(low, high),
+        "positive saturation": positive_saturation(low, high),
+    }
+    operator = operator_of(model)
+    left = {
+        name: float(np.mean((operator(one.input, state)[known:] - one.output[known:]) ** 2))
+        for name, state in states.items()
+    }
+    best = min(left, key=left.__getitem__)
+    return states[best], f"{best}, estimated"
 
 
 def metrics_of(evaluation: Evaluation) -> dict[str, float]:
@@ -245,7 +293,7 @@ def metrics_of(evaluation: Evaluation) -> dict[str, float]:
             for metric in METRICS:
                 named[f"{stem}.{drive}.{metric}"] = getattr(errors, metric)
     for model in evaluation.models:
-        for metric in ("rms", "rms_percent", "max_percent", "gain_percent"):
+        for metric in ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent"):
             named[f"{Path(model.name).stem}.{metric}"] = getattr(model, metric)
     return named
 

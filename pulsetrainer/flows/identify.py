@@ -13,10 +13,19 @@ from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import BoolArray, Fit, Model, Run
 from pulsetrainer.core import input_noise, metrics
 from pulsetrainer.core.coverage import coverage, largest_gap
-from pulsetrainer.core.identification import Identified, Method, Smoothing, identify
-from pulsetrainer.core.plane import Plane, Reading
+from pulsetrainer.core.identification import (
+    Identified,
+    Method,
+    Record,
+    Smoothing,
+    identify,
+    offsets_between,
+)
+from pulsetrainer.core.levels import plane_for
+from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
-from pulsetrainer.flows.modelling import known_from, record_of
+from pulsetrainer.flows.modelling import known_from, record_of, step_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,6 +66,10 @@ class Result:
     input_noise: float | None  # standard deviation, input unit; None where the records cannot tell
     false_reversals: int  # taken out of the input before the fit
     polarity: int
+    offsets: tuple[float, ...]  # of each run's output against their mean; zeros where one offset serves all
+    spacing: str  # of the levels: "even", or "crowded" where the loop is steep
+    congruence: float  # t; 0: the density is free
+    warning: str  # that this kind of model is the wrong one; empty where it is not
     iterations: int
     seconds: float
 
@@ -83,16 +96,21 @@ def run(options: Options, context: Context) -> Result:
     ranges = [input_range(one) for one in runs]
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     _check_range(options.runs, low, high, runs[0].input_unit)
-    plane = Plane.uniform(low, high, options.levels)
     cleaned = [input_noise.clean(one.input) for one in runs]
     _note_noise(cleaned, runs[0].input_unit, context)
     runs = [replace(one, input=clean.input) for one, clean in zip(runs, cleaned, strict=True)]
     context.progress(0.1)
+    records = [record_of(one, low, high) for one in runs]
+    plane = _plane(records, low, high, options, context)
+    shifts = offsets_between(records, plane, options.operator)
+    if np.any(shifts):
+        _note_shifts(options.runs, shifts, runs, context)
+        records = [record_of(one, low, high, shift) for one, shift in zip(runs, shifts, strict=True)]
     smoothing = options.smoothing
     if smoothing is None:
         smoothing = 0.0 if options.operator == "relay" else "auto"
     found = identify(
-        [record_of(one, low, high) for one in runs],
+        records,
         plane,
         reading=options.operator,
         method=options.method,
@@ -105,7 +123,11 @@ def run(options: Options, context: Context) -> Result:
     gap = largest_gap(plane, covered)
     if gap is not None and float(np.mean(covered)) < _WELL_COVERED:
         context.note(gap.words(plane, runs[0].input_unit))
-    model = _model(runs, found, covered)
+    model = _model(runs, records, found, covered)
+    compared = velocity.compare(records, [step_of(one) for one in runs], _residuals(records, found))
+    warning = velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
+    if warning:
+        context.note(warning)
     context.progress(0.9)
     header = provenance.make_header(
         f"Preisach model of {', '.join(path.stem for path in options.runs)}",
@@ -133,6 +155,10 @@ def run(options: Options, context: Context) -> Result:
         input_noise=_largest_noise(cleaned),
         false_reversals=sum(clean.removed for clean in cleaned),
         polarity=model.polarity,
+        offsets=tuple(float(shift) for shift in shifts),
+        spacing="even" if np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]) else "crowded",
+        congruence=found.congruence,
+        warning=warning,
         iterations=model.fit.iterations,
         seconds=time.perf_counter() - begun,
     )
@@ -185,15 +211,41 @@ def _check_range(paths: Sequence[Path], low: float, high: float, unit: str) -> N
         )
 
 
-def _model(runs: Sequence[Run], found: Identified, covered: BoolArray) -> Model:
+def _plane(records: Sequence[Record], low: float, high: float, options: Options, context: Context) -> Plane:
+    """Return the levels: even for relays, as in the paper, else where the output changes."""
+    if options.operator == "relay":
+        return Plane.uniform(low, high, options.levels)
+    plane = plane_for(records, low, high, options.levels)
+    if not np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]):
+        context.note("the loop is steep: the levels lie closer where the output changes")
+    return plane
+
+
+def _note_shifts(paths: Sequence[Path], shifts: FloatArray, runs: Sequence[Run], context: Context) -> None:
+    """Say how far the outputs of the runs are shifted against each other."""
+    span = float(np.ptp(np.concatenate([one.output for one in runs])))
+    listed = ", ".join(f"{path.stem} {shift:+.3g}" for path, shift in zip(paths, shifts, strict=True))
+    context.note(
+        f"the outputs of the runs are shifted against each other by up to {np.ptp(shifts):.3g} "
+        f"{runs[0].output_unit} ({100 * np.ptp(shifts) / span:.2f} % of the span): each was fitted with "
+        f"an offset of its own ({listed}); the model has their mean"
+    )
+
+
+def _residuals(records: Sequence[Record], found: Identified) -> list[FloatArray]:
+    """Measured less fitted output (n,) of each record."""
+    return [r.output - found.operator(r.input, r.start) for r in records]
+
+
+def _model(runs: Sequence[Run], records: Sequence[Record], found: Identified, covered: BoolArray) -> Model:
     """Return the stored form of an identified operator, with its fit."""
     operator, first = found.operator, runs[0]
     plane = operator.plane
     measured, predicted = [], []
-    for one in runs:
-        known = known_from(one.input, plane.low, plane.high)
-        measured.append(one.output[known:])
-        predicted.append(operator(one.input)[known:])
+    for record in records:
+        known = record.weights > 0
+        measured.append(record.output[known])
+        predicted.append(operator(record.input, record.start)[known])
     errors = metrics.prediction(np.concatenate(measured), np.concatenate(predicted))
     shown = slice(
         known_from(first.input, plane.low, plane.high), None, max(1, first.input.size // _TRACE_SAMPLES)
@@ -210,8 +262,8 @@ def _model(runs: Sequence[Run], found: Identified, covered: BoolArray) -> Model:
         method=found.method,
         time_s=None if first.time_s is None else first.time_s[shown],
         input=first.input[shown],
-        output=first.output[shown],
-        predicted=operator(first.input)[shown],
+        output=records[0].output[shown],
+        predicted=operator(records[0].input, records[0].start)[shown],
         smoothing=found.smoothing,
     )
     return Model(
