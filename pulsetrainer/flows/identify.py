@@ -26,6 +26,7 @@ from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
 from pulsetrainer.flows.modelling import known_from, record_of, step_of
+from pulsetrainer.flows.show import shown as shown_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -173,11 +174,12 @@ def _largest_noise(cleaned: Sequence[input_noise.Cleaned]) -> float | None:
 def _note_noise(cleaned: Sequence[input_noise.Cleaned], unit: str, context: Context) -> None:
     """Say how many reversals were noise."""
     removed = sum(clean.removed for clean in cleaned)
+    unit = f" {unit}" if shown_unit(unit) else ""
     if removed:
         worst = max(cleaned, key=lambda clean: clean.removed)
         context.note(
-            f"the measured input has noise of {worst.sigma:.2g} {unit}: {removed} false reversals below "
-            f"{worst.dead_band:.2g} {unit} taken out, {sum(clean.kept for clean in cleaned)} left"
+            f"the measured input has noise of {worst.sigma:.2g}{unit}: {removed} false reversals below "
+            f"{worst.dead_band:.2g}{unit} taken out, {sum(clean.kept for clean in cleaned)} left"
         )
 
 
@@ -227,8 +229,8 @@ def _note_shifts(paths: Sequence[Path], shifts: FloatArray, runs: Sequence[Run],
     listed = ", ".join(f"{path.stem} {shift:+.3g}" for path, shift in zip(paths, shifts, strict=True))
     context.note(
         f"the outputs of the runs are shifted against each other by up to {np.ptp(shifts):.3g} "
-        f"{runs[0].output_unit} ({100 * np.ptp(shifts) / span:.2f} % of the span): each was fitted with "
-        f"an offset of its own ({listed}); the model has their mean"
+        f"{shown_unit(runs[0].output_unit)} ({100 * np.ptp(shifts) / span:.2f} % of the span): each was "
+        f"fitted with an offset of its own ({listed}); the model has their mean"
     )
 
 
