@@ -325,6 +325,13 @@ class ModelEvaluation:
     output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
     predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
     output_unit: str = "N"
+    # how far the measured output lies above the predicted one, and what is left when that is taken out
+    offset: Annotated[float, Data("@output_unit", "offset of the run against the model")] = float("nan")
+    shape_rms_percent: Annotated[
+        float, Data("percent", "rms prediction error with the run's own offset, of the output span")
+    ] = float("nan")
+    start: str = "known"  # the state before the run: known, or which one was estimated
+    outside_percent: Annotated[float, Data("percent", "samples outside the range of the model")] = 0.0
 
 
 @dataclass(frozen=True, slots=True)

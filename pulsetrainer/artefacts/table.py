@@ -1,7 +1,8 @@
-"""Tables from any bench: CSV, TSV, semicolons, decimal commas, comments, with or without a header.
+"""Tables from any bench: text of any dialect, .npz, .mat, .wav.
 
-What a file is taken for is decided in ``table_text``, by explicit rules. Units are what a header says:
-``current_A``, ``Force (N)``, ``time [ms]``, ``Kraft / N``, or a line of units below it.
+What a text is taken for is decided in ``table_text``, by explicit rules; what is no text is read by
+``table_arrays``. Units are what a header says: ``current_A``, ``Force (N)``, ``time [ms]``, ``Kraft / N``,
+or a line of units below it.
 """
 
 from __future__ import annotations
@@ -12,17 +13,18 @@ import io
 import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pulsetrainer.artefacts.kinds import FloatArray, Run
+from pulsetrainer.artefacts.kinds import FloatArray
 from pulsetrainer.artefacts.output import replacing
+from pulsetrainer.artefacts.table_arrays import Columns, reader_of
 from pulsetrainer.artefacts.table_text import Dialect, detect, parse
-from pulsetrainer.errors import ArgumentError, DataError, UsageError
+from pulsetrainer.errors import ArgumentError, DataError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -36,7 +38,6 @@ _UNIT_NAMES = """
     deg rad C °C degC K Hz kHz W g kg A/m kA/m m/s mm/s rad/s N/A % percent
 """
 _UNITS = frozenset(_UNIT_NAMES.split())
-_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 _WRITTEN_ROWS = 1 << 14
 
 
@@ -50,9 +51,9 @@ class Table:
     units: Mapping[str, str]  # by name, where the header says one
     comments: tuple[str, ...]
     text_names: frozenset[str] = frozenset()  # columns of text
-    shifts: Sequence[tuple[int, int]] = field(
-        default=((0, 1),)
-    )  # (row, line) wherever their distance changes
+    # (row, line) wherever their distance changes; empty where the file has no lines
+    shifts: Sequence[tuple[int, int]] = ((0, 1),)
+    rate_Hz: float | None = None  # where the file itself says one
 
     def column(self, name: str) -> FloatArray:
         """Return a column (rows,) by its name, or by the name without its unit, whatever the case.
@@ -74,6 +75,10 @@ class Table:
         """
         return self.units.get(self.names[self.index(name)], "")
 
+    def place(self, row: int) -> str:
+        """Say where a row is: the line of a text, the row of anything else."""
+        return f"line {self.line_of(row)}" if self.shifts else f"row {row + 1}"
+
     def line_of(self, row: int) -> int:
         """Return the line of the file that holds a row."""
         first_row, line = self.shifts[bisect_right(self.shifts, row, key=lambda shift: shift[0]) - 1]
@@ -89,9 +94,14 @@ class Table:
         """
         values = self.column(name)
         bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size == values.size:
+            raise DataError(
+                f"{self.path} has no numbers in column {name}: all {values.size} rows are NaN or empty",
+                hint=f"name another column; it has {', '.join(self.names)}",
+            )
         if bad.size:
             raise DataError(
-                f"{self.path} has {values[bad[0]]} in column {name}, line {self.line_of(int(bad[0]))} "
+                f"{self.path} has {values[bad[0]]} in column {name}, {self.place(int(bad[0]))} "
                 f"({bad.size} of {values.size} rows are not finite)",
                 hint="remove those rows, or export the record again",
             )
@@ -105,7 +115,7 @@ class Table:
         DataError
             There is no such column (the nearest names are offered), or it holds text.
         """
-        bare = [_split_unit(own)[0].lower() for own in self.names]
+        bare = [split_unit(own)[0].lower() for own in self.names]
         if name in self.names:
             k = self.names.index(name)
         elif bare.count(name.lower()) == 1:
@@ -118,13 +128,13 @@ class Table:
             )
         if self.names[k] in self.text_names:
             raise DataError(
-                f"{self.path} has text, not numbers, in column {self.names[k]}, as in line {self.line_of(0)}",
+                f"{self.path} has text, not numbers, in column {self.names[k]}, as in {self.place(0)}",
                 hint="name another column",
             )
         return k
 
 
-def _split_unit(heading: str) -> tuple[str, str]:
+def split_unit(heading: str) -> tuple[str, str]:
     """Return name and unit of a column heading; no unit where it says none."""
     for pattern in (_BRACKETED, _DIVIDED):
         if (found := pattern.match(heading)) and found["name"]:
@@ -146,6 +156,9 @@ def read_table(path: Path | str) -> Table:
     """
     path = Path(path)
     try:
+        reader = reader_of(path)
+        if reader is not None:
+            return _of_arrays(path, reader(path))
         dialect = detect(path)
         if len(set(dialect.names)) < len(dialect.names):
             twice = next(name for name in dialect.names if dialect.names.count(name) > 1)
@@ -172,10 +185,19 @@ def read_table(path: Path | str) -> Table:
     )
 
 
+def _of_arrays(path: Path, columns: Columns) -> Table:
+    """Return the table of a file that is no text."""
+    names = tuple(columns.values)
+    values = np.stack([columns.values[name] for name in names], axis=1)
+    units = {name: columns.units.get(name) or split_unit(name)[1] for name in names}
+    named = {name: unit for name, unit in units.items() if unit}
+    return Table(path, names, values, named, (), shifts=(), rate_Hz=columns.rate_Hz)
+
+
 def _units(dialect: Dialect) -> dict[str, str]:
     """Return the unit of each column that has one, in its heading or in the line below."""
     pairs = zip(dialect.names, dialect.units, strict=True)
-    units = {name: _split_unit(name)[1] or below for name, below in pairs}
+    units = {name: split_unit(name)[1] or below for name, below in pairs}
     return {name: unit for name, unit in units.items() if unit}
 
 
@@ -210,81 +232,3 @@ def write_table(
         rows = zip(*(map(repr, array.tolist()) for array in arrays), strict=True)
         while block := list(islice(rows, _WRITTEN_ROWS)):
             out.write("".join(f"{','.join(row)}\n" for row in block))
-
-
-def run_from_table(
-    table: Table,
-    *,
-    input_column: str,
-    output_column: str,
-    time_column: str | None = None,
-    reference_column: str | None = None,
-    input_unit: str | None = None,
-    output_unit: str | None = None,
-    rate_Hz: float | None = None,
-) -> Run:
-    """Make a run of named columns.
-
-    Without ``time_column`` and ``rate_Hz`` the time is the first column, where that is neither input, output
-    nor reference; otherwise the run has no time and only its order counts. Time may be in ms or us.
-
-    Raises
-    ------
-    UsageError
-        Both a time column and a rate are given, or the rate is not positive.
-    DataError
-        A column is missing or not finite, there are fewer than two rows, or time does not increase (the line
-        is named).
-    """
-    if time_column is not None and rate_Hz is not None:
-        raise UsageError(
-            f"both a time column ({time_column}) and a rate ({rate_Hz:g} Hz) were given",
-            hint="give --time or --rate, not both",
-        )
-    if rate_Hz is not None and not 0 < rate_Hz < np.inf:
-        raise UsageError(f"the rate must be positive, got {rate_Hz:g} Hz", hint="for instance --rate 1000")
-    wanted = [name for name in (input_column, output_column, reference_column) if name is not None]
-    columns = {name: table.check_finite(name) for name in wanted}
-    rows = table.values.shape[0]
-    if rows < 2:
-        raise DataError(
-            f"{table.path} has {rows} row, a run needs two or more", hint="export the record again"
-        )
-    time_s = None
-    if rate_Hz is not None:
-        time_s = np.arange(rows) / rate_Hz
-    elif time_column is not None:
-        time_s = _time(table, time_column)
-    elif all(table.index(name) != 0 for name in wanted):
-        time_s = _time(table, table.names[0])
-    return Run(
-        time_s=time_s,
-        input=columns[input_column],
-        output=columns[output_column],
-        reference=None if reference_column is None else columns[reference_column],
-        input_unit=input_unit or table.unit(input_column) or "1",
-        output_unit=output_unit or table.unit(output_column) or "1",
-        input_quantity=_split_unit(table.names[table.index(input_column)])[0],
-        output_quantity=_split_unit(table.names[table.index(output_column)])[0],
-        signal=table.path.name,
-    )
-
-
-def _time(table: Table, name: str) -> FloatArray:
-    """Return a column as strictly increasing seconds."""
-    unit = table.unit(name)
-    if unit not in _SECONDS:
-        raise DataError(
-            f"{table.path} gives the time {name} in {unit!r}, which is not one of s, ms, us, min, h",
-            hint="name another --time column, or give --rate",
-        )
-    time_s = table.check_finite(name) * _SECONDS[unit]
-    back = np.flatnonzero(np.diff(time_s) <= 0)
-    if back.size:
-        row = int(back[0]) + 1
-        raise DataError(
-            f"the time in {table.path}, column {name}, does not increase at line {table.line_of(row)}: "
-            f"{time_s[row]:g} s after {time_s[row - 1]:g} s",
-            hint="name the --time column, sort the rows, drop repeated ones, or give --rate instead",
-        )
-    return time_s

@@ -91,7 +91,10 @@ def _payload(result: Result) -> dict[str, Any]:
             for w in evaluation.waveforms
         ]
     if evaluation.models:
-        names = ("name", "rms", "rms_percent", "max_percent", "gain_percent")
+        names = (
+            "name", "rms", "rms_percent", "max_percent", "gain_percent",
+            "offset", "shape_rms_percent", "start", "outside_percent",
+        )  # fmt: skip
         payload["models"] = [{name: getattr(m, name) for name in names} for m in evaluation.models]
     return payload | {
         "output": plain(result.output),
@@ -127,8 +130,11 @@ def tables(screen: Screen, evaluation: Evaluation) -> None:
     if evaluation.models:
         screen.table(
             "prediction error on the run",
-            ["model", "rms", "rms %", "max %", "gain %"],
-            [[m.name, m.rms, m.rms_percent, m.max_percent, m.gain_percent] for m in evaluation.models],
+            ["model", "rms", "rms %", "max %", "gain %", "offset", "rms % without it"],
+            [
+                [m.name, m.rms, m.rms_percent, m.max_percent, m.gain_percent, m.offset, m.shape_rms_percent]
+                for m in evaluation.models
+            ],
         )
 
 

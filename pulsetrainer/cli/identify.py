@@ -58,6 +58,7 @@ def identify(
     Example: pulsetrainer identify run.h5 -o model.h5
     """
     from pulsetrainer.flows import identify as flow
+    from pulsetrainer.flows.show import shown
 
     screen = Screen("identify", as_json=json)
     options = flow.Options(
@@ -74,16 +75,16 @@ def identify(
     with screen.working("fitting") as context:
         result = flow.run(options, context)
     screen.result(plain(result))
+    unit = shown(result.output_unit)
     sure = {}
     if result.output_uncertainty is not None:
-        sure["output known within"] = f"{result.output_uncertainty:.2g} {result.output_unit} (90 % band)"
-    unit = result.output_unit
+        sure["output known within"] = f"{result.output_uncertainty:.2g} {unit} (90 % band)"
     screen.facts(
         f"{result.output}: Preisach model of {result.levels} levels, {result.cells} cells",
         {
             "fit": f"{result.fit_rms_percent:.3f} % rms, {result.fit_max_percent:.2f} % max, of the span",
-            "fit rms": f"{result.fit_rms:.4g} {unit}",
-            "offset y0": f"{result.offset:.4g} {unit}",
+            "fit rms": f"{result.fit_rms:.4g} {unit}".rstrip(),
+            "offset y0": f"{result.offset:.4g} {unit}".rstrip(),
             "cells switched": f"{result.coverage_percent:.1f} %",
             "smoothing": f"{result.smoothing:.3g} of the range" if result.smoothing else "none",
             "loop": "falling" if result.polarity < 0 else "rising",

@@ -1,4 +1,4 @@
-"""``pulsetrainer import``: a table from any bench becomes a run."""
+"""``pulsetrainer import``: records from any bench become runs."""
 
 from __future__ import annotations
 
@@ -8,12 +8,22 @@ from typing import Annotated
 import typer
 
 from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, Force, Out
+from pulsetrainer.cli.options import AsJson, Force
 
 
 def import_(
-    file: Annotated[Path, typer.Argument(help="Table to read.", metavar="FILE.csv")],
-    out: Out,
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            help="CSV, TSV, .npz, .npy, .mat or .wav; several are parts of one run.", metavar="FILE.csv..."
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--out", help="File to write; '{name}.h5' makes a run of each file.", show_default=False
+        ),
+    ],
     input_column: Annotated[
         str, typer.Option("--input", help="Column of the input, a current for instance.")
     ],
@@ -36,10 +46,19 @@ def import_(
     rate: Annotated[
         float | None, typer.Option(help="Samples a second, instead of a time column.", show_default=False)
     ] = None,
+    no_time: Annotated[bool, typer.Option("--no-time", help="Only the order of the samples counts.")] = False,
+    resample: Annotated[
+        str | None,
+        typer.Option(
+            metavar="even|HZ",
+            help="Make the time steps even: at the median step, or at a rate. Default: left as they are.",
+            show_default=False,
+        ),
+    ] = None,
     force: Force = False,
     json: AsJson = False,
 ) -> None:
-    """Make a run of a table measured elsewhere.
+    """Make a run of a record measured elsewhere.
 
     Example: pulsetrainer import scope.csv --input current_A --output force_N -o run.h5
     """
@@ -47,7 +66,7 @@ def import_(
 
     screen = Screen("import", as_json=json)
     options = flow.Options(
-        file=file,
+        files=tuple(files),
         output=out,
         input_column=input_column,
         output_column=output_column,
@@ -56,9 +75,25 @@ def import_(
         input_unit=input_unit,
         output_unit=output_unit,
         rate_Hz=rate,
+        no_time=no_time,
+        resample=_rate(resample),
         force=force,
     )
-    with screen.working(f"reading {file.name}") as context:
+    with screen.working(f"reading {', '.join(path.name for path in files)}") as context:
         result = flow.run(options, context)
     screen.result(result)
-    screen.facts(f"{result.output}: {file.name}", result.facts)
+    for one in result.runs:
+        screen.facts(f"{one.output}: {', '.join(Path(name).name for name in one.report.files)}", one.facts)
+
+
+def _rate(text: str | None) -> float | None:
+    """Read --resample: 0 for even, a rate, or nothing."""
+    if text is None or text == "even":
+        return None if text is None else 0.0
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 0 < value < float("inf"):
+        raise typer.BadParameter(f"must be even or a positive rate, got {text!r}", param_hint="--resample")
+    return value

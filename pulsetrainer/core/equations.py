@@ -88,6 +88,10 @@ class NormalEquations:
             + offset**2 * self.weight
         )
 
+    def rms(self, masses: FloatArray, offset: float) -> float:
+        """Weighted rms error, output unit."""
+        return float(np.sqrt(max(self.sum_of_squares(masses, offset), 0.0) / self.weight))
+
     def __sub__(self, part: NormalEquations) -> NormalEquations:
         """Sums over the samples that are not in ``part``."""
         return NormalEquations(

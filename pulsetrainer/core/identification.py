@@ -17,9 +17,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pulsetrainer.core import large, nnls
+from pulsetrainer.core import congruence, large, nnls
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.equations import NormalEquations, Record, node_sums, normal_equations
+from pulsetrainer.core.levels import thinned
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.core.smoothing import choose, smoothed
@@ -31,9 +32,11 @@ __all__ = [
     "NormalEquations",
     "Record",
     "Smoothing",
+    "correlation_of",
     "coverage",
     "identify",
     "normal_equations",
+    "offsets_between",
     "polarity_of",
 ]
 
@@ -43,6 +46,14 @@ Smoothing = float | Literal["auto"]
 # The dense path holds about ten matrices of n_q^2 numbers at its peak; above this it goes matrix-free.
 DENSE_BYTES = 1_000_000_000
 _DENSE_COPIES = 10
+# A correlation of input and output above this tells by itself whether the loop rises or falls.
+CLEAR = 0.5
+_SIGN_LEVELS = 24
+_SIGN_SMOOTHING = 0.05
+# Below this share of the output's span the fit is good, and no stiffer density is tried.
+_POOR = 0.02
+# Records get an offset each where that lowers the rms error by at least this share.
+SHIFTED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,14 +66,44 @@ class Identified:
     kkt: float  # largest violation of the optimality conditions, relative
     smoothing: float = 0.0  # s, share of the input's range; see ``core.smoothing``
     tried: tuple[tuple[float, float], ...] = ()  # (s, held-out rms) when it was chosen, output unit
+    congruence: float = 0.0  # t, how alike the loops are along the diagonal; see ``core.congruence``
     samples: int = 0  # with weight; fewer than cells: what the data do not ask for is zero
 
 
-def polarity_of(records: Sequence[Record]) -> int:
-    """Return 1 when the output rises with the input, -1 when it falls: the sign of their covariance."""
+def correlation_of(records: Sequence[Record]) -> float:
+    """Return the correlation of input and output, -1..1; 0 where one of them does not vary."""
     u = np.concatenate([r.input if r.weight is None else r.input[r.weight > 0] for r in records])
     y = np.concatenate([r.output if r.weight is None else r.output[r.weight > 0] for r in records])
-    return -1 if float(np.mean((u - u.mean()) * (y - y.mean()))) < 0 else 1
+    # both scaled to 1 first: the product of two small numbers must not underflow
+    u, y = (
+        x / max(float(np.abs(x).max(initial=0.0)), np.finfo(float).tiny) for x in (u - u.mean(), y - y.mean())
+    )
+    size = float(np.sqrt(np.mean(u * u) * np.mean(y * y)))
+    return float(np.mean(u * y)) / size if size > 0 else 0.0
+
+
+def polarity_of(
+    records: Sequence[Record], plane: Plane | None = None, reading: Reading = "continuous"
+) -> int:
+    """Return 1 when the output rises with the input, -1 when it falls.
+
+    It is the sign of their correlation. Where that is weaker than ``CLEAR`` and a ``plane`` is given, both
+    signs are fitted, and the one that leaves less is returned: the loop's direction then tells more than
+    its trend.
+
+    Raises
+    ------
+    ConvergenceError
+        A fit did not settle.
+    """
+    correlation = correlation_of(records)
+    if plane is None or abs(correlation) >= CLEAR:
+        return -1 if correlation < 0 else 1
+    coarse = plane if plane.n_h <= _SIGN_LEVELS else thinned(plane, _SIGN_LEVELS)
+    equations = normal_equations(coarse, records, reading)
+    gram, rhs = smoothed(equations, _SIGN_SMOOTHING)
+    gains = {sign: float(sign * rhs @ nnls.solve(gram, sign * rhs).x) for sign in (1, -1)}
+    return max(gains, key=gains.__getitem__)
 
 
 def fits_dense(plane: Plane) -> bool:
@@ -105,16 +146,63 @@ def identify(
         The fit did not settle.
     """
     samples = _check(records, plane, method, smoothing)
-    sign = polarity_of(records) if polarity is None else polarity
+    sign = polarity_of(records, plane, reading) if polarity is None else polarity
     turned = [Record(r.input, sign * r.output, r.weight, r.start) for r in records]
     tried: tuple[tuple[float, float], ...] = ()
     if smoothing == "auto":
         choice = choose(turned, plane, reading)
         smoothing, tried = choice.smoothing, choice.tried
-    fit = _fit_dense if fits_dense(plane) else _fit_large
-    masses, offset, iterations, kkt = fit(turned, plane, reading, method, smoothing)
+    stiffness = 0.0
+    if not fits_dense(plane):
+        masses, offset, iterations, kkt = _fit_large(turned, plane, reading, method, smoothing)
+    else:
+        equations = normal_equations(plane, turned, reading)
+        masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, 0.0)
+        if tried and equations.rms(masses, offset) > _POOR * _span(turned):
+            stiffness = congruence.choose(turned, plane, reading)
+        if stiffness:
+            masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, stiffness)
     operator = Preisach(plane, masses / plane.areas, sign * offset, reading, polarity=sign)
-    return Identified(operator, method, iterations, kkt, smoothing, tried, samples)
+    return Identified(operator, method, iterations, kkt, smoothing, tried, stiffness, samples)
+
+
+def _span(records: Sequence[Record]) -> float:
+    """Span of the output over all samples with weight."""
+    return float(np.ptp(np.concatenate([r.output[r.weights > 0] for r in records])))
+
+
+def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = "continuous") -> FloatArray:
+    """Offsets (k,) of the outputs of k records against their mean, in output units, zero where they agree.
+
+    All records share one set of weights and each has an offset of its own, eliminated by centring. They are
+    zero unless that makes the error smaller by ``SHIFTED``: records of one device in one state keep one
+    offset.
+
+    Raises
+    ------
+    ConvergenceError
+        The fit did not settle.
+    """
+    if len(records) < 2:
+        return np.zeros(len(records))
+    coarse = plane if plane.n_h <= _SIGN_LEVELS else thinned(plane, _SIGN_LEVELS)
+    sign = polarity_of(records, plane, reading)
+    turned = [Record(r.input, sign * r.output, r.weight, r.start) for r in records]
+    single = [normal_equations(coarse, [record], reading) for record in turned]
+    whole = normal_equations(coarse, turned, reading)
+    shared_gram, shared_rhs = smoothed(whole, _SIGN_SMOOTHING)
+    bent = shared_gram - whole.centred()[0]
+    centred = [one.centred() for one in single]
+    shared = nnls.solve(shared_gram, shared_rhs).x
+    gram = bent + np.sum([g for g, _ in centred], axis=0)
+    own = nnls.solve(gram, np.sum([f for _, f in centred], axis=0)).x
+    levels = np.asarray([one.offset(own) for one in single])
+    before = whole.sum_of_squares(shared, whole.offset(shared))
+    after = sum(one.sum_of_squares(own, level) for one, level in zip(single, levels, strict=True))
+    if after > (1.0 - SHIFTED) ** 2 * before:
+        return np.zeros(len(records))
+    weight = np.asarray([one.weight for one in single])
+    return sign * (levels - float(weight @ levels / weight.sum()))
 
 
 def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: Smoothing) -> int:
@@ -151,12 +239,12 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
 _Fitted = tuple[FloatArray, float, int, float]  # masses, offset, iterations, relative KKT violation
 
 
-def _fit_dense(
-    records: Sequence[Record], plane: Plane, reading: Reading, method: Method, smoothing: float
-) -> _Fitted:
+def _fit_dense(equations: NormalEquations, method: Method, smoothing: float, stiffness: float) -> _Fitted:
     """Fit with the Gram matrix of the cells in memory."""
-    equations = normal_equations(plane, records, reading)
     gram, rhs = smoothed(equations, smoothing)
+    if stiffness:
+        centred = equations.centred()[0]
+        gram += congruence.penalty(equations.plane, np.diagonal(centred).copy(), stiffness).toarray()
     if method == "joint":
         found = nnls.solve(gram, rhs)
         masses, offset, iterations = found.x, equations.offset(found.x), found.iterations

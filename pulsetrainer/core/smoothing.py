@@ -14,7 +14,8 @@ they are coupled along the diagonal only.
 The output sees the density through two integrals, so a ripple of wavelength 2 pi / k enters the first sum
 as k^-4 and B as k^4: the two meet at k = 1 / s. The number s is therefore a length, as a share of the
 input's range: what is narrower than s in the density is smoothed away. It has no units and does not
-depend on the number of levels or samples.
+depend on the number of levels or samples. Where levels crowd (``core.levels``), x is the number of the level
+over n_h instead: what is smoothed away is narrower there too.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from scipy import sparse
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.equations import NodeSums, NormalEquations, Record, parted_sums
+from pulsetrainer.core.levels import thinned
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading
 from pulsetrainer.errors import ArgumentError
 
@@ -60,8 +62,8 @@ def bending(plane: Plane, usable: NDArray[np.bool_]) -> sparse.csr_array:
     i, j = plane.cell_indices
     cell = np.full((n, n), -1, dtype=np.int64)
     cell[i, j] = np.where(usable, np.arange(plane.n_q), -1)
-    size = np.diff(plane.levels) / (plane.high - plane.low)
-    middle = (plane.thresholds - plane.low) / (plane.high - plane.low)
+    size = np.full(n, 1.0 / n)
+    middle = (np.arange(n) + 0.5) / n
     per_mass = np.ones(plane.n_q)  # density per mass
     per_mass[i != j] = 1.0 / (size[i] * size[j])[i != j]
     per_mass[i == j] = 1.0 / size
@@ -181,7 +183,7 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> Choice:
     ArgumentError
         Too few samples with weight to hold any out.
     """
-    coarse = plane if plane.n_h <= CHOICE_LEVELS else Plane.uniform(plane.low, plane.high, CHOICE_LEVELS)
+    coarse = plane if plane.n_h <= CHOICE_LEVELS else thinned(plane, CHOICE_LEVELS)
     folds = [blocks(r.input, plane.low, plane.high) % FOLDS for r in records]
     sums = parted_sums(coarse, records, reading, folds, FOLDS)
     held_out = [part for part in sums if part.weight > 0]

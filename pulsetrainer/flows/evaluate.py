@@ -22,6 +22,7 @@ from pulsetrainer.artefacts.kinds import (
     WaveformEvaluation,
 )
 from pulsetrainer.core import metrics
+from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import DataError, QualityError, UsageError
 from pulsetrainer.flows.modelling import known_from, operator_of, parts_of, predict, step_of
@@ -40,6 +41,7 @@ PUBLISHED: dict[str, dict[str, float]] = {
 METRICS = ("mean_abs_error_percent", "max_abs_error_percent", "rms_error_percent", "hysteresis_percent",
            "current_tracking_max_percent")  # fmt: skip
 _TRACE_SAMPLES = 6000
+_BEYOND = 0.005  # of the model's range: an input further out than this was never identified
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +104,7 @@ def run(options: Options, context: Context) -> Result:
         )
     elif len(artefacts) == 1 and options.models:
         evaluation = _of_run(options.inputs[0], artefacts[0], options.models)
+        _note_limits(options.inputs[0], evaluation, context)
     else:
         raise UsageError(
             "evaluate takes playbacks, or one run together with the models to compare on it",
@@ -215,14 +218,22 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 hint="use a model of the same device, in the same units",
             )
         operator = operator_of(model)
+        low, high = operator.plane.low, operator.plane.high
         parts = parts_of(one)
-        known = [known_from(part.input, operator.plane.low, operator.plane.high) for part in parts]
+        known = [known_from(part.input, low, high) for part in parts]
+        starts = [_start(model, part, k) for part, k in zip(parts, known, strict=True)]
         step_s = step_of(one)
         predicted = np.concatenate(
-            [predict(model, part.input, step_s)[k:] for part, k in zip(parts, known, strict=True)]
+            [
+                predict(model, part.input, step_s, start)[k:]
+                for part, k, (start, _) in zip(parts, known, starts, strict=True)
+            ]
         )
         measured = np.concatenate([part.output[k:] for part, k in zip(parts, known, strict=True)])
         errors = metrics.prediction(measured, predicted)
+        shift = float(np.mean(measured - predicted))
+        own = metrics.prediction(measured, predicted + shift)
+        outside = (one.input < low - _BEYOND * (high - low)) | (one.input > high + _BEYOND * (high - low))
         thin = slice(None, None, max(1, predicted.size // _TRACE_SAMPLES))
         found.append(
             ModelEvaluation(
@@ -230,6 +241,10 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 rms=errors.rms,
                 rms_percent=errors.rms_percent,
                 max_percent=errors.max_percent,
+                offset=shift,
+                shape_rms_percent=own.rms_percent,
+                start=next((state for _, state in starts if state != "known"), "known"),
+                outside_percent=100.0 * float(np.mean(outside)),
                 gain_percent=100.0 * (1.0 - errors.rms / found[0].rms) if found else 0.0,
                 time_s=_times(parts, known, thin),
                 output=measured[thin],
@@ -246,6 +261,42 @@ def _times(parts: Sequence[Run], known: Sequence[int], thin: slice) -> FloatArra
     return np.concatenate(times)[thin] if times else None
 
 
+def _note_limits(path: Path, evaluation: Evaluation, context: Context) -> None:
+    """Say where a run leaves the range of a model, and which state before the run was assumed."""
+    for found in evaluation.models:
+        if found.outside_percent > 0:
+            context.note(
+                f"{found.outside_percent:.1f} % of the input of {path} is outside the range of {found.name}, "
+                "where it predicts its outermost values"
+            )
+        if found.start != "known":
+            context.note(f"{path} does not reach the ends of {found.name}; state before it: {found.start}")
+
+
+def _start(model: Model, one: Run, known: int) -> tuple[State | None, str]:
+    """Return the state from which a run is followed, and what it is called.
+
+    A run that never reaches an end of the model's range leaves open what came before it. Tried are both
+    saturations and the demagnetised state; the one that predicts best is taken.
+    """
+    low, high = float(model.levels[0]), float(model.levels[-1])
+    near = 0.01 * (high - low)
+    if np.any((one.input <= low + near) | (one.input >= high - near)):
+        return None, "known"
+    states = {
+        "negative saturation": negative_saturation(low),
+        "demagnetised": demagnetised(low, high),
+        "positive saturation": positive_saturation(low, high),
+    }
+    operator = operator_of(model)
+    left = {
+        name: float(np.mean((operator(one.input, state)[known:] - one.output[known:]) ** 2))
+        for name, state in states.items()
+    }
+    best = min(left, key=left.__getitem__)
+    return states[best], f"{best}, estimated"
+
+
 def metrics_of(evaluation: Evaluation) -> dict[str, float]:
     """All figures of an evaluation by dotted name: ``normal.continuous.scaled.max_abs_error_percent``."""
     named: dict[str, float] = {}
@@ -256,7 +307,7 @@ def metrics_of(evaluation: Evaluation) -> dict[str, float]:
             for metric in METRICS:
                 named[f"{stem}.{drive}.{metric}"] = getattr(errors, metric)
     for model in evaluation.models:
-        for metric in ("rms", "rms_percent", "max_percent", "gain_percent"):
+        for metric in ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent"):
             named[f"{Path(model.name).stem}.{metric}"] = getattr(model, metric)
     return named
 

@@ -13,10 +13,20 @@ from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import BoolArray, Fit, Model, Run
 from pulsetrainer.core import input_noise, metrics, uncertainty
 from pulsetrainer.core.coverage import coverage, largest_gap
-from pulsetrainer.core.identification import Identified, Method, Smoothing, identify
-from pulsetrainer.core.plane import Plane, Reading
+from pulsetrainer.core.identification import (
+    Identified,
+    Method,
+    Record,
+    Smoothing,
+    identify,
+    offsets_between,
+)
+from pulsetrainer.core.levels import plane_for
+from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
-from pulsetrainer.flows.modelling import known_from, parts_of, record_of
+from pulsetrainer.flows.modelling import known_from, parts_of, record_of, step_of
+from pulsetrainer.flows.show import shown as shown_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,6 +70,10 @@ class Result:
     false_reversals: int  # taken out of the input before the fit
     output_uncertainty: float | None  # mean half width of the 90 % band of the output; None without bootstrap
     polarity: int
+    offsets: tuple[float, ...]  # of each run's output against their mean; zeros where one offset serves all
+    spacing: str  # of the levels: "even", or "crowded" where the loop is steep
+    congruence: float  # t; 0: the density is free
+    warning: str  # that this kind of model is the wrong one; empty where it is not
     iterations: int
     seconds: float
 
@@ -83,19 +97,26 @@ def run(options: Options, context: Context) -> Result:
     for path, one in zip(options.runs, runs, strict=True):
         if not one.complete:
             context.note(f"{path} is incomplete; fitting the {one.input.size} samples it has")
-    runs = [part for one in runs for part in parts_of(one)]
+    parts = [
+        (path.stem, part) for path, one in zip(options.runs, runs, strict=True) for part in parts_of(one)
+    ]
+    names, runs = [name for name, _ in parts], [part for _, part in parts]
     ranges = [input_range(one) for one in runs]
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     _check_range(options.runs, low, high, runs[0].input_unit)
-    plane = Plane.uniform(low, high, options.levels)
     cleaned = [input_noise.clean(one.input) for one in runs]
     _note_noise(cleaned, runs[0].input_unit, context)
     runs = [replace(one, input=clean.input) for one, clean in zip(runs, cleaned, strict=True)]
     context.progress(0.1)
+    records = [record_of(one, low, high) for one in runs]
+    plane = _plane(records, low, high, options, context)
+    shifts = offsets_between(records, plane, options.operator)
+    if np.any(shifts):
+        _note_shifts(names, shifts, runs, context)
+        records = [record_of(one, low, high, shift) for one, shift in zip(runs, shifts, strict=True)]
     smoothing = options.smoothing
     if smoothing is None:
         smoothing = 0.0 if options.operator == "relay" else "auto"
-    records = [record_of(one, low, high) for one in runs]
     found = identify(
         records,
         plane,
@@ -116,7 +137,11 @@ def run(options: Options, context: Context) -> Result:
     gap = largest_gap(plane, covered)
     if gap is not None and float(np.mean(covered)) < _WELL_COVERED:
         context.note(gap.words(plane, runs[0].input_unit))
-    model = _model(runs, found, covered, ensemble)
+    model = _model(runs, records, found, covered, ensemble)
+    compared = velocity.compare(records, [step_of(one) for one in runs], _residuals(records, found))
+    warning = velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
+    if warning:
+        context.note(warning)
     context.progress(0.9)
     header = provenance.make_header(
         f"Preisach model of {', '.join(path.stem for path in options.runs)}",
@@ -145,6 +170,10 @@ def run(options: Options, context: Context) -> Result:
         false_reversals=sum(clean.removed for clean in cleaned),
         output_uncertainty=_half_width(model.fit),
         polarity=model.polarity,
+        offsets=tuple(float(shift) for shift in shifts),
+        spacing="even" if np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]) else "crowded",
+        congruence=found.congruence,
+        warning=warning,
         iterations=model.fit.iterations,
         seconds=time.perf_counter() - begun,
     )
@@ -159,11 +188,12 @@ def _largest_noise(cleaned: Sequence[input_noise.Cleaned]) -> float | None:
 def _note_noise(cleaned: Sequence[input_noise.Cleaned], unit: str, context: Context) -> None:
     """Say how many reversals were noise."""
     removed = sum(clean.removed for clean in cleaned)
+    unit = f" {unit}" if shown_unit(unit) else ""
     if removed:
         worst = max(cleaned, key=lambda clean: clean.removed)
         context.note(
-            f"the measured input has noise of {worst.sigma:.2g} {unit}: {removed} false reversals below "
-            f"{worst.dead_band:.2g} {unit} taken out, {sum(clean.kept for clean in cleaned)} left"
+            f"the measured input has noise of {worst.sigma:.2g}{unit}: {removed} false reversals below "
+            f"{worst.dead_band:.2g}{unit} taken out, {sum(clean.kept for clean in cleaned)} left"
         )
 
 
@@ -204,17 +234,47 @@ def _half_width(fit: Fit) -> float | None:
     return 0.5 * float(np.mean(fit.predicted_upper - fit.predicted_lower))
 
 
+def _plane(records: Sequence[Record], low: float, high: float, options: Options, context: Context) -> Plane:
+    """Return the levels: even for relays, as in the paper, else where the output changes."""
+    if options.operator == "relay":
+        return Plane.uniform(low, high, options.levels)
+    plane = plane_for(records, low, high, options.levels)
+    if not np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]):
+        context.note("the loop is steep: the levels lie closer where the output changes")
+    return plane
+
+
+def _note_shifts(names: Sequence[str], shifts: FloatArray, runs: Sequence[Run], context: Context) -> None:
+    """Say how far the outputs of the runs are shifted against each other."""
+    span = float(np.ptp(np.concatenate([one.output for one in runs])))
+    listed = ", ".join(f"{name} {shift:+.3g}" for name, shift in zip(names, shifts, strict=True))
+    context.note(
+        f"the outputs of the runs are shifted against each other by up to {np.ptp(shifts):.3g} "
+        f"{shown_unit(runs[0].output_unit)} ({100 * np.ptp(shifts) / span:.2f} % of the span): each was "
+        f"fitted with an offset of its own ({listed}); the model has their mean"
+    )
+
+
+def _residuals(records: Sequence[Record], found: Identified) -> list[FloatArray]:
+    """Measured less fitted output (n,) of each record."""
+    return [r.output - found.operator(r.input, r.start) for r in records]
+
+
 def _model(
-    runs: Sequence[Run], found: Identified, covered: BoolArray, ensemble: uncertainty.Ensemble | None
+    runs: Sequence[Run],
+    records: Sequence[Record],
+    found: Identified,
+    covered: BoolArray,
+    ensemble: uncertainty.Ensemble | None,
 ) -> Model:
     """Return the stored form of an identified operator, with its fit."""
     operator, first = found.operator, runs[0]
     plane = operator.plane
     measured, predicted = [], []
-    for one in runs:
-        known = known_from(one.input, plane.low, plane.high)
-        measured.append(one.output[known:])
-        predicted.append(operator(one.input)[known:])
+    for record in records:
+        known = record.weights > 0
+        measured.append(record.output[known])
+        predicted.append(operator(record.input, record.start)[known])
     errors = metrics.prediction(np.concatenate(measured), np.concatenate(predicted))
     shown = slice(
         known_from(first.input, plane.low, plane.high), None, max(1, first.input.size // _TRACE_SAMPLES)
@@ -233,8 +293,8 @@ def _model(
         method=found.method,
         time_s=None if first.time_s is None else first.time_s[shown],
         input=first.input[shown],
-        output=first.output[shown],
-        predicted=operator(first.input)[shown],
+        output=records[0].output[shown],
+        predicted=operator(records[0].input, records[0].start)[shown],
         smoothing=found.smoothing,
         draws=0 if ensemble is None else len(ensemble.weights),
         predicted_lower=None if band is None else band.lower[shown],

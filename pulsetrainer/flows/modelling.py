@@ -6,6 +6,7 @@ import numpy as np
 
 from pulsetrainer.artefacts.kinds import Model, Run
 from pulsetrainer.core.identification import Record
+from pulsetrainer.core.memory import State, positive_saturation
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.extended import Extended
@@ -28,8 +29,8 @@ def extended_of(model: Model) -> Extended:
     return Extended.of(operator_of(model), named)
 
 
-def predict(model: Model, inputs: FloatArray, dt_s: float | None) -> FloatArray:
-    """Output (n,) that a stored model predicts for an input (n,) at even steps.
+def predict(model: Model, inputs: FloatArray, dt_s: float | None, start: State | None = None) -> FloatArray:
+    """Output (n,) that a stored model predicts for an input (n,) at even steps, from ``start``.
 
     Raises
     ------
@@ -37,7 +38,7 @@ def predict(model: Model, inputs: FloatArray, dt_s: float | None) -> FloatArray:
         The model has extensions, but the time step is unknown; or as ``extended_of``.
     """
     if not model.extensions:
-        return operator_of(model)(inputs)
+        return operator_of(model)(inputs, start)
     if dt_s is None:
         raise DataError(
             f"the model is extended by {', '.join(e.cause for e in model.extensions)}, which need to know "
@@ -89,18 +90,43 @@ def parts_of(run: Run) -> tuple[Run, ...]:
 
 
 def known_from(inputs: FloatArray, low: float, high: float) -> int:
-    """First sample at which the memory is known: where the input first reaches an end of [low, high].
+    """First sample (n,) at which the memory is known, whatever came before the record.
 
-    At an end every remembered extreme has been wiped out, whatever came before. Reached means within
-    1 % of the range: a noisy record touches its extreme only once, late.
+    Where the input reaches an end of [low, high], every remembered extreme is wiped out. Reached means within
+    1 % of the range: a noisy record touches its extreme only once, late. An input that never gets there is
+    known, up to a constant, from where it first reaches an end of its own range: see ``start_of``.
     """
     near = 0.01 * (high - low)
     ends = np.flatnonzero((inputs <= low + near) | (inputs >= high - near))
-    return int(ends[0]) if ends.size else 0
+    return int(ends[0]) if ends.size else first_extreme(inputs)[0]
 
 
-def record_of(run: Run, low: float, high: float) -> Record:
-    """Return a run as a record to fit or predict; samples before the memory is known have no weight.
+def first_extreme(inputs: FloatArray) -> tuple[int, bool]:
+    """First sample (n,) within 1 % of an end of the input's own range, and whether that is the top."""
+    bottom, top = float(inputs.min()), float(inputs.max())
+    near = 0.01 * (top - bottom)
+    at = int(np.flatnonzero((inputs <= bottom + near) | (inputs >= top - near))[0])
+    return at, bool(inputs[at] >= top - near)
+
+
+def start_of(inputs: FloatArray, low: float, high: float) -> State | None:
+    """State from which a record is followed; None is negative saturation.
+
+    A record that swings within [low, high] and never reaches its ends leaves the relays outside its own
+    range as they were. Once it has visited both of its own extremes they add a constant, whatever they are
+    (congruency, Mayergoyz 2003, section 1.2). So that its first branch already is that of its closed loop,
+    it is started from the saturation opposite to the extreme it visits first.
+    """
+    near = 0.01 * (high - low)
+    if np.any((inputs <= low + near) | (inputs >= high - near)) or first_extreme(inputs)[1]:
+        return None
+    return positive_saturation(low, high)
+
+
+def record_of(run: Run, low: float, high: float, shift: float = 0.0) -> Record:
+    """Return a run as a record to fit; samples before the memory is known have no weight.
+
+    ``shift`` is the offset of this run's output against that of the others, output unit: it is taken out.
 
     Raises
     ------
@@ -109,4 +135,4 @@ def record_of(run: Run, low: float, high: float) -> Record:
     """
     weight = np.ones(run.input.size)
     weight[: known_from(run.input, low, high)] = 0.0
-    return Record(run.input, run.output, weight)
+    return Record(run.input, run.output - shift, weight, start_of(run.input, low, high))

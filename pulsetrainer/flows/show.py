@@ -73,10 +73,15 @@ def _playback(played: Playback) -> dict[str, Any]:
     }
 
 
+def shown(unit: str) -> str:
+    """Return a unit as a person reads it: nothing for a pure number."""
+    return "" if unit == "1" else unit
+
+
 def _span(values: FloatArray, unit: str) -> str:
     if values.size == 0:
         return "no samples"
-    return f"{np.min(values):.4g} .. {np.max(values):.4g} {unit}"
+    return f"{np.min(values):.4g} .. {np.max(values):.4g} {shown(unit)}".rstrip()
 
 
 def _run(run: Run) -> dict[str, Any]:
@@ -106,7 +111,7 @@ def _model(model: Model) -> dict[str, Any]:
         "operator": model.operator,
         "polarity": model.polarity,
         f"input ({model.input_quantity})": _span(model.levels, model.input_unit),
-        "offset": f"{model.offset:.4g} {model.output_unit}",
+        "offset": f"{model.offset:.4g} {shown(model.output_unit)}".rstrip(),
         "positive weights": int(np.sum(model.weights > 0)),
         "fit_rms_percent": fit.rms_percent if fit else None,
         "coverage_percent": fit.coverage_percent if fit else None,

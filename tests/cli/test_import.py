@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -69,3 +71,194 @@ def test_a_column_that_is_not_there_offers_the_nearest(run, tmp_path):
     assert done.code == 3
     assert "did you mean 'current_A'" in done.err
     assert not (tmp_path / "run.h5").exists()
+
+
+# --- what is read, said and refused, on real records ----------------------------------------------------
+
+
+def _words(name, *more):
+    return ["import", DATA / f"{name}.csv", "--input", "u", "--output", "y", *more]
+
+
+@pytest.fixture
+def columns():
+    """Time, input and output of a real record, 7833 uneven samples with 107 gaps."""
+    return np.loadtxt(DATA / "pneu_oring_3bar.csv", delimiter=",", skiprows=1).T
+
+
+def test_the_report_of_a_real_record(run):
+    """Samples, rate, gaps, ranges, units, polarity, reversals, coverage: on the screen and as JSON."""
+    done = run(*_words("pneu_oring_3bar", "--output-unit", "N", "-o", "run.h5", "--json"))
+    assert done.code == 0, done
+    report = done.json["runs"][0]["report"]
+    assert report["samples"] == 7833
+    assert report["rate_Hz"] == pytest.approx(100.0)
+    assert (report["even"], report["gaps"]) == (False, 107)
+    assert report["longest_gap_s"] == pytest.approx(2.66)
+    assert report["input_range"] == [-2.93, 36.858]
+    assert report["output_unit"] == "N"
+    assert report["polarity"] == "unclear"
+    assert report["reversals"] == 132
+    assert report["false_reversals"] == 102
+    assert report["coverage_percent"] == pytest.approx(100.0, abs=0.2)
+    assert "107 gaps" in done.err
+    assert "uneven" in done.err
+    shown = run(*_words("davinci_f0p1_torque10", "-o", "other.h5"))
+    assert "falling (correlation -0.99)" in shown.out
+    assert "10000" in shown.out
+
+
+def test_time_stamps_stay_as_they_are_unless_asked(run, tmp_path, columns):
+    """Uneven stamps are kept to the last bit, and evened out on request only."""
+    assert run(*_words("pneu_oring_3bar", "-o", "run.h5")).code == 0
+    done = run(*_words("pneu_oring_3bar", "--resample", "even", "-o", "even.h5", "--json"))
+    assert "filled with straight lines" in done.err
+    assert run(*_words("pneu_oring_3bar", "--resample", "50", "-o", "half.h5")).code == 0
+    assert run(*_words("pneu_oring_3bar", "--resample", "often", "-o", "x.h5")).code == 2
+    t, u, _ = columns
+    with h5py.File(tmp_path / "run.h5") as file:
+        np.testing.assert_array_equal(file["time"], t)
+    for name, rate in (("even.h5", 100.0), ("half.h5", 50.0)):
+        with h5py.File(tmp_path / name) as file:
+            np.testing.assert_allclose(np.diff(file["time"]), 1.0 / rate, rtol=1e-9)
+            np.testing.assert_array_equal(file["input"], np.interp(file["time"], t, u))
+
+
+def test_every_format_gives_the_same_run(run, tmp_path, columns):
+    """The same real record as CSV, decimal commas, .npz, .mat of both versions: equal numbers."""
+    from scipy.io import savemat
+
+    t, u, y = columns
+    lines = [";".join(map(repr, row)).replace(".", ",") for row in columns.T.tolist()]
+    (tmp_path / "comma.csv").write_text("t_s;u;y\n" + "\n".join(lines) + "\n")
+    np.savez(tmp_path / "r.npz", t=t, u=u, y=y)
+    savemat(tmp_path / "five.mat", {"t": t, "u": u, "y": y})
+    with h5py.File(tmp_path / "seven.mat", "w", userblock_size=512) as file:
+        for name, vector in (("t", t), ("u", u), ("y", y)):
+            file[name] = vector[None, :]
+    for name in ("comma.csv", "r.npz", "five.mat", "seven.mat"):
+        done = run("import", name, "--input", "u", "--output", "y", "-o", f"{name}.h5")
+        assert done.code == 0, done
+        with h5py.File(tmp_path / f"{name}.h5") as file:
+            for own, there in ((t, "time"), (u, "input"), (y, "output")):
+                np.testing.assert_array_equal(file[there], own)
+
+
+def test_a_recording_of_sound_needs_no_time_column(run, tmp_path):
+    """Two channels of a sound card: the rate is in the file."""
+    from scipy.io import wavfile
+
+    t = np.arange(4000) / 8000.0
+    both = np.stack([np.sin(50 * t), np.sin(50 * t) ** 3], axis=1).astype(np.float32)
+    wavfile.write(tmp_path / "r.wav", 8000, both)
+    done = run("import", "r.wav", "--input", "channel1", "--output", "channel2", "-o", "run.h5", "--json")
+    assert done.json["runs"][0]["report"]["rate_Hz"] == pytest.approx(8000.0)
+
+
+def test_several_files_are_parts_of_one_run_or_runs_of_their_own(run, tmp_path, columns):
+    """A record cut in three: joined it is whole again; with {name} each becomes a run."""
+    t, u, y = columns
+    parts = np.array_split(np.arange(t.size), 3)
+    for k, part in enumerate(parts):
+        # the second part goes on with the clock of the first; the third has a clock that starts anew
+        start = t[part[0]] if k == 2 else 0.0
+        rows = np.stack((t[part] - start, u[part], y[part]), axis=1)
+        np.savetxt(
+            tmp_path / f"p{k}.csv", rows, fmt="%.17g", delimiter=",", header="t_s,u_mm,y_N", comments=""
+        )
+    files = [f"p{k}.csv" for k in range(3)]
+    done = run("import", *files, "--input", "u", "--output", "y", "-o", "run.h5", "--json")
+    assert done.code == 0, done
+    assert "p2.csv starts anew" in done.err
+    assert done.json["facts"]["samples"] == t.size
+    with h5py.File(tmp_path / "run.h5") as file:
+        np.testing.assert_array_equal(file["input"], u)
+        np.testing.assert_array_equal(file["time"][: parts[2][0]], t[: parts[2][0]])
+        assert np.all(np.diff(file["time"]) > 0)
+    done = run("import", *files, "--input", "u", "--output", "y", "-o", "{name}.h5", "--json")
+    assert [one["output"] for one in done.json["runs"]] == ["p0.h5", "p1.h5", "p2.h5"]
+    assert [one["report"]["samples"] for one in done.json["runs"]] == [part.size for part in parts]
+
+
+def test_rows_that_are_merely_counted_are_no_time(run, tmp_path):
+    """A magnetic loop is indexed 0, 1, 2: that is said, and only its order counts, unless --time insists."""
+    done = run(*_words("bh_steel_m130_27s_1", "-o", "run.h5", "--json"))
+    assert "merely counts the rows" in done.err
+    assert done.json["facts"]["rate_Hz"] is None
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert "time" not in file
+    assert run(*_words("bh_steel_m130_27s_1", "--time", "t_s", "-o", "timed.h5")).code == 0
+    assert run(*_words("davinci_f0p1_torque10", "--no-time", "-o", "bare.h5")).code == 0
+    for name, timed in (("timed.h5", True), ("bare.h5", False)):
+        with h5py.File(tmp_path / name) as file:
+            assert ("time" in file) == timed
+
+
+ROWS = "".join(f"{k / 10},{k % 7},{k % 5}\n" for k in range(40))
+GOOD = f"t_s,current_A,force_N\n{ROWS}"
+
+
+@pytest.mark.parametrize(
+    ("text", "more", "said"),
+    [
+        (GOOD.replace("0.9,2,4", "0.9,2,oops"), [], ["'oops'", "column force_N", "line 11"]),
+        (GOOD.replace(",", ";").replace("0.9;2", "0,9;2"), [], ["mixes decimal signs", "line 11"]),
+        (GOOD.replace("0.9,2,4", "0.8,2,4"), [], ["does not increase", "line 11", "repeated"]),
+        (GOOD.replace("0.9,2,4", "0.3,2,4"), [], ["does not increase", "line 11", "sort"]),
+        ("t_s,current_A,force_N\n0,1,nan\n0.2,2,\n0.3,3,NaN\n", [], ["no numbers", "force_N", "all 3"]),
+        ("", [], ["empty"]),
+        ("t_s,current_A,force_N\n", [], ["empty below its header"]),
+        (GOOD.replace("force_N", "forse_N"), [], ["no column 'force_N'", "did you mean 'forse_N'"]),
+        (GOOD, ["--output-unit", "Newtonss"], ["'Newtonss'", "none", "--output-unit"]),
+        (GOOD, ["--time", "current_A"], ["in 'A'", "not one of s, ms"]),
+        (GOOD.replace("force_N", "force (as measured)"), ["--output", "force"], ["'as measured'", "none"]),
+    ],
+    ids=["text", "decimals", "duplicate", "backward", "all NaN", "empty", "header only", "column", "unit",
+         "time unit", "unit in header"],
+)  # fmt: skip
+def test_bad_input_is_exit_3_in_words_and_writes_nothing(run, tmp_path, text, more, said):
+    """File, line and column are named, with a next step; no output appears."""
+    (tmp_path / "bad.csv").write_text(text)
+    done = run("import", "bad.csv", "--input", "current_A", "--output", "force_N", *more, "-o", "run.h5")
+    assert done.code == 3, done
+    for word in ("bad.csv" if "--output-unit" not in more else "--output-unit", "try:", *said):
+        assert word in done.err, done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
+
+
+def test_one_bad_file_of_many_writes_none(run, tmp_path):
+    """All files are read before the first run is written."""
+    (tmp_path / "a.csv").write_text(GOOD)
+    (tmp_path / "b.csv").write_text(GOOD.replace("0.9,2,4", "0.9,2,oops"))
+    done = run("import", "a.csv", "b.csv", "--input", "current_A", "--output", "force_N", "-o", "{name}.h5")
+    assert done.code == 3
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "b.csv"]
+
+
+def test_a_large_file_is_streamed(tmp_path):
+    """Peak memory grows by less than three times what the file grows: it is never held as text."""
+
+    def peak(rows: int) -> tuple[int, int]:
+        path = tmp_path / f"{rows}.csv"
+        with path.open("w") as out:
+            out.write("t_s,current_A,force_N\n")
+            out.writelines(
+                f"{k / 1e4:.4f},{k % 20011 / 2e4:.7f},{k % 19997 / 5e3:.7f}\n" for k in range(rows)
+            )
+        words = ["import", str(path), "--input", "current_A", "--output", "force_N", "-o", f"{rows}.h5"]
+        program = (
+            "import resource, sys\nfrom pulsetrainer.cli.app import main\n"
+            "try:\n    main()\nfinally:\n"
+            "    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, file=sys.stderr)\n"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", program, *words], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return path.stat().st_size, int(done.stderr.splitlines()[-1])
+
+    (small, low), (large, high) = peak(300_000), peak(1_500_000)
+    growth = (high - low) / (large - small)
+    print(
+        f"peak memory {low / 1e6:.0f} MB at {small / 1e6:.0f} MB, {high / 1e6:.0f} MB at {large / 1e6:.0f} MB"
+    )
+    assert growth < 3.0

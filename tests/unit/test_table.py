@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pulsetrainer.artefacts.table import read_table, run_from_table, write_table
+from pulsetrainer.artefacts.table import read_table, write_table
+from pulsetrainer.artefacts.table_run import run_from_table
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -322,7 +323,8 @@ def test_one_row_is_no_run(table):
 @pytest.mark.parametrize(("name", "rows"), [("bh_ferrite_mnzn_1.csv", 129), ("bh_steel_m130_27s_1.csv", 256)])
 def test_measured_records(name, rows):
     """Real records read whole: their first and last rows are those of the file."""
-    run = run_from_table(read_table(DATA / name), **COLUMNS, input_unit="A/m", output_unit="T")
+    read, units = read_table(DATA / name), {"input_unit": "A/m", "output_unit": "T"}
+    run = run_from_table(read, **COLUMNS, **units, time_column="t_s")
     lines = (DATA / name).read_text().splitlines()
     assert len(run.input) == rows == len(lines) - 1
     for k in (0, -1):

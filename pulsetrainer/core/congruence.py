@@ -1,0 +1,80 @@
+"""How much the density may differ from one place of the diagonal to the next.
+
+A Prandtl-Ishlinskii model is a Preisach model whose density depends on alpha - beta alone (Krejci and Kuhnen,
+IEE Proc. Control Theory Appl. 148, 2001, 185-192): the same loop wherever it is traced. Adding
+
+    t g sum (m[i + 1, j + 1] - m[i, j])^2
+
+over neighbours along the diagonal, with g the mean of the Gram matrix's diagonal and m the cells' masses,
+leads from a free density (t = 0) to that model (t large). Where the data are no Preisach operator's at
+all, such as a force that follows the velocity, a free density learns one stretch by heart and predicts the
+next one worse than the stiff one: ``choose`` finds out on the last quarter of the records.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import sparse
+
+from pulsetrainer.core import nnls
+from pulsetrainer.core.equations import NormalEquations, Record, parted_sums
+from pulsetrainer.core.levels import thinned
+from pulsetrainer.core.plane import FloatArray, Plane, Reading
+
+STRENGTHS = (1.0, 100.0)  # 100 is within a few per cent of t -> infinity
+HELD_OUT = 0.25  # of the samples of each record, the last ones
+ENOUGH = 0.05  # the held-out error must fall by this share, else the density stays free
+_LEVELS = 32  # on which t is chosen
+
+
+def penalty(plane: Plane, diagonal: FloatArray, strength: float) -> sparse.csr_array:
+    """Return t g D'D (n_q, n_q) on the masses.
+
+    Parameters
+    ----------
+    diagonal
+        Diagonal (n_q,) of the centred Gram matrix; cells where it is zero are left alone.
+    strength
+        t, no unit.
+    """
+    n = plane.n_h
+    i, j = plane.cell_indices
+    number = np.zeros((n, n), dtype=np.int64)
+    number[i, j] = np.arange(plane.n_q)
+    inner = i + 1 < n
+    here, there = number[i[inner], j[inner]], number[i[inner] + 1, j[inner] + 1]
+    usable = diagonal > nnls.SMALLEST_DIAGONAL * diagonal.max(initial=0.0)
+    both = usable[here] & usable[there]
+    here, there = here[both], there[both]
+    count = here.size
+    value = np.concatenate((np.ones(count), -np.ones(count)))
+    row = np.concatenate((np.arange(count), np.arange(count)))
+    difference = sparse.csr_array((value, (row, np.concatenate((here, there)))), shape=(count, plane.n_q))
+    return (difference.T @ difference) * (strength * float(diagonal.sum()) / plane.n_q)
+
+
+def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
+    """Return t by the error on the last quarter of each record: 0, or one of ``STRENGTHS``."""
+    coarse = plane if plane.n_h <= _LEVELS else thinned(plane, _LEVELS)
+    parts = []
+    for record in records:
+        known = np.cumsum(record.weights > 0)
+        parts.append((known > (1.0 - HELD_OUT) * known[-1]).astype(np.int64))
+    fitted, held_out = (part.dense() for part in parted_sums(coarse, records, reading, parts, 2))
+    if min(fitted.weight, held_out.weight) <= 0:
+        return 0.0
+    free = _error(fitted, held_out, 0.0)
+    errors = {t: _error(fitted, held_out, t) for t in STRENGTHS}
+    best = min(errors, key=errors.__getitem__)
+    return best if errors[best] < (1.0 - ENOUGH) * free else 0.0
+
+
+def _error(fitted: NormalEquations, held_out: NormalEquations, strength: float) -> float:
+    gram, rhs = fitted.centred()
+    if strength:
+        gram += penalty(fitted.plane, np.diagonal(gram).copy(), strength).toarray()
+    found = nnls.solve(gram, rhs)
+    squares = held_out.sum_of_squares(found.x, fitted.offset(found.x))
+    return float(np.sqrt(max(squares, 0.0) / held_out.weight))

@@ -1,0 +1,90 @@
+"""Whether the output follows the velocity of the input: then a Preisach model is the wrong one.
+
+A Preisach operator with weights mu >= 0 lags behind its input: over a closed cycle its loop turns one way.
+A damper or a friction force leads it: it jumps when the motion turns, and depends on how fast it goes. No
+choice of weights repairs that, whatever the polarity. The test needs no model of the damper: the mean of
+the output over groups of equal velocity, f(v), is compared with the fitted operator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from pulsetrainer.core.equations import Record
+from pulsetrainer.core.plane import FloatArray
+
+POOR = 0.05  # of the output's span: a fit better than this needs no such question
+BETTER = 0.75  # f(v) must leave less than this share of what the operator leaves
+_GROUPS = 40
+_WINDOW = 9  # samples of the local parabolas whose slope is the velocity
+
+
+class Comparison(NamedTuple):
+    """What is left of the output, rms, output unit, by two kinds of model."""
+
+    preisach: float
+    velocity: float  # a static function of the velocity, or of its sign where there is no time
+    span: float
+
+    @property
+    def wrong(self) -> bool:
+        """True where the output follows the velocity, and the operator fits badly."""
+        return self.preisach > POOR * self.span and self.velocity < BETTER * self.preisach
+
+
+def compare(
+    records: Sequence[Record], dt_s: Sequence[float | None], residuals: Sequence[FloatArray]
+) -> Comparison:
+    """Compare the operator's residuals (n,) of each record with those of a function of the velocity.
+
+    Parameters
+    ----------
+    dt_s
+        Time step of each record, s; None where only the order of the samples is known: the direction of
+        motion then takes the place of the velocity.
+    """
+    kept = [r.weights > 0 for r in records]
+    output = np.concatenate([r.output[k] for r, k in zip(records, kept, strict=True)])
+    left = np.concatenate([e[k] for e, k in zip(residuals, kept, strict=True)])
+    timed = all(step is not None for step in dt_s)
+    speed = np.concatenate(
+        [
+            _velocity(r.input, step if timed and step is not None else None)[k]
+            for r, step, k in zip(records, dt_s, kept, strict=True)
+        ]
+    )
+    edges = np.unique(np.quantile(speed, np.linspace(0.0, 1.0, _GROUPS + 1)[1:-1]))
+    group = np.searchsorted(edges, speed, side="right")
+    count = np.bincount(group)
+    mean = np.bincount(group, weights=output) / np.maximum(count, 1)
+    rest = output - mean[group]
+    return Comparison(_rms(left), _rms(rest), float(np.ptp(output)))
+
+
+def _velocity(u: FloatArray, dt_s: float | None) -> FloatArray:
+    """Slope of local parabolas (n,), input unit per s; without time its sign."""
+    if u.size < _WINDOW:
+        return np.sign(np.gradient(u)) if dt_s is None else np.gradient(u, dt_s)
+    slope = savgol_filter(u, _WINDOW, 2, deriv=1, delta=dt_s or 1.0)
+    return np.sign(slope) if dt_s is None else np.asarray(slope)
+
+
+def _rms(x: FloatArray) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def warning(found: Comparison, input_quantity: str, output_quantity: str) -> str:
+    """Return in words that the model is the wrong one, or nothing."""
+    if not found.wrong:
+        return ""
+    percent = 100.0 / found.span
+    return (
+        f"{output_quantity} follows the velocity of {input_quantity}, not {input_quantity} itself: a "
+        f"Preisach model in {input_quantity} is the wrong model here. It leaves "
+        f"{found.preisach * percent:.1f} % rms of the span, a mere function of the velocity leaves "
+        f"{found.velocity * percent:.1f} %; take the velocity as the input, or a damper model"
+    )

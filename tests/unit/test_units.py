@@ -1,0 +1,36 @@
+"""Units: what a header or an option says must be one, in the eyes of pint too."""
+
+from __future__ import annotations
+
+import pint
+import pytest
+
+from pulsetrainer.artefacts.units import check_unit, is_unit
+from pulsetrainer.errors import DataError
+
+SI = ["A", "mA", "N", "kN", "A/m", "T", "mT", "nm", "V", "Pa", "bar", "mbar", "N*m", "m/s", "m/s^2", "nA*m^2"]
+SI += ["1/s", "Hz", "deg", "rad", "K", "ms", "kg", "J/kg", "rad/s", "ohm", "eV", "N·m", "m/s²", "s^-1"]
+OTHER = ["1", "%", "°C", "mmHg", "a.u.", "LSB", "counts", "µm", "emu", "Oe", "psi"]
+NONE = ["measured", "Newtons per mm", "xyz", "", "??", "m//s", "3", "N N N x", "A/", "force"]
+
+
+@pytest.mark.parametrize("text", SI + OTHER)
+def test_units(text):
+    """Symbols with prefixes, products, quotients and powers."""
+    assert is_unit(text)
+
+
+@pytest.mark.parametrize("text", SI)
+def test_pint_knows_them_too(text):
+    """An independent reader of units agrees."""
+    plain = text.replace("·", "*").replace("²", "^2").replace("nA m", "nA*m").replace("A m", "A*m")
+    pint.UnitRegistry().Unit(plain.removeprefix("1/") if plain.startswith("1/") else plain)
+
+
+@pytest.mark.parametrize("text", NONE)
+def test_no_units(text):
+    """Words, and what does not parse."""
+    assert not is_unit(text)
+    with pytest.raises(DataError, match="which is none") as caught:
+        check_unit(text, "the heading 'x' of a.csv", "--input-unit")
+    assert "--input-unit" in caught.value.hint
