@@ -64,6 +64,7 @@ RUN = {
     ROOT / "README.md": ("scope.csv", "other-run.h5"),
     ROOT / "docs/tutorial.md": (),
     HOW_TO / "own-bench.md": ("scope.csv", "other.csv"),
+    HOW_TO / "settings.md": (),
     HOW_TO / "ci.md": ("played.h5", "last-week.h5"),
     HOW_TO / "batches.md": ("workflow",),
 }  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
