@@ -189,6 +189,7 @@ WORDS = {
     "signal": "the excitation, or the table that was imported",
     "smoothing": "length below which the density was smoothed, share of the input's range",
     "source": "where the shape comes from, in words",
+    "start": "the state before the run: known, or which one was estimated",
     "text": "the cause in words",
     "unit": "unit of the value",
     "upper": "upper end of the interval",
@@ -260,7 +261,7 @@ def _units(plan: FieldPlan) -> str:
 
 def _quantity(plan: FieldPlan) -> str:
     if plan.data is None:
-        return "" if plan.role in ("group", "groups") else WORDS[plan.name]
+        return "" if plan.role in ("group", "groups") else WORDS.get(plan.name, plan.name.replace("_", " "))
     words = plan.data.quantity
     return f"as `{words[1:]}` says" if words.startswith("@") else _cell(words)
 
