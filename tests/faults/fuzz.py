@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 import ready
 import typer
-from kinds_of_fault import Tally, World, documented
-from ready import READS_ONLY, WRITERS, Writer
+from kinds_of_fault import Tally, World, documented, readers
+from ready import WRITERS, Writer
 
 from pulsetrainer.cli import app
 
@@ -36,7 +36,7 @@ def arguments(world: World, tries: int) -> Tally:
     """Run random command lines: real commands and options, values of all kinds, words missing or twice."""
     tally = Tally("fuzzed arguments")
     commands = typer.main.get_command(app.app).commands
-    names = [name for name in commands if name not in _SKIP]
+    names = world.rng.sample([name for name in commands if name not in _SKIP], len(commands) - len(_SKIP))
     everything = Writer(
         "all", (), (), tuple(f.name for f in world.ready.iterdir() if f.suffix in {".h5", ".csv"})
     )
@@ -135,9 +135,9 @@ def _table(rng: random.Random) -> bytes:
 def artefacts(world: World, tries: int) -> Tally:
     """Change values, shapes, types and names inside artefacts, and feed every reader with them."""
     tally = Tally("fuzzed artefacts")
-    readers = [one for one in (*WRITERS, *READS_ONLY) if any(name.endswith(".h5") for name in one.reads)]
+    able = world.order(readers())
     for number in range(tries):
-        writer = readers[number % len(readers)]
+        writer = able[number % len(able)]
         with world.folder(writer) as folder:
             victim = folder / world.rng.choice([name for name in writer.reads if name.endswith(".h5")])
             what = _change(victim, world.rng)

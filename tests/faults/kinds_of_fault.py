@@ -10,7 +10,7 @@ import re
 import shutil
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -89,10 +89,19 @@ class World:
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
+    def order(self, writers: Sequence[Writer]) -> list[Writer]:
+        """Shuffle the commands, so that a few tries meet other ones with every seed."""
+        return self.rng.sample(writers, len(writers))
+
     @property
     def log(self) -> Path:
         """Where a child's output goes."""
         return self.scratch / "log"
+
+
+def readers() -> list[Writer]:
+    """Return the commands that read an artefact."""
+    return [one for one in (*WRITERS, *READS_ONLY) if any(name.endswith(".h5") for name in one.reads)]
 
 
 def outputs(writer: Writer, folder: Path) -> list[Path]:
@@ -189,8 +198,9 @@ def small_disk(world: World, kilobytes: int) -> Iterator[Path]:
 def full_disk(world: World, tries: int) -> Tally:
     """Write onto a disk with less room than the output needs, or just enough."""
     tally = Tally("full disk (tmpfs)")
+    writers = world.order(WRITERS)
     for number in range(tries):
-        writer = WRITERS[number % len(WRITERS)]
+        writer = writers[number % len(writers)]
         room = world.rng.choice([4, 8, 16, 32, 64, 128, 512, 1024, 1200, 1500, 2048, 4096])
         with world.folder(writer) as folder, small_disk(world, room) as disk:
             older = world.rng.random() < 0.5
@@ -220,8 +230,9 @@ def _look_after(tally: Tally, writer: Writer, folder: Path, before: dict[Path, b
 def quota(world: World, tries: int) -> Tally:
     """Let every file end at a random size, as a quota does."""
     tally = Tally("full quota (RLIMIT_FSIZE)")
+    writers = world.order(WRITERS)
     for number in range(tries):
-        writer = WRITERS[number % len(WRITERS)]
+        writer = writers[number % len(writers)]
         limit = world.rng.choice([5000, 10_000, 20_000, 60_000, 200_000, 600_000])
         with world.folder(writer) as folder:
             older = put_older(writer, folder) if world.rng.random() < 0.5 else {}
@@ -236,8 +247,9 @@ def quota(world: World, tries: int) -> Tally:
 def read_only(world: World, tries: int) -> Tally:
     """Write into a folder that cannot be written: a disk mounted read-only, or no permission."""
     tally = Tally("read-only folder")
+    writers = world.order(WRITERS)
     for number in range(tries):
-        writer = WRITERS[number % len(WRITERS)]
+        writer = writers[number % len(writers)]
         older = world.rng.random() < 0.5
         with world.folder(writer) as folder, _read_only_disk(world, writer, older) as (disk, before):
             done = children.run(folder, writer.line(force=older, folder=f"{disk}/"), world.log)
@@ -300,10 +312,10 @@ def _flip(data: bytes, rng: random.Random) -> bytes:
 
 
 def _damaged(world: World, tries: int, fault: str, damage: Callable[[bytes, random.Random], bytes]) -> Tally:
-    readers = [one for one in (*WRITERS, *READS_ONLY) if any(name.endswith(".h5") for name in one.reads)]
+    able = world.order(readers())
     tally = Tally(fault)
     for number in range(tries):
-        writer = readers[number % len(readers)]
+        writer = able[number % len(able)]
         with world.folder(writer) as folder:
             victim = folder / world.rng.choice([name for name in writer.reads if name.endswith(".h5")])
             data = victim.read_bytes()
@@ -324,8 +336,9 @@ def _damaged(world: World, tries: int, fault: str, damage: Callable[[bytes, rand
 def together(world: World, tries: int) -> Tally:
     """Two processes write one output at the same time: the first wins, with --force the last one."""
     tally = Tally("two processes, one output")
+    writers = world.order(WRITERS)
     for number in range(tries):
-        writer, force = WRITERS[number % len(WRITERS)], number // len(WRITERS) % 2 == 1
+        writer, force = writers[number % len(writers)], number // len(writers) % 2 == 1
         with world.folder(writer) as folder:
             first = Child(folder, writer.line(force=force), Path(f"{world.log}-1"))
             time.sleep(world.rng.choice([0, 0, world.rng.uniform(0, world.seconds[writer.name])]))
@@ -348,7 +361,7 @@ def together(world: World, tries: int) -> Tally:
 def locked(world: World, tries: int) -> Tally:
     """An input is locked by another process, as by a network drive: said so; an output is replaced."""
     tally = Tally("locked by another process")
-    able = [one for one in (*WRITERS, *READS_ONLY) if any(name.endswith(".h5") for name in one.reads)]
+    able = world.order(readers())
     for number in range(tries):
         writer = able[number % len(able)]
         with world.folder(writer) as folder, contextlib.ExitStack() as held:

@@ -69,15 +69,15 @@ def _rows(world: World, options: argparse.Namespace) -> Iterator[Tally]:
     """Yield one row after the other, and say on stderr where we are."""
     each = max(1, options.tries // (2 * len(ready.WRITERS)))
     share = max(len(ready.WRITERS), options.tries // 5)
+    kills = [(writer, older) for writer in ready.WRITERS for older in (False, True)]
     if options.sample:
-        each, share = 1, 5
+        each, share, kills = 1, 3, world.rng.sample(kills, 10)
     jobs = [
         (
             f"kill -9 {writer.name}",
             lambda writer=writer, older=older: faults.kill(world, each, writer, older=older),
         )
-        for writer in ready.WRITERS
-        for older in (False, True)
+        for writer, older in kills
     ]
     root = os.geteuid() == 0
     jobs += [("full disk", lambda: faults.full_disk(world, share))] if root else []

@@ -12,27 +12,21 @@ import pytest
 _RUN = Path(__file__).with_name("run.py")
 
 
-@pytest.mark.parametrize("fault", ["kill -9", "damaged", "others"])
-def test_a_sample_of_the_fault_table(fault, tmp_path):
-    """Nothing lost, nothing half-written, no hang, no wrong exit: another seed each day would show the same."""
-    only = {
-        "kill -9": ["kill"],
-        "damaged": ["truncated", "bit-flipped", "unsealed", "fuzzed artefacts", "fuzzed tables"],
-        "others": ["full", "read-only", "together", "locked", "fuzzed arguments"],
-    }[fault]
-    table = tmp_path / "table.json"
-    words = [
-        sys.executable,
-        _RUN,
-        "--sample",
-        "--json",
-        table,
-        *(w for name in only for w in ("--only", name)),
-    ]
+@pytest.fixture(scope="module")
+def table(tmp_path_factory) -> list[dict]:
+    """The rows of a small table, tried once for all tests."""
+    path = tmp_path_factory.mktemp("faults") / "table.json"
+    words = [sys.executable, _RUN, "--sample", "--json", path]
     done = subprocess.run(words, capture_output=True, text=True, timeout=280, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    rows = json.loads(table.read_text())
-    assert len(rows) >= 4
-    assert all(row["tries"] > 0 for row in rows)
-    counts = ("lost", "half_written", "hangs", "wrong_exits")
-    assert sum(row[count] for row in rows for count in counts) == 0, done.stdout
+    assert path.exists(), done.stdout + done.stderr
+    return json.loads(path.read_text())
+
+
+@pytest.mark.xdist_group("faults")
+@pytest.mark.parametrize("fault", ["kill -9", "full", "read-only", "input", "output", "locked", "fuzzed"])
+def test_nothing_is_lost_and_every_failure_is_told(table, fault):
+    """Nothing lost, nothing half-written, no hang, no wrong exit."""
+    rows = [row for row in table if fault in row["fault"]]
+    assert sum(row["tries"] for row in rows) >= 3
+    for count in ("lost", "half_written", "hangs", "wrong_exits"):
+        assert sum(row[count] for row in rows) == 0, [row["complaints"] for row in rows]
