@@ -16,7 +16,7 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo test lint bench blind docs bounds firmware-mps2 firmware-cost clean help
+.PHONY: demo test lint faults bench blind docs bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -85,6 +85,9 @@ lint: $(VENV)/installed-test  ## style, types, import contracts
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+faults: $(VENV)/installed-test  ## kill -9, full disks, damaged files, fuzzing: hundreds of tries, one table
+	$(BIN)/python tests/faults/run.py --tries $(or $(TRIES),400) --seed $(or $(SEED),1)
 
 bench: $(VENV)/installed-test  ## speed and memory, as ratios in one run
 	$(BIN)/python -m pytest benchmarks -p no:xdist --timeout=0 -s
