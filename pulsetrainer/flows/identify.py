@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
 
 _TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
+_CROWDED_MISFIT = 0.02  # of the span, rms: beyond it levels do not crowd
 _WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
 
@@ -102,7 +103,7 @@ def run(options: Options, context: Context) -> Result:
     runs = [replace(one, input=clean.input) for one, clean in zip(runs, cleaned, strict=True)]
     context.progress(0.1)
     records = [record_of(one, low, high) for one in runs]
-    plane = _plane(records, low, high, options, context)
+    plane = _plane(records, low, high, options)
     shifts = offsets_between(records, plane, options.operator)
     if np.any(shifts):
         _note_shifts(options.runs, shifts, runs, context)
@@ -110,13 +111,13 @@ def run(options: Options, context: Context) -> Result:
     smoothing = options.smoothing
     if smoothing is None:
         smoothing = 0.0 if options.operator == "relay" else "auto"
-    found = identify(
-        records,
-        plane,
-        reading=options.operator,
-        method=options.method,
-        smoothing=smoothing,
-    )
+    found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
+    if not _is_even(plane) and _misfit(records, found) > _CROWDED_MISFIT:
+        # what is steep here is nothing that the operator can follow: closer levels would learn it by heart
+        plane = Plane.uniform(low, high, options.levels)
+        found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
+    if not _is_even(plane):
+        context.note("the loop is steep: the levels lie closer where the output changes")
     context.progress(0.8)
     if found.operator.polarity < 0:
         context.note("the output falls when the input rises: fitted as a falling loop")
@@ -157,7 +158,7 @@ def run(options: Options, context: Context) -> Result:
         false_reversals=sum(clean.removed for clean in cleaned),
         polarity=model.polarity,
         offsets=tuple(float(shift) for shift in shifts),
-        spacing="even" if np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]) else "crowded",
+        spacing="even" if _is_even(plane) else "crowded",
         congruence=found.congruence,
         warning=warning,
         iterations=model.fit.iterations,
@@ -213,14 +214,22 @@ def _check_range(paths: Sequence[Path], low: float, high: float, unit: str) -> N
         )
 
 
-def _plane(records: Sequence[Record], low: float, high: float, options: Options, context: Context) -> Plane:
+def _plane(records: Sequence[Record], low: float, high: float, options: Options) -> Plane:
     """Return the levels: even for relays, as in the paper, else where the output changes."""
     if options.operator == "relay":
         return Plane.uniform(low, high, options.levels)
-    plane = plane_for(records, low, high, options.levels)
-    if not np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]):
-        context.note("the loop is steep: the levels lie closer where the output changes")
-    return plane
+    return plane_for(records, low, high, options.levels)
+
+
+def _is_even(plane: Plane) -> bool:
+    return bool(np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]))
+
+
+def _misfit(records: Sequence[Record], found: Identified) -> float:
+    """Rms error of the fit as a share of the output's span."""
+    left = [e[r.weights > 0] for e, r in zip(_residuals(records, found), records, strict=True)]
+    span = float(np.ptp(np.concatenate([r.output[r.weights > 0] for r in records])))
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) / span
 
 
 def _note_shifts(paths: Sequence[Path], shifts: FloatArray, runs: Sequence[Run], context: Context) -> None:
