@@ -15,7 +15,7 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo test lint bench bounds firmware-mps2 firmware-cost clean help
+.PHONY: demo test lint bench docs bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -74,6 +74,18 @@ lint: $(VENV)/installed-test  ## style, types, import contracts
 
 bench: $(VENV)/installed-test  ## speed and memory, as ratios in one run
 	$(BIN)/python -m pytest benchmarks -p no:xdist --timeout=0 -s
+
+ARM_TOOLS := arm-none-eabi-gcc qemu-system-arm
+firmware-mps2 firmware-cost: arm-tools
+
+.PHONY: arm-tools
+arm-tools:
+	@for tool in $(ARM_TOOLS); do command -v $$tool > /dev/null || { echo "$$tool is not there; on Debian:" \
+	"sudo apt-get install -y --no-install-recommends gcc-arm-none-eabi qemu-system-arm" >&2; exit 1; }; done
+
+docs: $(VENV)/installed  ## the reference pages, off the code; the figures of the theory
+	$(BIN)/python docs/make.py
+	$(BIN)/python docs/figures.py
 
 firmware-mps2:  ## the firmware for the emulated Cortex-M4F (Debian: gcc-arm-none-eabi, qemu-system-arm)
 	$(MAKE) -C firmware mps2

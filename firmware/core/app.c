@@ -268,6 +268,9 @@ uint8_t app_wave_commit(uint32_t count, uint32_t crc)
 
 uint8_t app_arm(uint32_t nonce)
 {
+    /* A wire that repeats itself may bring ARM or START once more after another command: nothing to do. */
+    if (app.state == PT_STATE_ARMED && nonce == app.nonce)
+        return 0;
     uint8_t refused = must_be_idle();
     if (refused)
         return refused;
@@ -287,6 +290,8 @@ uint8_t app_arm(uint32_t nonce)
 
 uint8_t app_start(void)
 {
+    if (app.state == PT_STATE_RUNNING)
+        return 0;
     if (app.state != PT_STATE_ARMED || !app.wave.committed)
         return PT_NAK_CODE_STATE;
     hal_critical_enter();

@@ -12,10 +12,6 @@
 #include "telemetry.h"
 #include "wave.h"
 
-#define APP_FIRMWARE_MAJOR 0u
-#define APP_FIRMWARE_MINOR 1u
-#define APP_FIRMWARE_PATCH 0u
-
 #define APP_RAMP 15 /* 100 uA a tick: the full 1.5 A goes to zero in 100 ms */
 #define APP_RAMP_TICKS 1001u
 

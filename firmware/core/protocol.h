@@ -5,11 +5,21 @@
 
 #include <stdint.h>
 
+
 #ifndef PT_PROTOCOL_MAJOR
 #define PT_PROTOCOL_MAJOR 1u
 #endif
 #ifndef PT_PROTOCOL_MINOR
 #define PT_PROTOCOL_MINOR 0u
+#endif
+#ifndef PT_FIRMWARE_MAJOR
+#define PT_FIRMWARE_MAJOR 0u
+#endif
+#ifndef PT_FIRMWARE_MINOR
+#define PT_FIRMWARE_MINOR 1u
+#endif
+#ifndef PT_FIRMWARE_PATCH
+#define PT_FIRMWARE_PATCH 0u
 #endif
 
 #define PT_MAGIC 0x52545031uL

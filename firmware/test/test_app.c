@@ -452,7 +452,30 @@ static void a_repeated_command_is_answered_from_memory(void)
     CHECK_EQUAL(f.type, PT_ACK);
     CHECK_EQUAL(f.payload[PT_ACK_SESSION], session);
     CHECK_EQUAL(app.session, session);
-    CHECK_EQUAL(fake_command_seq(PT_START, 201, NULL, 0).type, PT_NAK);
+}
+
+/* The wire repeats ARM and START together: neither is the last command any more when it comes again. */
+static void an_older_repetition_changes_nothing_and_is_no_refusal(void)
+{
+    uint8_t nonce[PT_ARM_LEN];
+    ready(5000, 10, SAMPLES);
+    put_u32(nonce, fake.nonce);
+    CHECK_EQUAL(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN).type, PT_ACK);
+    CHECK_EQUAL(fake_command_seq(PT_HEARTBEAT, 201, NULL, 0).type, PT_ACK);
+    CHECK_EQUAL(state_of(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN)), PT_STATE_ARMED);
+    CHECK_EQUAL(fake_command_seq(PT_START, 202, NULL, 0).type, PT_ACK);
+    uint8_t session = app.session;
+    alive_ticks(100);
+    CHECK_EQUAL(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN).type, PT_NAK);
+    struct frame f = fake_command_seq(PT_START, 202, NULL, 0);
+    CHECK_EQUAL(state_of(f), PT_STATE_RUNNING);
+    CHECK_EQUAL(app.session, session);
+    CHECK_EQUAL(app.tick, 100);
+    (void)plain(PT_STOP);
+    fake_ticks(1500);
+    CHECK_EQUAL(fake_command_seq(PT_START, 202, NULL, 0).type, PT_NAK); /* the run is over: no second one */
+    CHECK_EQUAL(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN).type, PT_NAK);
+    CHECK_EQUAL(app.state, PT_STATE_IDLE);
 }
 
 static void a_host_that_does_not_read_costs_samples_not_replies(void)
@@ -555,6 +578,7 @@ int main(void)
     RUN(parameters_only_lower_the_compiled_limits);
     RUN(upload_is_idempotent_and_in_order);
     RUN(a_repeated_command_is_answered_from_memory);
+    RUN(an_older_repetition_changes_nothing_and_is_no_refusal);
     RUN(a_host_that_does_not_read_costs_samples_not_replies);
     RUN(the_slew_limit_is_flagged_and_the_asked_value_reported);
     RUN(the_watchdog_wants_both_contexts);

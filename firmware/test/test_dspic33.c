@@ -346,6 +346,12 @@ int main(int argc, char **argv)
         board_start();
         return 0;
     }
+    if (argc == 2 && strcmp(argv[1], "locked") == 0) { /* programmed without its configuration words */
+        xc_shim_reset(POWER_ON);
+        xc_shim_lock_pwm();
+        board_start();
+        return 0;
+    }
     RUN(the_output_is_off_before_anything_else);
     RUN(the_fault_is_set_up_while_the_pwm_is_off);
     RUN(clocks_first_then_what_they_drive);

@@ -17,7 +17,8 @@ Sizes in the comments: n samples, L = n_h + 1 nodes, q = n_h (n_h + 1) / 2 cells
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -96,6 +97,9 @@ class Run:
     reference: Annotated[FloatArray | None, Data("@input_unit", "reference", "time")] = (
         None  # (n,) what was asked
     )
+    # (n,) true at the first sample of each part but the first: before it the device was off, for a time that
+    # the record does not tell, and then replayed the extremes that its memory should hold. None: one part
+    seam: Annotated[BoolArray | None, Data("1", "first sample after a pause", "time")] = None
     input_unit: str = "A"
     output_unit: str = "N"
     input_quantity: str = "current"
@@ -105,8 +109,22 @@ class Run:
     dropped_samples: int = 0  # lost on the wire; the samples that are here are right
 
     def __post_init__(self) -> None:
-        _check_equal_length(self, ("time_s", "input", "output", "reference"))
+        _check_equal_length(self, ("time_s", "input", "output", "reference", "seam"))
         _check_time(self)
+
+    def parts(self) -> tuple[Run, ...]:
+        """Return the uninterrupted parts, each a run of its own; the run itself where it has no seam."""
+        if self.seam is None or not np.any(self.seam):
+            return (self,)
+        edges = [0, *np.flatnonzero(self.seam[1:]) + 1, self.seam.size]
+        arrays = [name for name in _RUN_ARRAYS if getattr(self, name) is not None]
+        return tuple(
+            replace(self, seam=None, **{name: getattr(self, name)[start:stop] for name in arrays})
+            for start, stop in pairwise(edges)
+        )
+
+
+_RUN_ARRAYS = ("time_s", "input", "output", "reference")
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +146,14 @@ class Fit:
     output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
     predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
     smoothing: float = 0.0  # length below which the density was smoothed, share of the input's range
+    draws: int = 0  # refits of the block bootstrap; 0: none was made
+    # 90 % band of the predicted output, without the noise of a measurement
+    predicted_lower: Annotated[
+        FloatArray | None, Data("@output_unit", "lower end of the predicted output", "time")
+    ] = None
+    predicted_upper: Annotated[
+        FloatArray | None, Data("@output_unit", "upper end of the predicted output", "time")
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +196,13 @@ class Model:
     output_quantity: str = "force"
     operator: str = "continuous"  # how the weights are read: "continuous" | "relay"
     polarity: int = 1  # -1: the output falls when the input rises
+    # 90 % interval of every weight, where a bootstrap was made
+    weights_lower: Annotated[
+        FloatArray | None, Data("@weights_unit", "lower end of the Preisach weights", "cell")
+    ] = None
+    weights_upper: Annotated[
+        FloatArray | None, Data("@weights_unit", "upper end of the Preisach weights", "cell")
+    ] = None
     fit: Fit | None = None
     extensions: tuple[Extension, ...] = ()
 

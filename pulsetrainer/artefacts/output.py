@@ -10,6 +10,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pulsetrainer.artefacts.lease import Lease, sweep
 from pulsetrainer.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -66,9 +67,10 @@ def _exists(path: Path) -> UsageError:
 
 @contextlib.contextmanager
 def replacing(path: Path | str, *, force: bool) -> Iterator[Path]:
-    """Give the name of a new temporary file, which becomes ``path`` when the block ends well.
+    """Give a new, empty temporary file, which becomes ``path`` when the block ends well.
 
-    Whatever goes wrong, the temporary file is removed and a file that was at ``path`` is untouched.
+    Whatever goes wrong, the temporary file is removed and a file that was at ``path`` is untouched. A process
+    that is killed leaves its temporary file; the next one that writes the same output removes it.
 
     Raises
     ------
@@ -79,21 +81,49 @@ def replacing(path: Path | str, *, force: bool) -> Iterator[Path]:
     """
     check_output(path, force)
     target = Path(path).resolve()  # through a symbolic link, not over it
-    temporary = temporary_name(target)
+    for leftover in _leftovers(target):
+        sweep(leftover)
+    temporary: Path | None = None
+    lease: Lease | None = None
     try:
+        temporary, lease = _claim(target)
         yield temporary
         publish(temporary, target, force=force)
     except OSError as error:
         raise cannot_write(path, error) from error
     finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+        if lease is not None:
+            lease.end()
 
 
-def temporary_name(target: Path) -> Path:
-    """Return a name in the target's folder that no other process uses."""
-    stem = os.fsdecode(os.fsencode(target.name)[:_LONGEST_STEM])
-    return target.with_name(f".{stem}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
+def _claim(target: Path) -> tuple[Path, Lease]:
+    """Make a temporary file that no other process uses, with a lease on it.
+
+    Between its making and the lease another process may have swept it away; then it is made again.
+    """
+    while True:
+        temporary = target.with_name(f".{_stem(target)}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
+        temporary.open("xb").close()
+        with contextlib.suppress(FileNotFoundError):
+            lease = Lease(temporary)
+            if lease.is_on(temporary):
+                return temporary, lease
+            lease.end()
+
+
+def _stem(target: Path) -> str:
+    return os.fsdecode(os.fsencode(target.name)[:_LONGEST_STEM])
+
+
+def _leftovers(target: Path) -> list[Path]:
+    """Return the temporary files of this output that other processes made, whether they live or not."""
+    pattern = re.compile(rf"\.{re.escape(_stem(target))}\.\d+-[0-9a-f]{{8}}\.tmp")
+    with contextlib.suppress(OSError):
+        return [entry for entry in target.parent.iterdir() if pattern.fullmatch(entry.name)]
+    return []
 
 
 def publish(temporary: Path, target: Path, *, force: bool) -> None:

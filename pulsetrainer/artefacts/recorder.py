@@ -7,8 +7,10 @@ readable at every moment, and the sample count is written last: a reader trusts 
 from __future__ import annotations
 
 import contextlib
+import errno
 import itertools
 import os
+import re
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -18,10 +20,11 @@ import numpy as np
 
 from pulsetrainer.artefacts.encode import encode
 from pulsetrainer.artefacts.kinds import FloatArray, Run
+from pulsetrainer.artefacts.lease import Lease, is_abandoned, sweep
 from pulsetrainer.artefacts.output import cannot_write, check_output, publish
 from pulsetrainer.artefacts.schema import plan_of
 from pulsetrainer.artefacts.seal import append_seal
-from pulsetrainer.artefacts.store import LIBVER, write_root
+from pulsetrainer.artefacts.store import LIBVER, read, read_samples, write_root
 from pulsetrainer.errors import ArgumentError, DataError, PulsetrainerError
 
 if TYPE_CHECKING:
@@ -35,6 +38,8 @@ _RESERVE_BYTES = 1 << 20
 _BYTES_PER_SAMPLE = 32
 _CACHE_BYTES = 1 << 16
 _COLUMNS = ("time_s", "reference", "input", "output")
+_COPIED_SAMPLES = 1 << 16  # at a time
+_CHUNK_BYTES = 1 << 15  # a smaller file holds no sample
 
 
 class RunRecorder:
@@ -53,6 +58,8 @@ class RunRecorder:
         Replace an existing file.
     input_unit, output_unit, input_quantity, output_quantity, signal
         As in ``Run``.
+    in_parts
+        Whether there will be seams; without, ``begin_part`` is an error.
 
     Raises
     ------
@@ -73,6 +80,7 @@ class RunRecorder:
         input_quantity: str = "current",
         output_quantity: str = "force",
         signal: str = "",
+        in_parts: bool = False,
     ) -> None:
         check_output(path, force)
         self._final = Path(path)
@@ -80,6 +88,9 @@ class RunRecorder:
         self._samples = 0
         self._last_time = -np.inf
         self._finished = False
+        self._at_seam = False
+        self._lease: Lease | None = None
+        self._superseded: list[Path] = []
         self.dropped_samples = 0  # set it as losses become known: an interrupted run tells them too
         empty = np.zeros(0)
         values: dict[str, Any] = dict.fromkeys(_COLUMNS, empty) | {
@@ -90,6 +101,7 @@ class RunRecorder:
             "signal": signal,
             "complete": False,
             "dropped_samples": 0,
+            "seam": np.zeros(0, dtype=np.bool_) if in_parts else None,
         }
         self.partial = _claim_partial(self._final)
         try:
@@ -101,18 +113,28 @@ class RunRecorder:
             write_root(self._file, Run, header, samples=0)
             encode(self._file, Run, values, growing=True)
             self._file.swmr_mode = True
+            self._lease = Lease(self.partial)  # not before: HDF5 has the file locked until here
+            if not self._lease.is_on(self.partial):  # between its making and HDF5's lock
+                raise FileNotFoundError(errno.ENOENT, "another process removed it, try again")  # noqa: TRY301
         except BaseException as error:
             self.partial.unlink(missing_ok=True)
+            self._end_lease()
             if isinstance(error, OSError | RuntimeError):
                 raise cannot_write(self.partial, error) from error
             raise
         paths = {plan.name: plan.path for plan in plan_of(Run)}
         self._datasets = {name: self._file[paths[name]] for name in _COLUMNS}
+        self._seam = self._file[paths["seam"]] if in_parts else None
 
     @property
     def samples(self) -> int:
         """How many samples are safe on disk."""
         return self._samples
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last sample."""
+        return self._last_time
 
     def append(self, time_s: ArrayLike, reference: ArrayLike, input: ArrayLike, output: ArrayLike) -> None:  # noqa: A002 - the field's name
         """Append a batch; when this returns, it survives the death of the program.
@@ -138,12 +160,49 @@ class RunRecorder:
                 dataset.resize(total, axis=0)
                 dataset[self._samples :] = arrays[name]
                 dataset.flush()
+            if self._seam is not None:
+                self._seam.resize(total, axis=0)  # with zeros
+                self._seam[self._samples] = self._at_seam
+                self._seam.flush()
             self._file.attrs.modify("samples", np.int64(total))
             self._file.flush()
         except (OSError, RuntimeError) as error:
             raise cannot_write(self.partial, error) from error
         self._samples = total
         self._last_time = float(arrays["time_s"][-1])
+        self._at_seam = False
+
+    def begin_part(self) -> None:
+        """Say that the device was off since the last sample: the next one is the first of a new part.
+
+        Raises
+        ------
+        ArgumentError
+            The recorder was not made for parts.
+        """
+        if self._seam is None:
+            raise ArgumentError("this recorder was not made for parts", hint="this is a bug in the caller")
+        self._at_seam = self._samples > 0
+
+    def take_over(self, path: Path | str, run: Run) -> None:
+        """Begin with the samples of an interrupted recording.
+
+        When this one has its name, that one is removed, and what it had been begun with.
+
+        Raises
+        ------
+        ArgumentError, DataError
+            As ``append``; the run lacks time or reference.
+        """
+        if run.time_s is None or run.reference is None:
+            raise ArgumentError("a recording has a time and a reference", hint="this is a bug in the caller")
+        for part in run.parts():
+            self.begin_part()
+            arrays = [getattr(part, name) for name in _COLUMNS]
+            for start in range(0, part.input.size, _COPIED_SAMPLES):
+                self.append(*(array[start : start + _COPIED_SAMPLES] for array in arrays))
+        self.dropped_samples = run.dropped_samples
+        self._superseded = [Path(path), *(left for left, _ in interrupted(self._final) if _begins(run, left))]
 
     def _check_batch(self, arrays: dict[str, FloatArray]) -> int:
         """Return the length of a batch that can be appended."""
@@ -218,7 +277,17 @@ class RunRecorder:
             raise self._kept(cannot_write(self._final, error)) from error
         except PulsetrainerError as error:
             raise self._kept(error) from error
+        finally:
+            self._end_lease()
+        for path in self._superseded:
+            if path != self._final:
+                with contextlib.suppress(OSError):
+                    path.unlink(missing_ok=True)
         return self._final
+
+    def _end_lease(self) -> None:
+        if self._lease is not None:
+            self._lease.end()
 
     def _kept(self, error: PulsetrainerError) -> PulsetrainerError:
         """Return the error with the place where the samples are."""
@@ -243,12 +312,51 @@ class RunRecorder:
             with contextlib.suppress(OSError, RuntimeError):
                 self._file.close()
             self.partial.unlink(missing_ok=True)
+            self._end_lease()
             return
         try:
             self.finish(complete=False)
         except PulsetrainerError as second:
             # the first error tells why the block ended; this one, where the samples are
             error.add_note(f"{second.message} ({second.hint})")
+
+
+def interrupted(final: Path | str) -> list[tuple[Path, int]]:
+    """Return what killed programs left of captures into ``final``, with the number of samples, longest first.
+
+    Files that hold no sample are removed; one whose writer is alive, or that cannot be read, is not listed.
+    """
+    final = Path(final)
+    pattern = re.compile(rf"{re.escape(final.name)}\.partial(-\d+)?")
+    found: list[tuple[Path, int]] = []
+    with contextlib.suppress(OSError):  # no such folder: another check says so
+        for path in sorted(entry for entry in final.parent.iterdir() if pattern.fullmatch(entry.name)):
+            if not is_abandoned(path):
+                continue
+            try:
+                samples = read_samples(path)
+            except DataError:
+                if path.stat().st_size < _CHUNK_BYTES:
+                    sweep(path)
+                continue
+            if samples:
+                found.append((path, samples))
+            else:
+                sweep(path)
+    return sorted(found, key=lambda pair: -pair[1])
+
+
+def _begins(run: Run, path: Path) -> bool:
+    """Whether a run begins with all the samples of this recording."""
+    with contextlib.suppress(DataError):
+        part = read(path, Run)
+        size = part.input.size
+        return (
+            size <= run.input.size
+            and np.array_equal(part.input, run.input[:size], equal_nan=True)
+            and np.array_equal(part.output, run.output[:size], equal_nan=True)
+        )
+    return False
 
 
 def _claim_partial(final: Path) -> Path:

@@ -30,7 +30,7 @@ from pulsetrainer.errors import DataError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-__all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "write"]
+__all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "read_samples", "write"]
 
 FORMAT_VERSION = 1
 # from 1.10 on a file can be read while it grows, and HDF5 keeps checksums of most of its own structures
@@ -58,7 +58,7 @@ def write(path: Path | str, artefact: Any, header: Header, *, force: bool = Fals
             image = _image(cls, values, header)
         except DataError as error:
             raise DataError(f"{path} was not written: {error.message}", hint=error.hint) from error
-        with temporary.open("xb") as stream:
+        with temporary.open("wb") as stream:
             stream.write(image)
             stream.write(seal_of(zlib.crc32(image)))
 
@@ -166,14 +166,32 @@ def read_header(path: Path | str) -> Header:
         )
 
 
-def _decode(file: h5py.File, path: Path | str, kind: str) -> Any:
+def read_samples(path: Path | str) -> int:
+    """Read how many samples an artefact has along its time axis; 0 where it has none.
+
+    Raises
+    ------
+    DataError
+        As ``read_any``.
+    """
+    with _opened(path) as file:
+        _kind(file, path)
+        return _trusted(file, path) or 0
+
+
+def _trusted(file: h5py.File, path: Path | str) -> int | None:
+    """Return the sample count at the root; None where the kind has no time axis."""
     samples = file.attrs.get("samples")
-    if samples is not None and (
-        np.ndim(samples) or not np.issubdtype(type(samples), np.integer) or samples < 0
-    ):
+    if samples is None:
+        return None
+    if np.ndim(samples) or not np.issubdtype(type(samples), np.integer) or samples < 0:
         raise DataError(f"{path}: the attribute 'samples' is {samples!r}, expected a count", hint=_DAMAGED)
+    return int(samples)
+
+
+def _decode(file: h5py.File, path: Path | str, kind: str) -> Any:
     origin = Origin(str(path), kind, maker(kind))
-    return decode(file, KINDS[kind], origin, samples=None if samples is None else int(samples))
+    return decode(file, KINDS[kind], origin, samples=_trusted(file, path))
 
 
 def _kind(file: h5py.File, path: Path | str) -> str:

@@ -225,7 +225,7 @@ def write_table(
     csv.writer(header, lineterminator="\n").writerow(columns)
     with (
         replacing(path, force=force) as temporary,
-        temporary.open("x", encoding="utf-8", newline="\n") as out,
+        temporary.open("w", encoding="utf-8", newline="\n") as out,
     ):
         out.writelines(f"# {line}\n" for comment in comments for line in comment.splitlines())
         out.write(header.getvalue())

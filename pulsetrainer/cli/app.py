@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Annotated
 
@@ -10,7 +11,9 @@ import typer
 from pulsetrainer import __version__
 from pulsetrainer.cli import (
     capture,
+    compare,
     diagnose,
+    doctor,
     evaluate,
     extend,
     guard,
@@ -20,6 +23,7 @@ from pulsetrainer.cli import (
     play,
     plot,
     ports,
+    settings,
     show,
 )
 
@@ -38,11 +42,13 @@ app.command("identify")(identify.identify)
 app.command("invert")(invert.invert)
 app.command("play")(play.play)
 app.command("evaluate")(evaluate.evaluate)
+app.command("compare")(compare.compare)
 app.command("diagnose")(diagnose.diagnose)
 app.command("extend")(extend.extend)
 app.command("show")(show.show)
 app.command("plot")(plot.plot)
 app.command("ports")(ports.ports)
+app.command("doctor")(doctor.doctor)
 
 
 def _version(wanted: bool) -> None:
@@ -53,12 +59,27 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def root(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
+    settings_file: Annotated[
+        str | None,
+        typer.Option(
+            "--settings",
+            help="File of settings; default: pulsetrainer.toml here, or in the user's configuration.",
+            show_default=False,
+        ),
+    ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show the whole traceback of an error.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Say on stderr what is being done.")] = False,
 ) -> None:
     """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate."""
+    if context.resilient_parsing or {"--help"} & set(sys.argv):
+        return  # help and completion need no settings, and a bad file must not hide them
+    file = settings.find(settings_file, os.environ)
+    if file is not None:
+        context.default_map = settings.defaults(settings.read(file))
 
 
 def main() -> None:

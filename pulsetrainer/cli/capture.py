@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, Force, Out, Port
+from pulsetrainer.cli.options import AsJson, DryRun, Force, LimitCurrent, LimitForce, Out, Port
+from pulsetrainer.cli.settings import variable
+
+if TYPE_CHECKING:
+    from pulsetrainer.flows.capture import Plan
 
 
 def capture(
@@ -17,11 +21,24 @@ def capture(
     ],
     out: Out,
     port: Port = None,
-    levels: Annotated[int, typer.Option(help="Levels whose cells the signal shall switch.")] = 48,
-    current_max: Annotated[float, typer.Option(help="Top of the range, A.")] = 1.5,
-    speed: Annotated[float, typer.Option(help="Speed of the identification signal, A/s.")] = 0.75,
-    rate: Annotated[float, typer.Option(help="Samples a second, Hz.")] = 1000.0,
+    levels: Annotated[
+        int, typer.Option(help="Levels whose cells the signal shall switch.", envvar=variable("levels"))
+    ] = 48,
+    current_max: Annotated[
+        float, typer.Option(help="Top of the range, A.", envvar=variable("current_max_A"))
+    ] = 1.5,
+    speed: Annotated[
+        float, typer.Option(help="Speed of the identification signal, A/s.", envvar=variable("speed_A_per_s"))
+    ] = 0.75,
+    rate: Annotated[float, typer.Option(help="Samples a second, Hz.", envvar=variable("rate_Hz"))] = 1000.0,
     condition: Annotated[bool, typer.Option(help="Go around the major loop once before recording.")] = True,
+    repeats: Annotated[int, typer.Option(help="How often the signal is played, without a pause.")] = 1,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the recording into this output that was cut off.")
+    ] = False,
+    limit_current: LimitCurrent = None,
+    limit_force: LimitForce = None,
+    dry_run: DryRun = False,
     force: Force = False,
     json: AsJson = False,
 ) -> None:
@@ -30,9 +47,28 @@ def capture(
     Example: pulsetrainer capture identification -o run.h5
     """
     from pulsetrainer.flows import capture as flow
+    from pulsetrainer.link import Limits
 
     screen = Screen("capture", as_json=json)
-    options = flow.Options(signal, out, port, levels, current_max, speed, rate, condition, force)
+    limits = Limits(limit_current, limit_force)
+    options = flow.Options(
+        signal,
+        out,
+        port,
+        levels,
+        current_max,
+        speed,
+        rate,
+        condition,
+        repeats,
+        resume,
+        limits,
+        dry_run,
+        force,
+    )
+    if dry_run:
+        _show(screen, flow.plan(options))
+        return
     with screen.working(f"capturing {signal}") as context:
         result = flow.run(options, context)
     if result.dropped_samples:
@@ -46,6 +82,21 @@ def capture(
             "current": f"{current[0]:.3f} .. {current[1]:.3f} A",
             "force": f"{force_range[0]:.3f} .. {force_range[1]:.3f} N",
             "reversals": result.reversals,
+            **({"parts": result.parts} if result.parts > 1 else {}),
             "cells switched": f"{result.coverage_percent:.1f} %",
+        },
+    )
+
+
+def _show(screen: Screen, plan: Plan) -> None:
+    """Say what would be played."""
+    screen.result(plan)
+    screen.facts(
+        f"would play {plan.signal} on {plan.port} and write {plan.output}; nothing was done",
+        {
+            "length": f"{plan.seconds:.1f} s, {plan.samples} samples, {plan.rate_Hz:g} a second",
+            "current": f"{plan.peak_current_A:.3f} A at most, {plan.rms_current_A:.3f} A rms",
+            "reversals": plan.reversals,
+            "cells switched": f"{plan.coverage_percent:.1f} %",
         },
     )

@@ -17,7 +17,9 @@ _DEBUG_HINT = "run it again with --debug for the whole traceback, and report it"
 def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     """Run the program on ``argv`` and return its exit code; nothing but ``SystemExit`` gets past."""
     debug = "--debug" in argv
-    words = [word for word in argv if word != "--debug"]
+    if "--verbose" in argv:
+        _be_verbose()
+    words = [word for word in argv if word not in ("--debug", "--verbose")]
     problem: PulsetrainerError
     try:
         code = program(args=words, standalone_mode=False, prog_name="pulsetrainer")
@@ -36,6 +38,16 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
         return int(code or 0)
     report(problem, command=next((w for w in words if not w.startswith("-")), ""), as_json="--json" in words)
     return problem.exit_code
+
+
+def _be_verbose() -> None:
+    """Let the package's log lines through to stderr, each with its time."""
+    import logging
+
+    logging.basicConfig(
+        stream=sys.stderr, format="%(asctime)s.%(msecs)03d %(name)s: %(message)s", datefmt="%H:%M:%S"
+    )
+    logging.getLogger("pulsetrainer").setLevel(logging.DEBUG)
 
 
 def _trace(debug: bool) -> None:

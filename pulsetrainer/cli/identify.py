@@ -10,6 +10,7 @@ import typer
 
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.options import AsJson, Force, Out
+from pulsetrainer.cli.settings import variable
 
 
 class Operator(StrEnum):
@@ -29,7 +30,9 @@ class Method(StrEnum):
 def identify(
     runs: Annotated[list[Path], typer.Argument(help="Runs to fit together.", metavar="RUN.h5...")],
     out: Out,
-    levels: Annotated[int, typer.Option(help="Levels of the Preisach plane.")] = 48,
+    levels: Annotated[
+        int, typer.Option(help="Levels of the Preisach plane.", envvar=variable("levels"))
+    ] = 48,
     operator: Annotated[
         Operator, typer.Option(help="continuous, or relay as in the paper.")
     ] = Operator.continuous,
@@ -42,6 +45,11 @@ def identify(
             "auto: by held-out blocks (default; 0 with relay).",
         ),
     ] = None,
+    bootstrap: Annotated[
+        int,
+        typer.Option(min=0, help="Refits to resampled blocks, for 90 % intervals; 200 take about a minute."),
+    ] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
     force: Force = False,
     json: AsJson = False,
 ) -> None:
@@ -54,11 +62,24 @@ def identify(
 
     screen = Screen("identify", as_json=json)
     options = flow.Options(
-        tuple(runs), out, levels, operator.value, method.value, _smoothing(smoothing), force
+        tuple(runs),
+        out,
+        levels,
+        operator.value,
+        method.value,
+        _smoothing(smoothing),
+        bootstrap,
+        seed,
+        force,
     )
     with screen.working("fitting") as context:
         result = flow.run(options, context)
     screen.result(plain(result))
+    sure = {}
+    if result.output_uncertainty is not None:
+        sure["output known within"] = (
+            f"{result.output_uncertainty:.2g} {shown(result.output_unit)} (90 % band)"
+        )
     unit = shown(result.output_unit)
     screen.facts(
         f"{result.output}: Preisach model of {result.levels} levels, {result.cells} cells",
@@ -69,6 +90,7 @@ def identify(
             "cells switched": f"{result.coverage_percent:.1f} %",
             "smoothing": f"{result.smoothing:.3g} of the range" if result.smoothing else "none",
             "loop": "falling" if result.polarity < 0 else "rising",
+            **sure,
             "took": f"{result.seconds:.2f} s, {result.iterations} iterations",
         },
     )

@@ -10,6 +10,7 @@ import typer
 
 from pulsetrainer.cli.console import Screen
 from pulsetrainer.cli.options import AsJson, Force, Out
+from pulsetrainer.cli.settings import variable
 
 
 class Inversion(StrEnum):
@@ -40,8 +41,12 @@ def invert(
     force_max: Annotated[
         float | None, typer.Option(help="Force at its top, N; default: the highest.", show_default=False)
     ] = None,
-    periods: Annotated[int, typer.Option(help="Periods to play; the first is not scored.")] = 4,
-    slew: Annotated[float, typer.Option(help="Fastest the drive may move, A/s.")] = 30.0,
+    periods: Annotated[
+        int, typer.Option(help="Periods to play; the first is not scored.", envvar=variable("periods"))
+    ] = 4,
+    slew: Annotated[
+        float, typer.Option(help="Fastest the drive may move, A/s.", envvar=variable("slew_A_per_s"))
+    ] = 30.0,
     force: Force = False,
     json: AsJson = False,
 ) -> None:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from pulsetrainer.cli.settings import variable
+
 Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.", show_default=False)]
 Force = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
@@ -16,6 +18,27 @@ Port = Annotated[
         "--port",
         help="bench: (default), bench:?seed=3, qemu:, /dev/ttyUSB0, COM3 or socket://host:port.",
         envvar="PULSETRAINER_PORT",
+        show_default=False,
+    ),
+]
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Say what would be played; touch no port, write nothing.")
+]
+LimitCurrent = Annotated[
+    float | None,
+    typer.Option(
+        "--limit-current",
+        help="Current that the device shall refuse to exceed, A; its own limit can only be lowered.",
+        envvar=variable("limits.current_A"),
+        show_default=False,
+    ),
+]
+LimitForce = Annotated[
+    float | None,
+    typer.Option(
+        "--limit-force",
+        help="Force above which the device shall switch off, N; its own limit can only be lowered.",
+        envvar=variable("limits.force_N"),
         show_default=False,
     ),
 ]

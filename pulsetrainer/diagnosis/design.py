@@ -3,11 +3,15 @@
 Rows are made at the full sample rate, so that no tip of a fast loop is lost, and then averaged over
 bins of a few milliseconds together with the output: some 20 000 rows whatever the record's length. With
 S the smoothing of ``core.smoothing``, the fitted part of any signal c is D (D'D + S)^-1 D'c.
+
+What the device did before a record began goes on decaying in it: a finger that was pressed relaxes for
+seconds. No record tells how much, so a few exponential decays from its first sample are fitted freely, as the
+offset is, and taken off everything else (left out, a creep's time constant came out 15 % too short).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,15 +20,18 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from pulsetrainer.core import nnls
-from pulsetrainer.core.operator import follow, rows
+from pulsetrainer.core.memory import Trace
+from pulsetrainer.core.operator import Preisach, base_rows, follow, steps
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane
 from pulsetrainer.core.smoothing import penalty
-from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.errors import DataError
 
 # Short enough for a resonance of 70 Hz; longer when the records would otherwise make more rows than this.
 _BIN_S = 0.005
 _MOST_ROWS = 20_000
+# Spaced as the time constants of a creep; the longest must have gone by well before the record's end.
+_START_S = (0.2, 0.8, 3.2)
+_START_SHARE = 6.0
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,7 @@ class Bins:
     count: int
     record: IntArray  # (count,) record of each bin
     time_s: FloatArray  # (count,) since the start of its record
+    width: tuple[int, ...]  # samples a bin has when all have weight, of each record
 
     def average(self, signals: Sequence[FloatArray]) -> FloatArray:
         """Averages (count,) of one signal per record."""
@@ -54,6 +62,58 @@ class Bins:
             inside = number >= 0
             total += np.bincount(number[inside], weights=one[inside], minlength=self.count)
         return total / self.sizes
+
+    @cached_property
+    def free(self) -> FloatArray:
+        """Orthonormal columns (count, k) of what is fitted freely: one offset, the start of each record."""
+        return np.asarray(linalg.qr(self._starts, mode="economic", check_finite=False)[0])
+
+    @cached_property
+    def _starts(self) -> FloatArray:
+        """The offset and the decays themselves (count, k)."""
+        columns = [np.ones(self.count)]
+        for k in np.unique(self.record):
+            own = self.record == k
+            since = self.time_s - self.time_s[own][0]
+            longest = float(since[own][-1]) / _START_SHARE
+            # decays far in the past would be zero, and exp would overflow before the record
+            columns += [
+                np.where(own, np.exp(-np.maximum(since, 0.0) / tau), 0.0) for tau in _START_S if tau < longest
+            ]
+        return np.stack(columns, axis=1)
+
+    def even(self, values: FloatArray, k: int) -> FloatArray:
+        """Values (count,) of record ``k`` at even steps of its bins, zero where there is no bin."""
+        number = self.number[k]
+        used, first = np.unique(number, return_index=True)
+        start = int(used[0] == -1)
+        spread = np.zeros(-(-number.size // self.width[k]))
+        spread[first[start:] // self.width[k]] = values[used[start:]]
+        return spread
+
+    def filtered(
+        self,
+        columns: FloatArray,
+        through: Callable[[FloatArray, int, float], FloatArray],
+        dt_s: Sequence[float],
+    ) -> FloatArray:
+        """Columns (count, m) after ``through(even columns, record, step)``; holes keep the last value."""
+        result = np.empty_like(columns)
+        for k, (width, step) in enumerate(zip(self.width, dt_s, strict=True)):
+            own = np.flatnonzero(self.record == k)
+            at = np.floor(self.time_s[own] / (width * step)).astype(np.int64)
+            last = np.maximum(np.searchsorted(at, np.arange(at[-1] + 1), side="right") - 1, 0)
+            result[own] = through(columns[own[last]], k, width * step)[at]
+        return result
+
+    def constant(self, along: FloatArray) -> float:
+        """Return the offset that belongs to coordinates (k,) along ``free``."""
+        upper = self.free.T @ self._starts
+        return float(linalg.solve_triangular(upper, along, check_finite=False)[0])
+
+    def settled(self, columns: FloatArray) -> FloatArray:
+        """Signals (count,) or (count, m) without their offset and start."""
+        return columns - self.free @ (self.free.T @ columns)
 
     @cached_property
     def sizes(self) -> FloatArray:
@@ -74,7 +134,7 @@ def bins_of(records: Sequence[Measured]) -> Bins:
     """
     duration = sum(r.input.size * r.dt_s for r in records)
     width = max(_BIN_S, duration / _MOST_ROWS)
-    numbers, record, time, count = [], [], [], 0
+    numbers, record, time, widths, count = [], [], [], [], 0
     for k, r in enumerate(records):
         per_bin = max(1, round(width / r.dt_s))
         raw = np.where(r.weight > 0, np.arange(r.input.size) // per_bin, -1)
@@ -84,13 +144,14 @@ def bins_of(records: Sequence[Measured]) -> Bins:
         size = used.size - first
         record.append(np.full(size, k))
         time.append((used[first:] + 0.5) * per_bin * r.dt_s)
+        widths.append(per_bin)
         count += size
     if count < 100:
         raise DataError(
             f"only {count} short averages can be made of this data, too few to tell causes apart",
             hint="record longer: pulsetrainer capture diagnostic -o run.h5",
         )
-    return Bins(tuple(numbers), count, np.concatenate(record), np.concatenate(time))
+    return Bins(tuple(numbers), count, np.concatenate(record), np.concatenate(time), tuple(widths))
 
 
 @dataclass
@@ -99,28 +160,36 @@ class Design:
 
     plane: Plane
     bins: Bins
-    matrix: FloatArray  # (count, n_q) centred
-    mean: FloatArray  # (n_q,)
+    matrix: FloatArray  # (count, n_q) without offset and start
+    taken: FloatArray  # (k, n_q) coordinates of offset and start
     smoothing: float
 
     @classmethod
-    def build(cls, plane: Plane, bins: Bins, inputs: Sequence[FloatArray], smoothing: float) -> Design:
-        """Trace the inputs (n,) that the hysteresis sees, one per record."""
+    def build(
+        cls,
+        plane: Plane,
+        bins: Bins,
+        paths: Sequence[Followed],
+        smoothing: float,
+        shown: Callable[[FloatArray], FloatArray] = lambda columns: columns,
+    ) -> Design:
+        """Average the rows of the inputs that the hysteresis sees, one per record; ``shown`` filters them."""
         packed = sparse.csr_array((bins.count, plane.n_q))
-        for number, u in zip(bins.number, inputs, strict=True):
-            path = follow(plane, u, None, "continuous")
-            own, base = rows(plane, path)
+        for number, path in zip(bins.number, paths, strict=True):
             inside = np.flatnonzero(number >= 0)
             where = number[inside]
             share = 1.0 / bins.sizes[where]
-            shape = (bins.count, own.shape[0])
-            packed = packed + sparse.csr_array((share, (where, inside)), shape=shape) @ own
+            shape = (bins.count, path.own.shape[0])
+            packed = packed + sparse.csr_array((share, (where, inside)), shape=shape) @ path.own
+            base = base_rows(plane, path.trace)
             shape = (bins.count, base.shape[0])
-            packed = packed + sparse.csr_array((share, (where, path.anchor[inside])), shape=shape) @ base
-        matrix = _to_cells(plane, packed)
-        mean = matrix.mean(axis=0)
-        matrix -= mean
-        return cls(plane, bins, matrix, mean, smoothing)
+            packed = (
+                packed + sparse.csr_array((share, (where, path.trace.anchor[inside])), shape=shape) @ base
+            )
+        matrix = shown(_to_cells(plane, packed))
+        taken = bins.free.T @ matrix
+        matrix -= bins.free @ taken
+        return cls(plane, bins, matrix, taken, smoothing)
 
     @cached_property
     def gram(self) -> FloatArray:
@@ -135,15 +204,44 @@ class Design:
 
     def fit(self, y: FloatArray, passive: NDArray[np.bool_] | None = None) -> nnls.NonNegative:
         """Non-negative masses for binned outputs (count,)."""
-        return nnls.solve(self.gram, self.matrix.T @ (y - y.mean()), passive=passive)
+        return nnls.solve(self.gram, self.matrix.T @ self.bins.settled(y), passive=passive)
 
     def offset(self, y: FloatArray, masses: FloatArray) -> float:
         """Offset y0 that belongs to the masses; rows here rise from 0, so W is added back."""
-        return float(y.mean() - self.mean @ masses + masses.sum())
+        along = self.bins.free.T @ y - self.taken @ masses
+        return self.bins.constant(along) + float(masses.sum())
+
+    def output(self, operator: Preisach) -> FloatArray:
+        """Averaged output (count,) of an operator on the inputs of the rows."""
+        masses = operator.masses
+        level = operator.offset - float(masses.sum())
+        return self.matrix @ masses + self.bins.free @ (self.taken @ masses) + level
 
     def projector(self, passive: NDArray[np.bool_]) -> Projector:
         """What the positive cells can fit."""
         return Projector(self, np.flatnonzero(passive))
+
+
+@dataclass(frozen=True)
+class Followed:
+    """An input followed through the plane's memory once: any weights then cost one sparse product."""
+
+    trace: Trace
+    own: sparse.csr_array  # (n, n_q) from the anchor to the sample, node space
+    step: sparse.csr_array  # (m, n_q) from turning point to turning point
+
+    @classmethod
+    def along(cls, plane: Plane, u: FloatArray) -> Followed:
+        """Follow an input (n,) from negative saturation."""
+        path = follow(plane, u, None, "continuous")
+        own = steps(plane, path.value, path.node_value[path.anchor])
+        return cls(path, own, steps(plane, path.node_value, path.node_value[path.parent]))
+
+    def output(self, operator: Preisach) -> FloatArray:
+        """Output (n,), polarity 1."""
+        turning = self.trace.along_tree(self.step @ operator.nodes)
+        level = operator.offset - operator.total
+        return np.asarray(self.own @ operator.nodes + turning[self.trace.anchor] + level)
 
 
 def _to_cells(plane: Plane, packed: sparse.csr_array) -> FloatArray:
@@ -156,22 +254,19 @@ def _to_cells(plane: Plane, packed: sparse.csr_array) -> FloatArray:
 
 
 class Projector:
-    """Takes off what the positive cells can fit: c - D (D'D + S)^-1 D'c, and the mean."""
+    """Takes off what offset, start and the positive cells can fit: c - D (D'D + S)^-1 D'c."""
 
     def __init__(self, design: Design, free: IntArray) -> None:
-        self.columns = design.matrix[:, free]
+        self.design, self.free = design, free
         block = design.gram[np.ix_(free, free)].copy()
         block[np.diag_indices_from(block)] += 1e-10 * float(np.diagonal(block).max())
         self.factor = linalg.cho_factor(block, lower=True, check_finite=False)
 
     def __call__(self, columns: FloatArray) -> FloatArray:
         """Columns (count, k) without their fitted part."""
-        centred = columns - columns.mean(axis=0)
-        return centred - self.columns @ linalg.cho_solve(
-            self.factor, self.columns.T @ centred, check_finite=False
-        )
-
-
-def frames_of(records: Sequence[Measured], span: float, reach: float) -> list[Frame]:
-    """One frame per record."""
-    return [Frame(r.dt_s, r.input, span, reach, k, len(records)) for k, r in enumerate(records)]
+        settled = self.design.bins.settled(columns)
+        masses = np.zeros((self.design.plane.n_q, columns.shape[1]))
+        along = self.design.matrix.T @ settled
+        masses[self.free] = linalg.cho_solve(self.factor, along[self.free], check_finite=False)
+        settled -= self.design.matrix @ masses
+        return settled

@@ -11,31 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, Plane
-from pulsetrainer.diagnosis.causes.base import Frame
-from pulsetrainer.diagnosis.design import Bins, Design, Measured, Projector
-from pulsetrainer.diagnosis.extended import Term, chain, in_order, seen_input, shown_output
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.design import Design, Projector
+from pulsetrainer.diagnosis.extended import Term, chain, in_order, shown_output
+from pulsetrainer.diagnosis.problem import Problem
 
 _ROUNDS = 6
-_PASSES = 2
+_PASSES = 8
+_SETTLED = 0.05  # change of what the causes add, over the residual, at which the passes end
 _ENOUGH = 2e-3  # relative fall of the sum of squares below which the refit ends
-
-
-@dataclass(frozen=True)
-class Problem:
-    """The data, the plane on which the weights live, and how they are averaged."""
-
-    records: tuple[Measured, ...]
-    frames: tuple[Frame, ...]
-    plane: Plane
-    bins: Bins
-    measured: FloatArray  # (count,) averaged output
-    smoothing: float
 
 
 @dataclass(frozen=True)
@@ -43,13 +33,11 @@ class Fitted:
     """A jointly fitted model."""
 
     terms: tuple[Term, ...]
-    built: tuple[Term, ...]  # the input causes in the rows of the design
     simulator: Simulator
-    added: FloatArray  # (count,) what the output causes add to the hysteresis
     design: Design
     passive: NDArray[np.bool_]
-    predicted: FloatArray  # (count,)
-    residual: FloatArray  # (count,) measured less predicted
+    simulated: FloatArray  # (count,) as the causes and the operator give it
+    residual: FloatArray  # (count,) measured less simulated, without offset and start
     squares: float
 
     @property
@@ -57,9 +45,25 @@ class Fitted:
         """Ids of the causes in it."""
         return tuple(term.cause.id for term in self.terms)
 
+    @cached_property
     def projector(self) -> Projector:
         """What its weights can fit."""
         return self.design.projector(self.passive)
+
+    @cached_property
+    def slopes(self) -> FloatArray:
+        """Derivatives (count, p) of the averaged output with respect to all parameters, weights held."""
+        columns = []
+        for k, term in enumerate(self.terms):
+            for j, quantity in enumerate(term.cause.parameters):
+                step = _difference(term, j)
+                up = step if term.values[j] + step <= quantity.high else -step
+                moved = list(self.terms)
+                values = list(term.values)
+                values[j] += up
+                moved[k] = Term(term.cause, tuple(values))
+                columns.append((self.simulator(moved) - self.simulated) / up)
+        return np.stack(columns, axis=1) if columns else np.empty((self.simulated.size, 0))
 
 
 class Simulator:
@@ -73,10 +77,13 @@ class Simulator:
         """Outputs of the hysteresis of every record at the full rate."""
         before = tuple(t for t in terms if t.cause.stage == "input")
         if before not in self._static:
-            self._static[before] = [
-                chain(before, self.operator, frame, record.output)
-                for record, frame in zip(self.problem.records, self.problem.frames, strict=True)
-            ]
+            if any(t.cause.feeds_back for t in before):
+                self._static[before] = [
+                    chain(before, self.operator, frame, record.output)
+                    for record, frame in zip(self.problem.records, self.problem.frames, strict=True)
+                ]
+            else:
+                self._static[before] = [one.output(self.operator) for one in self.problem.paths(before)]
         return self._static[before]
 
     def full(self, terms: Sequence[Term]) -> list[FloatArray]:
@@ -98,51 +105,45 @@ def weights_for(
 
     The rows are those of ``near``; what the causes make of them is subtracted from the output, with the
     weights of the pass before: m <- fit(y - (M(m) - D m)). The passes contract by the relative size
-    of the causes, some per cent. ``rebuild`` makes new rows for the input that the hysteresis now sees, so
-    that nothing of an input cause is left to be subtracted.
+    of the causes, some per cent, and end when they change little against the residual. ``rebuild`` makes
+    new rows for the input that the hysteresis now sees, so that nothing of an input cause is left to be
+    subtracted.
     """
-    if near is None or rebuild:
-        built = tuple(t for t in terms if t.cause.stage == "input")
-        inputs = [
-            seen_input(built, record.output, frame)
-            for record, frame in zip(problem.records, problem.frames, strict=True)
-        ]
-        design = Design.build(problem.plane, problem.bins, inputs, problem.smoothing)
-    else:
-        design, built = near.design, near.built
+    design = _rows(problem, terms) if near is None or rebuild else near.design
     passive = None if near is None else near.passive
     simulator = None if near is None else near.simulator
     added = np.zeros(problem.bins.count)
-    exact = tuple(terms) == built
-    for _ in range(1 if exact else 3 * _PASSES if near is None else _PASSES):
-        if simulator is not None and not exact:
-            added = simulator(terms) - simulator(built)
+    if simulator is not None:
+        added = simulator(terms) - design.output(simulator.operator)
+    for _ in range(_PASSES):
         wanted = problem.measured - added
         found = design.fit(wanted, passive)
         passive = found.passive
         offset = design.offset(wanted, found.x)
         simulator = Simulator(problem, Preisach(problem.plane, found.x / problem.plane.areas, offset))
+        simulated = simulator(terms)
+        residual = problem.bins.settled(problem.measured - simulated)
+        before, added = added, simulated - design.output(simulator.operator)
+        if np.linalg.norm(problem.bins.settled(added - before)) < _SETTLED * np.linalg.norm(residual):
+            break
     assert simulator is not None
-    assert passive is not None
-    predicted = simulator(terms)
-    residual = problem.measured - predicted
     squares = float(residual @ residual)
-    return Fitted(tuple(terms), built, simulator, added, design, passive, predicted, residual, squares)
+    return Fitted(tuple(terms), simulator, design, found.passive, simulated, residual, squares)
 
 
-def slopes(problem: Problem, fitted: Fitted) -> FloatArray:
-    """Derivatives (count, p) of the averaged output with respect to all parameters, weights held."""
-    columns = []
-    for k, term in enumerate(fitted.terms):
-        for j, quantity in enumerate(term.cause.parameters):
-            step = _difference(term, j)
-            up = step if term.values[j] + step <= quantity.high else -step
-            moved = list(fitted.terms)
-            values = list(term.values)
-            values[j] += up
-            moved[k] = Term(term.cause, tuple(values))
-            columns.append((fitted.simulator(moved) - fitted.predicted) / up)
-    return np.stack(columns, axis=1) if columns else np.empty((problem.bins.count, 0))
+def _rows(problem: Problem, terms: Sequence[Term]) -> Design:
+    """Rows behind the input causes, through the output causes that filter them."""
+    before = tuple(t for t in terms if t.cause.stage == "input")
+    through = [t for t in terms if t.cause.in_rows]
+
+    def one(columns: FloatArray, k: int, dt_s: float) -> FloatArray:
+        return shown_output(through, columns, replace(problem.frames[k], dt_s=dt_s))
+
+    def shown(columns: FloatArray) -> FloatArray:
+        steps = [record.dt_s for record in problem.records]
+        return problem.bins.filtered(columns, one, steps) if through else columns
+
+    return Design.build(problem.plane, problem.bins, problem.paths(before), problem.smoothing, shown)
 
 
 def _difference(term: Term, j: int) -> float:
@@ -159,13 +160,15 @@ def refit(
     rebuild: bool = False,
 ) -> Fitted:
     """Joint refit from the parameter values in ``terms``."""
+    known = near.names if near is not None else ()
+    rebuild = rebuild or any(t.cause.in_rows and t.cause.id not in known for t in terms)
     fitted = weights_for(problem, in_order(terms), near, rebuild=rebuild)
     damping = 0.0
     for _ in range(rounds):
-        columns = slopes(problem, fitted)
+        columns = fitted.slopes
         if columns.shape[1] == 0:
             return fitted
-        free = fitted.projector()(columns)
+        free = fitted.projector(columns)
         size = np.sqrt(np.sum(free**2, axis=0))
         size[size == 0] = 1.0
         scaled = free / size

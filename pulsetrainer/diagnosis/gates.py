@@ -28,16 +28,21 @@ class Firing:
     value: float  # the size of it
     unit: str  # "y", "u" or "1"
     mask: BoolArray | None = None  # samples to leave out
+    spread: float = 0.0  # of the value, where it is known
 
 
-def noise_of(y: FloatArray) -> float:
+def noise_of(y: FloatArray, weight: FloatArray | None = None) -> float:
     """White noise (rms) of a record from its third differences, robust against jumps.
 
-    A smooth output hardly has any; of white noise they have twenty times the variance.
+    A smooth output hardly has any; of white noise they have twenty times the variance. Where samples
+    without ``weight`` were filled in there is no noise to be seen.
     """
     if y.size < 8:
         return 0.0
     third = np.diff(y, 3)
+    if weight is not None:
+        known = ndimage.minimum_filter1d(weight, 4, origin=-2)[:-3] > 0
+        third = third[known] if np.count_nonzero(known) >= 8 else third
     return float(np.median(np.abs(third - np.median(third))) / 0.6745 / np.sqrt(20.0))
 
 
@@ -89,7 +94,10 @@ def _saturated(record: Measured) -> Firing | None:
                 share,
                 rail,
                 "y",
-                ndimage.binary_dilation(at, iterations=3),
+                # next to it only the samples with low noise are left: those must go too
+                ndimage.binary_dilation(at, iterations=3)
+                | (ndimage.uniform_filter1d(y, 9) > rail - 3.0 * noise_of(y, np.where(at, 0.0, 1.0))),
+                step,
             )
     return None
 
@@ -162,6 +170,7 @@ def _quantised(record: Measured) -> Firing | None:
         1.0,
         step,
         "y",
+        spread=0.5 * float(np.ptp(np.quantile(np.diff(np.unique(y)), [0.05, 0.95]))),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import signal
 
 from pulsetrainer.core.plane import FloatArray, IntArray
-from pulsetrainer.diagnosis.fitting import Problem
+from pulsetrainer.diagnosis.problem import Problem
 
 _RATE_EDGES = np.asarray([0.0, 0.05, 0.3, 1.0, 3.0, 7.0, np.inf])  # ranges per second; below the first: rest
 _GROUPS = 10

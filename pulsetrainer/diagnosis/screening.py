@@ -23,7 +23,8 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.extended import Term, in_order
-from pulsetrainer.diagnosis.fitting import Fitted, Problem, slopes
+from pulsetrainer.diagnosis.fitting import Fitted
+from pulsetrainer.diagnosis.problem import Problem
 
 DRAWS = 199
 _AR_ORDER = 10
@@ -78,7 +79,7 @@ class _Block:
 
 def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: int = DRAWS) -> Screen:
     """Score every cause that is not in the model yet."""
-    project = fitted.projector()
+    project = fitted.projector
     residual = project(fitted.residual[:, None])[:, 0]
     blocks = _blocks(problem, fitted, residual)
     everything = np.hstack([b.basis for b in blocks]) if blocks else np.empty((residual.size, 0))
@@ -107,28 +108,38 @@ def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: in
 
 def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Block]:
     """All blocks of columns, weights and the causes already in the model projected off."""
-    project = fitted.projector()
-    own = project(slopes(problem, fitted))
+    project = fitted.projector
+    own = project(fitted.slopes)
     known = linalg.orth(own) if own.shape[1] else own
+    parts = [problem.bins.even(residual, k) for k in range(len(problem.records))]
+    tried: list[tuple[Cause, list[Values]]] = [
+        (cause, values)
+        for cause in library().values()
+        if cause.stage != "record" and cause.id not in fitted.names
+        for values in cause.starts(problem.frames, parts)
+    ]
+    if not tried:
+        return []
+    # all at once: the projection is bound by reading the rows
+    columns = np.stack(
+        [
+            fitted.simulator(in_order((*fitted.terms, Term(cause, one)))) - fitted.simulated
+            for cause, values in tried
+            for one in values
+        ],
+        axis=1,
+    )
+    free = project(columns)
+    free -= known @ (known.T @ free)
+    size, whole_size = np.linalg.norm(free, axis=0), np.linalg.norm(columns, axis=0)
+    visible = np.isfinite(size) & (size > 1e-6 * whole_size)  # else the weights can do all of it
     found: list[_Block] = []
-    parts = [residual[problem.bins.record == k] for k in range(len(problem.records))]
-    for cause in library().values():
-        if cause.stage == "record" or cause.id in fitted.names:
-            continue
-        for values in cause.starts(problem.frames, parts):
-            columns = np.stack(
-                [
-                    fitted.simulator(in_order((*fitted.terms, Term(cause, one)))) - fitted.predicted
-                    for one in values
-                ],
-                axis=1,
-            )
-            free = project(columns)
-            free -= known @ (known.T @ free)
-            size = np.linalg.norm(free, axis=0)
-            if not np.all(np.isfinite(size)) or np.any(size <= 1e-6 * np.linalg.norm(columns, axis=0)):
-                continue  # the weights can do all of it: it cannot be seen on these data
-            basis, upper = np.linalg.qr(free)
+    end = 0
+    for cause, values in tried:
+        part = slice(end, end + len(values))
+        end = part.stop
+        if np.all(visible[part]):
+            basis, upper = np.linalg.qr(free[:, part])
             whole = cause.strengths == 0
             one_sided = not whole and len(values) == 1 and cause.parameters[0].low >= 0
             found.append(_Block(cause, tuple(values), basis, np.linalg.inv(upper), one_sided, whole))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis.answer import Answer
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.selection import Answer
 
 
 def evidence(answer: Answer, lacks: list[str]) -> list[str]:

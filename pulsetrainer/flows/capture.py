@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pulsetrainer.artefacts import output, provenance, table
-from pulsetrainer.artefacts.recorder import RunRecorder
+from pulsetrainer.artefacts.recorder import RunRecorder, interrupted
 from pulsetrainer.core import signals
+from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.signals import Signal
-from pulsetrainer.errors import ArgumentError, DataError, DeviceError, Interrupted, UsageError
-from pulsetrainer.link import open_device, redact
+from pulsetrainer.errors import DataError, DeviceError, UsageError
+from pulsetrainer.flows import recording
+from pulsetrainer.flows.recording import Earlier, Tally, check_ended, conditioning_loop
+from pulsetrainer.link import DEFAULT_PORT, Limits, open_device, redact
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
-    from pulsetrainer.link import Block, Device
+    from pulsetrainer.link import Device
 
 EXCITATIONS = ("identification", "diagnostic")
-CONDITIONING_SPEED_A_PER_S = 3.0
-CONDITIONING_REST_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,10 @@ class Options:
     speed_A_per_s: float = 0.75
     rate_Hz: float = 1000.0
     condition: bool = True  # one unrecorded major loop first
+    repeats: int = 1  # of the signal, without a pause
+    resume: bool = False  # go on with the recording into the same output that was interrupted
+    limits: Limits = field(default_factory=Limits)  # put in force on the device before anything is played
+    dry_run: bool = False  # plan only
     force: bool = False
 
 
@@ -51,6 +56,7 @@ class Result:
     seconds: float
     rate_Hz: float
     reversals: int
+    parts: int  # the device was off in between
     coverage_percent: float
     current_range_A: tuple[float, float]
     force_range_N: tuple[float, float]
@@ -60,7 +66,52 @@ class Result:
     firmware: str
 
 
-def plan(options: Options) -> Signal:
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What would be played."""
+
+    signal: str
+    samples: int
+    seconds: float  # the conditioning loop included
+    rate_Hz: float
+    reversals: int
+    coverage_percent: float
+    peak_current_A: float
+    rms_current_A: float
+    port: str
+    output: Path
+    dry_run: bool = True
+
+
+def plan(options: Options) -> Plan:
+    """Return what ``run`` would play; nothing is opened or written.
+
+    Raises
+    ------
+    UsageError, DataError
+        As ``reference``; also when the output exists.
+    """
+    output.check_output(options.output, options.force)
+    signal = reference(options)
+    course = Course(signal, options.repeats)
+    top = float(signal.value.max())
+    first = conditioning_loop(top, options.rate_Hz).size / options.rate_Hz if options.condition else 0.0
+    covered = coverage(Plane.uniform(0.0, top, options.levels), [signal.value]) if top > 0 else np.zeros(1)
+    return Plan(
+        signal=signal.name,
+        samples=course.size,
+        seconds=course.duration_s + first,
+        rate_Hz=options.rate_Hz,
+        reversals=course.reversals,
+        coverage_percent=100.0 * float(covered.mean()),
+        peak_current_A=float(np.abs(signal.value).max()),
+        rms_current_A=float(np.sqrt(np.mean(signal.value**2))),
+        port=redact(options.port or DEFAULT_PORT),
+        output=options.output,
+    )
+
+
+def reference(options: Options) -> Signal:
     """Return the reference to be played.
 
     Raises
@@ -115,100 +166,120 @@ def run(options: Options, context: Context) -> Result:
     Raises
     ------
     UsageError
-        The output exists, or the signal is unknown.
+        The output exists, the signal is unknown, or there is nothing to resume.
     DeviceError
         The device stopped by itself; what was recorded until then was kept with ``complete=false``.
     Interrupted
         Ctrl-C: the output was stopped first, then what was recorded was kept.
     """
-    output.check_output(options.output, options.force)
-    signal = plan(options)
-    with open_device(options.port) as device:
-        if options.condition:
-            condition(device, float(signal.value.max()), options.rate_Hz)
-        return _record(options, signal, device, context)
+    if not options.resume:
+        output.check_output(options.output, options.force)
+    course = Course(reference(options), options.repeats)
+    earlier = None
+    if options.resume:
+        earlier = recording.earlier_of(options.output, course, _same(options), options.force)
+        context.note(
+            f"going on with {earlier.path} after {earlier.run.input.size} samples, "
+            f"{100.0 * earlier.at / course.size:.0f} % of the signal"
+        )
+    else:
+        _note_leftovers(options.output, context)
+    try:
+        with open_device(options.port, limits=options.limits) as device:
+            return _record(options, course, device, earlier, context)
+    finally:
+        if earlier is not None:
+            earlier.lease.end()
 
 
-def condition(device: Device, high_A: float, rate_Hz: float) -> None:
-    """Take the actuator once around its major loop, so that what came before is forgotten.
-
-    Raises
-    ------
-    DeviceError, Interrupted
-        The loop could not be completed.
-    """
-    if high_A <= 0:
-        return
-    loop = signals.conditioning(
-        0.0, high_A, speed=CONDITIONING_SPEED_A_PER_S, rate_Hz=rate_Hz, rest_s=CONDITIONING_REST_S
-    )
-    recording = device.play(loop, rate_Hz)
-    check_ended(recording.fault, "conditioning", "", recording.remedy)
-
-
-def check_ended(fault: str, what: str, kept: str, remedy: str) -> None:
-    """Raise what a play that did not reach its end has to say.
-
-    Raises
-    ------
-    DeviceError, Interrupted
-        ``fault`` is not empty.
-    """
-    if fault == "interrupted":
-        raise Interrupted(f"stopped by you during {what}; the output was switched off first{kept}")
-    if fault:
-        raise DeviceError(
-            f"the device stopped during {what}: {fault}{kept}",
-            hint=remedy or "remove the cause; the next command clears the fault",
+def _note_leftovers(path: Path, context: Context) -> None:
+    for left, samples in interrupted(path):
+        context.note(
+            f"{left} holds {samples} samples of a capture that was cut off: "
+            "continue it with --resume, or delete it"
         )
 
 
-def _record(options: Options, signal: Signal, device: Device, context: Context) -> Result:
-    info = device.info
-    decimation = round(info.tick_rate_Hz / options.rate_Hz)
-    if decimation < 1 or not np.isclose(decimation * options.rate_Hz, info.tick_rate_Hz):
-        raise ArgumentError(
-            f"the rate must divide the device's {info.tick_rate_Hz:g} Hz, got {options.rate_Hz:g} Hz",
-            hint="use 1000, 2000 or 5000 Hz",
+def _record(
+    options: Options, course: Course, device: Device, earlier: Earlier | None, context: Context
+) -> Result:
+    info, signal = device.info, course.signal
+    recording.decimation_for(info.tick_rate_Hz, options.rate_Hz)  # before anything is written
+    serial = None if earlier is None else earlier.header.provenance.device
+    if earlier is not None and serial is not None and serial.serial != info.serial:
+        raise DeviceError(
+            f"{earlier.path} was recorded on {serial.serial}, this is {info.serial}",
+            hint="connect that device, or leave --resume out and name another output",
         )
     header = provenance.make_header(
         f"{signal.name} on {info.serial}",
         argv=context.argv,
         now=context.now(),
         parameters={
-            key: value for key, value in asdict(options).items() if key not in ("port", "output", "force")
+            key: value
+            for key, value in asdict(options).items()
+            if key not in ("port", "output", "force", "dry_run", "resume")
         },
-        inputs=provenance.digests([] if signal.name in EXCITATIONS else [options.signal]),
+        inputs=_inputs(options) | ({} if earlier is None else provenance.digests([earlier.path])),
+        ancestors=[] if earlier is None else [earlier.header],
         device=provenance.Device(info.serial, info.firmware, redact(options.port or "")),
         libraries=provenance.library_versions(),
     )
-    measured: list[Block] = []
-    with RunRecorder(options.output, header, signal=signal.name, force=options.force) as recorder:
-
-        def keep(block: Block) -> None:
-            recorder.append(block.tick / info.tick_rate_Hz, block.reference_A, block.current_A, block.force_N)
-            measured.append(block)
-            context.progress(float(block.tick[-1]) / info.tick_rate_Hz / signal.duration_s)
-
-        recording = device.play(signal.value, options.rate_Hz, decimation=decimation, on_block=keep)
-        recorder.finish(complete=recording.complete, dropped_samples=recording.dropped_samples)
-    kept = f"; {recording.tick.size} samples were kept in {options.output} (complete=false)"
-    check_ended(recording.fault, "the capture", kept, recording.remedy)
-    current, force = recording.current_A, recording.force_N
-    plane = Plane.uniform(0.0, float(signal.value.max()), options.levels)
-    covered = coverage(plane, [recording.reference_A])
+    top = float(signal.value.max())
+    tally = Tally(Plane.uniform(0.0, top, options.levels) if top > 0 else None)
+    with RunRecorder(
+        options.output,
+        header,
+        signal=signal.name,
+        force=options.force or (earlier is not None and earlier.path == options.output),
+        in_parts=earlier is not None or course.duration_s > device.longest_play_s,
+    ) as recorder:
+        if earlier is not None:
+            _take_over(recorder, tally, earlier)
+        ending = recording.record(
+            course,
+            device,
+            recorder,
+            tally,
+            at=0 if earlier is None else earlier.at,
+            condition_first=options.condition,
+            progress=context.progress,
+        )
+        recorder.finish(complete=ending.complete)
+    kept = f"; {recorder.samples} samples were kept in {options.output} (complete=false)"
+    check_ended(ending.fault, "the capture", kept, ending.remedy)
     return Result(
         output=options.output,
         signal=signal.name,
-        samples=recording.tick.size,
-        seconds=float(recording.time_s[-1]),
+        samples=recorder.samples,
+        seconds=recorder.end_s,
         rate_Hz=options.rate_Hz,
-        reversals=signal.reversals,
-        coverage_percent=100.0 * float(covered.mean()),
-        current_range_A=(float(current.min()), float(current.max())),
-        force_range_N=(float(force.min()), float(force.max())),
-        dropped_samples=recording.dropped_samples,
-        complete=recording.complete,
+        reversals=course.reversals,
+        parts=ending.parts + (0 if earlier is None else len(earlier.run.parts())),
+        coverage_percent=tally.coverage_percent,
+        current_range_A=tally.current_A,
+        force_range_N=tally.force_N,
+        dropped_samples=recorder.dropped_samples,
+        complete=ending.complete,
         serial=info.serial,
         firmware=info.firmware,
     )
+
+
+def _take_over(recorder: RunRecorder, tally: Tally, earlier: Earlier) -> None:
+    """Begin with what was recorded before."""
+    recorder.take_over(earlier.path, earlier.run)
+    for part in earlier.run.parts():
+        assert part.reference is not None
+        tally.add(part.reference, part.input, part.output)
+        tally.end_part()
+
+
+def _inputs(options: Options) -> dict[str, str]:
+    return provenance.digests([] if options.signal in EXCITATIONS else [options.signal])
+
+
+def _same(options: Options) -> dict[str, object]:
+    """What must be the same when a capture is resumed."""
+    names = ("signal", "levels", "current_max_A", "speed_A_per_s", "rate_Hz", "condition", "repeats")
+    return {name: getattr(options, name) for name in names}

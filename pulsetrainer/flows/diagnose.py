@@ -18,12 +18,13 @@ from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import seen_input
 from pulsetrainer.diagnosis.fitting import weights_for
-from pulsetrainer.diagnosis.selection import Answer, diagnose, problem_for
+from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.selection import diagnose
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.flows.modelling import known_from, predict, step_of
+from pulsetrainer.flows.modelling import known_from, parts_of, predict, step_of
 
 if TYPE_CHECKING:
-    from pulsetrainer.diagnosis.selection import Finding
+    from pulsetrainer.diagnosis.answer import Answer, Finding
     from pulsetrainer.flows.context import Context
 
 FASTEST_HZ = 1000.0  # more samples a second are averaged down
@@ -78,7 +79,7 @@ def run(options: Options, context: Context) -> Result:
     records = []
     for path, one in zip(options.runs, runs, strict=True):
         _check_fits(path, one, options.model, model)
-        records.append(measured_of(path, one, model.polarity, low, high))
+        records += [measured_of(path, part, model.polarity, low, high) for part in parts_of(one)]
         if not one.complete:
             context.note(f"{path} is incomplete; diagnosing the {one.input.size} samples it has")
     answer = diagnose(
@@ -216,8 +217,8 @@ def _artefact(answer: Answer, runs: Sequence[Run], records: Sequence[Measured], 
         time_s=time_s[thin],
         input=problem.bins.average([r.input for r in problem.records])[thin],
         output=sign * problem.measured[thin],
-        before=sign * answer.baseline.predicted[thin],
-        after=sign * answer.final.predicted[thin],
+        before=sign * (problem.measured - answer.baseline.residual)[thin],
+        after=sign * (problem.measured - answer.final.residual)[thin],
         extended=extended,
         input_unit=first.input_unit,
         output_unit=first.output_unit,

@@ -25,7 +25,7 @@ from pulsetrainer.core import metrics
 from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import DataError, QualityError, UsageError
-from pulsetrainer.flows.modelling import known_from, operator_of, predict, step_of
+from pulsetrainer.flows.modelling import known_from, operator_of, parts_of, predict, step_of
 from pulsetrainer.report import html
 
 if TYPE_CHECKING:
@@ -219,12 +219,17 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
             )
         operator = operator_of(model)
         low, high = operator.plane.low, operator.plane.high
-        known = known_from(one.input, low, high)
-        start, state = _start(model, one, known)
-        predicted = predict(model, one.input, step_of(one), start)[known:]
-        errors = metrics.prediction(one.output[known:], predicted)
-        shift = float(np.mean(one.output[known:] - predicted))
-        own = metrics.prediction(one.output[known:], predicted + shift)
+        parts = parts_of(one)
+        known = [known_from(part.input, low, high) for part in parts]
+        step_s = step_of(one)
+        start, state = _start(model, parts, known)
+        predicted = np.concatenate(
+            [predict(model, part.input, step_s, start)[k:] for part, k in zip(parts, known, strict=True)]
+        )
+        measured = np.concatenate([part.output[k:] for part, k in zip(parts, known, strict=True)])
+        errors = metrics.prediction(measured, predicted)
+        shift = float(np.mean(measured - predicted))
+        own = metrics.prediction(measured, predicted + shift)
         outside = (one.input < low - _BEYOND * (high - low)) | (one.input > high + _BEYOND * (high - low))
         thin = slice(None, None, max(1, predicted.size // _TRACE_SAMPLES))
         found.append(
@@ -238,13 +243,19 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 start=state,
                 outside_percent=100.0 * float(np.mean(outside)),
                 gain_percent=100.0 * (1.0 - errors.rms / found[0].rms) if found else 0.0,
-                time_s=None if one.time_s is None else one.time_s[known:][thin],
-                output=one.output[known:][thin],
+                time_s=_times(parts, known, thin),
+                output=measured[thin],
                 predicted=predicted[thin],
                 output_unit=one.output_unit,
             )
         )
     return Evaluation(models=tuple(found), model=model)
+
+
+def _times(parts: Sequence[Run], known: Sequence[int], thin: slice) -> FloatArray | None:
+    """Times of the samples after ``known`` of each part, thinned; None where the run has no time."""
+    times = [part.time_s[k:] for part, k in zip(parts, known, strict=True) if part.time_s is not None]
+    return np.concatenate(times)[thin] if times else None
 
 
 def _note_limits(path: Path, evaluation: Evaluation, context: Context) -> None:
@@ -259,7 +270,7 @@ def _note_limits(path: Path, evaluation: Evaluation, context: Context) -> None:
             context.note(f"{path} does not reach the ends of {found.name}; state before it: {found.start}")
 
 
-def _start(model: Model, one: Run, known: int) -> tuple[State | None, str]:
+def _start(model: Model, parts: Sequence[Run], known: Sequence[int]) -> tuple[State | None, str]:
     """Return the state from which a run is followed, and what it is called.
 
     A run that never reaches an end of the model's range leaves open what came before it. Tried are both
@@ -267,7 +278,7 @@ def _start(model: Model, one: Run, known: int) -> tuple[State | None, str]:
     """
     low, high = float(model.levels[0]), float(model.levels[-1])
     near = 0.01 * (high - low)
-    if np.any((one.input <= low + near) | (one.input >= high - near)):
+    if any(np.any((one.input <= low + near) | (one.input >= high - near)) for one in parts):
         return None, "known"
     states = {
         "negative saturation": negative_saturation(low),
@@ -276,7 +287,10 @@ def _start(model: Model, one: Run, known: int) -> tuple[State | None, str]:
     }
     operator = operator_of(model)
     left = {
-        name: float(np.mean((operator(one.input, state)[known:] - one.output[known:]) ** 2))
+        name: sum(
+            float(np.sum((operator(one.input, state)[k:] - one.output[k:]) ** 2))
+            for one, k in zip(parts, known, strict=True)
+        )
         for name, state in states.items()
     }
     best = min(left, key=left.__getitem__)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import BoolArray, Fit, Model, Run
-from pulsetrainer.core import input_noise, metrics
+from pulsetrainer.core import input_noise, metrics, uncertainty
 from pulsetrainer.core.coverage import coverage, largest_gap
 from pulsetrainer.core.identification import (
     Identified,
@@ -25,7 +25,7 @@ from pulsetrainer.core.levels import plane_for
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
-from pulsetrainer.flows.modelling import known_from, record_of, step_of
+from pulsetrainer.flows.modelling import known_from, parts_of, record_of, step_of
 from pulsetrainer.flows.show import shown as shown_unit
 
 if TYPE_CHECKING:
@@ -48,6 +48,8 @@ class Options:
     operator: Reading = "continuous"
     method: Method = "joint"
     smoothing: Smoothing | None = None  # None: "auto", or 0 for relays, as in the paper
+    bootstrap: int = 0  # refits to resampled blocks
+    seed: int = 0  # of the resampling
     force: bool = False
 
 
@@ -67,6 +69,7 @@ class Result:
     smoothing: float  # share of the input's range
     input_noise: float | None  # standard deviation, input unit; None where the records cannot tell
     false_reversals: int  # taken out of the input before the fit
+    output_uncertainty: float | None  # mean half width of the 90 % band of the output; None without bootstrap
     polarity: int
     offsets: tuple[float, ...]  # of each run's output against their mean; zeros where one offset serves all
     spacing: str  # of the levels: "even", or "crowded" where the loop is steep
@@ -95,6 +98,9 @@ def run(options: Options, context: Context) -> Result:
     for path, one in zip(options.runs, runs, strict=True):
         if not one.complete:
             context.note(f"{path} is incomplete; fitting the {one.input.size} samples it has")
+    cut = [parts_of(one) for one in runs]
+    names = [path.stem for path, parts in zip(options.runs, cut, strict=True) for _ in parts]
+    runs = [part for parts in cut for part in parts]
     ranges = [input_range(one) for one in runs]
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     _check_range(options.runs, low, high, runs[0].input_unit)
@@ -102,34 +108,23 @@ def run(options: Options, context: Context) -> Result:
     _note_noise(cleaned, runs[0].input_unit, context)
     runs = [replace(one, input=clean.input) for one, clean in zip(runs, cleaned, strict=True)]
     context.progress(0.1)
-    records = [record_of(one, low, high) for one in runs]
-    plane = _plane(records, low, high, options)
-    shifts = offsets_between(records, plane, options.operator)
-    if np.any(shifts):
-        _note_shifts(options.runs, shifts, runs, context)
-        records = [record_of(one, low, high, shift) for one, shift in zip(runs, shifts, strict=True)]
-    smoothing = options.smoothing
-    if smoothing is None:
-        smoothing = 0.0 if options.operator == "relay" else "auto"
-    found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
-    if not _is_even(plane) and _misfit(records, found) > _CROWDED_MISFIT:
-        # what is steep here is nothing that the operator can follow: closer levels would learn it by heart
-        plane = Plane.uniform(low, high, options.levels)
-        found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
-    if not _is_even(plane):
-        context.note("the loop is steep: the levels lie closer where the output changes")
-    context.progress(0.8)
+    records, found, shifts = _fitted(runs, names, (low, high), options, context)
+    plane = found.operator.plane
+    context.progress(0.4 if options.bootstrap else 0.8)
+    ensemble = None
+    if options.bootstrap:
+        ensemble = uncertainty.bootstrap(
+            records, found, rng=np.random.default_rng(options.seed), draws=options.bootstrap
+        )
+        context.progress(0.8)
     if found.operator.polarity < 0:
         context.note("the output falls when the input rises: fitted as a falling loop")
     covered = coverage(plane, [one.input for one in runs])
     gap = largest_gap(plane, covered)
     if gap is not None and float(np.mean(covered)) < _WELL_COVERED:
         context.note(gap.words(plane, runs[0].input_unit))
-    model = _model(runs, records, found, covered)
-    compared = velocity.compare(records, [step_of(one) for one in runs], _residuals(records, found))
-    warning = velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
-    if warning:
-        context.note(warning)
+    model = _model(runs, records, found, covered, ensemble)
+    warning = _warned(runs, records, found, context)
     context.progress(0.9)
     header = provenance.make_header(
         f"Preisach model of {', '.join(path.stem for path in options.runs)}",
@@ -156,6 +151,7 @@ def run(options: Options, context: Context) -> Result:
         smoothing=found.smoothing,
         input_noise=_largest_noise(cleaned),
         false_reversals=sum(clean.removed for clean in cleaned),
+        output_uncertainty=_half_width(model.fit),
         polarity=model.polarity,
         offsets=tuple(float(shift) for shift in shifts),
         spacing="even" if _is_even(plane) else "crowded",
@@ -164,6 +160,43 @@ def run(options: Options, context: Context) -> Result:
         iterations=model.fit.iterations,
         seconds=time.perf_counter() - begun,
     )
+
+
+def _fitted(
+    runs: Sequence[Run],
+    names: Sequence[str],
+    reach: tuple[float, float],
+    options: Options,
+    context: Context,
+) -> tuple[list[Record], Identified, FloatArray]:
+    """Return the records as fitted, the operator, and the offset of each record against their mean."""
+    low, high = reach
+    records = [record_of(one, low, high) for one in runs]
+    plane = _plane(records, low, high, options)
+    shifts = offsets_between(records, plane, options.operator)
+    if np.any(shifts):
+        _note_shifts(names, shifts, runs, context)
+        records = [record_of(one, low, high, shift) for one, shift in zip(runs, shifts, strict=True)]
+    smoothing = options.smoothing
+    if smoothing is None:
+        smoothing = 0.0 if options.operator == "relay" else "auto"
+    found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
+    if not _is_even(plane) and _misfit(records, found) > _CROWDED_MISFIT:
+        # what is steep here is nothing that the operator can follow: closer levels would learn it by heart
+        plane = Plane.uniform(low, high, options.levels)
+        found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
+    if not _is_even(plane):
+        context.note("the loop is steep: the levels lie closer where the output changes")
+    return records, found, shifts
+
+
+def _warned(runs: Sequence[Run], records: Sequence[Record], found: Identified, context: Context) -> str:
+    """Say where the output follows the velocity of the input, not the input."""
+    compared = velocity.compare(records, [step_of(one) for one in runs], _residuals(records, found))
+    warning = velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
+    if warning:
+        context.note(warning)
+    return warning
 
 
 def _largest_noise(cleaned: Sequence[input_noise.Cleaned]) -> float | None:
@@ -214,6 +247,13 @@ def _check_range(paths: Sequence[Path], low: float, high: float, unit: str) -> N
         )
 
 
+def _half_width(fit: Fit) -> float | None:
+    """Mean half width of the band of the predicted output."""
+    if fit.predicted_lower is None or fit.predicted_upper is None:
+        return None
+    return 0.5 * float(np.mean(fit.predicted_upper - fit.predicted_lower))
+
+
 def _plane(records: Sequence[Record], low: float, high: float, options: Options) -> Plane:
     """Return the levels: even for relays, as in the paper, else where the output changes."""
     if options.operator == "relay":
@@ -232,10 +272,10 @@ def _misfit(records: Sequence[Record], found: Identified) -> float:
     return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) / span
 
 
-def _note_shifts(paths: Sequence[Path], shifts: FloatArray, runs: Sequence[Run], context: Context) -> None:
+def _note_shifts(names: Sequence[str], shifts: FloatArray, runs: Sequence[Run], context: Context) -> None:
     """Say how far the outputs of the runs are shifted against each other."""
     span = float(np.ptp(np.concatenate([one.output for one in runs])))
-    listed = ", ".join(f"{path.stem} {shift:+.3g}" for path, shift in zip(paths, shifts, strict=True))
+    listed = ", ".join(f"{name} {shift:+.3g}" for name, shift in zip(names, shifts, strict=True))
     context.note(
         f"the outputs of the runs are shifted against each other by up to {np.ptp(shifts):.3g} "
         f"{shown_unit(runs[0].output_unit)} ({100 * np.ptp(shifts) / span:.2f} % of the span): each was "
@@ -248,7 +288,13 @@ def _residuals(records: Sequence[Record], found: Identified) -> list[FloatArray]
     return [r.output - found.operator(r.input, r.start) for r in records]
 
 
-def _model(runs: Sequence[Run], records: Sequence[Record], found: Identified, covered: BoolArray) -> Model:
+def _model(
+    runs: Sequence[Run],
+    records: Sequence[Record],
+    found: Identified,
+    covered: BoolArray,
+    ensemble: uncertainty.Ensemble | None,
+) -> Model:
     """Return the stored form of an identified operator, with its fit."""
     operator, first = found.operator, runs[0]
     plane = operator.plane
@@ -261,6 +307,8 @@ def _model(runs: Sequence[Run], records: Sequence[Record], found: Identified, co
     shown = slice(
         known_from(first.input, plane.low, plane.high), None, max(1, first.input.size // _TRACE_SAMPLES)
     )
+    band = None if ensemble is None else ensemble.output_band(first.input)
+    weights = None if ensemble is None else ensemble.weight_interval()
     fit = Fit(
         rms=errors.rms,
         max_abs=errors.max_abs,
@@ -276,6 +324,9 @@ def _model(runs: Sequence[Run], records: Sequence[Record], found: Identified, co
         output=records[0].output[shown],
         predicted=operator(records[0].input, records[0].start)[shown],
         smoothing=found.smoothing,
+        draws=0 if ensemble is None else len(ensemble.weights),
+        predicted_lower=None if band is None else band.lower[shown],
+        predicted_upper=None if band is None else band.upper[shown],
     )
     return Model(
         levels=plane.levels,
@@ -289,5 +340,7 @@ def _model(runs: Sequence[Run], records: Sequence[Record], found: Identified, co
         output_quantity=first.output_quantity,
         operator=operator.reading,
         polarity=operator.polarity,
+        weights_lower=None if weights is None else weights.lower,
+        weights_upper=None if weights is None else weights.upper,
         fit=fit,
     )

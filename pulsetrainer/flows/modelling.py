@@ -12,6 +12,8 @@ from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.extended import Extended
 from pulsetrainer.errors import DataError
 
+_SHORTEST_PART = 100  # samples
+
 
 def extended_of(model: Model) -> Extended:
     """Return a stored model with its extensions, ready to predict and to be inverted.
@@ -75,6 +77,16 @@ def operator_of(model: Model) -> Preisach:
         "relay" if model.operator == "relay" else "continuous",
         model.polarity,
     )
+
+
+def parts_of(run: Run) -> tuple[Run, ...]:
+    """Return the parts of a run that are long enough to say something: each is a record of its own.
+
+    After a seam the device had been off: what is slow in it (heat, creep) does not go on where it was. Each
+    part begins at the low end of the input, so that its memory is known.
+    """
+    parts = run.parts()
+    return tuple(part for part in parts if part.input.size >= _SHORTEST_PART) or (run,)
 
 
 def known_from(inputs: FloatArray, low: float, high: float) -> int:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import logging
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,13 +13,14 @@ from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import DrivePlayback, Playback, Waveform
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.flows.capture import check_ended
-from pulsetrainer.link import open_device, redact
+from pulsetrainer.flows.recording import check_ended
+from pulsetrainer.link import DEFAULT_PORT, Limits, open_device, redact
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
     from pulsetrainer.link import Device, Recording
 
+_LOG = logging.getLogger(__name__)
 DRIVES = ("compensated", "scaled")
 
 
@@ -30,6 +32,8 @@ class Options:
     output: Path
     port: str | None = None
     repeats: int = 5
+    limits: Limits = field(default_factory=Limits)  # put in force on the device before anything is played
+    dry_run: bool = False  # plan only
     force: bool = False
 
 
@@ -49,6 +53,62 @@ class Result:
     firmware: str
 
 
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What would be played."""
+
+    name: str
+    inversion: str
+    repeats: int
+    samples: int  # of one drive, once
+    seconds: float  # both drives, all repeats
+    rate_Hz: float
+    peak_current_A: float
+    rms_current_A: float
+    port: str
+    output: Path
+    dry_run: bool = True
+
+
+def plan(options: Options) -> Plan:
+    """Return what ``run`` would play; no port is opened and nothing written.
+
+    Raises
+    ------
+    UsageError, DataError
+        As ``run``.
+    """
+    waveform = _waveform(options)
+    drives = np.stack((waveform.compensated, waveform.scaled))
+    step = float(np.median(np.diff(waveform.time_s)))
+    return Plan(
+        name=waveform.name,
+        inversion=waveform.inversion,
+        repeats=options.repeats,
+        samples=waveform.time_s.size,
+        seconds=waveform.time_s.size * step * options.repeats * len(DRIVES),
+        rate_Hz=1.0 / step,
+        peak_current_A=float(np.abs(drives).max()),
+        rms_current_A=float(np.sqrt(np.mean(drives**2))),
+        port=redact(options.port or DEFAULT_PORT),
+        output=options.output,
+    )
+
+
+def _waveform(options: Options) -> Waveform:
+    """Return the drive to be played, or say why it cannot be."""
+    output.check_output(options.output, options.force)
+    waveform = store.read(options.drive, Waveform)
+    if options.repeats < 1:
+        raise ArgumentError(f"repeats must be at least 1, got {options.repeats}", hint="5 is usual")
+    if waveform.input_unit != "A":
+        raise DataError(
+            f"{options.drive} drives in {waveform.input_unit}; the device takes a current in A",
+            hint="identify and invert a run that was captured on the device",
+        )
+    return waveform
+
+
 def run(options: Options, context: Context) -> Result:
     """Play both drives alternately, ``repeats`` times each, and store what was measured.
 
@@ -63,23 +123,15 @@ def run(options: Options, context: Context) -> Result:
     Interrupted
         Ctrl-C: the output was stopped first; whole repeats played until then are kept.
     """
-    output.check_output(options.output, options.force)
-    waveform = store.read(options.drive, Waveform)
-    if options.repeats < 1:
-        raise ArgumentError(f"repeats must be at least 1, got {options.repeats}", hint="5 is usual")
-    if waveform.input_unit != "A":
-        raise DataError(
-            f"{options.drive} drives in {waveform.input_unit}; the device takes a current in A",
-            hint="identify and invert a run that was captured on the device",
-        )
-    with open_device(options.port) as device:
+    waveform = _waveform(options)
+    with open_device(options.port, limits=options.limits) as device:
         playback, (fault, remedy) = _play(waveform, options.repeats, device, context)
         info = device.info
     header = provenance.make_header(
         f"{waveform.name} by {waveform.inversion} inversion, played on {info.serial}",
         argv=context.argv,
         now=context.now(),
-        parameters={"repeats": options.repeats},
+        parameters={"repeats": options.repeats, "limits": asdict(options.limits)},
         inputs=provenance.digests([options.drive]),
         ancestors=[store.read_header(options.drive)],
         device=provenance.Device(info.serial, info.firmware, redact(options.port or "")),
@@ -115,6 +167,7 @@ def _play(
     dropped, fault, remedy = 0, "", ""
     for number in range(repeats * len(DRIVES)):
         name = DRIVES[number % len(DRIVES)]
+        _LOG.info("repeat %d of %d, %s drive", number // len(DRIVES) + 1, repeats, name)
         recording = device.play(drives[name], rate, decimation=decimation)
         dropped += recording.dropped_samples
         fault, remedy = recording.fault, recording.remedy

@@ -87,12 +87,14 @@ def _span(values: FloatArray, unit: str) -> str:
 def _run(run: Run) -> dict[str, Any]:
     timed = run.time_s is not None and run.time_s.size > 1
     steps = np.diff(run.time_s) if run.time_s is not None and timed else np.zeros(0)
+    parts = len(run.parts())
     return {
         "signal": run.signal,
         "samples": run.input.size,
         "seconds": float(run.time_s[-1] - run.time_s[0]) if run.time_s is not None and timed else None,
         "rate_Hz": float(1.0 / np.median(steps)) if timed else None,
-        "gaps": int(np.sum(steps > 1.5 * np.median(steps))) if timed else None,
+        "gaps": int(np.sum(steps > 1.5 * np.median(steps))) - (parts - 1) if timed else None,
+        **({"parts": parts} if parts > 1 else {}),
         f"input ({run.input_quantity})": _span(run.input, run.input_unit),
         f"output ({run.output_quantity})": _span(run.output, run.output_unit),
         "reversals": max(turning_points(run.input if run.reference is None else run.reference).size - 1, 0),

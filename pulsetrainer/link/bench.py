@@ -14,7 +14,7 @@ from urllib.parse import parse_qsl
 
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.link.build import firmware_executable
-from pulsetrainer.link.noise import MAX_RATE
+from pulsetrainer.link.simulated import GOOD_WIRE, Wire, wire_rate, wire_seed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,8 +33,7 @@ class BenchOptions:
     speed: str = "max"
     settings: tuple[tuple[str, str], ...] = ()
     breaks: tuple[str, ...] = ()
-    wire: float = 0.0  # damage per byte on the way between host and device
-    wire_seed: int = 1
+    wire: Wire = GOOD_WIRE
 
     def arguments(self) -> list[str]:
         """Return the firmware process's command-line arguments."""
@@ -44,28 +43,6 @@ class BenchOptions:
         for what in self.breaks:
             words += ["--break", what]
         return words
-
-
-def _wire_rate(text: str) -> float:
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = -1.0
-    if not 0 <= rate <= MAX_RATE:
-        raise UsageError(
-            f"bench parameter wire={text} is not a rate of damaged bytes between 0 and {MAX_RATE}",
-            hint='one byte in ten thousand: "bench:?wire=0.0001&wire-seed=3"',
-        )
-    return rate
-
-
-def _wire_seed(text: str) -> int:
-    if not re.fullmatch(r"\d{1,9}", text):
-        raise UsageError(
-            f"bench parameter wire-seed={text} is not a whole number from 0 on",
-            hint='"bench:?wire=0.0001&wire-seed=3"',
-        )
-    return int(text)
 
 
 def parse_bench(port: str) -> BenchOptions:
@@ -83,7 +60,7 @@ def parse_bench(port: str) -> BenchOptions:
             hint='like this: "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
     ideal, speed = False, "max"
-    wire, wire_seed = 0.0, 1
+    rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
     settings: list[tuple[str, str]] = []
     breaks: list[str] = []
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
@@ -100,12 +77,12 @@ def parse_bench(port: str) -> BenchOptions:
         elif name == "break":
             breaks.append(value)
         elif name == "wire":
-            wire = _wire_rate(value)
+            rate = wire_rate("bench", value)
         elif name == "wire-seed":
-            wire_seed = _wire_seed(value)
+            seed = wire_seed("bench", value)
         else:
             settings.append((name, value))
-    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), wire, wire_seed)
+    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), Wire(rate, seed))
 
 
 def _known(executable: Path) -> tuple[dict[str, tuple[str, str, str, str]], list[str]]:

@@ -11,6 +11,11 @@ from enum import IntEnum
 MAGIC = 0x52545031  # "1PTR" on the wire: tells our firmware from whatever else sits behind a port
 PROTOCOL_MAJOR = 1
 PROTOCOL_MINOR = 0
+FIRMWARE_MAJOR = (
+    0  # of the firmware that comes with this program; below 1.0.0 each minor version is another one
+)
+FIRMWARE_MINOR = 1
+FIRMWARE_PATCH = 0
 
 MAX_PAYLOAD = 128  # bytes: the longest frame stays under 254, so COBS adds exactly one byte
 TICK_RATE_HZ = 10_000

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import threading
 import time
@@ -18,9 +19,16 @@ from pulsetrainer.link.bench import Bench
 from pulsetrainer.link.noise import NoisyTransport
 from pulsetrainer.link.player import Player, describe_fault
 from pulsetrainer.link.ports import find_device_port
-from pulsetrainer.link.qemu import QEMU_TIMEOUTS_S, Emulator
+from pulsetrainer.link.qemu import (
+    QEMU_BAD_WIRE_TIMEOUTS_S,
+    QEMU_PIECE_S,
+    QEMU_PORT,
+    QEMU_TIMEOUTS_S,
+    Emulator,
+)
 from pulsetrainer.link.recording import Block, FloatArray, Recording
 from pulsetrainer.link.session import TIMEOUTS_S, Session
+from pulsetrainer.link.simulated import Wire
 from pulsetrainer.link.transport import SerialTransport, Transport
 
 if TYPE_CHECKING:
@@ -28,6 +36,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+_LOG = logging.getLogger(__name__)
 PORT_VARIABLE = "PULSETRAINER_PORT"
 DEFAULT_PORT = "bench:"
 _INTERRUPTED = "interrupted"
@@ -72,6 +81,14 @@ class DeviceInfo:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Limits that shall be in force; None leaves the device's own. They can only be lowered."""
+
+    current_A: float | None = None
+    force_N: float | None = None
+
+
 class Device:
     """An open device; closing it stops and disarms it, always."""
 
@@ -83,7 +100,9 @@ class Device:
         *,
         monotonic: Callable[[], float],
         sleep: Callable[[float], None],
+        piece_s: float = np.inf,
     ) -> None:
+        self._piece_s = piece_s  # of the reference in one frame while it plays
         self._session = session
         self._transport = transport
         self._bench = bench
@@ -112,6 +131,11 @@ class Device:
             self._transport.close()
             if self._bench is not None:
                 self._bench.close()
+
+    @property
+    def longest_play_s(self) -> float:
+        """Longest reference that the device plays in one go, s."""
+        return self.info.on_time_limit_s - _RAMP_S
 
     def stop(self) -> None:
         """Ramp the current to zero and disarm; from another thread it ends a play."""
@@ -148,6 +172,29 @@ class Device:
         self._greet()  # the limits in force have changed
         return reply.value
 
+    def lower(self, limits: Limits) -> None:
+        """Put limits in force that are stricter than the device's own.
+
+        Raises
+        ------
+        ArgumentError
+            if a limit is not positive, or above the device's own.
+        """
+        info = self.info
+        for what, parameter, wanted, own, quantum, unit in (
+            ("current", "current_limit", limits.current_A, info.current_limit_A, codes.CURRENT_UNIT_A, "A"),
+            ("force", "force_trip", limits.force_N, info.force_limit_N, codes.FORCE_UNIT_N, "N"),
+        ):
+            if wanted is None:
+                continue
+            if not 0 < wanted <= own:
+                raise ArgumentError(
+                    f"a {what} limit of {wanted:g} {unit} was asked for; the device's own is {own:g} {unit}",
+                    hint="a limit can only be lowered",
+                )
+            self.set_parameter(parameter, round(wanted / quantum))
+            _LOG.info("%s limit lowered from %g to %g %s", what, own, wanted, unit)
+
     def play(
         self,
         reference_A: ArrayLike,
@@ -155,14 +202,17 @@ class Device:
         *,
         decimation: int = 10,
         on_block: Callable[[Block], None] | None = None,
+        keep: bool = True,
         should_stop: Callable[[], bool] | None = None,
     ) -> Recording:
         """Play a coil current and return what the device measured meanwhile.
 
         The reference, shape (n,) in A at ``rate_Hz``, is interpolated linearly to the device's tick; its
         first sample is tick 0. Telemetry is one sample every ``decimation`` ticks. ``on_block`` gets it
-        in pieces as it comes. Ctrl-C, ``should_stop`` or a fault of the device stop the output first;
-        what was recorded until then is returned with ``complete=False``. The device ends disarmed.
+        in pieces as it comes; without ``keep`` that is all there is of it: the recording that is returned
+        has counts only, and memory stays flat. Ctrl-C, ``should_stop`` or a fault of the device stop the
+        output first; what was recorded until then is returned with ``complete=False``. The device ends
+        disarmed.
 
         Raises
         ------
@@ -179,14 +229,20 @@ class Device:
                 hint="10 gives 1000 samples a second",
             )
         player = Player(
-            self._session, wire, ticks_per_sample, decimation, hello=self._hello, monotonic=self._monotonic
+            self._session,
+            wire,
+            ticks_per_sample,
+            decimation,
+            hello=self._hello,
+            monotonic=self._monotonic,
+            piece_s=self._piece_s,
         )
         self._player = player
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
         thread.start()
         interrupted = False
         try:
-            interrupted = self._follow(player, on_block, should_stop)
+            interrupted = self._follow(player, on_block, should_stop, keep=keep)
         finally:
             player.stop(_STOPPED)
             while thread.is_alive():  # it is stopping the device: not to be interrupted, and soon over
@@ -204,9 +260,11 @@ class Device:
         player: Player,
         on_block: Callable[[Block], None] | None,
         should_stop: Callable[[], bool] | None,
+        *,
+        keep: bool,
     ) -> bool:
         """Hand over the telemetry as it comes until the play has ended; True if Ctrl-C hastened the end."""
-        passed = 0
+        passed = forgotten = 0
         ended = interrupted = False
         while not ended:
             try:
@@ -216,6 +274,9 @@ class Device:
                 player.taken_at_s = self._monotonic()
                 if on_block is not None and any(b.count for b in fresh):
                     on_block(Block.from_wire(fresh, player.decimation))
+                if not keep:
+                    player.forget(forgotten, passed)
+                    forgotten = passed
                 if should_stop is not None and should_stop():
                     player.stop(_STOPPED)
                 if not ended:
@@ -229,11 +290,11 @@ class Device:
         outcome = player.outcome
         block = Block.from_wire(player.received, player.decimation)
         assert outcome is not None
-        received = len(block.tick)
+        received = player.samples
         if outcome.produced >= 0:
             dropped = outcome.produced - received
         else:  # the device is gone: what is missing between the samples that came
-            dropped = int(block.tick[-1]) // player.decimation + 1 - received if received else 0
+            dropped = player.last_tick // player.decimation + 1 - received if received else 0
         return Recording(
             tick=block.tick,
             reference_A=block.reference_A,
@@ -244,6 +305,7 @@ class Device:
             # Interrupted even if it came during the last ramp: the user wants out.
             complete=outcome.played_to_end and not interrupted,
             fault=outcome.fault or (_INTERRUPTED if interrupted else ""),
+            samples=received,
             remedy=outcome.remedy,
         )
 
@@ -282,7 +344,7 @@ class Device:
                 hint="scale the waveform into the range",
             )
         seconds = (reference.size - 1) * ticks_per_sample / self.info.tick_rate_Hz
-        if seconds > self.info.on_time_limit_s - _RAMP_S:
+        if seconds > self.longest_play_s:
             raise ArgumentError(
                 f"the reference is {seconds:g} s long; the device stays on for at most "
                 f"{self.info.on_time_limit_s:g} s",
@@ -296,9 +358,15 @@ def redact(port: str) -> str:
     return DEFAULT_PORT if port.startswith("bench:") else port
 
 
+def _through(wire: Wire, transport: Transport, monotonic: Callable[[], float]) -> Transport:
+    """Return the transport as it is at the other end of a wire that may be bad."""
+    return NoisyTransport(transport, wire.rate, wire.seed, monotonic=monotonic) if wire.rate else transport
+
+
 def open_device(
     port: str | None,
     *,
+    limits: Limits | None = None,
     monotonic: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> Device:
@@ -308,6 +376,8 @@ def open_device(
     ------
     UsageError
         if the port's text makes no sense.
+    ArgumentError
+        if a limit is beyond the device's own.
     DeviceError
         if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
     """
@@ -316,22 +386,30 @@ def open_device(
     transport: Transport | None = None
     try:
         name = port
+        timeouts_s: tuple[float, ...] = TIMEOUTS_S
         if port.startswith("bench:"):
             machine = bench = Bench(port)
             name = DEFAULT_PORT
             transport = SerialTransport(bench.path, name)
-            if bench.options.wire:
-                rate, seed = bench.options.wire, bench.options.wire_seed
-                transport = NoisyTransport(transport, rate, seed, monotonic=monotonic)
+            transport = _through(bench.options.wire, transport, monotonic)
         elif port.startswith("qemu:"):
             machine = emulator = Emulator(port)
-            transport = emulator.transport
+            name = QEMU_PORT
+            transport = _through(emulator.options.wire, emulator.transport, monotonic)
+            timeouts_s = QEMU_BAD_WIRE_TIMEOUTS_S if emulator.options.wire.rate else QEMU_TIMEOUTS_S
         else:
             name = find_device_port() if port == "auto" else port
             transport = SerialTransport(name)
-        timeouts_s = QEMU_TIMEOUTS_S if isinstance(machine, Emulator) else TIMEOUTS_S
         session = Session(transport, name, monotonic=monotonic, timeouts_s=timeouts_s)
-        return Device(session, transport, machine, monotonic=monotonic, sleep=sleep)
+        piece_s = QEMU_PIECE_S if isinstance(machine, Emulator) else np.inf
+        device = Device(session, transport, machine, monotonic=monotonic, sleep=sleep, piece_s=piece_s)
+        _LOG.info(
+            "%s: %s, firmware %s, protocol %s, limits %g A and %g N",
+            *(redact(port), device.info.serial, device.info.firmware, device.info.protocol),
+            *(device.info.current_limit_A, device.info.force_limit_N),
+        )
+        device.lower(limits or Limits())
+        return device  # noqa: TRY300 - what fails up to here closes the port
     except BaseException:
         if transport is not None:
             transport.close()

@@ -21,13 +21,8 @@ _TOP = """\
 
 #include <stdint.h>
 
-#ifndef PT_PROTOCOL_MAJOR
-#define PT_PROTOCOL_MAJOR {major}u
-#endif
-#ifndef PT_PROTOCOL_MINOR
-#define PT_PROTOCOL_MINOR {minor}u
-#endif
 """
+_VERSIONS = ("PROTOCOL_MAJOR", "PROTOCOL_MINOR", "FIRMWARE_MAJOR", "FIRMWARE_MINOR", "FIRMWARE_PATCH")
 
 _CONSTANTS = (
     "MAX_PAYLOAD",
@@ -65,7 +60,10 @@ def _message(message: type[m.Message]) -> Iterator[str]:
 
 def c_header() -> str:
     """Return the text of ``protocol.h``."""
-    lines = [_TOP.format(major=codes.PROTOCOL_MAJOR, minor=codes.PROTOCOL_MINOR)]
+    lines = [_TOP]
+    for name in _VERSIONS:  # a test may build another one
+        lines += [f"#ifndef PT_{name}", f"#define PT_{name} {getattr(codes, name)}u", "#endif"]
+    lines.append("")
     lines.append(f"#define PT_MAGIC 0x{codes.MAGIC:08X}uL")
     lines += [f"#define PT_{name} {getattr(codes, name)}u" for name in _CONSTANTS]
     for title, prefix, members in (

@@ -292,3 +292,18 @@ COMMANDS: tuple[type[Message], ...] = (
 )  # fmt: skip
 REPLIES: tuple[type[Message], ...] = (HelloReply, StatusReply, Ack, Nak, ParamReply, Telemetry)
 BY_TYPE: dict[int, type[Message]] = {m.TYPE: m for m in (*COMMANDS, *REPLIES)}
+_ANSWERS: dict[type[Message], type[Message]] = {
+    Hello: HelloReply,
+    Status: StatusReply,
+    GetParam: ParamReply,
+    SetParam: ParamReply,
+}
+
+
+def answers(reply: Message, command: Message) -> bool:
+    """Return whether ``reply`` can be the answer to ``command``: the kind asked for, or its refusal."""
+    if isinstance(reply, Nak):
+        return reply.command == command.TYPE
+    if isinstance(command, GetParam | SetParam) and isinstance(reply, ParamReply):
+        return reply.id == command.id
+    return isinstance(reply, _ANSWERS.get(type(command), Ack))

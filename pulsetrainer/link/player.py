@@ -41,6 +41,8 @@ class Outcome:
     remedy: str = ""  # what to do about the fault, where something better than finding its cause is known
 
 
+NOTHING = m.Telemetry(0, 0, 0, 0, 0, b"")  # in the place of a block that nobody needs any more
+
 # Faults whose cause is not in the device.
 _REMEDY = {
     codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
@@ -63,6 +65,7 @@ class Player:
         *,
         hello: m.HelloReply,
         monotonic: Callable[[], float],
+        piece_s: float = np.inf,
     ) -> None:
         self._session = session
         self._samples = reference
@@ -71,6 +74,8 @@ class Player:
         self.decimation = decimation
         self._hello = hello
         self._monotonic = monotonic
+        self._piece_s = piece_s
+        self._short = m.WaveData.MAX_ITEMS  # samples a frame while the buffer is well filled
         self._sent = 0
         self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
         self._play_session = -1
@@ -80,12 +85,24 @@ class Player:
         self._last_block = False
         # A plain list: appending is atomic, and a Ctrl-C in the reader's thread can lose nothing of it.
         self.received: list[m.Telemetry] = []
+        self.samples = 0  # received so far
         self.ended = threading.Event()
         self._stop = threading.Event()
         self._stop_reason = ""
+        self._stop_remedy = ""
         self.taken_at_s = monotonic()
         self.outcome: Outcome | None = None
         self.error: BaseException | None = None
+
+    @property
+    def last_tick(self) -> int:
+        """Tick of the last sample received; -1 before the first."""
+        return self._recorded_tick
+
+    def forget(self, start: int, stop: int) -> None:
+        """Let go of the samples of these blocks: a long play must not fill the memory."""
+        for number in range(start, stop):
+            self.received[number] = NOTHING
 
     def stop(self, reason: str) -> None:
         """Ask for the output to be stopped at once; the first reason counts."""
@@ -116,6 +133,7 @@ class Player:
             self._tick = max(self._tick, last_tick)
         self._last_block = self._last_block or bool(block.flags & codes.FLAG_LAST)
         self.received.append(block)
+        self.samples += block.count
 
     def _request(self, command: m.Message) -> m.Ack:
         self._tick_at_send = self._tick
@@ -157,7 +175,8 @@ class Player:
 
     def _send_chunk(self, credit: int) -> bool:
         """Send the next samples if the device has room for a whole frame of them."""
-        count = min(m.WaveData.MAX_ITEMS, len(self._samples) - self._sent)
+        most = self._short if credit < self._hello.wave_buffer // 2 else m.WaveData.MAX_ITEMS
+        count = min(most, len(self._samples) - self._sent)
         if count == 0 or credit < count:
             return False
         at = self._sent
@@ -180,8 +199,11 @@ class Player:
 
     def _stream(self) -> None:
         """Keep the buffer full until the play ends, whoever ends it."""
+        in_piece = self._piece_s * self._hello.tick_rate_Hz / self._ticks_per_sample
+        self._short = int(min(m.WaveData.MAX_ITEMS, max(1, in_piece)))
         while self._ack.state == codes.State.RUNNING and not self._last_block:
             if self._monotonic() - self.taken_at_s > _TAKER_S:
+                self._stop_remedy = "the disk is too slow: write elsewhere, close other programs"
                 self.stop(f"the program did not take its data for {_TAKER_S:g} s")
             if self._stop.is_set():
                 self._request(m.Stop())
@@ -250,7 +272,7 @@ class Player:
         # Refused before it started: the numbers in the status are those of an earlier play.
         produced = status.produced if status.session == self._play_session else 0
         known = {int(f): text for f, text in _REMEDY.items()}
-        return Outcome(produced, to_end, fault, known.get(status.fault, ""))
+        return Outcome(produced, to_end, fault, known.get(status.fault, self._stop_remedy))
 
 
 def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:

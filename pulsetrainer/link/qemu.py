@@ -13,10 +13,14 @@ import socket
 import subprocess
 import tempfile
 import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from urllib.parse import parse_qsl
 
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.link.build import DEBIAN_PACKAGES, firmware_image
+from pulsetrainer.link.codes import TICK_RATE_HZ
+from pulsetrainer.link.simulated import GOOD_WIRE, Wire, parse_break, wire_rate, wire_seed
 from pulsetrainer.link.transport import PortLostError
 
 if TYPE_CHECKING:
@@ -26,6 +30,11 @@ QEMU_PORT = "qemu:"
 # The line loses nothing but is slow, some 10 kB/s and less on a busy computer: a command repeated early
 # would only make it slower.
 QEMU_TIMEOUTS_S = (0.5, 0.5, 1.0)
+# A long frame takes 10 ms on an idle computer and 200 ms on a crowded one, and the device takes it for a sign
+# of life only when it is whole: short ones, while the buffer is well filled.
+QEMU_PIECE_S = 0.02
+# Behind a bad wire a lost command must come again before the device takes its host for gone.
+QEMU_BAD_WIRE_TIMEOUTS_S = (0.06, 0.06, 0.06, 0.1, 0.5, 1.0)
 _SLICE_S = 0.01
 _GATHER_S = 0.001  # the emulator sends byte by byte: without a pause each would wake this process
 _WRITE_S = 2.0
@@ -33,6 +42,7 @@ _LEAVE_S = 2.0
 _PIECE = 65_536
 _SEND_ROOM = 4_000_000  # the system takes it down to its limit
 _SEED_ADDRESS = 0x2000_0000  # `retained` in port/mps2/mps2.ld
+_BREAKS_ADDRESS = _SEED_ADDRESS + 16  # its break_tick
 # 2^5 ns of the device's time an instruction, held to the wall clock: 31 MIPS is what the real board's
 # 25 MHz give about, twice what tick and simulated world need, and light enough for a busy computer.
 _REAL_TIME = "shift=5,align=on"
@@ -42,19 +52,48 @@ _REAL_TIME = "shift=5,align=on"
 _LEASH = '"$@" 3>&1 1>&2 </dev/null & exec 1>&-; read -r _; kill -9 $!; wait'
 
 
-def check_qemu(port: str) -> None:
-    """Refuse whatever stands behind ``qemu:``.
+@dataclass(frozen=True, slots=True)
+class QemuOptions:
+    """What a ``qemu:`` port asks for."""
+
+    breaks: tuple[tuple[int, float], ...] = ()  # what, at which second of the play
+    wire: Wire = GOOD_WIRE
+
+    def loads(self) -> list[str]:
+        """Return the emulator's arguments that put the breaks into the device's memory."""
+        words = []
+        for what, second in self.breaks:
+            tick = int(second * TICK_RATE_HZ) + 1
+            words += ["-device", f"loader,addr={_BREAKS_ADDRESS + 4 * what:#x},data={tick:#x},data-len=4"]
+        return words
+
+
+def parse_qemu(port: str) -> QemuOptions:
+    """Return the options in ``qemu:?break=force-high@1&wire=0.0001&wire-seed=3``.
 
     Raises
     ------
     UsageError
-        if something does.
+        if it is not of that form: the plant of the emulated device takes no parameters.
     """
-    if re.fullmatch(r"qemu:(?://)?", port) is None:
-        raise UsageError(
-            f"{port!r} is not a port: the emulated device takes no parameters",
-            hint='"qemu:" alone; the virtual bench takes them: "bench:?seed=3&creep=0.05"',
-        )
+    match = re.fullmatch(r"qemu:(?://)?(?:\?(.+))?", port)
+    if match is None:
+        raise UsageError(f"{port!r} is not a port", hint='"qemu:" alone, or "qemu:?break=reset@1"')
+    breaks: list[tuple[int, float]] = []
+    rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
+    for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
+        if name == "break":
+            breaks.append(parse_break(value))
+        elif name == "wire":
+            rate = wire_rate("qemu", value)
+        elif name == "wire-seed":
+            seed = wire_seed("qemu", value)
+        else:
+            raise UsageError(
+                f"the emulated device has no parameter {name!r}: its image is built once",
+                hint='it takes break, wire and wire-seed; for others the bench: "bench:?seed=3&creep=0.05"',
+            )
+    return QemuOptions(tuple(breaks), Wire(rate, seed))
 
 
 class SocketTransport:
@@ -114,7 +153,7 @@ class Emulator:
     """A running emulator; ``transport`` is its serial line."""
 
     def __init__(self, port: str) -> None:
-        check_qemu(port)
+        self.options = parse_qemu(port)
         if os.name != "posix":
             raise DeviceError(
                 "the emulated device needs a POSIX shell, which this system does not have",
@@ -131,6 +170,7 @@ class Emulator:
         words += ["-chardev", "socket,id=wire,fd=3", "-serial", "chardev:wire"]
         seed = secrets.randbits(32)
         words += ["-device", f"loader,addr={_SEED_ADDRESS:#x},data={seed:#x},data-len=4"]
+        words += self.options.loads()
         ours, theirs = socket.socketpair()
         # The emulator sends single bytes, each of which takes the room of a kilobyte in here.
         theirs.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_ROOM)

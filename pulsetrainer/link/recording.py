@@ -46,7 +46,10 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """All that a play brought back; lost samples are counted, never filled."""
+    """All that a play brought back; lost samples are counted, never filled.
+
+    The arrays are empty where the play was asked not to keep what it handed over.
+    """
 
     tick: Int64Array
     reference_A: FloatArray
@@ -56,6 +59,7 @@ class Recording:
     dropped_samples: int
     complete: bool  # the reference was played to its end
     fault: str  # why not: the device's first cause, or "interrupted"; empty when complete
+    samples: int  # received, also where they were not kept
     remedy: str = ""  # what to do about it, where that is known
 
     @property

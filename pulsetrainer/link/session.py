@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.link.codes import (
     FAULT_TEXT,
+    FIRMWARE_MAJOR,
+    FIRMWARE_MINOR,
+    FIRMWARE_PATCH,
     MAGIC,
     NAK_TEXT,
     PROTOCOL_MAJOR,
@@ -15,7 +18,16 @@ from pulsetrainer.link.codes import (
     NakCode,
 )
 from pulsetrainer.link.frames import Frame, FrameReader, encode
-from pulsetrainer.link.messages import BY_TYPE, COMMANDS, Hello, HelloReply, Message, Nak, Telemetry
+from pulsetrainer.link.messages import (
+    BY_TYPE,
+    COMMANDS,
+    Hello,
+    HelloReply,
+    Message,
+    Nak,
+    Telemetry,
+    answers,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -97,19 +109,23 @@ class Session:
         self._transport.write(encode(Frame(command.TYPE, seq, command.pack())))
         self.sent_at_s = self._monotonic()
 
-    def _reply(self, seq: int, timeout_s: float) -> Message | None:
-        """Return the reply to ``seq``; replies to anything earlier are stale and dropped."""
+    def _reply(self, command: Message, timeout_s: float) -> Message | None:
+        """Return the reply to ``command``, just sent; replies to anything earlier are stale and dropped."""
         deadline = self._monotonic() + timeout_s
         while True:
             while self._replies:
                 frame = self._replies.pop(0)
                 kind = BY_TYPE.get(frame.type)
-                if frame.seq != seq or kind is None:
+                if frame.seq != self._seq or kind is None:
                     continue
                 try:
-                    return kind.parse(frame.payload)
+                    reply = kind.parse(frame.payload)
                 except ValueError:
                     self.rejected += 1
+                    continue
+                if answers(reply, command):  # else it is 256 commands old, or damage that fits the checksum
+                    return reply
+                self.rejected += 1
             if self._monotonic() >= deadline:
                 return None
             self.receive()
@@ -127,7 +143,7 @@ class Session:
         self._seq = (self._seq + 1) & 0xFF
         for timeout_s in self._timeouts_s:
             self._send(command, self._seq)
-            reply = self._reply(self._seq, timeout_s)
+            reply = self._reply(command, timeout_s)
             if isinstance(reply, Nak):
                 raise RefusedError(self._port, reply)
             if reply is not None:
@@ -153,7 +169,7 @@ class Session:
         while self._monotonic() < deadline:
             self._seq = (self._seq + 1) & 0xFF
             self._send(command, self._seq)
-            reply = self._reply(self._seq, _HELLO_TRY_S)
+            reply = self._reply(command, _HELLO_TRY_S)
             if isinstance(reply, HelloReply) and reply.magic == MAGIC:
                 self._check_version(reply)
                 return reply
@@ -169,16 +185,29 @@ class Session:
         )
 
     def _check_version(self, reply: HelloReply) -> None:
-        if reply.major == PROTOCOL_MAJOR:
-            return
-        older = "device" if reply.major < PROTOCOL_MAJOR else "program"
+        firmware = (reply.firmware_major, reply.firmware_minor, reply.firmware_patch)
+        name = f"the device on {self._port} (firmware {_dotted(firmware)})"
+        theirs: tuple[int, ...] = (reply.major, reply.minor)
+        ours: tuple[int, ...] = (PROTOCOL_MAJOR, PROTOCOL_MINOR)
+        if reply.major != PROTOCOL_MAJOR:
+            said = f"speaks protocol {_dotted(theirs)}, this program {_dotted(ours)}"
+        else:
+            theirs, ours = firmware, (FIRMWARE_MAJOR, FIRMWARE_MINOR, FIRMWARE_PATCH)
+            if _generation(theirs) == _generation(ours):
+                return
+            said = f"is of another generation than this program's firmware {_dotted(ours)}"
+        older = "device" if theirs < ours else "program"
         remedy = {
             "device": "flash the firmware that came with this program (make -C firmware)",
             "program": "update this program: pip install --upgrade pulsetrainer",
         }[older]
-        firmware = f"{reply.firmware_major}.{reply.firmware_minor}.{reply.firmware_patch}"
-        raise DeviceError(
-            f"the device on {self._port} (firmware {firmware}) speaks protocol {reply.major}.{reply.minor}, "
-            f"this program {PROTOCOL_MAJOR}.{PROTOCOL_MINOR}: the {older} is older",
-            hint=remedy,
-        )
+        raise DeviceError(f"{name} {said}: the {older} is older", hint=remedy)
+
+
+def _dotted(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))
+
+
+def _generation(version: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the part of a firmware version that must agree: below 1.0.0 that is also the minor one."""
+    return version[:1] if version[0] else version[:2]

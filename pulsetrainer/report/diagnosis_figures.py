@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from pulsetrainer.report import panels
 from pulsetrainer.report.style import (
@@ -22,15 +23,16 @@ from pulsetrainer.report.style import (
 )
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts.kinds import Diagnosis
+    from pulsetrainer.artefacts.kinds import Diagnosis, Profile
 
 _MOST_BARS = 10
+_SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side
 
 
 @styled
 def course(found: Diagnosis) -> Figure:
     """Return the measured output with the static model, and the residuals before and after extension."""
-    figure = Figure(figsize=(2 * COLUMN_IN, 5.4), layout="constrained")
+    figure = Figure(figsize=(COLUMN_IN, 4.4), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1.0))
     panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
     panels.trace(above, found.time_s, found.before, **MODEL, label="static model, refitted")
@@ -47,27 +49,25 @@ def course(found: Diagnosis) -> Figure:
 
 
 @styled
-def profiles(found: Diagnosis) -> Figure:
-    """Return the rms residual against rate, level, direction, time and frequency, before and after."""
-    count = len(found.profiles)
-    rows = -(-count // 3)
-    figure = Figure(figsize=(2 * COLUMN_IN, 2.5 * rows), layout="constrained")
-    cells = figure.subplots(rows, 3, squeeze=False).ravel()
-    for axes in cells[count:]:
-        axes.set_axis_off()
-    for axes, one in zip(cells, found.profiles, strict=False):
-        known = np.isfinite(one.before)
-        axes.plot(one.at[known], one.before[known], color=VERMILION, marker="o", markersize=3, label="static")
-        if not found.quick:
-            axes.plot(one.at[known], one.after[known], color=BLUE, marker="s", markersize=3, label="extended")
-        if one.name in ("rate", "frequency"):
-            axes.set_xscale("log" if one.name == "frequency" else "symlog")
-        if one.name == "direction":
-            axes.set_xticks([-1, 0, 1], ["falling", "rest", "rising"])
-        axes.set_xlabel(one.name if one.name == "direction" else label(one.name, one.unit))
-        axes.set_ylabel(label("rms residual", one.output_unit))
-        axes.set_ylim(bottom=0.0)
-    cells[0].legend(loc="upper left")
+def profile(one: Profile, *, extended: bool) -> Figure:
+    """Return the rms residual against one quantity, before the extension and, where there is one, after."""
+    figure = Figure(figsize=(_SMALL_IN, 2.6), layout="constrained")
+    axes = figure.add_subplot()
+    known = np.isfinite(one.before)
+    axes.plot(one.at[known], one.before[known], color=VERMILION, marker="o", markersize=3, label="static")
+    if extended:
+        axes.plot(one.at[known], one.after[known], color=BLUE, marker="s", markersize=3, label="extended")
+    if one.name in ("rate", "frequency"):
+        axes.set_xscale("log" if one.name == "frequency" else "symlog")
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))  # powers of ten would need mathtext
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    if one.name == "direction":
+        axes.set_xticks([-1, 0, 1], ["falling", "rest", "rising"])
+        axes.margins(x=0.08)
+    axes.set_xlabel(one.name if one.name == "direction" else label(one.name, one.unit))
+    axes.set_ylabel(label("rms residual", one.output_unit))
+    axes.set_ylim(bottom=0.0)
+    panels.headroom(axes)
     return figure
 
 

@@ -11,7 +11,7 @@ from pulsetrainer.report import diagnosis_figures as figures
 from pulsetrainer.report.html import environment, indented
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import pretty_unit
-from pulsetrainer.report.views import Picture
+from pulsetrainer.report.views import Number, Picture, number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,8 +47,11 @@ def render_diagnosis(
             found=found,
             headline=headline(found),
             named=[_words(one) for one in named],
+            levels=[(words, number(getattr(found, name), name, ".3f")) for name, words in _levels(found)],
             rows=[_row(one) for one in shown],
-            pictures=_pictures(found),
+            course=_course(found),
+            profiles=_profiles(found),
+            ranking=_ranking(found),
         )
     )
 
@@ -80,32 +83,52 @@ def _words(one: Cause) -> dict[str, str]:
     }
 
 
-def _row(one: Cause) -> dict[str, str]:
-    gain = (
-        f"{one.held_out_gain_percent:.1f}" if one.found and math.isfinite(one.held_out_gain_percent) else "·"
-    )
+def _levels(found: Diagnosis) -> list[tuple[str, str]]:
+    """Return field and words of every row of the table of before and after."""
+    return [
+        ("rms_percent", "the model as given, single samples"),
+        ("noise_percent", "noise of single samples"),
+        ("static_percent", "weights refitted, short averages"),
+        *([] if found.quick else [("extended_percent", "extended, short averages")]),
+        ("floor_percent", "when nothing is wrong, short averages"),
+    ]
+
+
+def _row(one: Cause) -> dict[str, str | Number]:
+    measured = one.found and math.isfinite(one.held_out_gain_percent)
     return {
         "id": one.cause,
         "found": "yes" if one.found else "no",
-        "p": f"{one.p_value:.3f}",
-        "explains": f"{one.explains_percent:.2f}",
-        "gain": gain,
+        "p": number(one.p_value, f"{one.cause}.p_value", ".3f"),
+        "explains": number(one.explains_percent, f"{one.cause}.explains_percent"),
+        "gain": number(one.held_out_gain_percent, f"{one.cause}.held_out_gain_percent", ".1f")
+        if measured
+        else Number(""),
     }
 
 
-def _pictures(found: Diagnosis) -> dict[str, Picture]:
-    def picture(name: str, figure: Figure, words: str) -> Picture:
-        svg = inline_svg(figure, identifier=name, title=words, description=words)
-        return Picture(Markup(svg), words)  # noqa: S704 - our own XML, its texts are escaped
+def _picture(name: str, figure: Figure, title: str, words: str) -> Picture:
+    svg = inline_svg(figure, identifier=name, title=title, description=words)
+    return Picture(Markup(svg), words)  # noqa: S704 - our own XML, its texts are escaped
 
-    return {
-        "course": picture(
-            "course", figures.course(found), "Measured output and static model, the residuals below."
-        ),
-        "profiles": picture(
-            "profiles",
-            figures.profiles(found),
-            "Where the residual is: against rate, level, direction, time and frequency, before and after.",
-        ),
-        "ranking": picture("ranking", figures.ranking(found), "Ranking of the causes, found ones in colour."),
-    }
+
+def _course(found: Diagnosis) -> Picture:
+    words = "Measured output and static model; below, what the static and the extended model leave."
+    return _picture("course", figures.course(found), "Output and residual over time", words)
+
+
+def _profiles(found: Diagnosis) -> list[Picture]:
+    return [
+        _picture(
+            f"profile-{one.name}",
+            figures.profile(one, extended=not found.quick),
+            f"Residual against {one.name}",
+            f"Where the residual is: against {one.name}.",
+        )
+        for one in found.profiles
+    ]
+
+
+def _ranking(found: Diagnosis) -> Picture:
+    words = "Ranking of the causes, found ones in colour."
+    return _picture("ranking", figures.ranking(found), "Ranking of the causes", words)

@@ -6,7 +6,7 @@ device reports. The judge sees the case when the verdict is in.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,58 +17,77 @@ from pulsetrainer.link.device import open_device
 RATE_HZ = 1000.0
 HIGH_A = 1.5
 DT_S = 1.0 / RATE_HZ
+# The bench's current filter makes the measured current late. Nothing in a record tells this from the device:
+# what can be identified is each lag relative to the measured current, and a force that leads it by this much.
+FILTER_S = 0.0001
+SLOPE_N_A = 9.5  # the bench's force over its current, on the whole
 
 
 def _log(rng, low, high):
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-# for each cause: bench parameters, and the truth of the diagnosis's own parameters
+def _sign(rng):
+    return float(rng.choice([-1, 1]))
+
+
+# For each cause, given a generator and a factor of its strength (1: half a per cent of the span or more): the
+# bench's parameters, and the truth of the diagnosis's own.
 LIBRARY = {
-    "output-lag": lambda r: ({"output-lag": (v := _log(r, 0.003, 0.02))}, {"tau": v}),
-    "field-lag": lambda r: ({"field-lag": (v := _log(r, 0.003, 0.02))}, {"tau": v - FILTER_S}),
-    "delay": lambda r: ({"delay": (v := _log(r, 0.003, 0.015))}, {"delay": v - FILTER_S}),
-    "rate-widening": lambda r: ({"rate-widening": (v := _log(r, 0.006, 0.03))}, {"coefficient": v}),
-    "viscous": lambda r: ({"viscous": (v := _log(r, 0.015, 0.05))}, {"coefficient": v}),
-    "creep": lambda r: (
-        {"creep": (v := _log(r, 0.02, 0.1)), "creep-tau": (t := _log(r, 0.5, 2.0))},
+    "output-lag": lambda r, s: ({"output-lag": (v := s * _log(r, 0.0016, 0.016))}, {"tau": v - FILTER_S}),
+    "field-lag": lambda r, s: ({"field-lag": (v := s * _log(r, 0.0018, 0.016))}, {"tau": v - FILTER_S}),
+    "delay": lambda r, s: ({"delay": (v := s * _log(r, 0.0016, 0.012))}, {"delay": v - FILTER_S}),
+    "rate-widening": lambda r, s: ({"rate-widening": (v := s * _log(r, 0.005, 0.025))}, {"coefficient": v}),
+    "viscous": lambda r, s: (
+        {"viscous": (v := s * _log(r, 0.017, 0.06))},
+        {"coefficient": v + FILTER_S * SLOPE_N_A},
+    ),
+    "creep": lambda r, s: (
+        {"creep": (v := s * _log(r, 0.024, 0.1)), "creep-tau": (t := _log(r, 0.5, 2.0))},
         {"amplitude": v, "tau": t},
     ),
-    "thermal-drift": lambda r: (
-        {"thermal-drift": (v := _log(r, 0.008, 0.04)), "thermal-tau": (t := _log(r, 10, 30))},
+    "thermal-drift": lambda r, s: (
+        {"thermal-drift": (v := s * _log(r, 0.014, 0.05)), "thermal-tau": (t := _log(r, 10, 30))},
         {"coefficient": v, "tau": t},
     ),
-    "offset-drift": lambda r: (
-        {"offset-drift": (v := r.choice([-1, 1]) * _log(r, 0.002, 0.01))},
+    "offset-drift": lambda r, s: (
+        {"offset-drift": (v := s * _sign(r) * _log(r, 0.0015, 0.008))},
         {"rate": v},
     ),
-    "resonance": lambda r: (
-        {"resonance": (f := _log(r, 6, 30)), "resonance-zeta": (z := _log(r, 0.05, 0.3))},
+    "resonance": lambda r, s: (
+        {"resonance": (f := _log(r, 8, 40) / s), "resonance-zeta": (z := _log(r, 0.08, 0.4))},
         {"frequency": f, "damping": z},
     ),
-    "periodic": lambda r: (
-        {"periodic": _log(r, 0.07, 0.4), "periodic-frequency": (f := _log(r, 2, 60))},
+    "periodic": lambda r, s: (
+        {"periodic": s * _log(r, 0.11, 0.4), "periodic-frequency": (f := _log(r, 2, 60))},
         {"frequency": f},
     ),
-    "step": lambda r: (
-        {"step": (v := r.choice([-1, 1]) * _log(r, 0.1, 0.5)), "step-time": r.uniform(25, 75)},
+    "step": lambda r, s: (
+        {"step": (v := s * _sign(r) * _log(r, 0.15, 0.5)), "step-time": r.uniform(25, 75)},
         {"offset": v},
     ),
-    "load-dependence": lambda r: (
-        {"load-dependence": (v := r.choice([-1, 1]) * _log(r, 0.004, 0.01))},
+    "load-dependence": lambda r, s: (
+        {"load-dependence": (v := s * _sign(r) * _log(r, 0.001, 0.01))},
         {"coefficient": v},
     ),
-    "accommodation": lambda r: (
-        {"accommodation": (v := _log(r, 0.08, 0.3)), "accommodation-path": (p := _log(r, 15, 60))},
+    "accommodation": lambda r, s: (
+        {"accommodation": (v := s * _log(r, 0.02, 0.25)), "accommodation-path": (p := _log(r, 15, 60))},
         {"amplitude": v, "path": p},
     ),
-    "stick-slip": lambda r: ({"stick-slip": _log(r, 0.15, 0.6)}, {}),
-    "saturation": lambda r: ({"saturation": (v := r.uniform(10.5, 12.5))}, {"size": v}),
-    "quantisation": lambda r: ({"quantisation": (v := _log(r, 0.1, 0.5))}, {"size": v}),
-    "outliers": lambda r: ({"outliers": _log(r, 0.001, 0.01), "outlier-size": _log(r, 2, 6)}, {}),
+    "stick-slip": lambda r, s: ({"stick-slip": s * _log(r, 0.2, 0.6)}, {}),
+    "saturation": lambda r, _: ({"saturation": (v := r.uniform(10.5, 12.5))}, {"size": v}),
+    "quantisation": lambda r, s: ({"quantisation": (v := s * _log(r, 0.25, 0.6))}, {"size": v}),
+    "outliers": lambda r, s: ({"outliers": s * _log(r, 0.001, 0.01), "outlier-size": _log(r, 2, 6)}, {}),
+    # on the measurement itself: the bench has no second clock, no second condition and no other range
+    "clock-skew": lambda r, s: ({}, {"skew": s * _sign(r) * _log(r, 3e-5, 2.5e-4)}),
+    "condition-change": lambda r, s: (
+        {},
+        {"offset": s * _sign(r) * _log(r, 0.1, 0.4), "gain": s * _sign(r) * _log(r, 0.01, 0.04)},
+    ),
+    "current-tracking": lambda r, _: ({"supply": r.uniform(6.2, 7.2)}, {}),
+    "out-of-range": lambda r, _: ({}, {"high": r.uniform(1.2, 1.4)}),
 }
-# the firmware's current filter makes the measured current late: lags before the hysteresis look shorter
-FILTER_S = 0.0002
+SETTINGS = ("seed", "noise-seed", "noise")
 # what the library does not hold, put on the measured output
 OUTSIDE = ("gain wander", "hidden load", "bursts")
 FAMILIES = (
@@ -76,6 +95,9 @@ FAMILIES = (
     {"offset-drift", "step"},
     {"creep", "accommodation"},
 )
+# Not in pairs: a second record, effects that take data away, and a feedback that the weights of this
+# bench can hold as a whole (what is left of it is below a fortieth of a per cent of the span).
+ALONE = ("condition-change", "out-of-range", "current-tracking", "load-dependence")
 
 
 @dataclass(frozen=True)
@@ -94,61 +116,119 @@ class Case:
         words = [f"{name}={value}" for name, value in self.settings.items()]
         return "bench:?" + "&".join(["ideal", *words])
 
+    @property
+    def healthy(self) -> Case:
+        """The same device and noise with nothing hidden."""
+        return Case(self.seed, (), {k: v for k, v in self.settings.items() if k in SETTINGS})
+
+
+@dataclass(frozen=True)
+class Data:
+    """What the judge gets to see."""
+
+    records: list[Measured]
+    high: float  # of the range that was identified
+    played: float  # highest current
+
 
 def draw(kind: str, seed: int) -> Case:
-    """Draw a case: ``control``, ``single``, ``single:NAME``, ``pair`` or ``unknown``."""
+    """Draw a case: ``control``, ``single:NAME``, ``weak:NAME``, ``pair`` or ``unknown``."""
     rng = np.random.default_rng([seed, *kind.encode()])
     settings = {
         "seed": int(rng.integers(1, 10_000)),
         "noise-seed": int(rng.integers(1, 1000)),
         "noise": round(_log(rng, 0.001, 0.004), 5),
     }
+    kind, _, name = kind.partition(":")
     if kind == "unknown":
         return Case(seed, (), settings, {}, OUTSIDE[int(rng.integers(len(OUTSIDE)))])
-    count = {"control": 0, "pair": 2}.get(kind, 1)
-    names = [kind.partition(":")[2]] if ":" in kind else _names(rng, count)
+    names = {"control": [], "pair": _pair(rng)}.get(kind, [name])
+    factor = _log(rng, 0.02, 0.5) if kind == "weak" else 1.0
     truth = {}
-    for name in names:
-        more, truth[name] = LIBRARY[name](rng)
+    for one in names:
+        more, truth[one] = LIBRARY[one](rng, factor)
         settings |= more
     return Case(seed, tuple(names), settings, truth)
 
 
-def _names(rng, count):
-    """Causes of different families: two of one family are one cause to any eye."""
+def _pair(rng):
+    """Two causes of different families: two of one family are one cause to any eye."""
     names: list[str] = []
-    for name in rng.permutation(list(LIBRARY)).tolist():
-        if len(names) < count and not any(name in f and set(names) & f for f in FAMILIES):
+    for name in rng.permutation([name for name in LIBRARY if name not in ALONE]).tolist():
+        if len(names) < 2 and not any(name in f and set(names) & f for f in FAMILIES):
             names.append(name)
     return names
 
 
-def measure(case: Case) -> tuple[Measured, float]:
-    """Play the diagnostic signal on the bench; return what the device reports and the range played.
+def measure(case: Case) -> Data:
+    """Play the diagnostic signal on the bench; return what the device reports.
 
     A device that trips its force limit, as a ringing one may, is played at less.
     """
-    for high in (HIGH_A, 1.2, 0.9):
-        value = signals.diagnostic(0.0, high, rate_Hz=RATE_HZ).value
-        with open_device(case.port) as device:
-            lead = signals.conditioning(0.0, high, speed=3.0, rate_Hz=RATE_HZ, rest_s=0.2)
-            if device.play(lead, RATE_HZ).fault:
-                continue
-            got = device.play(value, RATE_HZ)
-        if not got.fault:
-            y = got.force_N
-            if case.outside:
-                y = _spoil(case, got.time_s, y)
-            return Measured(DT_S, got.current_A, y, np.ones(y.size), got.reference_A), high
-    raise RuntimeError(f"{case.port} cannot be played: {got.fault}")
+    for high in (HIGH_A, 1.2, 0.9, 0.6):
+        record = _play(case, high)
+        if record is not None:
+            break
+    else:
+        raise RuntimeError(f"{case.port} cannot be played")
+    records, range_high = [_spoilt(case, record)], high
+    if "condition-change" in case.causes:
+        change = case.truth["condition-change"]
+        later = _play(replace(case, settings=case.settings | {"noise-seed": 1001}), high, seconds=30.0)
+        assert later is not None
+        records.append(replace(later, output=later.output * (1 + change["gain"]) + change["offset"]))
+    if "out-of-range" in case.causes:
+        range_high = min(case.truth["out-of-range"]["high"], 0.9 * high)
+    return Data(records, range_high, high)
 
 
-def _spoil(case, t, y):
+def _play(case: Case, high: float, seconds: float | None = None) -> Measured | None:
+    value = signals.diagnostic(0.0, high, rate_Hz=RATE_HZ).value
+    if seconds is not None:
+        value = value[: round(seconds * RATE_HZ)]
+    with open_device(case.port) as device:
+        lead = signals.conditioning(0.0, high, speed=3.0, rate_Hz=RATE_HZ, rest_s=0.2)
+        if device.play(lead, RATE_HZ).fault:
+            return None
+        got = device.play(value, RATE_HZ)
+    if got.fault:
+        return None
+    return Measured(DT_S, got.current_A, got.force_N, np.ones(got.force_N.size), got.reference_A)
+
+
+def size_percent(case: Case, data: Data) -> float:
+    """Rms of what the effect changes in the output, in per cent of its span, against the healthy device."""
+    last = data.records[-1]
+    twin = _play(case.healthy, data.played, last.input.size * DT_S)
+    if "condition-change" in case.causes:
+        twin = _play(
+            replace(case.healthy, settings=case.healthy.settings | {"noise-seed": 1001}), data.played, 30.0
+        )
+    assert twin is not None
+    count = min(twin.output.size, last.output.size)
+    if "current-tracking" in case.causes:  # the device is healthy: its driver is not
+        return float(100 * np.sqrt(np.mean((last.input - last.reference) ** 2)) / data.played)
+    difference = last.output[:count] - twin.output[:count]
+    if "out-of-range" in case.causes:
+        outside = np.maximum(last.input - data.high, 0.0)
+        return float(100 * np.sqrt(np.mean(outside**2)) / data.played)
+    return float(100 * np.sqrt(np.mean(difference**2)) / np.ptp(twin.output))
+
+
+def _spoilt(case: Case, record: Measured) -> Measured:
+    """The record with what the bench itself cannot hide."""
     rng = np.random.default_rng([case.seed, 77])
+    t, y = np.arange(record.output.size) * DT_S, record.output
+    if "clock-skew" in case.causes:
+        y = np.interp(t * (1.0 + case.truth["clock-skew"]["skew"]), t, y)
     if case.outside == "gain wander":
-        return y * (1.0 + 0.02 * np.sin(2 * np.pi * t / rng.uniform(7, 13) + rng.uniform(0, 6)))
+        y = y * (1.0 + 0.02 * np.sin(2 * np.pi * t / rng.uniform(7, 13) + rng.uniform(0, 6)))
     if case.outside == "hidden load":  # somebody leans on the device now and then
         edges = np.sort(rng.uniform(0, t[-1], 24)).reshape(-1, 2)
-        return y + 0.35 * np.any([(t > a) & (t < b) for a, b in edges], axis=0)
-    burst = np.sin(2 * np.pi * 11 * t + 3 * np.sin(2 * np.pi * 0.7 * t)) * (np.sin(2 * np.pi * t / 17) > 0.3)
-    return y + 0.25 * burst * np.sin(2 * np.pi * t / 3.1)
+        y = y + 0.35 * np.any([(t > a) & (t < b) for a, b in edges], axis=0)
+    if case.outside == "bursts":
+        burst = np.sin(2 * np.pi * 11 * t + 3 * np.sin(2 * np.pi * 0.7 * t)) * (
+            np.sin(2 * np.pi * t / 17) > 0.3
+        )
+        y = y + 0.25 * burst * np.sin(2 * np.pi * t / 3.1)
+    return replace(record, output=y)

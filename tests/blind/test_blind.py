@@ -12,27 +12,53 @@ sys.path.insert(0, str(Path(__file__).parent))
 import judge
 
 pytestmark = pytest.mark.timeout(600)
+SEED = 4242
 
 
-@pytest.mark.parametrize("name", ["output-lag", "creep", "periodic", "saturation"])
-def test_a_single_hidden_cause_is_named(name):
-    """The name, its main parameter within a tenth, and a gain on held-out blocks."""
-    verdict = judge.judge(f"single:{name}", 4242)
-    assert verdict.verdict == name, verdict
-    assert all(error < 0.12 for error in verdict.errors.values()), verdict
-    if name != "saturation":
-        assert verdict.held_out > 80
+@pytest.fixture(scope="module")
+def singles():
+    """Judge one hidden cause of each kind: of the input, of the output, of the record, of slow memory."""
+    names = ("field-lag", "creep", "periodic", "saturation", "step")
+    return {name: judge.judge(f"single:{name}", SEED) for name in names}
 
 
-def test_controls_do_not_alarm():
+def test_single_hidden_causes_are_named(singles):
+    """Each by its name and by no other."""
+    assert {name: v.verdict for name, v in singles.items()} == {name: name for name in singles}
+    assert {name: v.found for name, v in singles.items()} == {name: (name,) for name in singles}
+
+
+def test_their_parameters_are_found(singles):
+    """Within an eighth, and within their 95 % intervals but for one (chance of two more: 3 %)."""
+    errors = [error for v in singles.values() for error in v.errors.values()]
+    covered = [inside for v in singles.values() for inside in v.covered.values()]
+    assert len(errors) >= 6
+    assert max(errors) < 0.125
+    assert sum(covered) >= len(covered) - 1
+
+
+def test_the_gain_on_held_out_blocks_is_that_of_the_truth(singles):
+    """At least four fifths of what the true cause with its true parameters gains."""
+    assert singles["field-lag"].oracle_share > 0.8
+    assert singles["creep"].oracle_share > 0.8
+    assert all(v.held_out > 80 for v in singles.values() if v.verdict != "saturation")
+
+
+@pytest.mark.parametrize("seed", [SEED, SEED + 1])
+def test_controls_do_not_alarm(seed):
     """Nothing hidden, nothing named."""
-    for seed in (4242, 4243):
-        verdict = judge.judge("control", seed)
-        assert verdict.verdict == "none", verdict
-        assert verdict.found == ()
+    verdict = judge.judge("control", seed)
+    assert verdict.verdict == "none", verdict
+    assert verdict.found == ()
+
+
+def test_a_hidden_pair_is_found():
+    """Exactly the two."""
+    verdict = judge.judge("pair", SEED)
+    assert set(verdict.found) == set(verdict.causes), verdict
 
 
 def test_what_the_library_does_not_hold_is_unknown():
     """No confident wrong name."""
-    verdict = judge.judge("unknown", 4242)
+    verdict = judge.judge("unknown", SEED)
     assert verdict.verdict == "unknown", verdict

@@ -101,6 +101,21 @@ def test_another_protocol_names_both_versions_and_who_is_older(folder, firmware,
     refused(folder, port, f"speaks protocol {major}.0", "this program 1.0", older, remedy)
 
 
+@pytest.mark.parametrize(
+    ("define", "version", "older", "remedy"),
+    [
+        ("-DPT_FIRMWARE_MAJOR=1u", "1.1.0", "the program is older", "pip install --upgrade"),
+        ("-DPT_FIRMWARE_MINOR=0u", "0.0.0", "the device is older", "flash the firmware"),
+    ],
+)
+def test_another_firmware_names_both_versions_and_who_is_older(
+    folder, firmware, define, version, older, remedy
+):
+    """The same protocol but another generation of firmware: exit 4 before anything moves."""
+    port, _ = firmware(defines=(define,))
+    refused(folder, port, f"firmware {version}", "this program's firmware 0.1.0", older, remedy)
+
+
 def test_a_device_that_is_not_ours(folder):
     """Something talks behind the port, but not our protocol."""
     ours, theirs = os.openpty()

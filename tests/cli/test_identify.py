@@ -76,3 +76,27 @@ def test_the_missing_part_of_the_plane_is_named(run, record):
     assert done.json["coverage_percent"] < 99
     assert "never switched: relays with" in done.err
     assert "% of the plane" in done.err
+
+
+def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path):
+    """Stored beside weights and fit, around them, repeatable by seed, and wide enough to hold the truth."""
+    from pulsetrainer.artefacts import store
+    from pulsetrainer.artefacts.kinds import Model
+
+    record()
+    base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force", "--json")
+    assert run(*base).json["output_uncertainty"] is None
+    first = run(*base, "--bootstrap", "60", "--seed", "5").json["output_uncertainty"]
+    assert 1e-4 < first < 0.01  # noise of 0.01 on 4000 samples, 78 cells
+    model = store.read(tmp_path / "model.h5", Model)
+    assert model.fit.draws == 60
+    assert np.all(model.weights_lower <= model.weights_upper)
+    inside = (model.fit.predicted_lower <= model.fit.predicted) & (
+        model.fit.predicted <= model.fit.predicted_upper
+    )
+    assert inside.mean() > 0.9
+    truth = np.tanh(3 * model.fit.input - 1.5)
+    spread = np.abs(truth - model.fit.predicted)
+    assert np.median(spread) < 3 * first
+    assert run(*base, "--bootstrap", "60", "--seed", "5").json["output_uncertainty"] == first
+    assert run(*base, "--bootstrap", "60", "--seed", "6").json["output_uncertainty"] != first

@@ -49,6 +49,17 @@ def test_core_is_clean_under_strict_warnings(compiler, tmp_path):
         )
 
 
+@pytest.mark.skipif(os.name != "posix", reason="the host port is POSIX")
+@pytest.mark.parametrize("compiler", compilers(), ids=lambda c: c[-1])
+def test_plant_and_host_port_are_clean_under_strict_warnings(compiler, tmp_path):
+    """The same for what surrounds the core on this computer."""
+    flags = ["-std=c99", "-O2", "-D_XOPEN_SOURCE=700", "-Wall", "-Wextra", "-Wconversion", "-Werror"]
+    port = FIRMWARE / "port" / "host"
+    for source in [*PLANT, *sorted(port.glob("*.c"))]:
+        words = [*compiler, *flags, *INCLUDE, f"-I{port}", "-c", str(source), "-o", str(tmp_path / "unit.o")]
+        subprocess.run(words, check=True)
+
+
 def test_core_has_no_floating_point(tmp_path):
     """The sources name no floating type, and none hides in a literal."""
     for path in [*CORE, *(FIRMWARE / "core").glob("*.h")]:

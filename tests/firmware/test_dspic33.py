@@ -56,8 +56,21 @@ def test_a_converter_that_never_gets_ready_is_waited_for_with_the_output_off(pro
     """The wait has no end of its own: the watchdog, on from reset, ends it."""
     done = subprocess.run([str(program), "stuck"], capture_output=True, text=True, check=False)
     assert (done.returncode, "waits for ever" in done.stdout) == (3, True)
+    assert _configured("WDTEN") == "ON"
+
+
+def test_a_locked_pwm_is_never_started(program):
+    """Its output could not be switched off: the start ends there, and the configuration says unlocked."""
+    done = subprocess.run([str(program), "locked"], capture_output=True, text=True, check=False)
+    assert (done.returncode, "waits for ever" in done.stdout) == (3, True)
+    assert _configured("PWMLOCK") == "OFF"
+
+
+def _configured(name: str) -> str:
     main = (FIRMWARE / "port" / "dspic33" / "main.c").read_text(encoding="utf-8")
-    assert re.search(r"#pragma config WDTEN = ON\b", main)
+    found = re.search(rf"#pragma config {name} = (\w+)", main)
+    assert found is not None
+    return found[1]
 
 
 @pytest.mark.parametrize("compiler", compilers(), ids=lambda c: c[-1])

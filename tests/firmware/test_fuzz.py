@@ -24,20 +24,21 @@ def _built(what: str, folder: Path) -> str:
 
 
 def test_a_million_damaged_frames_and_wild_sequences(tmp_path):
-    """No sanitizer speaks, no invariant breaks, next to no damaged frame passes checksum and exact length.
+    """No sanitizer speaks, no invariant breaks, no more damaged frames pass than 16 bits of checksum allow.
 
-    With one to four hurts a frame, often scrambled as a whole, one in some millions passes: 2^-16 of those
-    whose length still fits.
+    With one to four hurts a frame one in 25 keeps a sound shape and length; of those 2^-16 may pass.
     """
     program = _built("fuzz", tmp_path)
     words = [program, "1", str(FRAMES), str(SEQUENCES)]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    frames, intact, wrong = map(int, re.findall(r"frames (\d+) intact (\d+) wrong (\d+)", done.stdout)[0])
+    counted = re.findall(r"frames (\d+) intact (\d+) shaped (\d+) wrong (\d+)", done.stdout)[0]
+    frames, intact, shaped, wrong = map(int, counted)
     sequences, ran, faults = map(int, re.findall(r"(\d+)", done.stdout.splitlines()[1]))
     assert frames == FRAMES
     assert intact > 10_000  # some hurts only add zeros between frames: the reader is not deaf
-    assert wrong <= 2
+    assert 20_000 < shaped < 60_000  # what the checksum is there for
+    assert wrong <= 6  # expected: shaped / 65536, which is 0.6; more than 6 once in a hundred thousand seeds
     assert sequences == SEQUENCES
     assert ran > 500  # the wild commands do reach the deep states
     assert faults > 10

@@ -67,6 +67,16 @@ def test_the_image_is_clean_under_strict_warnings(make):
     assert make("mps2") == ""
 
 
+@pytest.mark.parametrize("unit", ["frame", "wave", "pid", "safety", "app"])
+def test_the_unit_tests_of_the_core_pass_on_this_processor(make, unit):
+    """The same C tests as on the host, each limit and fault to the tick, on the Cortex-M4F."""
+    told = make(f"mps2-test-{unit}")  # its exit status is the program's
+    assert told.count("ok   ") == (FIRMWARE / "test" / f"test_{unit}.c").read_text(encoding="utf-8").count(
+        "    RUN("
+    )
+    assert "FAIL" not in told
+
+
 def test_loop_and_plant_give_the_same_bits_on_the_emulated_device(make, tmp_path):
     """100 000 ticks of PID and plant: one hash on every host compiler and on the Cortex-M4F."""
     hashes = {compiler[-1]: host_hash(compiler, "float", tmp_path) for compiler in host_compilers()}

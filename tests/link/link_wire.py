@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from pulsetrainer.link import codes
 from pulsetrainer.link import messages as m
 from pulsetrainer.link.bench import Bench
-from pulsetrainer.link.session import Session
-from pulsetrainer.link.transport import SerialTransport
+from pulsetrainer.link.qemu import QEMU_TIMEOUTS_S, Emulator
+from pulsetrainer.link.session import TIMEOUTS_S, Session
+from pulsetrainer.link.transport import SerialTransport, Transport
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,12 +22,22 @@ if TYPE_CHECKING:
 
 
 class Wire:
-    """A session on a bench, one command at a time."""
+    """A session on a bench or an emulated device, one command at a time."""
 
     def __init__(self, port: str, executable: Path | None = None) -> None:
-        self.bench = Bench(port, executable)
-        self.transport = SerialTransport(self.bench.path)
-        self.session = Session(self.transport, "bench:", monotonic=time.monotonic)
+        self.bench: Bench | Emulator
+        self.transport: Transport
+        timeouts_s = TIMEOUTS_S
+        if port.startswith("qemu:"):
+            self.bench = Emulator(port)
+            self.transport = self.bench.transport
+            timeouts_s = QEMU_TIMEOUTS_S
+        else:
+            self.bench = Bench(port, executable)
+            self.transport = SerialTransport(self.bench.path)
+        self.session = Session(
+            self.transport, port.partition("?")[0], monotonic=time.monotonic, timeouts_s=timeouts_s
+        )
         self.telemetry: list[m.Telemetry] = []
         self.session.on_telemetry = self.telemetry.append
 

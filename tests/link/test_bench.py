@@ -16,6 +16,7 @@ import pytest
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.link import build, open_device
 from pulsetrainer.link.bench import Bench, BenchOptions, parse_bench
+from pulsetrainer.link.simulated import BREAKS, Wire
 
 
 @pytest.mark.parametrize(
@@ -27,7 +28,7 @@ from pulsetrainer.link.bench import Bench, BenchOptions, parse_bench
         ("bench:?ideal=1&speed=real", BenchOptions(ideal=True, speed="real")),
         ("bench:?seed=3&creep=0.05", BenchOptions(settings=(("seed", "3"), ("creep", "0.05")))),
         ("bench:?break=reset@2", BenchOptions(breaks=("reset@2",))),
-        ("bench:?wire=1e-4&wire-seed=3", BenchOptions(wire=1e-4, wire_seed=3)),
+        ("bench:?wire=1e-4&wire-seed=3", BenchOptions(wire=Wire(1e-4, 3))),
     ],
 )
 def test_ports_that_make_sense(port, options):
@@ -73,6 +74,12 @@ def test_unknown_and_impossible_parameters_teach(port, message, hint):
         Bench(port)
     assert message in caught.value.message
     assert hint in caught.value.hint
+
+
+def test_what_can_break_is_what_the_firmware_lists():
+    """One list in Python, one in C: the same names in the same order."""
+    told = subprocess.check_output([str(build.firmware_executable()), "--list"], text=True)
+    assert tuple(told.partition("\n\n")[2].split()) == BREAKS
 
 
 def _executable(cache: str) -> str:
@@ -146,9 +153,10 @@ def _gone(pid: int, seconds: float = 10.0) -> bool:
 
 
 HOST = """
-import sys
+import signal
 import numpy as np
 from pulsetrainer.link import open_device
+signal.signal(signal.SIGINT, signal.default_int_handler)  # tests run in the background have it ignored
 device = open_device("bench:?speed=real")
 def tell(block):
     print(device._bench.pid, block.tick[-1], flush=True)

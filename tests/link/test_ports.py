@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from pulsetrainer.errors import DeviceError
-from pulsetrainer.link import list_ports, open_device, ports
+from pulsetrainer.link import Block, list_ports, open_device, ports
+from pulsetrainer.link import messages as m
+from pulsetrainer.link.codes import Fault, State
 from pulsetrainer.link.transport import SerialTransport
 
 
@@ -105,16 +107,18 @@ def test_a_socket_nobody_listens_on():
         SerialTransport("socket://127.0.0.1:9")
 
 
-def test_a_device_behind_a_socket(wire):
-    """socket:// is a port like any other: greeting, a play, nothing lost."""
+@pytest.fixture
+def carrier(wire):
+    """A real-time bench behind socket://: its hand-held wire, its port, and an event that pulls the cable."""
     one = wire("bench:?speed=real")
     server = socket.create_server(("127.0.0.1", 0))
+    pulled = threading.Event()
 
     def carry() -> None:
         peer, _ = server.accept()
         with peer:
             peer.settimeout(0.002)
-            while True:
+            while not pulled.is_set():
                 with contextlib.suppress(TimeoutError):
                     data = peer.recv(4096)
                     if not data:
@@ -124,11 +128,38 @@ def test_a_device_behind_a_socket(wire):
                 if came:
                     peer.sendall(came)
 
-    carrier = threading.Thread(target=carry, daemon=True)
-    carrier.start()
-    with open_device(f"socket://127.0.0.1:{server.getsockname()[1]}") as device:
-        recording = device.play(np.linspace(0, 1, 500), 1000)
-    carrier.join(timeout=5)
+    thread = threading.Thread(target=carry, daemon=True)
+    thread.start()
+    yield one, f"socket://127.0.0.1:{server.getsockname()[1]}", pulled
+    pulled.set()
+    thread.join(timeout=5)
     server.close()
+
+
+def test_a_device_behind_a_socket(carrier):
+    """socket:// is a port like any other: greeting, a play, nothing lost."""
+    _, port, _ = carrier
+    with open_device(port) as device:
+        recording = device.play(np.linspace(0, 1, 500), 1000)
     assert recording.complete
     assert (len(recording.tick), recording.dropped_samples) == (500, 0)
+
+
+def test_a_cable_pulled_in_mid_play(carrier):
+    """The device lives on without its host: it switches off by itself, latched; the host keeps what came."""
+    one, port, pulled = carrier
+
+    def pull(block: Block) -> None:
+        if block.tick[-1] > 3000:
+            pulled.set()
+
+    with open_device(port) as device:
+        recording = device.play(np.full(20_000, 0.5), 1000, on_block=pull)
+    assert not recording.complete
+    assert "gone" in recording.fault or "did not answer" in recording.fault
+    assert "by itself" in recording.remedy
+    assert 300 <= len(recording.tick) < 4000
+    status = one.wait_for(State.FAULT)
+    assert Fault(status.fault) == Fault.HEARTBEAT
+    assert status.fault_tick - recording.tick[-1] < 2000 + 1500  # 200 ms after the last command, not later
+    assert one.ask(m.Heartbeat()).state == State.FAULT

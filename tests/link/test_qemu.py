@@ -16,6 +16,8 @@ import pytest
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.link import build, open_device
 from pulsetrainer.link.build import DEBIAN_PACKAGES
+from pulsetrainer.link.qemu import QemuOptions, parse_qemu
+from pulsetrainer.link.simulated import Wire
 
 pytestmark = pytest.mark.realtime
 RANGE_A = 1.5
@@ -58,12 +60,33 @@ def gone(session: int, seconds: float = 5.0) -> bool:
 # --- without an emulator ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("port", ["qemu:?creep=0.05", "qemu:fast", "qemu:?"])
-def test_parameters_are_refused_with_the_port_that_takes_them(port):
-    """The image is built once, without parameters; the bench has them."""
-    with pytest.raises(UsageError, match="takes no parameters") as caught:
+@pytest.mark.parametrize(
+    ("port", "says", "hint"),
+    [
+        ("qemu:?creep=0.05", "no parameter 'creep'", "bench:?"),
+        ("qemu:fast", "not a port", "qemu:?break"),
+        ("qemu:?", "not a port", "qemu:?break"),
+        ("qemu:?break=leg@1", "cannot break 'leg@1'", "current-rail"),
+        ("qemu:?break=hag", "did you mean hang", "break=WHAT@SECONDS"),
+        ("qemu:?break=hang@soon", "cannot break 'hang@soon'", "break=WHAT@SECONDS"),
+        ("qemu:?break=hang@", "cannot break 'hang@'", "break=WHAT@SECONDS"),
+        ("qemu:?break=hang@1e9", "cannot break", "break=WHAT@SECONDS"),
+        ("qemu:?wire=1", "qemu parameter wire=1 is not a rate", "wire-seed"),
+        ("qemu:?wire-seed=x", "qemu parameter wire-seed=x", "wire-seed"),
+    ],
+)
+def test_parameters_that_make_no_sense_teach(port, says, hint):
+    """The plant of the image has no parameters, the bench's has; the rest is explained."""
+    with pytest.raises(UsageError, match=says) as caught:
         open_device(port)
-    assert "bench:?" in caught.value.hint
+    assert hint in caught.value.hint
+
+
+def test_parameters_that_make_sense():
+    """Breaks and a bad wire, in any number and order."""
+    assert parse_qemu("qemu:") == parse_qemu("qemu://") == QemuOptions()
+    port = "qemu:?break=reset@1.5&wire=1e-4&break=hang&wire-seed=7"
+    assert parse_qemu(port) == QemuOptions(((8, 1.5), (9, 0.0)), Wire(1e-4, 7))
 
 
 @pytest.mark.parametrize("missing", ["qemu-system-arm", "arm-none-eabi-gcc"])
@@ -100,7 +123,18 @@ def test_two_starts_are_told_apart():
     assert len(nonces) == 2
 
 
-def measure_pace() -> float:
+@pytest.fixture
+def tell(capsys):
+    """Print a measured figure past pytest's capture."""
+
+    def say(text: str) -> None:
+        with capsys.disabled():
+            print("\n" + text)
+
+    return say
+
+
+def measure_pace(tell) -> float:
     """Play strokes for some ten seconds and return ticks over wall time; everything else must be right."""
     arrivals: list[tuple[float, int]] = []
     with open_device("qemu:") as device:
@@ -109,14 +143,14 @@ def measure_pace() -> float:
         )
     assert "missed its tick" not in recording.fault
     if not recording.complete:  # the computer was away: the device saw a silent host and did its duty
-        print(f"stopped: {recording.fault}")
+        tell(f"stopped: {recording.fault}")
         return 0.0
     # Some blocks after the start: the emulator has caught up by then.
     (first_s, first), (last_s, last) = arrivals[10], arrivals[-1]
     ratio = (last - first) / 10_000 / (last_s - first_s)
     error = np.abs(recording.current_A - recording.reference_A).max() / RANGE_A
-    print(
-        f"ticks/wall {ratio:.4f} over {last_s - first_s:.1f} s, lost {recording.dropped_samples}, "
+    tell(
+        f"qemu: ticks/wall {ratio:.4f} over {last_s - first_s:.1f} s, lost {recording.dropped_samples}, "
         f"tracking error {100 * error:.2f} % of the range"
     )
     assert last_s - first_s > 9.9
@@ -128,11 +162,11 @@ def measure_pace() -> float:
 
 @needs_emulator
 @group
-def test_ten_seconds_of_strokes_at_the_pace_of_the_wall_clock():
+def test_ten_seconds_of_strokes_at_the_pace_of_the_wall_clock(tell):
     """Ticks over wall time 0.99 to 1.01 with telemetry on, no tick or sample lost, tracking under 1 %."""
     ratios: list[float] = []
     while len(ratios) < 3:  # a computer busy with something else may take the emulator's time away
-        ratios.append(measure_pace())
+        ratios.append(measure_pace(tell))
         if 0.99 < ratios[-1] < 1.01:
             return
     pytest.fail(f"ticks/wall {ratios}")
@@ -140,7 +174,7 @@ def test_ten_seconds_of_strokes_at_the_pace_of_the_wall_clock():
 
 @needs_emulator
 @group
-def test_reference_is_the_one_of_the_bench():
+def test_reference_is_the_one_of_the_bench(tell):
     """The same core plays the same reference: equal at every tick, whatever the processor."""
     with open_device("qemu:") as device:
         emulated = device.play(strokes(1), 1000, decimation=1)
@@ -153,13 +187,13 @@ def test_reference_is_the_one_of_the_bench():
     assert np.abs(emulated.current_A - native.current_A[received]).max() < 0.005
     for name, recording in (("host", native), ("cortex-m4f", emulated)):
         error = np.abs(recording.current_A - recording.reference_A).max() / RANGE_A
-        print(f"{name}: 4 Hz full strokes, tracking error at 10 kHz {100 * error:.2f} % of the range")
+        tell(f"{name}: 4 Hz full strokes, tracking error at 10 kHz {100 * error:.2f} % of the range")
         assert error < 0.01
 
 
 @needs_emulator
 @group
-def test_step_settles_quickly():
+def test_step_settles_quickly(tell):
     """A step of two thirds of the range: settled into 1 % of the range soon after the slew limit lets it."""
     at, low, high = 500, 0.2, 1.2  # all of it fits the buffer: the line is too slow to stream at 10 kHz
     slewed_s = (high - low) / 150  # 15 mA a tick
@@ -172,13 +206,38 @@ def test_step_settles_quickly():
         outside = np.flatnonzero(np.abs(after - high) > 0.01 * RANGE_A)
         settling_s = (outside.max() + 1) / 10_000
         overshoot = (after.max() - high) / (high - low)
-        print(
+        tell(
             f"{port} step of {high - low:g} A: settling {1000 * settling_s:.1f} ms "
             f"({1000 * slewed_s:.1f} of it the slew limit), overshoot {100 * overshoot:.2f} % of the step"
         )
         assert settling_s < slewed_s + 0.0035
         # The current filter is late: at the corner of the ramp the loop still believes to be behind.
         assert overshoot < 0.05
+
+
+@needs_emulator
+@group
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_bad_wire_costs_counted_samples_only(seed, tell):
+    """Three bad bytes in ten thousand: played to its end, each reference right, the lost ones counted."""
+    reference = strokes(6)
+    for _ in range(3):  # a computer busy with something else may be away for longer than the heartbeat
+        with open_device(f"qemu:?wire=0.0003&wire-seed={seed}") as device:
+            recording = device.play(reference, 1000)
+            wire = device._transport
+        if "heard nothing" not in recording.fault:
+            break
+        tell(f"stopped: {recording.fault}")
+    lost = recording.dropped_samples
+    tell(
+        f"qemu: bad wire, seed {seed}: {wire.to_host.damaged.total()} + {wire.to_device.damaged.total()} "
+        f"hurts, {lost} of {len(reference)} samples lost"
+    )
+    assert recording.complete, recording.fault
+    assert 0 < lost == len(reference) - len(recording.tick)
+    sent = np.rint(reference / 1e-4)[recording.tick // 10]
+    np.testing.assert_array_equal(np.rint(recording.reference_A / 1e-4), sent)
+    assert np.abs(recording.current_A - recording.reference_A).max() < 0.01 * RANGE_A
 
 
 @needs_emulator

@@ -26,6 +26,39 @@ def test_greeting_gets_through_garbage(wire):
     assert one.session.hello().magic == MAGIC
 
 
+def test_a_program_killed_in_mid_upload_leaves_nothing_behind(wire):
+    """Half a reference, half a frame and unread replies: the next program greets and plays as if alone."""
+    one = wire("bench:")
+    one.session.hello()
+    one.ask(m.WaveBegin(5000, 10, 1))
+    for at in range(0, 610, 61):
+        one.ask(m.WaveData(at, 61, bytes(122)))
+    for seq in range(5):
+        one.transport.write(encode(Frame(m.Status.TYPE, seq, b"")))  # nobody reads the answers
+    one.transport.write(encode(Frame(m.WaveData.TYPE, 7, m.WaveData(610, 61, bytes(122)).pack()))[:70])
+    one.session = Session(one.transport, "bench:", monotonic=time.monotonic)
+    one.session.on_telemetry = one.telemetry.append
+    one.start(np.full(200, 3000, dtype=np.int16))
+    assert one.wait_for(State.IDLE).fault == Fault.NONE
+    while not one.telemetry or not one.telemetry[-1].flags & 1:
+        one.session.receive()
+    assert sum(b.count for b in one.telemetry) == 200
+
+
+def test_the_whole_firmware_under_the_sanitizers(wire):
+    """Garbage, a play, a fault and a stop: neither address nor undefined-behaviour sanitizer has a word."""
+    sanitized = firmware_executable(("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"))
+    one = wire("bench:?break=force-high@0.2", sanitized)
+    one.transport.write(np.random.default_rng(4).bytes(3000))
+    one.start((5000 - 5000 * np.cos(np.arange(900) / 50)).astype(np.int16), decimation=1)
+    assert one.wait_for(State.FAULT).fault == Fault.OVER_FORCE
+    one.ask(m.ClearFault())
+    one.start(np.full(300, 3000, dtype=np.int16))
+    one.ask(m.Stop())
+    one.wait_for(State.IDLE)
+    assert one.bench._process.poll() is None  # a sanitizer that finds something ends the process
+
+
 def test_a_repeated_command_is_done_once(wire):
     """The same sequence number again: the same answer, from memory."""
     one = wire("bench:")
@@ -61,8 +94,58 @@ def test_another_protocol_major_is_named_with_the_remedy(wire):
 
 
 def test_another_minor_version_is_fine(wire):
-    """A newer minor version of the same protocol is spoken to."""
+    """A newer minor version of the same protocol is spoken to, and a patched firmware."""
     assert wire("bench:", firmware_executable(("-DPT_PROTOCOL_MINOR=7u",))).session.hello().minor == 7
+    assert (
+        wire("bench:", firmware_executable(("-DPT_FIRMWARE_PATCH=9u",))).session.hello().firmware_patch == 9
+    )
+
+
+def test_another_firmware_generation_is_named_with_the_remedy(wire):
+    """The same protocol, but a firmware that this program does not come with."""
+    newer = wire("bench:", firmware_executable(("-DPT_FIRMWARE_MAJOR=1u",)))
+    said = r"\(firmware 1\.1\.0\) is of another generation than .* firmware 0\.1\.0: the program is older"
+    with pytest.raises(DeviceError, match=said) as caught:
+        newer.session.hello()
+    assert "pip install --upgrade" in caught.value.hint
+    older = wire("bench:", firmware_executable(("-DPT_FIRMWARE_MINOR=0u",)))
+    with pytest.raises(DeviceError, match=r"firmware 0\.0\.0.*the device is older") as caught:
+        older.session.hello()
+    assert "flash" in caught.value.hint
+
+
+def test_an_answer_to_something_else_is_none(wire):
+    """Left-over replies that carry just the next sequence number, but are of another kind, are not taken."""
+    one = wire("bench:")
+    one.session.hello()
+    one.session._seq = 40
+    for seq in range(41, 44):
+        one.transport.write(encode(Frame(m.Heartbeat.TYPE, seq, b"")))
+        one.transport.write(encode(Frame(m.GetParam.TYPE, seq, b"\x07")))
+        one.transport.write(encode(Frame(m.Start.TYPE, seq, b"")))  # a refusal
+    assert isinstance(one.ask(m.Status()), m.StatusReply)
+    reply = one.ask(m.GetParam(3))
+    assert isinstance(reply, m.ParamReply)
+    assert reply.id == 3
+    assert isinstance(one.ask(m.Heartbeat()), m.Ack)
+    assert one.session.rejected >= 3
+
+
+def test_a_start_that_comes_twice_is_one_run(wire):
+    """A wire that repeats ARM and START after the reply got lost: acknowledged, the same session goes on."""
+    one = wire("bench:?speed=real")
+    hello = one.start(np.full(900, 3000, dtype=np.int16))
+    last, session = one.session._seq, one.status().session
+    for frame in (
+        Frame(m.Arm.TYPE, (last - 1) & 0xFF, m.Arm(hello.boot_nonce).pack()),
+        Frame(m.Start.TYPE, last, b""),
+    ):
+        one.transport.write(encode(frame))
+    one.session._seq = (last - 1) & 0xFF  # the next command carries START's number
+    ack = one.ask(m.Start())
+    assert isinstance(ack, m.Ack)
+    assert (ack.state, ack.session) == (State.RUNNING, session)
+    assert one.status().fault == Fault.NONE
 
 
 def test_a_new_program_on_a_running_device_stops_it(wire):

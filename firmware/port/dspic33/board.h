@@ -1,14 +1,16 @@
 /* The board of the dsPIC33EP64GS504: its clocks as numbers, its wiring, its parts.
  *
- * This port has never been compiled with the vendor's compiler nor run on a device. What the public
- * material leaves open is marked CHECK: compare it with the data sheet DS70005127 (GS50X family).
+ * This port has never been compiled with the vendor's compiler nor run on a device. Register values and
+ * configuration names were compared with what the vendor's code generator writes for this very device
+ * (public projects; docs/decisions/020 says which value came from where). The data sheet of the GS50X family,
+ * DS70005127, has the last word.
  *
  * Wiring, ours (the published device does not give its pins):
  *   RA0 AN0    coil current: shunt, gain 50, low-pass          2 A   = AVDD
  *   RA1 CMP1B  coil current before the low-pass: comparator    2 A   = AVDD
  *   RA2 AN2    force: instrumentation amplifier                -1..17 N = 0..AVDD
  *   RA4 PWM1H  gate of the MOSFET; a pull-down keeps it off while the pin floats at reset
- *   RC0 RP48   U1TX    RC1 RP49  U1RX                          CHECK */
+ *   RC0 RP48   U1TX    RC1 RP49  U1RX */
 #ifndef PULSETRAINER_BOARD_H
 #define PULSETRAINER_BOARD_H
 

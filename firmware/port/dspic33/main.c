@@ -11,10 +11,11 @@
 #pragma config FCKSM = CSECME   /* clock switching and the fail-safe monitor */
 #pragma config PLLKEN = ON
 #pragma config IOL1WAY = ON
-#pragma config WDTEN = ON       /* from reset on, not to be switched off by software; CHECK the name */
+#pragma config WDTEN = ON       /* from reset on, not to be switched off by software */
 #pragma config WDTPRE = PR32    /* 32 kHz / 32 / 256: 256 ms */
 #pragma config WDTPOST = PS256
 #pragma config WINDIS = OFF
+#pragma config PWMLOCK = OFF    /* erased it is ON: each write to IOCON1 and FCLCON1 would want a key first */
 #pragma config JTAGEN = OFF
 #pragma config ICS = PGD1
 #endif

@@ -21,7 +21,7 @@
 
 /* CMP1CON */
 #define CMP_ON 0x8000u
-#define CMP_HYSTERESIS_15_MV 0x0800u
+#define CMP_HYSTERESIS_LEAST 0x0800u /* 5 or 15 mV: the public examples disagree */
 #define CMP_FILTER 0x0400u
 #define CMP_INPUT_B 0x0040u
 #define CMP_RANGE_AVDD 0x0001u
@@ -36,6 +36,10 @@ void board_output_off(void)
     REG_WRITE(_TRISA4, 0);
     REG_WRITE(IOCON1, IOCON_OFF);
     REG_WRITE(PTCON, 0);
+    /* Locked by the configuration word this register would not have changed, and could never be switched
+     * off either. The PWM is not started then; the watchdog, on from reset, tries again for ever. */
+    while (REG_READ(IOCON1) != IOCON_OFF) {
+    }
 }
 
 void board_comparator(void)
@@ -43,8 +47,8 @@ void board_comparator(void)
     REG_WRITE(_ANSA1, 1);
     REG_WRITE(CMP1CON, 0);
     REG_WRITE(CMP1DAC, BOARD_CHOP_COUNTS);
-    REG_WRITE(CMP1CON, CMP_HYSTERESIS_15_MV | CMP_FILTER | CMP_INPUT_B | CMP_RANGE_AVDD);
-    REG_WRITE(CMP1CON, CMP_ON | CMP_HYSTERESIS_15_MV | CMP_FILTER | CMP_INPUT_B | CMP_RANGE_AVDD);
+    REG_WRITE(CMP1CON, CMP_HYSTERESIS_LEAST | CMP_FILTER | CMP_INPUT_B | CMP_RANGE_AVDD);
+    REG_WRITE(CMP1CON, CMP_ON | CMP_HYSTERESIS_LEAST | CMP_FILTER | CMP_INPUT_B | CMP_RANGE_AVDD);
 }
 
 void board_pwm(void)

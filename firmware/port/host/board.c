@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "app.h"
+#include "breaks.h"
 #include "hal.h"
 #include "port.h"
 
@@ -34,16 +35,6 @@ static uint64_t fed_at;
 
 /* --- provoked faults -------------------------------------------------------------------------- */
 
-enum broken {
-    CURRENT_RAIL, CURRENT_ZERO, CURRENT_FROZEN, FORCE_HIGH, FORCE_RAIL, FORCE_ZERO, FORCE_FROZEN,
-    TICK_OVERRUN, RESET, HANG, BREAKS
-};
-static const char *const break_names[BREAKS] = {
-    "current-rail", "current-zero", "current-frozen", "force-high", "force-rail", "force-zero",
-    "force-frozen", "tick-overrun", "reset", "hang",
-};
-static uint32_t break_tick[BREAKS]; /* tick of the session at which it sets in, plus 1; 0: never */
-static struct hal_adc frozen;
 static bool overrun_pending;
 static bool hanging;
 
@@ -58,9 +49,9 @@ bool board_break(const char *what_at)
         if (end == at + 1 || *end != '\0' || !(seconds >= 0.0 && seconds < 1e5))
             return false;
     }
-    for (int k = 0; k < BREAKS; k++) {
-        if (strlen(break_names[k]) == length && strncmp(break_names[k], what_at, length) == 0) {
-            break_tick[k] = (uint32_t)(seconds * (double)PT_TICK_RATE_HZ) + 1u;
+    for (int k = 0; k < BREAKS_COUNT; k++) {
+        if (strlen(breaks_names[k]) == length && strncmp(breaks_names[k], what_at, length) == 0) {
+            breaks_at((enum breaks_what)k, (uint32_t)(seconds * (double)PT_TICK_RATE_HZ) + 1u);
             return true;
         }
     }
@@ -69,26 +60,19 @@ bool board_break(const char *what_at)
 
 void board_list_breaks(void)
 {
-    for (int k = 0; k < BREAKS; k++)
-        printf("%s\n", break_names[k]);
+    for (int k = 0; k < BREAKS_COUNT; k++)
+        printf("%s\n", breaks_names[k]);
 }
 
-static bool is_broken(enum broken what)
+static void tell_breaks(void)
 {
-    return break_tick[what] != 0 && app.state == PT_STATE_RUNNING && app.tick + 1u >= break_tick[what];
-}
-
-static bool breaks_now(enum broken what)
-{
-    bool now = is_broken(what);
-    if (now)
-        break_tick[what] = 0;
-    return now;
+    breaks_play(app.state == PT_STATE_RUNNING, app.tick);
 }
 
 bool board_main_loop_runs(void)
 {
-    if (breaks_now(HANG))
+    tell_breaks();
+    if (breaks_once(BREAKS_HANG))
         hanging = true;
     return !hanging;
 }
@@ -117,8 +101,6 @@ static void start_firmware(uint8_t reset_cause)
 void board_init(const struct solenoid_params *p, uint8_t reset_cause)
 {
     solenoid_init(&plant, p);
-    frozen.current = solenoid_adc_current(&plant);
-    frozen.force = solenoid_adc_force(&plant);
     start_firmware(reset_cause);
 }
 
@@ -129,14 +111,11 @@ uint64_t board_ticks(void)
 
 void board_tick(void)
 {
-    if (breaks_now(RESET))
+    tell_breaks();
+    if (breaks_once(BREAKS_RESET))
         start_firmware(PT_RESET_EXTERNAL);
-    if (breaks_now(TICK_OVERRUN))
+    if (breaks_once(BREAKS_TICK_OVERRUN))
         overrun_pending = true;
-    if (!is_broken(CURRENT_FROZEN))
-        frozen.current = solenoid_adc_current(&plant);
-    if (!is_broken(FORCE_FROZEN))
-        frozen.force = solenoid_adc_force(&plant);
     app_tick();
     solenoid_step(&plant, duty, HAL_PWM_PERIOD);
     ticks++;
@@ -148,17 +127,9 @@ void board_tick(void)
 
 void hal_adc_read(struct hal_adc *out)
 {
-    *out = frozen;
-    if (is_broken(CURRENT_RAIL))
-        out->current = 4095;
-    if (is_broken(CURRENT_ZERO))
-        out->current = 0;
-    if (is_broken(FORCE_HIGH))
-        out->force = 3800; /* 15.7 N */
-    if (is_broken(FORCE_RAIL))
-        out->force = 0;
-    if (is_broken(FORCE_ZERO))
-        out->force = (uint16_t)(228u + (ticks & 1u)); /* no force, but a living converter */
+    out->current = solenoid_adc_current(&plant);
+    out->force = solenoid_adc_force(&plant);
+    breaks_sensors(&out->current, &out->force);
 }
 
 void hal_pwm_set(uint16_t on)

@@ -3,6 +3,7 @@
 #include "board.h"
 
 #include "app.h"
+#include "breaks.h"
 #include "hal.h"
 #include "registers.h"
 #include "solenoid.h"
@@ -24,7 +25,9 @@ extern volatile struct retained {
     uint32_t powered; /* POWERED: this start is not the first since power-on */
     uint32_t boots;
     uint32_t cause; /* of the next start */
+    uint32_t break_tick[BREAKS_COUNT]; /* by the loader too; plus 1, 0: never */
 } retained;
+typedef char retained_fits_its_place[sizeof(struct retained) <= 64u ? 1 : -1];
 
 static struct solenoid plant;
 static struct solenoid_params params;
@@ -72,13 +75,18 @@ void nmi_handler(void)
         __asm__ volatile("cpsid i" ::: "memory");
 }
 
-void fault_handler(void)
+static void reset(uint8_t next_cause)
 {
-    hal_pwm_kill();
-    retained.cause = PT_RESET_SOFTWARE;
+    retained.cause = next_cause;
     SCB_RESET = SCB_RESET_REQUEST;
     for (;;) {
     }
+}
+
+void fault_handler(void)
+{
+    hal_pwm_kill();
+    reset(PT_RESET_SOFTWARE);
 }
 
 void board_init(void)
@@ -87,6 +95,8 @@ void board_init(void)
     read_reset_cause();
     solenoid_as_built(&params);
     solenoid_init(&plant, &params);
+    for (int k = 0; k < BREAKS_COUNT; k++)
+        breaks_at((enum breaks_what)k, retained.break_tick[k]);
 
     UART0->divider = CLOCK_HZ / BAUD;
     UART0->control = UART_TX_ENABLE | UART_RX_ENABLE | UART_RX_INTERRUPT_ENABLE;
@@ -128,8 +138,33 @@ void board_world(void)
     solenoid_step(&plant, duty, HAL_PWM_PERIOD);
 }
 
+static void tell_breaks(void)
+{
+    breaks_play(app.state == PT_STATE_RUNNING, app.tick);
+}
+
+/* Really, not in name: the tick stays away, the chip resets, the main loop stands still. */
+static void break_tick(void)
+{
+    tell_breaks();
+    if (breaks_once(BREAKS_RESET))
+        reset(PT_RESET_EXTERNAL);
+    if (breaks_once(BREAKS_TICK_OVERRUN)) {
+        uint32_t from = board_cycles();
+        while (board_cycles() - from < 2u * BOARD_TICK_CYCLES) {
+        }
+    }
+}
+
+void board_main_loop(void)
+{
+    while (breaks_is(BREAKS_HANG)) {
+    }
+}
+
 void board_tick(void)
 {
+    break_tick();
     app_tick();
     board_world();
     ticks++;
@@ -152,6 +187,7 @@ void hal_adc_read(struct hal_adc *out)
 {
     out->current = solenoid_adc_current(&plant);
     out->force = solenoid_adc_force(&plant);
+    breaks_sensors(&out->current, &out->force);
 }
 
 void hal_pwm_set(uint16_t on)

@@ -9,6 +9,7 @@
 void board_init(void);       /* everything but the tick; the output is off */
 void board_start_tick(void); /* from here on the control interrupt runs */
 void board_tick(void);       /* what it does: the firmware's tick, then 100 us of the world */
+void board_main_loop(void);  /* once a pass: does not return where the main loop is to hang */
 void board_world(void);      /* the 100 us alone */
 void board_send(void);       /* main loop: hand what waits to the UART */
 uint32_t board_cycles(void); /* of 40 ns, free-running */

@@ -10,6 +10,7 @@ int main(void)
     app_init();
     board_start_tick();
     for (;;) {
+        board_main_loop();
         app_poll();
         board_send();
     }

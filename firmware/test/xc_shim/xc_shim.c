@@ -20,6 +20,7 @@ static uint8_t sent[4096];
 static uint16_t sent_count;
 static uint16_t in_fifo;
 static int early;
+static int locked;
 static uint32_t noise = 1;
 
 void _U1RXInterrupt(void);
@@ -38,6 +39,13 @@ void xc_shim_reset(uint16_t rcon)
     sent_count = 0;
     in_fifo = 0;
     early = 0;
+    locked = 0;
+}
+
+void xc_shim_lock_pwm(void)
+{
+    locked = 1;
+    polls = 0;
 }
 
 void xc_shim_forget(void)
@@ -109,6 +117,8 @@ void xc_shim_write(volatile uint16_t *reg, const char *name, uint16_t value)
     entries[count].value = value;
     count++;
     uint16_t status = U1STA & 0x0301u; /* read-only */
+    if (locked && (reg == &IOCON1 || reg == &FCLCON1))
+        return;
     *reg = value;
     if (reg == &U1STA)
         U1STA = (uint16_t)((value & ~0x0301u) | status);
@@ -117,11 +127,10 @@ void xc_shim_write(volatile uint16_t *reg, const char *name, uint16_t value)
 
 uint16_t xc_shim_read(volatile uint16_t *reg)
 {
-    if (reg == stuck) {
-        if (++polls > 1000)
-            fail("waits for ever:", "the watchdog resets the device here");
+    if ((reg == stuck || (locked && reg == &IOCON1)) && ++polls > 1000)
+        fail("waits for ever:", "the watchdog resets the device here");
+    if (reg == stuck)
         return 0;
-    }
     if (reg == &U1RXREG && rx_left > 0) {
         uint8_t byte = *rx_bytes++;
         if (--rx_left == 0)

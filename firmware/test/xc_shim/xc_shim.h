@@ -16,6 +16,7 @@ void xc_shim_forget(void);         /* empties the log */
 int32_t xc_shim_count(void);
 const struct xc_shim_entry *xc_shim_entry(int32_t at);
 void xc_shim_wait_for_ever(volatile uint16_t *reg); /* this flag never comes up */
+void xc_shim_lock_pwm(void); /* as with PWMLOCK = ON: writes to IOCON1 and FCLCON1 are ignored */
 
 void xc_shim_receive(const uint8_t *bytes, uint16_t count); /* into the receiver, then its interrupt */
 uint16_t xc_shim_sent(uint8_t *bytes, uint16_t most);       /* runs the sender's interrupt while enabled */

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, settled
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
 
 class Accommodation(Cause):
@@ -33,9 +33,8 @@ class Accommodation(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        turned = settled(frame.input, 0.004 * frame.reach)
-        share = np.append(0.0, np.abs(np.diff(turned))) / values[1]
-        done = np.cumsum(share)
+        done = frame.path / values[1]
+        share = np.diff(done, prepend=0.0)
         # LP(y) = exp(-s) (y0 + integral of y exp(s') ds'), with exp kept small by an origin per stretch
         slow = np.empty_like(y)
         last, begin = float(y[0]), 0

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -47,6 +48,12 @@ class Frame:
         """Time since the first sample (n,)."""
         return np.asarray(np.arange(self.input.size) * self.dt_s, dtype=np.float64)
 
+    @cached_property
+    def path(self) -> FloatArray:
+        """Length of the input's path at each sample (n,), wiggles of noise left out."""
+        turned = settled(self.input, 0.004 * self.reach)
+        return np.append(0.0, np.cumsum(np.abs(np.diff(turned))))
+
 
 class Cause:
     """A reason why a static Preisach model is wrong, with the operator that repairs it."""
@@ -63,10 +70,14 @@ class Cause:
     parameters: ClassVar[tuple[Quantity, ...]] = ()
     strengths: ClassVar[int] = 1  # so many leading parameters enter almost linearly
     lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model
+    in_rows: ClassVar[bool] = False  # an output cause too strong to be subtracted: linear, filters the rows
     feeds_back: ClassVar[bool] = False  # needs the output to compute the input
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try; the columns of a block are fitted together."""
+        """Blocks of parameter values to try; the columns of a block are fitted together.
+
+        ``residual`` holds the averages of each record at even steps, zero where there are none.
+        """
         raise NotImplementedError
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:

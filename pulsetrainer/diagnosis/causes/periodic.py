@@ -35,7 +35,7 @@ class Periodic(Cause):
         """Blocks of parameter values to try."""
         frame, one = frames[0], residual[0]
         power = np.abs(np.fft.rfft(one * np.hanning(one.size))) ** 2
-        dt_s = frame.dt_s * frame.input.size / one.size
+        dt_s = frame.dt_s * round(frame.input.size / one.size)
         frequency = np.fft.rfftfreq(one.size, dt_s)
         power[frequency < 0.4] = 0.0
         # against its surroundings: a line, not the slope of a spectrum

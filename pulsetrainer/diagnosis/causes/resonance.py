@@ -24,6 +24,7 @@ class Resonance(Cause):
     order = 70
     family = "resonance"
     strengths = 0
+    in_rows = True
     parameters = (
         Quantity("frequency", "Hz", 1.0, 200.0, 0.1),
         Quantity("damping", "1", 0.01, 0.7, 0.005),
@@ -42,5 +43,5 @@ class Resonance(Cause):
         # exact for an output that is straight between samples
         b, a, _ = signal.cont2discrete(oscillator, frame.dt_s, method="foh")
         b = b.ravel()
-        state = signal.lfilter_zi(b, a) * y[0]
-        return np.asarray(signal.lfilter(b, a, y, zi=state)[0])
+        state = np.multiply.outer(signal.lfilter_zi(b, a), y[0])
+        return np.asarray(signal.lfilter(b, a, y, axis=0, zi=state)[0])

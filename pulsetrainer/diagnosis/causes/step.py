@@ -32,12 +32,26 @@ class Step(Cause):
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        end = frames[0].time_s[-1]
-        size = 0.003 * frames[0].span
-        return [[(size, 0.0, t), (0.0, 0.003, t)] for t in (np.arange(1, 10) / 10.0 * end).tolist()]
+        frame, one = frames[0], residual[0]
+        dt_s = frame.dt_s * round(frame.input.size / one.size)
+        size = 0.003 * frame.span
+        edges = np.linspace(0.02, 0.98, 13) * one.size
+        times = [
+            _split(one, int(begin), int(end)) * dt_s for begin, end in zip(edges[:-2], edges[2:], strict=True)
+        ]
+        return [[(size, 0.0, t), (0.0, 0.003, t)] for t in dict.fromkeys(times)]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
         # between samples the change is shared out, so that the error falls smoothly with the time
         after = np.clip((frame.time_s - values[2]) / (20.0 * frame.dt_s) + 0.5, 0.0, 1.0)
         return y + after * (values[0] + values[1] * y)
+
+
+def _split(residual: FloatArray, begin: int, end: int) -> int:
+    """Place within a window where the means on both sides differ most (a refit cannot move far from it)."""
+    window = residual[begin:end]
+    count = np.arange(1, window.size)
+    apart = np.cumsum(window - window.mean())[:-1] ** 2 / (count * (window.size - count))
+    edge = window.size // 20 + 1
+    return begin + edge + 1 + int(np.argmax(apart[edge:-edge])) if window.size > 4 * edge else begin + edge

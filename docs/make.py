@@ -1,0 +1,310 @@
+"""Write the reference pages: ``python docs/make.py`` writes commands.md, format.md and decisions/README.md.
+
+They are read off the code: the commands off the program's own parser, the format off the annotations that
+the store writes by, the decisions off their titles. ``--check`` writes nothing and exits 1 where a page is not what the code says.
+"""  # noqa: INP001 - a folder of pages with its script, not a package
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from pulsetrainer.artefacts.kinds import KINDS
+from pulsetrainer.artefacts.schema import FieldPlan, plan_of
+from pulsetrainer.cli.app import app
+from pulsetrainer.cli.settings import SETTINGS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+HERE = Path(__file__).parent
+MARK = "<!-- made by `make docs` from the code: change the code, not this page -->"
+
+
+# --- commands ---------------------------------------------------------------------------------------------
+COMMANDS = """\
+# Commands
+
+{mark}
+
+`pulsetrainer COMMAND --help` says the same on the screen. Results go to stdout, progress and notes to stderr; bars show
+only on a terminal, colours nowhere when `NO_COLOR` is set. No command replaces a file without `--force`.
+
+With `--json` a command writes one object to stdout: `{{"schema": 1, "command": ..., ...}}`, and for an error
+`"error": {{"kind", "message", "hint"}}`.
+
+| exit code | what happened |
+|---|---|
+| 0 | it is done |
+| 1 | a quality gate failed: a bound of `evaluate --bounds`, a finding of `doctor` |
+| 2 | the command line, the settings, or an output that exists |
+| 3 | an artefact or its data |
+| 4 | the device or the line to it |
+| 5 | a fit or an inverse did not converge |
+| 70 | a bug of ours: `--debug` shows where |
+| 130 | you stopped it |
+
+`pulsetrainer --install-completion` teaches your shell the commands and options, `--show-completion` shows how.
+"""
+
+
+SETTINGS_WORDS = """\
+What stands in `pulsetrainer.toml` need not be typed. The file is that in the folder where you work, or the one that
+`--settings` or `PULSETRAINER_SETTINGS` names, or the one in your own configuration folder. A flag wins over the
+environment, the environment over the file, the file over the default; an unknown key is an error. A dot in a key is a
+table of the file.
+"""
+
+
+def commands_page() -> str:
+    """Return the reference of every command and option."""
+    root: Any = typer.main.get_command(app)
+    listed = [f"[{name}](#{name})" for name in root.commands]
+    parts = [COMMANDS.format(mark=MARK), ", ".join(listed) + "\n", *_options(root, of="every command")]
+    for name, command in root.commands.items():
+        parts += [
+            f"## {name}\n",
+            *_description(command.help),
+            *_arguments(command),
+            *_options(command, of=name),
+        ]
+    return "\n".join(parts + _settings())
+
+
+def _description(text: str) -> Iterator[str]:
+    for paragraph in text.strip().split("\n\n"):
+        line = " ".join(paragraph.split())
+        example = line.removeprefix("Example: ")
+        yield f"```console\n$ {example}\n```\n" if example != line else f"{line}\n"
+
+
+def _arguments(command: Any) -> Iterator[str]:
+    listed = [p for p in command.params if p.param_type_name == "argument"]
+    if listed:
+        yield "| argument | what |\n|---|---|"
+        for one in listed:
+            name = (one.metavar or one.name.upper()).strip("{}[]")
+            yield f"| `{_cell(name)}` | {_cell(one.help or '')}{'' if one.required else ' (may be left out)'} |"
+        yield ""
+
+
+def _options(command: Any, *, of: str) -> Iterator[str]:
+    yield f"| option of {of} | what | default |\n|---|---|---|"
+    for one in command.params:
+        if one.param_type_name == "option" and one.name != "help":
+            names = ", ".join(f"`{name}`" for name in (*one.opts, *one.secondary_opts))
+            variable = f" (environment: `{one.envvar}`)" if one.envvar else ""
+            yield f"| {names} | {_cell(one.help or '')}{variable} | {_default(one)} |"
+    yield ""
+
+
+def _default(option: Any) -> str:
+    if option.required:
+        return "must be given"
+    value = option.default
+    if value is None or value is False or value in ((), []):
+        return ""
+    if value is True:
+        return f"`{option.opts[0]}`" if option.secondary_opts else ""
+    return "" if callable(value) or not isinstance(value, str | int | float) else f"{value}"
+
+
+def _settings() -> list[str]:
+    rows = [
+        f"| `{one.key}` | {one.unit} | {one.what} | "
+        + ", ".join(sorted({command for command, _ in one.options}))
+        + f" | `{one.variable}` |"
+        for one in SETTINGS
+    ]
+    return [
+        "## Settings\n",
+        SETTINGS_WORDS,
+        "| key | unit | what | taken by | environment |\n|---|---|---|---|---|",
+        *rows,
+        "",
+    ]
+
+
+# --- format -----------------------------------------------------------------------------------------------
+FORMAT = """\
+# The files
+
+{mark}
+
+Every artefact is one HDF5 file. Any HDF5 reader opens it; axes are dimension scales, so xarray
+(`xarray.open_dataset("run.h5", engine="h5netcdf")`) finds them by name, and pint parses every unit.
+
+- **Root attributes**: `kind` ({kinds}), `format_version` (1), `title`, `created` (UTC, ISO 8601), `history` (a line a
+  command, oldest first), `provenance` (JSON: program, version, argv, effective parameters, seed, sha256 of the inputs,
+  versions of the libraries, serial number and firmware of the device), `samples` where there is a time axis.
+- **Datasets** have the attributes `units` and `quantity` (in words). Numbers are 64-bit floats, yes and no are 8-bit
+  integers with the attribute `dtype` = `bool`. NaN stands for a sample that was lost; what drives a device and what a model
+  is made of holds neither NaN nor infinity.
+- **Units** come with the data: where the table says `input_unit`, the attribute of that name in the same group says which.
+- **Groups** hold parts, groups named `0000`, `0001`, ... hold a list. What is marked *optional* may be missing.
+- An axis is the dataset of its name: `time` in seconds, or an index (`level`, `cell`, `repeat`, `group`). Time may be
+  missing in a run that was imported without one.
+- Files are written under another name and renamed when they are complete: a killed command leaves the old file or none. A
+  capture grows in place under a temporary name, and an interrupted one keeps what there is with `complete` = 0.
+
+Cells of the Preisach plane are numbered k = i (i + 1) / 2 + j, i >= j: the relays that switch up between levels i and i + 1,
+down between levels j and j + 1 ([theory](theory.md)).
+
+`pulsetrainer show FILE.h5` prints what a file holds, `pulsetrainer plot FILE.h5 -o figure.png` draws it.
+"""
+
+
+# attributes have no words of their own in the file
+WORDS = {
+    "cause": "id of the cause",
+    "clipped_samples": "targets outside the reachable range",
+    "complete": "the recording was not interrupted",
+    "confounded_with": "causes that these runs cannot tell from it",
+    "draws": "refits of the block bootstrap, 0 for none",
+    "dropped_samples": "lost on the wire; those that are here are right",
+    "evidence": "reasons for the verdict, in words",
+    "explains_percent": "of what can be explained of the squared error",
+    "found": "it was found",
+    "held_out_gain_percent": "of what can be explained, on blocks that were not fitted; NaN where not measured",
+    "input_quantity": "what the input is",
+    "input_unit": "unit of the input",
+    "inversion": "continuous, closest-match or extended",
+    "iterations": "of the solver",
+    "lower": "lower end of the interval",
+    "method": "joint or alternating",
+    "name": "its name",
+    "next_experiment": "what to measure next, in words",
+    "operator": "how the weights are read: continuous or relay",
+    "output_quantity": "what the output is",
+    "output_unit": "unit of the output",
+    "p_value": "over the whole library; 0 for what is read off the raw data",
+    "polarity": "1; or -1 where the output falls as the input rises",
+    "quick": "screened only",
+    "repeats": "how often each drive was played",
+    "samples": "of the records that were fitted",
+    "signal": "the excitation, or the table that was imported",
+    "smoothing": "length below which the density was smoothed, share of the input's range",
+    "source": "where the shape comes from, in words",
+    "text": "the cause in words",
+    "unit": "unit of the value",
+    "upper": "upper end of the interval",
+    "value": "the value",
+    "verdict": "id of the strongest cause, none or unknown",
+    "weights_unit": "unit of the weights: output over input squared",
+}
+
+
+def format_page() -> str:
+    """Return the description of every kind of artefact."""
+    parts = [FORMAT.format(mark=MARK, kinds=", ".join(KINDS))]
+    parents: list[type] = []
+    for kind, cls in KINDS.items():
+        parts += [f"## {kind}\n", f"{_first_line(cls)}\n", *_table(cls)]
+        parents += [inner for inner in _parts(cls) if inner not in parents]
+    parents = [cls for cls in parents if not hasattr(cls, "kind")]
+    for cls in parents:
+        parts += [f"## Part: {cls.__name__}\n", f"{_first_line(cls)}\n", *_table(cls)]
+    return "\n".join(parts)
+
+
+def _first_line(cls: type) -> str:
+    return (cls.__doc__ or "").strip().partition("\n\n")[0].replace("\n", " ")
+
+
+def _parts(cls: type) -> list[type]:
+    """Return the dataclasses that a class is made of, at any depth."""
+    direct = [plan.type for plan in plan_of(cls) if plan.role in ("group", "groups")]
+    return [found for inner in direct for found in (inner, *_parts(inner))]
+
+
+def _table(cls: type) -> Iterator[str]:
+    yield "| name | holds | axes | units | what |\n|---|---|---|---|---|"
+    for plan in plan_of(cls):
+        holds = _holds(plan) + (", optional" if plan.optional else "")
+        yield f"| `{plan.path}` | {holds} | {' × '.join(plan.dims)} | {_units(plan)} | {_quantity(plan)} |"
+    yield ""
+
+
+def _holds(plan: FieldPlan) -> str:
+    names = {float: "float", int: "integer", bool: "yes or no", str: "text"}
+    match plan.role:
+        case "array":
+            return "dataset, yes or no" if plan.type.__name__.startswith("bool") else "dataset"
+        case "number":
+            return "dataset, one number"
+        case "attribute":
+            return f"attribute, {names[plan.type]}"
+        case "list":
+            return f"attribute, list of {names[plan.type]}"
+        case "group":
+            return f"group: {_link(plan.type)}"
+        case "groups":
+            return f"list of groups: {_link(plan.type)}"
+
+
+def _link(cls: type) -> str:
+    kind = getattr(cls, "kind", None)
+    return f"[{kind}](#{kind})" if kind else f"[{cls.__name__}](#part-{cls.__name__.lower()})"
+
+
+def _units(plan: FieldPlan) -> str:
+    if plan.data is None:
+        return ""
+    unit = plan.data.units
+    return f"`{unit[1:]}`" if unit.startswith("@") else unit
+
+
+def _quantity(plan: FieldPlan) -> str:
+    if plan.data is None:
+        return "" if plan.role in ("group", "groups") else WORDS[plan.name]
+    words = plan.data.quantity
+    return f"as `{words[1:]}` says" if words.startswith("@") else _cell(words)
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "\\|")
+
+
+# --- decisions --------------------------------------------------------------------------------------------
+DECISIONS = """\
+# Decisions
+
+{mark}
+
+Ten lines each: what was decided, why, and what else was tried.
+
+"""
+
+
+def decisions_page() -> str:
+    """Return the list of all decisions."""
+    pages = sorted((HERE / "decisions").glob("[0-9]*.md"))
+    titles = [page.read_text(encoding="utf-8").partition("\n")[0].lstrip("# ").strip() for page in pages]
+    lines = [f"- [{title}]({page.name})\n" for title, page in zip(titles, pages, strict=True)]
+    return DECISIONS.format(mark=MARK) + "".join(lines)
+
+
+PAGES = {"commands.md": commands_page, "format.md": format_page, "decisions/README.md": decisions_page}
+
+
+def main() -> int:
+    """Write the pages, or with ``--check`` name those that are out of date."""
+    stale = []
+    for name, make in PAGES.items():
+        text, path = make(), HERE / name
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            stale.append(name)
+            if "--check" not in sys.argv:
+                path.write_text(text, encoding="utf-8")
+                print(f"wrote docs/{name}")
+    if stale and "--check" in sys.argv:
+        print(f"out of date: {', '.join(stale)}; run `make docs`", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

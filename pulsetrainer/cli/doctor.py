@@ -1,0 +1,54 @@
+"""``pulsetrainer doctor``: what stands in the way, each with its fix."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+import typer
+
+from pulsetrainer.cli import settings
+from pulsetrainer.cli.console import Screen, plain
+from pulsetrainer.cli.options import AsJson, Port
+
+_MARKS = {"ok": "ok", "warning": "warning", "problem": "PROBLEM"}
+
+
+def doctor(
+    context: typer.Context,
+    port: Port = None,
+    capture: Annotated[
+        bool, typer.Option(help="Drive the coil for 3 s, to half its range, and look at what comes back.")
+    ] = True,
+    json: AsJson = False,
+) -> None:
+    """Check this computer, its ports and the device.
+
+    Exit code 1 when something stands in the way. Nobody's finger should be on the device meanwhile.
+
+    Example: pulsetrainer doctor --port /dev/ttyUSB0
+    """
+    from pulsetrainer.errors import QualityError
+    from pulsetrainer.flows import doctor as flow
+
+    screen = Screen("doctor", as_json=json)
+    named = context.parent.params.get("settings_file") if context.parent else None
+    rows = settings.effective(settings.find(named, os.environ))
+    words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
+    with screen.working("looking") as working:
+        result = flow.run(flow.Options(port, capture, words), working)
+    payload = plain(result) | {"problems": result.problems}
+    problem = f"{result.problems} of {len(result.findings)} findings stand in the way"
+    hint = "follow the fixes, from the top"
+    if result.problems:
+        payload["error"] = {"kind": QualityError.kind, "message": problem, "hint": hint}
+    screen.result(payload)
+    if not json:
+        width = max(len(one.name) for one in result.findings)
+        for one in result.findings:
+            typer.echo(f"{_MARKS[one.state]:<8} {one.name:<{width}}  {one.found}")
+            if one.fix and one.state != "ok":
+                typer.echo(f"{'':<8} {'':<{width}}  fix: {one.fix}")
+    if result.problems:
+        typer.echo(f"error: {problem}\n  try: {hint}", err=True)
+        raise typer.Exit(QualityError.exit_code)

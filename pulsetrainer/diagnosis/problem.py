@@ -1,0 +1,66 @@
+"""The question: some records, the plane on which weights live, and how samples are averaged."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.design import Bins, Followed, Measured, bins_of
+from pulsetrainer.diagnosis.extended import Term, seen_input
+from pulsetrainer.errors import DataError
+
+LEVELS = 32  # of the plane on which causes are sought: finer ones take longer and decide the same
+SMOOTHING = 0.035  # share of the range
+_KEPT = 6  # followed inputs: some ten megabytes each
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The data, the plane on which the weights live, and how they are averaged."""
+
+    records: tuple[Measured, ...]
+    frames: tuple[Frame, ...]
+    plane: Plane
+    bins: Bins
+    measured: FloatArray  # (count,) averaged output
+    smoothing: float
+    _followed: OrderedDict[tuple[Term, ...], list[Followed]] = field(default_factory=OrderedDict, repr=False)
+
+    def paths(self, terms: tuple[Term, ...]) -> list[Followed]:
+        """Follow what the hysteresis sees of each record behind some input causes; the last few are kept."""
+        if terms not in self._followed:
+            self._followed[terms] = [
+                Followed.along(self.plane, seen_input(terms, record.output, frame))
+                for record, frame in zip(self.records, self.frames, strict=True)
+            ]
+            if len(self._followed) > _KEPT:
+                self._followed.popitem(last=False)
+        self._followed.move_to_end(terms)
+        return self._followed[terms]
+
+
+def problem_for(records: Sequence[Measured], low: float, high: float, levels: int = LEVELS) -> Problem:
+    """The records with masks applied, ready to be fitted.
+
+    Raises
+    ------
+    DataError
+        Input or output does not vary, or too few samples are left.
+    """
+    bins = bins_of(records)
+    measured = bins.average([r.output for r in records])
+    moved = np.concatenate([np.clip(r.input[r.weight > 0], low, high) for r in records])
+    if np.ptp(measured) == 0 or np.ptp(moved) == 0:
+        what = "output" if np.ptp(measured) == 0 else "input"
+        raise DataError(
+            f"the {what} does not vary, so nothing can be said about a cause",
+            hint="record a signal that sweeps the range: pulsetrainer capture diagnostic -o run.h5",
+        )
+    span, reach = float(np.ptp(measured)), high - low
+    frames = tuple(Frame(r.dt_s, r.input, span, reach, k, len(records)) for k, r in enumerate(records))
+    return Problem(tuple(records), frames, Plane.uniform(low, high, levels), bins, measured, SMOOTHING)

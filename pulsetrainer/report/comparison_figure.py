@@ -1,0 +1,52 @@
+"""The figure of a comparison: one panel a metric, one line a pulse and inversion, one place an evaluation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import cycle
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from pulsetrainer.report.style import BLUE, COLUMN_IN, GREEN, INK, VERMILION, styled
+
+_PANEL_IN = 2.3
+_NAMES = {
+    "mean_error_reduction_percent": "reduction of the mean error, %",
+    "compensated.mean_abs_error_percent": "mean error, % of full force",
+    "compensated.max_abs_error_percent": "max error, % of full force",
+    "rms_percent": "rms error, % of the span",
+    "max_percent": "max error, % of the span",
+}
+_LINES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
+
+
+@styled
+def draw(labels: Sequence[str], values: Mapping[str, Sequence[float | None]]) -> Figure:
+    """Return one panel for each of the headline metrics that are there, evaluations from left to right."""
+    panels: dict[str, dict[str, Sequence[float | None]]] = {}
+    for name, row in values.items():
+        for metric in _NAMES:
+            if name.endswith(f".{metric}"):
+                panels.setdefault(metric, {})[name.removesuffix(f".{metric}")] = row
+    figure = Figure(figsize=(COLUMN_IN, 0.6 + _PANEL_IN * len(panels)), layout="constrained")
+    axes_of = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    place = np.arange(len(labels))
+    for axes, (metric, rows) in zip(axes_of, panels.items(), strict=True):
+        colours, lines = cycle((BLUE, VERMILION, GREEN, INK)), cycle(_LINES)
+        for stem, row in rows.items():
+            line, marker = next(lines)
+            known = np.asarray([np.nan if v is None else v for v in row], dtype=np.float64)
+            axes.plot(
+                place, known, color=next(colours), linestyle=line, marker=marker, markersize=4, label=stem
+            )
+        axes.set_title(_NAMES[metric])
+        top = max((v for row in rows.values() for v in row if v is not None), default=1.0)
+        axes.set_ylim(0.0, 1.1 * top if top > 0 else 1.0)
+        axes.yaxis.set_major_locator(MaxNLocator(5))
+        axes.margins(x=0.08)
+    axes_of[0].legend(loc="best")
+    upright = max(map(len, labels), default=0) * len(labels) <= 60
+    axes_of[-1].set_xticks(place, labels, rotation=0 if upright else 30, ha="center" if upright else "right")
+    return figure

@@ -1,0 +1,105 @@
+"""A real browser, and two reports that the program made: an evaluation and a diagnosis."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+# one short record for both: six seconds of the device, twelve levels
+STEPS = (
+    "capture identification --levels 12 --speed 3 -o run.h5",
+    "identify run.h5 --levels 12 -o model.h5",
+    "invert normal --model model.h5 -o drive.h5",
+    "invert bifid --model model.h5 -o drive2.h5",
+    "play drive.h5 --repeats 2 -o played.h5",
+    "play drive2.h5 --repeats 2 -o played2.h5",
+    "evaluate played.h5 played2.h5 -o evaluation.h5 --html evaluation.html",
+    "diagnose run.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html",
+)
+# one interpreter for all steps: numpy and matplotlib are imported once
+ONE_PROCESS = """
+import sys
+from pulsetrainer.cli import app, guard
+for step in sys.argv[1:]:
+    sys.argv = ["pulsetrainer", *step.split()]
+    code = guard.funnel(app.app, sys.argv[1:])
+    assert code == 0, step
+"""
+
+
+@dataclass(frozen=True)
+class Report:
+    """One page and the artefact that it is about."""
+
+    kind: str
+    html: Path
+    h5: Path
+    figures: int
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory) -> Path:
+    """A folder in which the program has made both reports."""
+    here = tmp_path_factory.mktemp("reports")
+    done = subprocess.run(
+        [sys.executable, "-c", ONE_PROCESS, *STEPS],
+        cwd=here,
+        env={**os.environ, "PULSETRAINER_PORT": "bench:?seed=1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return here
+
+
+@pytest.fixture(scope="session", params=["evaluation", "diagnosis"])
+def report(request, folder) -> Report:
+    """Each report in turn."""
+    kind = request.param
+    figures = {"evaluation": 2 * 2 + 2, "diagnosis": 1 + 5 + 1}[kind]
+    return Report(kind, folder / f"{kind}.html", folder / f"{kind}.h5", figures)
+
+
+@pytest.fixture(scope="package")
+def browser():
+    """A headless Chromium of this machine; without one these tests cannot say anything."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.skip(f"none of {', '.join(BROWSERS)} is installed (Debian: apt-get install chromium)")
+    with playwright.sync_playwright() as play:
+        # in a container there is no user namespace for the sandbox, and the page is our own
+        started = play.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def opened(browser, report):
+    """Open the report without a network; what the console says and what is asked for is kept."""
+    contexts = []
+
+    def open_page(width: int = 1280, height: int = 900, scheme: str = "light"):
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, color_scheme=scheme, offline=True
+        )
+        contexts.append(context)
+        page = context.new_page()
+        page.said, page.asked = [], []
+        page.on("console", lambda message: page.said.append(f"{message.type}: {message.text}"))
+        page.on("pageerror", lambda error: page.said.append(f"error: {error}"))
+        page.on("request", lambda request: page.asked.append(request.url))
+        page.goto(report.html.as_uri())
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()

@@ -1,0 +1,224 @@
+"""The reports in a real browser: drawn, silent, readable in the dark, on a phone, on paper, by keyboard."""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+from itertools import pairwise
+from pathlib import Path
+
+import h5py
+import pytest
+
+pytestmark = pytest.mark.xdist_group("browser")
+
+MEASURING = Path(__file__).with_name("measuring.js").read_text()
+
+
+def measure(page, what, *arguments):
+    """Ask the page one of the questions of ``measuring.js``."""
+    page.evaluate(MEASURING)
+    return page.evaluate(f"(arguments) => measuring.{what}(...arguments)", list(arguments))
+
+
+def test_nothing_is_asked_of_a_network_and_the_console_is_silent(opened, report):
+    """The file itself is the only request, although the whole page was scrolled and unfolded."""
+    page = opened()
+    page.locator("summary").click()
+    page.keyboard.press("End")
+    page.wait_for_load_state("networkidle")
+    assert page.asked == [report.html.as_uri()]
+    assert page.said == []
+    assert page.title().startswith(report.kind.capitalize())
+
+
+def test_figures_are_drawn_and_named(opened, report):
+    """Each has a size, a curve that spans it, nothing beyond its frame, and a name for a screen reader."""
+    page = opened()
+    figures = measure(page, "figures")
+    assert len(figures) == report.figures
+    for figure in figures:
+        assert figure["width"] > 200
+        assert figure["height"] > 100
+        assert figure["longest"] > figure["width"] / 2
+        assert figure["outside"] == 0
+        assert figure["texts"] > 4
+    images = page.get_by_role("img").and_(page.locator("svg"))
+    assert images.count() == report.figures
+    names = [page.locator(f"[id='{i}']").first.text_content() for i in _labels(images)]
+    assert len(set(names)) == report.figures
+    assert all(len(name) > 10 for name in names)
+
+
+def _labels(images):
+    return [image.get_attribute("aria-labelledby").split()[0] for image in images.all()]
+
+
+def test_headings_are_in_order(opened):
+    """One first heading, and none skips a level."""
+    levels = opened().evaluate("[...document.querySelectorAll('h1,h2,h3,h4')].map(h => +h.tagName[1])")
+    assert levels[0] == 1
+    assert levels.count(1) == 1
+    assert all(b <= a + 1 for a, b in pairwise(levels))
+
+
+def test_numbers_are_those_of_the_file(opened, report):
+    """Read by h5py: each number in the page is the file's to the last bit and is printed as that number."""
+    page = opened()
+    shown = measure(page, "numbers", "data-metric")
+    with h5py.File(report.h5) as file:
+        expected = {"evaluation": _evaluation, "diagnosis": _diagnosis}[report.kind](file)
+    for one in shown:
+        value = expected[one["metric"]]
+        assert float(one["value"]) == value, one
+        _prints(one["text"], value)
+    wanted = {name for name in expected if not name.endswith((".lower", ".upper"))}
+    assert {one["metric"] for one in shown} >= wanted
+    assert len(shown) > 20
+
+
+def _evaluation(file):
+    """Return every number of an evaluation by the name that it has in the page."""
+    found = {}
+    for group in file["waveforms"].values():
+        stem = f"{group.attrs['name']}.{group.attrs['inversion']}"
+        found[f"{stem}.repeats"] = float(group.attrs["repeats"])
+        for name in ("mean_error_reduction_percent", "noise_percent", "full_force"):
+            found[f"{stem}.{name}"] = group[name][()]
+        for drive in ("scaled", "compensated"):
+            for name, data in group[drive].items():
+                if data.shape == ():
+                    found[f"{stem}.{drive}.{name}"] = data[()]
+    model = file["model"]
+    found |= {
+        "model.levels": model["levels"].size - 1,
+        "model.cells": model["weights"].size,
+        "model.offset": model["offset"][()],
+    }
+    for name in ("coverage_percent", "rms", "rms_percent"):
+        found[f"model.fit.{name}"] = model["fit"][name][()]
+    assert len(found) == 2 * (4 + 2 * 5) + 6
+    return found
+
+
+def _diagnosis(file):
+    """Return every number of the two tables of a diagnosis by the name that it has in the page."""
+    names = ("rms_percent", "noise_percent", "static_percent", "extended_percent", "floor_percent")
+    found = {name: file[name][()] for name in names}
+    listed = [cause.attrs for cause in file["causes"].values()]
+    chosen = [one for one in listed if one["found"]]
+    chosen += [one for one in listed if not one["found"] and one["explains_percent"] > 0]
+    for one in chosen[:12]:
+        for name in ("p_value", "explains_percent", "held_out_gain_percent"):
+            value = float(one[name])
+            if name != "held_out_gain_percent" or (one["found"] and math.isfinite(value)):
+                found[f"{one['cause']}.{name}"] = value
+    return found
+
+
+def _prints(text, value):
+    """Hold that a text is a number rounded to the digits that it shows."""
+    digits = text.replace("−", "-")
+    assert re.fullmatch(r"-?\d+(\.\d+)?(e-?\d+)?", digits), text
+    exponent = int(digits.partition("e")[2] or 0)
+    unit = 10.0 ** (exponent - len(digits.partition("e")[0].partition(".")[2]))
+    assert abs(float(digits) - value) <= 0.5 * unit * (1 + 1e-9), (text, value)
+
+
+def test_dark_is_dark_and_both_schemes_can_be_read(opened):
+    """WCAG 2.1: 4.5 for every text, those in figures too; 3 for the colours of the curves."""
+    seen = {}
+    for scheme in ("light", "dark"):
+        page = opened(scheme=scheme)
+        texts = measure(page, "texts")
+        assert len(texts) > 100
+        pale = [one for one in texts if one["contrast"] < 4.5]
+        assert pale == []
+        lines = measure(page, "lines")
+        assert [one for one in lines if one["contrast"] < 3.0] == []
+        seen[scheme] = (
+            page.evaluate("getComputedStyle(document.body).backgroundColor"),
+            {one["colour"] for one in texts},
+            {one["name"]: one["colour"] for one in lines},
+        )
+    (light_paper, light_texts, light_lines), (dark_paper, dark_texts, dark_lines) = seen.values()
+    assert sum(_rgb(dark_paper)) < 150
+    assert sum(_rgb(light_paper)) > 700
+    assert not light_texts & dark_texts
+    assert all(light_lines[name] != dark_lines[name] for name in light_lines)
+
+
+def _rgb(colour):
+    return [float(part) for part in re.findall(r"[\d.]+", colour)[:3]]
+
+
+@pytest.mark.parametrize("width", [320, 360, 412])
+def test_a_phone_never_scrolls_sideways(opened, width):
+    """Wide tables scroll by themselves; text stays large enough, in figures too."""
+    page = opened(width=width, height=740)
+    page.locator("summary").click()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert measure(page, "beyond") == []
+    if width >= 360:
+        assert [one for one in measure(page, "texts") if one["px"] < 7.0] == []
+
+
+def test_paper_has_everything(opened, report):
+    """The PDF of a dark screen: dark on light, every section, and what was folded away."""
+    pypdf = pytest.importorskip("pypdf", reason="pypdf is not installed")
+    page = opened(scheme="dark")
+    page.emulate_media(media="print", color_scheme="dark")
+    assert sum(_rgb(page.evaluate("getComputedStyle(document.body).color"))) < 200
+    assert measure(page, "beyond") == []
+    headings = page.locator("h1, h2").all_text_contents()
+    provenance = page.locator("#provenance-json").text_content()
+    pdf = report.html.with_suffix(".pdf")
+    page.pdf(path=pdf, prefer_css_page_size=True)
+    document = pypdf.PdfReader(pdf)
+    # ligatures are letters, and where a line is broken is the printer's business
+    text = unicodedata.normalize("NFKC", "".join(sheet.extract_text() for sheet in document.pages))
+    squeezed = re.sub(r"\s+", "", text)
+    for words in (*headings, provenance, page.locator("pre.history").text_content()):
+        assert re.sub(r"\s+", "", unicodedata.normalize("NFKC", words)) in squeezed
+    assert 2 <= len(document.pages) <= 8
+
+
+def test_the_keyboard_reaches_everything_in_order(opened):
+    """Tab visits what a mouse can use, in the order of the page, each with a ring around it."""
+    page = opened(width=360, height=740)
+    page.locator("summary").click()  # what is folded away counts too
+    page.evaluate("document.activeElement.blur()")
+    page.mouse.click(1, 1)
+    expected = measure(page, "interactive")
+    visited = []
+    for _ in range(expected):
+        page.keyboard.press("Tab")
+        visited.append(page.evaluate("document.activeElement.dataset.order"))
+        assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    assert visited == [str(k) for k in range(expected)]
+    assert expected > 8
+
+
+def test_the_first_key_leads_past_the_head(opened):
+    """The skip link shows when it has the focus, and leads to the result."""
+    page = opened()
+    page.keyboard.press("Tab")
+    skip = page.get_by_role("link", name="Skip to the result")
+    assert skip.bounding_box()["x"] >= 0
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "main"
+    folded = page.locator("details")
+    assert folded.get_attribute("open") is None
+    page.locator("summary").focus()
+    page.keyboard.press("Enter")
+    assert folded.get_attribute("open") is not None
+
+
+def test_axe_finds_nothing(opened):
+    """The rules of axe-core, an independent judge of accessible pages."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+    page = opened()
+    page.locator("summary").click()
+    found = axe.Axe().run(page).response["violations"]
+    assert [(one["id"], one["nodes"][0]["html"][:120]) for one in found] == []

@@ -1,0 +1,80 @@
+"""Evaluations side by side: as a table, as JSON, as a file."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+
+@pytest.fixture
+def folder(as_built, run):
+    """Run in the tests' own folder with the evaluations of the paper's and our method."""
+
+    def call(*words):
+        return run("compare", as_built / "evaluation-relay.h5", as_built / "evaluation-continuous.h5", *words)
+
+    return call
+
+
+def test_before_and_after(folder, as_built):
+    """The values are those of the evaluations; the change has the right sign and word."""
+    import json
+
+    done = folder("--json")
+    assert done.code == 0, done
+    before, after = (json.loads((as_built / f"{name}.json").read_text()) for name in ("relay", "continuous"))
+    metrics = {m["name"]: m for m in done.json["metrics"]}
+    for k, pulse in enumerate(("normal", "bifid")):
+        one = metrics[f"{pulse}.mean_error_reduction_percent"]
+        wanted = [d["waveforms"][k]["mean_error_reduction_percent"] for d in (before, after)]
+        assert one["values"] == pytest.approx(wanted)
+        assert one["change"] == pytest.approx(wanted[1] - wanted[0])
+        assert one["better"] is True
+        worst = metrics[f"{pulse}.compensated.max_abs_error_percent"]
+        assert worst["better"] is True
+        assert worst["change"] < 0
+    assert len(folder("--json", "--all").json["metrics"]) > len(metrics)
+
+
+def test_as_text(folder):
+    """A row for each figure, and the word for the change."""
+    done = folder()
+    assert done.code == 0
+    assert "normal: reduction" in done.out
+    assert "better" in done.out
+    assert "worse" not in done.out
+
+
+def test_as_figure_and_as_table(folder, tmp_path):
+    """PNG and SVG are pictures; CSV can be read back; what exists is not replaced."""
+    assert folder("-o", tmp_path / "c.png").code == 0
+    assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
+    assert folder("-o", tmp_path / "c.svg").code == 0
+    assert b"<svg" in (tmp_path / "c.svg").read_bytes()
+    assert folder("-o", tmp_path / "c.csv").code == 0
+    with (tmp_path / "c.csv").open() as file:
+        rows = list(csv.reader(file))
+    assert rows[0][0] == "metric"
+    assert float(rows[1][3]) == pytest.approx(float(rows[1][2]) - float(rows[1][1]))
+    assert folder("-o", tmp_path / "c.csv").code == 2
+    assert folder("-o", tmp_path / "c.docx").code == 2
+
+
+def test_bad_input(run, as_built):
+    """One file, a file of another kind: each its message."""
+    done = run("compare", as_built / "evaluation-relay.h5")
+    assert done.code == 2
+    assert "at least two" in done.err
+    done = run("compare", as_built / "evaluation-relay.h5", as_built / "run.h5")
+    assert done.code == 3
+    assert "expected an evaluation" in done.err or "evaluation" in done.err
+
+
+def test_two_evaluations_without_a_common_figure(run, as_built, tmp_path):
+    """A pulse against a prediction: nothing to compare, said so."""
+    model = as_built / "model-continuous.h5"
+    assert run("evaluate", as_built / "run.h5", "--model", model, "-o", tmp_path / "fit.h5").code == 0
+    done = run("compare", tmp_path / "fit.h5", as_built / "evaluation-relay.h5")
+    assert done.code == 3
+    assert "in common" in done.err

@@ -1,0 +1,82 @@
+"""What `doctor` finds: each trouble with its fix, nothing where there is none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from program import pulsetrainer
+
+
+def _named(done):
+    return {one["name"]: one for one in done.json["findings"]}
+
+
+def test_a_sound_bench_has_no_findings(run):
+    """Everything that is looked at is named, and in order."""
+    done = run("doctor", "--port", "bench:", "--json")
+    assert done.code == 0, done
+    found = _named(done)
+    for name in ("versions", "compiler", "folder", "settings", "device", "link", "force noise", "saturation"):
+        assert found[name]["state"] == "ok", found[name]
+    assert done.json["problems"] == 0
+    assert "numpy" in found["versions"]["found"]
+    assert "firmware" in found["device"]["found"]
+
+
+@pytest.mark.parametrize(
+    ("setting", "name", "state", "words"),
+    [
+        ("saturation=4", "saturation", "problem", "cut off"),
+        ("noise=0.02", "force noise", "warning", "of"),
+        ("wire=0.002&wire-seed=2", "link", "warning", "lost"),
+    ],
+)
+def test_troubles_of_the_device_are_found(run, setting, name, state, words):
+    """A force that is cut off, a noisy sensor, a bad wire."""
+    done = run("doctor", "--port", f"bench:?{setting}", "--json")
+    finding = _named(done)[name]
+    assert finding["state"] == state, finding
+    assert words in finding["found"]
+    assert finding["fix"]
+    assert done.code == (1 if state == "problem" else 0)
+
+
+def test_an_absent_port_is_a_problem_with_a_fix(run):
+    """As text, as a person reads it; nothing is captured."""
+    done = run("doctor", "--port", "/dev/ttyNOWHERE")
+    assert done.code == 1
+    assert "PROBLEM  device" in done.out
+    assert "fix: check the cable" in done.out
+    assert "link" not in done.out
+
+
+def test_without_a_compiler_the_fix_is_named(run, tmp_path):
+    """An empty PATH: no compiler, no emulator."""
+    done = run(
+        "doctor", "--no-capture", "--json", env={"PATH": str(tmp_path), "CC": "", "PULSETRAINER_PORT": "x"}
+    )
+    found = _named(done)
+    if found["compiler"]["state"] == "ok":
+        assert "ziglang" in found["compiler"]["found"]
+    else:
+        assert "apt install" in found["compiler"]["fix"]
+    assert found["emulator"]["state"] == "warning"
+    assert "apt install" in found["emulator"]["fix"]
+
+
+def test_a_folder_that_cannot_be_written_is_a_problem():
+    """Said before an hour of capture has nowhere to go; not even root may write in /proc."""
+    done = pulsetrainer(Path("/proc"), "doctor", "--no-capture", "--json")
+    found = _named(done)["folder"]
+    assert found["state"] == "problem"
+    assert "cannot be written" in found["found"]
+    assert found["fix"]
+    assert done.code == 1
+
+
+def test_no_capture_leaves_the_coil_alone(run):
+    """Only who the device is."""
+    found = _named(run("doctor", "--port", "bench:", "--no-capture", "--json"))
+    assert "device" in found
+    assert "link" not in found

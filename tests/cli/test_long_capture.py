@@ -1,0 +1,208 @@
+"""Captures longer than the device stays on, longer than the memory should hold, and cut off in the middle."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from program import PROGRAM, pulsetrainer
+
+from pulsetrainer.artefacts.kinds import Run
+from pulsetrainer.artefacts.recorder import RunRecorder
+from pulsetrainer.artefacts.store import read, read_header, read_samples
+from pulsetrainer.core import signals
+from pulsetrainer.errors import DataError
+
+SEED = 20260103
+IDENTIFICATION = ("capture", "identification", "--levels", "16", "--speed", "3", "--repeats", "40")
+STEP_A = 1.5e-4  # the device tells currents in steps of 0.1 mA
+
+
+def reference_of(run: Run) -> np.ndarray:
+    """The reference without what was led in again after each seam."""
+    parts = run.parts()
+    played = [parts[0].reference]
+    for part in parts[1:]:
+        whole = np.concatenate(played)
+        signal_ = course()
+        rest = signal_[whole.size :]
+        k = part.reference.size - rest.size if part is parts[-1] else None
+        if k is None:  # cut off itself: find the place where it follows the course again
+            k = next(
+                j
+                for j in range(part.reference.size)
+                if np.all(
+                    np.abs(part.reference[j : j + 400] - rest[: part.reference[j : j + 400].size]) < STEP_A
+                )
+            )
+        played.append(part.reference[k:])
+    return np.concatenate(played)
+
+
+def course() -> np.ndarray:
+    """The reference of ``IDENTIFICATION`` in full."""
+    one = signals.identification(0.0, 1.5, n_h=16, speed=3.0, rate_Hz=1000.0).value
+    return np.tile(one, 40)
+
+
+def killed(folder: Path, words: tuple[str, ...], after_samples: int) -> None:
+    """Start a capture and kill it once it has recorded so many samples."""
+    before = set(folder.iterdir())
+    process = subprocess.Popen([*PROGRAM, *words], cwd=folder, stdout=subprocess.DEVNULL)
+    deadline = time.monotonic() + 60
+    while True:
+        fresh = [path for path in set(folder.iterdir()) - before if ".partial" in path.name]
+        with contextlib.suppress(DataError):  # just made
+            if fresh and read_samples(fresh[0]) > after_samples:
+                break
+        assert process.poll() is None, "ended before it could be killed"
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+
+
+def test_resumed_after_two_kills_it_is_the_whole_course(tmp_path):
+    """Every sample of the course once and in order, seams where it was cut, no file left over."""
+    rng = random.Random(SEED)
+    print("seed", SEED)
+    words = (*IDENTIFICATION, "-o", "run.h5")
+    killed(tmp_path, words, rng.randrange(20_000, 150_000))
+    first = read(tmp_path / "run.h5.partial", Run)
+    assert not first.complete
+    killed(tmp_path, (*words, "--resume"), first.input.size + rng.randrange(20_000, 100_000))
+    done = pulsetrainer(tmp_path, *words, "--resume", "--json")
+    assert done.code == 0, done
+    assert done.json["parts"] == 3
+    assert done.json["complete"] is True
+    assert "going on with run.h5.partial-2" in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
+    run = read(tmp_path / "run.h5", Run)
+    assert np.array_equal(run.output[: first.output.size], first.output)
+    assert np.flatnonzero(run.seam)[0] == first.output.size
+    np.testing.assert_allclose(reference_of(run), course(), atol=STEP_A)
+    assert sum("--resume" in line for line in read_header(tmp_path / "run.h5").history) == 2
+    for part in run.parts():
+        assert part.reference[0] <= STEP_A  # each begins at zero, with a known memory
+
+    # what is made of it: as of a run that was never cut
+    assert pulsetrainer(tmp_path, "identify", "run.h5", "--levels", "16", "-o", "cut.h5").code == 0
+    assert pulsetrainer(tmp_path, *IDENTIFICATION, "-o", "whole.h5").code == 0
+    assert pulsetrainer(tmp_path, "identify", "whole.h5", "--levels", "16", "-o", "uncut.h5").code == 0
+    models = ("--model", "uncut.h5", "--model", "cut.h5")
+    uncut, cut = pulsetrainer(tmp_path, "evaluate", "whole.h5", *models, "--json").json["models"]
+    assert cut["rms"] < 1.02 * uncut["rms"]
+
+
+def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
+    """What a device's fault cut off goes on under its own name, without --force; the way down is kept."""
+    words = ("capture", "identification", "--levels", "12", "--speed", "3", "-o", "run.h5")
+    done = pulsetrainer(tmp_path, *words, "--port", "bench:?break=current-zero@4")
+    assert done.code == 4, done
+    assert not read(tmp_path / "run.h5", Run).complete
+    cut = read(tmp_path / "run.h5", Run).output
+    refused = pulsetrainer(tmp_path, *words)
+    assert refused.code == 2
+    done = pulsetrainer(tmp_path, *words, "--resume")
+    assert done.code == 0, done
+    run = read(tmp_path / "run.h5", Run)
+    assert run.complete
+    assert np.array_equal(run.output[: cut.size], cut)
+    assert len(run.parts()) == 2
+    last = run.parts()[1].reference
+    one = signals.identification(0.0, 1.5, n_h=12, speed=3.0, rate_Hz=1000.0).value
+    np.testing.assert_allclose(last[-500:], one[-500:], atol=STEP_A)
+
+
+def test_what_cannot_be_resumed_says_why(tmp_path):
+    """Nothing there, complete, other options, another signal's recording, still being written."""
+    words = ("capture", "identification", "--levels", "12", "--speed", "12", "-o", "run.h5")
+    cases = [((), "nothing to resume: neither run.h5 nor run.h5.partial", "leave --resume out")]
+
+    def refused(extra, said, hint):
+        done = pulsetrainer(tmp_path, *words, "--resume", *extra)
+        assert done.code == 2, done
+        assert said in done.err
+        assert hint in done.err
+
+    refused(*cases[0])
+    slow = ("capture", "identification", "--levels", "12", "--speed", "0.75", "-o", "run.h5")
+    killed(tmp_path, (*slow, "--port", "bench:?speed=real"), 200)
+    before = (tmp_path / "run.h5.partial").read_bytes()
+    refused((), "other options: speed_A_per_s was 0.75, now it is 12", "same options")
+    noted = pulsetrainer(tmp_path, *words)
+    assert noted.code == 0, noted
+    assert "run.h5.partial holds" in noted.err
+    assert "--resume" in noted.err
+    refused(("--speed", "0.75"), "run.h5 exists already and is complete", "--force")
+    (tmp_path / "run.h5.partial").unlink()
+    refused((), "nothing to resume: run.h5 is complete", "leave --resume out")
+    (tmp_path / "run.h5").unlink()
+    (tmp_path / "run.h5.partial").write_bytes(before)
+    with RunRecorder(tmp_path / "other.h5", read_header(tmp_path / "run.h5.partial")) as recorder:
+        recorder.append([0.0, 0.001], [0.5, 0.5], [0.5, 0.5], [1.0, 1.0])
+        (tmp_path / "run.h5.partial").unlink()
+        os.link(tmp_path / "other.h5.partial", tmp_path / "run.h5.partial")
+        refused(("--speed", "0.75"), "run.h5.partial is being written by another program", "wait")
+    done = pulsetrainer(tmp_path, *words, "--speed", "0.75", "--resume")
+    assert done.code == 3
+    assert "not that of this signal" in done.err
+
+
+def test_it_can_be_read_while_it_grows(tmp_path):
+    """Another process shows the capture that is under way, and sees it grow."""
+    words = ["capture", "diagnostic", "--port", "bench:?speed=real", "-o", "run.h5"]
+    process = subprocess.Popen([*PROGRAM, *words], cwd=tmp_path, stdout=subprocess.DEVNULL)
+    try:
+        deadline = time.monotonic() + 60
+        while not (tmp_path / "run.h5.partial").exists():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        counts = []
+        while len(counts) < 2:
+            done = pulsetrainer(tmp_path, "show", "run.h5.partial", "--json")
+            if done.code == 0 and done.json["facts"]["samples"]:
+                counts.append(done.json["facts"]["samples"])
+                assert done.json["facts"]["complete"] is False
+            assert time.monotonic() < deadline
+    finally:
+        process.kill()
+        process.wait()
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+
+
+_PEAK = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+"""
+
+
+def test_memory_does_not_grow_with_the_length(tmp_path):
+    """Half an hour takes no more memory than a quarter of one: the most that is held is one part."""
+
+    def peak_MB(repeats: int) -> float:
+        words = ["capture", "diagnostic", "--repeats", str(repeats), "--force", "-o", "run.h5"]
+        # a small process in between: a child is charged with the memory of who starts it
+        done = subprocess.run(
+            [sys.executable, "-c", _PEAK, *PROGRAM, *words],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return int(done.stdout.splitlines()[-1]) / 1024
+
+    short, long = peak_MB(10), peak_MB(20)
+    print(f"{short:.1f} MB for 15 min, {long:.1f} MB for 30 min")
+    samples = read(tmp_path / "run.h5", Run).input.size
+    assert samples > 1_800_000
+    assert long - short < 8  # the samples of the other quarter of an hour alone are 29 MB

@@ -1,0 +1,127 @@
+"""Settings: flag over environment over file over default; what is unknown is refused, what held is stored."""
+
+from __future__ import annotations
+
+import json
+
+import h5py
+import pytest
+
+PLAN = ("capture", "identification", "--dry-run", "--json", "-o", "run.h5")
+
+
+def test_flag_over_environment_over_file_over_default(run, tmp_path):
+    """Each layer hides the ones below it."""
+    env = {"PULSETRAINER_CURRENT_MAX_A": "1.1"}
+    assert run(*PLAN).json["peak_current_A"] == pytest.approx(1.5)
+    (tmp_path / "pulsetrainer.toml").write_text("current_max_A = 1.2\n")
+    assert run(*PLAN).json["peak_current_A"] == pytest.approx(1.2)
+    assert run(*PLAN, env=env).json["peak_current_A"] == pytest.approx(1.1)
+    assert run(*PLAN, "--current-max", "1", env=env).json["peak_current_A"] == pytest.approx(1.0)
+
+
+def test_a_file_can_be_named(run, tmp_path):
+    """By flag and by environment; one that is not there is an error."""
+    (tmp_path / "lab.toml").write_text("current_max_A = 0.9\n")
+    assert run("--settings", "lab.toml", *PLAN).json["peak_current_A"] == pytest.approx(0.9)
+    env = {"PULSETRAINER_SETTINGS": "lab.toml"}
+    assert run(*PLAN, env=env).json["peak_current_A"] == pytest.approx(0.9)
+    done = run("--settings", "nowhere.toml", *PLAN)
+    assert done.code == 2
+    assert "nowhere.toml" in done.err
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("lvels = 3\n", "did you mean levels?"),
+        ("zzz = 3\n", "there are: port"),
+        ("levels = 4.5\n", "a whole number above 0"),
+        ("levels = true\n", "a whole number above 0"),
+        ("rate_Hz = 0\n", "a number of Hz above 0"),
+        ("rate_Hz = nan\n", "a number of Hz above 0"),
+        ("port = 3\n", "must be text"),
+        ("port = \n", "cannot be read"),
+    ],
+)
+def test_a_wrong_setting_is_refused(run, tmp_path, text, words):
+    """Exit 2, the file and the key named, the next step."""
+    (tmp_path / "pulsetrainer.toml").write_text(text)
+    done = run(*PLAN)
+    assert done.code == 2, done
+    assert words in done.err
+    assert "pulsetrainer.toml" in done.err
+    assert "Traceback" not in done.err
+    assert run("capture", "--help").code == 0  # help does not need the file
+
+
+def test_effective_values_are_in_the_provenance(run, tmp_path):
+    """Those of the file too: what was in force can be read off the artefact."""
+    (tmp_path / "pulsetrainer.toml").write_text(
+        "levels = 6\ncurrent_max_A = 0.5\nspeed_A_per_s = 3\n[limits]\ncurrent_A = 0.6\n"
+    )
+    assert run("capture", "identification", "-o", "run.h5").code == 0
+    assert run("identify", "run.h5", "-o", "model.h5").code == 0
+    with h5py.File(tmp_path / "run.h5") as file:
+        captured = json.loads(file.attrs["provenance"])["parameters"]
+    assert captured["levels"] == 6
+    assert captured["current_max_A"] == 0.5
+    assert captured["limits"]["current_A"] == 0.6
+    with h5py.File(tmp_path / "model.h5") as file:
+        identified = json.loads(file.attrs["provenance"])["parameters"]
+    assert identified["levels"] == 6
+
+
+def test_limits_are_in_force_on_the_device(run, tmp_path):
+    """What goes beyond is refused before anything moves; a force beyond switches off."""
+    refused = run("capture", "identification", "--limit-current", "0.4", "--current-max", "0.5", "-o", "a.h5")
+    assert refused.code in (3, 4)
+    assert "0..0.4 A" in refused.err
+    tripped = run("capture", "identification", "--limit-force", "5", "-o", "b.h5")
+    assert tripped.code == 4
+    assert "force above its limit" in tripped.err
+    raised = run("capture", "identification", "--limit-current", "9", "-o", "c.h5")
+    assert raised.code == 3
+    assert "can only be lowered" in raised.err
+
+
+def test_dry_run_touches_nothing(run, tmp_path):
+    """No port is opened, no file written, and an output that exists is still refused."""
+    done = run("capture", "diagnostic", "--dry-run", "--port", "/dev/ttyNOWHERE", "-o", "run.h5")
+    assert done.code == 0, done
+    assert "nothing was done" in done.out
+    assert list(tmp_path.iterdir()) == []
+    plan = run("capture", "diagnostic", "--dry-run", "--json", "-o", "run.h5").json
+    assert plan["dry_run"] is True
+    assert 80 < plan["seconds"] < 120
+    assert plan["peak_current_A"] <= 1.5
+    (tmp_path / "run.h5").write_text("mine")
+    assert run(*PLAN).code == 2
+
+
+def test_dry_run_of_a_play_is_what_the_play_does(run, tmp_path):
+    """Duration and peak current of the plan are those of the playback."""
+    short = ("--levels", "8", "--current-max", "1", "--speed", "3")
+    assert run("capture", "identification", *short, "-o", "run.h5").code == 0
+    assert run("identify", "run.h5", "--levels", "8", "--smoothing", "0", "-o", "model.h5").code == 0
+    assert run("invert", "normal", "--model", "model.h5", "-o", "drive.h5").code == 0
+    plan = run("play", "drive.h5", "--repeats", "2", "--dry-run", "--json", "-o", "played.h5").json
+    assert not (tmp_path / "played.h5").exists()
+    played = run("play", "drive.h5", "--repeats", "2", "--json", "-o", "played.h5").json
+    assert plan["seconds"] == pytest.approx(played["seconds"], rel=1e-3)
+    assert plan["samples"] == played["samples"]
+    with h5py.File(tmp_path / "played.h5") as file:
+        peak = max(file["compensated/reference"][()].max(), file["scaled/reference"][()].max())
+    assert plan["peak_current_A"] == pytest.approx(peak, abs=2e-4)
+
+
+def test_verbose_says_what_is_done_on_stderr(run):
+    """Each step with its time; stdout stays the same."""
+    words = ("capture", "identification", "--levels", "4", "--speed", "3", "--current-max", "0.5", "--json")
+    done = run(*words, "-o", "run.h5", "--verbose")
+    assert done.code == 0
+    assert done.json["samples"] > 0
+    assert "firmware" in done.err
+    assert "conditioning" in done.err
+    quiet = run(*words, "-o", "run2.h5")
+    assert quiet.err == ""

@@ -1,0 +1,131 @@
+"""Every command block of README, tutorial and how-tos is run, in order, in an empty folder."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from pages import ROOT, Block, blocks
+
+HOW_TO = ROOT / "docs" / "how-to"
+# Blocks that a test cannot run inside itself: they install into .venv and start this very test.
+NOT_RUN = ("make demo", "make test")
+
+
+@pytest.fixture(scope="session")
+def given(tmp_path_factory) -> Path:
+    """What the pages take for granted: artefacts of the tutorial, records of the reader's bench."""
+    folder = tmp_path_factory.mktemp("given")
+    for line in (
+        "pulsetrainer capture identification -o run.h5",
+        "pulsetrainer capture identification --speed 2 --levels 12 -o other.h5",
+        "pulsetrainer identify run.h5 --levels 24 -o model.h5",
+        "pulsetrainer invert normal --model model.h5 -o drive.h5",
+        "pulsetrainer play drive.h5 -o played.h5",
+        "pulsetrainer evaluate played.h5 -o last-week.h5",
+    ):
+        done = shell(line, folder)
+        assert done.returncode == 0, done.stderr
+    for name, source, step in (("scope.csv", "run.h5", 20), ("other.csv", "other.h5", 1)):
+        with h5py.File(folder / source) as file:
+            columns = np.column_stack([file[key][::step] for key in ("time", "input", "output")])
+        np.savetxt(folder / name, columns, delimiter=",", header="t_s,current_A,force_N", comments="")
+    shutil.copy(folder / "other.h5", folder / "other-run.h5")
+    shutil.copytree(ROOT / "workflow", folder / "workflow")
+    return folder
+
+
+def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run one command as a shell would, with this interpreter's programs first."""
+    return subprocess.run(
+        ["sh", "-c", command],
+        cwd=folder,
+        env={
+            **os.environ,
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "COLUMNS": "100",
+        },
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+
+
+# page, what must be there before
+RUN = {
+    ROOT / "README.md": ("scope.csv", "other-run.h5"),
+    ROOT / "docs/tutorial.md": (),
+    HOW_TO / "own-bench.md": ("scope.csv", "other.csv"),
+    HOW_TO / "ci.md": ("played.h5", "last-week.h5"),
+    HOW_TO / "batches.md": ("workflow",),
+}  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
+# the README takes as long as all others together
+GROUPS = [
+    pytest.param(page, id=page.stem, marks=pytest.mark.xdist_group(f"docs-{page.stem == 'README'}"))
+    for page in RUN
+]
+
+
+@pytest.mark.parametrize("page", GROUPS)
+def test_commands_of_a_page_run(page, given, tmp_path):
+    """In the order of the page; what a page shows as output is what came out."""
+    for name in RUN[page]:
+        there = given / name
+        (shutil.copytree if there.is_dir() else shutil.copy)(there, tmp_path / name)
+    for block in blocks(page, "toml"):  # a file that the page shows, its name in the first line
+        name = re.match(r"# (\S+\.toml):", block.text)
+        if name:
+            (tmp_path / name[1]).write_text(block.text)
+    said, ran = "", 0
+    for block in blocks(page, "sh", "text"):
+        if block.language == "text":
+            if ran:
+                _shows(said, block)
+            continue
+        said = ""
+        for command in block.commands:
+            if command.startswith(NOT_RUN):
+                continue
+            done = shell(command, tmp_path)
+            assert done.returncode == 0, (f"{page.name}:{block.line}", command, done.stdout, done.stderr)
+            said += done.stdout + done.stderr
+            ran += 1
+    assert ran >= 2
+
+
+def test_what_is_not_run_is_there(given):
+    """The blocks that are left out are targets of the Makefile."""
+    left_out = [
+        c for block in blocks(ROOT / "README.md", "sh") for c in block.commands if c.startswith(NOT_RUN)
+    ]
+    assert len(left_out) == len(NOT_RUN)
+    makefile = (ROOT / "Makefile").read_text()
+    for command in left_out:
+        assert re.search(rf"^{command.split()[1]}:", makefile, flags=re.MULTILINE)
+
+
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
+
+
+def _shows(said: str, block: Block) -> None:
+    """Hold that each line of the block came out: the words exactly, decimals to two per cent."""
+    came = [(_NUMBER.sub("#", " ".join(line.split())), _NUMBER.findall(line)) for line in said.splitlines()]
+    for line in block.text.splitlines():
+        skeleton, numbers = _NUMBER.sub("#", " ".join(line.split())), _NUMBER.findall(line)
+        candidates = [found for words, found in came if words == skeleton]
+        assert any(_close(numbers, found) for found in candidates), (block.line, line, candidates)
+
+
+def _close(shown: list[str], found: list[str]) -> bool:
+    pairs = zip(shown, found, strict=True)
+    return all(
+        float(b) == pytest.approx(float(a), rel=0.02, abs=0.02) if "." in a else a == b for a, b in pairs
+    )

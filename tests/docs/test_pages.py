@@ -1,0 +1,197 @@
+"""What the pages say is so: links, commands, options, figures, the format."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+
+import h5py
+import pytest
+import report_examples
+import store_examples
+import typer
+from pages import PAGES, ROOT, anchors, blocks, links, tables, words
+
+from pulsetrainer.artefacts import store
+from pulsetrainer.cli.app import app
+from pulsetrainer.report.render import encode
+
+
+def script(name: str):
+    """Return a script of docs/ as a module."""
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", ROOT / "docs" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    """Each relative link is a file of the project, its anchor a heading of it."""
+    for target in links(page):
+        if target.startswith(("http://", "https://", "mailto:")):
+            continue
+        path, _, anchor = target.partition("#")
+        there = (page.parent / path).resolve() if path else page
+        assert there.exists(), f"{target}: no such file"
+        assert there.is_relative_to(ROOT)
+        assert not anchor or anchor in anchors(there), f"{target}: no such heading"
+
+
+def test_every_page_can_be_found():
+    """From the README, by links alone."""
+    seen, todo = set(), [ROOT / "README.md"]
+    while todo:
+        page = todo.pop()
+        seen.add(page)
+        for target in links(page):
+            there = (page.parent / target.partition("#")[0]).resolve()
+            if there.suffix == ".md" and there not in seen and there.exists():
+                todo.append(there)
+    assert {page for page in PAGES if page.is_relative_to(ROOT / "docs")} <= seen
+
+
+@pytest.mark.parametrize("name", script("make").PAGES)
+def test_reference_is_what_the_code_says(name):
+    """A command, option, dataset or unit that changed shows here; `make docs` writes the page."""
+    assert (ROOT / "docs" / name).read_text() == script("make").PAGES[name]()
+
+
+def test_commands_on_all_pages_exist():
+    """Every line that calls the program names a command that exists, and options that it has."""
+    root = typer.main.get_command(app)
+    found = 0
+    for page in PAGES:
+        for block in blocks(page):
+            for line in block.commands if block.language in ("sh", "console", "") else ():
+                called = words(line)
+                if called[:1] != ["pulsetrainer"] or len(called) < 2 or called[1].startswith("-"):
+                    continue
+                if called[1].isupper():  # COMMAND in general
+                    continue
+                assert called[1] in root.commands, f"{page.name}: {line}"
+                known = {
+                    name for p in root.commands[called[1]].params for name in (*p.opts, *p.secondary_opts)
+                }
+                used = {word.partition("=")[0] for word in called[2:] if re.match(r"--?[a-z]", word)}
+                assert used <= known | {"--help"}, f"{page.name}: {line}"
+                found += 1
+    assert found > 40
+
+
+# --- figures ----------------------------------------------------------------------------------------------
+BOUNDS = tomllib.loads((ROOT / "tests/regression/bounds.toml").read_text())
+ROWS = {
+    "mean error, scaled": "scaled.mean_abs_error_percent",
+    "mean error, compensated": "compensated.mean_abs_error_percent",
+    "reduction of the mean error": "mean_error_reduction_percent",
+    "max error, scaled": "scaled.max_abs_error_percent",
+    "max error, compensated": "compensated.max_abs_error_percent",
+}
+COLUMNS = {2: "normal.closest-match", 3: "normal.continuous", 5: "bifid.closest-match", 6: "bifid.continuous"}
+
+
+def _flat(table, prefix=""):
+    """Return a nested table as dotted names."""
+    flat = {}
+    for key, value in table.items():
+        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return flat
+
+
+def test_figures_of_the_readme_are_those_that_are_held():
+    """Each number of ours lies within the bounds that `make bounds` holds against the demo."""
+    bounds = _flat(BOUNDS)
+    table = next(t for t in tables(ROOT / "README.md") if t[0][0] == "% of full force")
+    assert [row[0] for row in table[1:]] == list(ROWS)
+    for name, *cells in table[1:]:
+        for column, stem in COLUMNS.items():
+            low, high = bounds[f"{stem}.{ROWS[name]}"]
+            assert low <= float(cells[column - 1]) <= high, (name, stem)
+
+
+def test_figures_of_the_theory_are_drawn_by_the_code(tmp_path):
+    """Each figure on the page has its function, and what is written in it is what the function writes."""
+    drawn = script("figures").FIGURES
+    shown = [target for target in links(ROOT / "docs/theory.md") if target.endswith(".svg")]
+    assert sorted(shown) == sorted(f"figures/{name}.svg" for name in drawn)
+    for name, draw in drawn.items():
+        made = encode(draw(), "svg").decode()
+        kept = (ROOT / "docs" / "figures" / f"{name}.svg").read_text()
+        labels = [re.findall(r"<text[^>]*>([^<]*[A-Za-zα-ω][^<]*)</text>", text) for text in (made, kept)]
+        assert labels[0] == labels[1]
+        assert len(labels[0]) >= 6
+        assert len(kept) < 60_000
+
+
+# --- the format -------------------------------------------------------------------------------------------
+def _described() -> dict[str, dict[str, list[str]]]:
+    """Return the rows of format.md by kind or part and name."""
+    page = (ROOT / "docs/format.md").read_text()
+    found = {}
+    for section in page.split("\n## ")[1:]:
+        title = section.partition("\n")[0].removeprefix("Part: ")
+        rows = [line.strip("|").split("|") for line in section.splitlines() if line.startswith("| `")]
+        found[title] = {row[0].strip(" `"): [cell.strip() for cell in row[1:]] for row in rows}
+    return found
+
+
+def _compare(group: h5py.Group, rows: dict[str, list[str]], pages: dict, where: str) -> int:
+    """Hold one group of a file against its table, and its parts against theirs; return how many were held."""
+    held = 0
+    scales = {"time", "level", "cell", "repeat", "group"}
+    described = {name.partition("/")[0] for name in rows}
+    unknown = set(group) - described - scales
+    assert not unknown, f"{where}: {unknown} are in the file, not on the page"
+    for name, (holds, axes, units, _) in rows.items():
+        item = group.get(name)
+        if holds.startswith("attribute"):
+            assert name in group.attrs, f"{where}: no attribute {name}"
+        elif item is None:
+            assert "optional" in holds, f"{where}: no {name}"
+            continue
+        elif holds.startswith("dataset"):
+            assert isinstance(item, h5py.Dataset)
+            assert [dim.label for dim in item.dims] == [axis for axis in axes.split(" × ") if axis] or (
+                name == "time" and axes == "time"
+            )
+            unit = group.attrs[units.strip("`")] if units.startswith("`") else units
+            assert item.attrs["units"] == unit, f"{where}: {name}"
+        else:
+            part = pages[re.match(r".*\[(\w+)\]", holds)[1]]
+            parts = item.values() if holds.startswith("list") else [item]
+            held += sum(_compare(one, part, pages, f"{where}/{name}") for one in parts)
+        held += 1
+    return held
+
+
+FILES = store_examples.EXAMPLES | {
+    "evaluation": report_examples.evaluation,
+    "evaluation of models": report_examples.model_comparison,
+    "extended model": report_examples.extended_model,
+}
+
+
+@pytest.mark.parametrize("example", FILES)
+def test_files_are_as_described(example, tmp_path):
+    """An artefact of each kind, read by plain h5py, holds what the page says, with its axes and units."""
+    pages = _described()
+    path = tmp_path / "example.h5"
+    artefact = FILES[example]()
+    store.write(path, artefact, store_examples.header())
+    with h5py.File(path) as file:
+        for name in ("kind", "format_version", "title", "created", "history", "provenance"):
+            assert name in file.attrs
+        assert _compare(file, pages[artefact.kind], pages, example) >= 5
+
+
+def test_demo_and_test_come_first():
+    """A fresh machine's two commands are the first block of the README."""
+    first = blocks(ROOT / "README.md")[0]
+    assert [command.split("#")[0].strip() for command in first.commands] == ["make demo", "make test"]
+    assert shutil.which("make") or Path("/usr/bin/make").exists()

@@ -1,0 +1,195 @@
+"""Batches: Snakemake and make run the same commands, and what comes out is what the commands make by hand."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.xdist_group("batches")
+
+ROOT = Path(__file__).parents[2]
+SNAKEFILE = ROOT / "workflow" / "Snakefile"
+PROGRAM = f"{sys.executable} -m pulsetrainer"
+# a short record, one repeat: the point is which commands run, not how good the model is
+SHORT = {"capture": "--levels 12 --speed 3", "identify": "--levels 12", "play": "--repeats 1"}
+DEVICES = "name\tport\nleft\tbench:?seed=3\nright\tbench:?seed=4\n"
+
+
+def snakemake(folder: Path, *words: object, **config: object) -> subprocess.CompletedProcess[str]:
+    """Run the Snakefile in ``folder`` with a configuration of its own."""
+    (folder / "my.json").write_text(json.dumps({"out": "out", "program": PROGRAM, **config}))
+    command = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--configfile", "my.json", *words]
+    done = subprocess.run(
+        list(map(str, command)), cwd=folder, capture_output=True, text=True, check=False, timeout=240
+    )
+    done.said = done.stdout + done.stderr
+    return done
+
+
+def by_hand(folder: Path, *lines: str) -> None:
+    """Run commands as a person types them."""
+    for line in lines:
+        done = subprocess.run([*PROGRAM.split(), *line.split()], cwd=folder, capture_output=True, check=False)
+        assert done.returncode == 0, (line, done.stderr)
+
+
+def figures(path: Path) -> dict[str, np.ndarray]:
+    """Return everything that an evaluation holds, but for the time and the words of its making."""
+    found = {}
+    with h5py.File(path) as file:
+        file.visititems(
+            lambda name, item: found.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None
+        )
+    return found
+
+
+def same(one: Path, other: Path) -> bool:
+    """Whether two evaluations hold the same values to the last bit."""
+    a, b = figures(one), figures(other)
+    return a.keys() == b.keys() and all(
+        np.array_equal(a[k], b[k], equal_nan=a[k].dtype.kind == "f") for k in a
+    )
+
+
+@pytest.fixture(scope="module")
+def hand(tmp_path_factory) -> Path:
+    """The right device by hand."""
+    folder = tmp_path_factory.mktemp("hand")
+    by_hand(
+        folder,
+        f"capture identification --port bench:?seed=4 {SHORT['capture']} -o run.h5",
+        f"identify run.h5 {SHORT['identify']} -o model.h5",
+        "invert normal --model model.h5 -o drive.h5",
+        f"play drive.h5 --port bench:?seed=4 {SHORT['play']} -o played.h5",
+        "evaluate played.h5 -o evaluation.h5",
+    )
+    return folder
+
+
+@pytest.fixture(scope="module")
+def batch(tmp_path_factory) -> Path:
+    """Both devices by Snakemake, on two cores."""
+    folder = tmp_path_factory.mktemp("batch")
+    (folder / "two.tsv").write_text(DEVICES)
+    done = snakemake(folder, "--cores", 2, devices="two.tsv", pulses=["normal"], **SHORT)
+    assert done.returncode == 0, done.said
+    return folder
+
+
+def test_snakemake_makes_what_the_commands_make(batch, hand):
+    """Each number of the evaluation is that of the commands by hand; another device has other numbers."""
+    assert same(batch / "out/right/evaluation.h5", hand / "evaluation.h5")
+    assert not same(batch / "out/left/evaluation.h5", hand / "evaluation.h5")
+    assert "<svg" in (batch / "out/left/report.html").read_text()
+
+
+def test_make_makes_what_the_commands_make(tmp_path, hand):
+    """The same commands by pattern rules, side by side."""
+    (tmp_path / "two.tsv").write_text(DEVICES)
+    options = [f"{name.upper()}={words}" for name, words in SHORT.items()]
+    command = ["make", "-f", str(ROOT / "workflow" / "Makefile"), "-j2", f"PT={PROGRAM}", "DEVICES=two.tsv"]
+    command += ["OUT=out", "PULSES=normal", *options, "out/right/report.html"]
+    quiet = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    done = subprocess.run(command, cwd=tmp_path, env=quiet, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert same(tmp_path / "out/right/evaluation.h5", hand / "evaluation.h5")
+    assert not (tmp_path / "out/left").exists()
+
+
+def test_summary_is_a_table_of_all_devices(batch):
+    """One column a device, with the numbers of its file."""
+    with (batch / "out/summary.csv").open(newline="") as file:
+        rows = {row["metric"]: row for row in csv.DictReader(file)}
+    for device in ("left", "right"):
+        stored = figures(batch / "out" / device / "evaluation.h5")
+        for name in ("mean_error_reduction_percent", "compensated.max_abs_error_percent"):
+            column = next(c for c in rows[f"normal.{name}"] if device in c)
+            assert float(rows[f"normal.{name}"][column]) == stored["waveforms/0000/" + name.replace(".", "/")]
+
+
+def test_what_is_there_is_not_made_again(batch):
+    """A second start finds nothing to do; a device that is lost is made again alone."""
+    (batch / "two.tsv").write_text(DEVICES)
+    done = snakemake(batch, "--cores", 2, "--dry-run", devices="two.tsv", pulses=["normal"], **SHORT)
+    assert "Nothing to be done" in done.said
+    forced = snakemake(
+        batch, "--dry-run", "--cores", 1, "--forcerun", "out/left/run.h5",
+        devices="two.tsv", pulses=["normal"], **SHORT,
+    )  # fmt: skip
+    assert _jobs(forced.said)["capture"] == 1
+
+
+def _jobs(text: str) -> dict[str, int]:
+    """Return how many jobs of each rule a dry run announces."""
+    return {rule: int(n) for rule, n in re.findall(r"^(\w+) +(\d+)$", text, flags=re.MULTILINE)}
+
+
+def test_twenty_benches_are_planned(tmp_path):
+    """The table that comes with the project: twenty devices, two pulses each."""
+    table = ROOT / "workflow" / "devices.tsv"
+    done = snakemake(tmp_path, "--cores", 2, "--dry-run", devices=str(table), pulses=["normal", "bifid"])
+    assert done.returncode == 0, done.said
+    expected = {"capture": 20, "identify": 20, "invert": 40, "play": 40, "evaluate": 20, "summary": 1}
+    assert _jobs(done.said).items() >= expected.items()
+
+
+def test_the_slurm_profile_is_one(tmp_path):
+    """Read by Snakemake with the executor plugin that it names."""
+    pytest.importorskip(
+        "snakemake_executor_plugin_slurm", reason="snakemake-executor-plugin-slurm is not installed"
+    )
+    (tmp_path / "two.tsv").write_text(DEVICES)
+    profile = ROOT / "workflow" / "profiles" / "slurm"
+    done = snakemake(tmp_path, "--dry-run", "--profile", profile, devices="two.tsv", pulses=["normal"])
+    assert done.returncode == 0, done.said
+    assert "runtime=10" in done.said
+
+
+def test_the_local_profile_is_one(tmp_path):
+    """Read by Snakemake."""
+    (tmp_path / "two.tsv").write_text(DEVICES)
+    profile = ROOT / "workflow" / "profiles" / "local"
+    done = snakemake(tmp_path, "--dry-run", "--profile", profile, devices="two.tsv", pulses=["normal"])
+    assert done.returncode == 0, done.said
+
+
+def test_a_folder_of_records(tmp_path, hand):
+    """Runs as they are, tables imported first; each gets a model, and a diagnosis when asked for."""
+    records = tmp_path / "records"
+    records.mkdir()
+    (records / "bench.h5").write_bytes((hand / "run.h5").read_bytes())
+    with h5py.File(hand / "run.h5") as file:
+        columns = np.column_stack([file[name][::4] for name in ("time", "input", "output")])
+    np.savetxt(records / "scope.csv", columns, delimiter=",", header="t_s,i_A,f_N", comments="")
+    config = {"devices": "", "runs": "records", "import": "--time t_s --input i_A --output f_N"}
+    done = snakemake(tmp_path, "--cores", 2, **config, identify=SHORT["identify"])
+    assert done.returncode == 0, done.said
+    assert same(tmp_path / "out/runs/bench/model.h5", hand / "model.h5")
+    assert (tmp_path / "out/runs/scope/model.h5").exists()
+    planned = snakemake(tmp_path, "--cores", 1, "--dry-run", **config, diagnose="full")
+    assert _jobs(planned.said)["diagnose_record"] == 2
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        ({"devices": "", "runs": ""}, "nothing to do: set `devices` or `runs`"),
+        ({"devices": "", "runs": "nowhere"}, "nowhere: no such folder"),
+        ({"devices": "twice.tsv"}, "stands there twice"),
+    ],
+)
+def test_a_wrong_configuration_is_said(tmp_path, config, words):
+    """Before anything is run."""
+    (tmp_path / "twice.tsv").write_text("name\tport\na\tbench:\nb\tbench:\n")
+    done = snakemake(tmp_path, "--cores", 1, **config)
+    assert done.returncode != 0
+    assert words in done.said
