@@ -189,7 +189,6 @@ WORDS = {
     "signal": "the excitation, or the table that was imported",
     "smoothing": "length below which the density was smoothed, share of the input's range",
     "source": "where the shape comes from, in words",
-    "start": "the state before the run: known, or which one was estimated",
     "text": "the cause in words",
     "unit": "unit of the value",
     "upper": "upper end of the interval",

@@ -221,7 +221,7 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
 
 
 def joined(parts: Sequence[Run], note: Note = _silent) -> Run:
-    """Return parts of one run, one after the other; a part whose time starts anew follows one step later.
+    """Return parts of one run, one after the other, with a seam where one does not go on with the one before.
 
     Raises
     ------
@@ -242,9 +242,14 @@ def joined(parts: Sequence[Run], note: Note = _silent) -> Run:
                     f"of {first.signal} and {part.signal} only one has a {name.removesuffix('_s')}",
                     hint="give --rate or --no-time for all, or import them one by one",
                 )
+    times, seams = _joined_time(parts, note)
+    starts = np.cumsum([part.input.size for part in parts])[:-1]
+    seam = np.zeros(sum(part.input.size for part in parts), dtype=bool)
+    seam[starts] = seams
     return replace(
         first,
-        time_s=None if first.time_s is None else _joined_time(parts, note),
+        seam=seam if seam.any() else None,
+        time_s=times,
         input=np.concatenate([part.input for part in parts]),
         output=np.concatenate([part.output for part in parts]),
         reference=None
@@ -254,16 +259,26 @@ def joined(parts: Sequence[Run], note: Note = _silent) -> Run:
     )
 
 
-def _joined_time(parts: Sequence[Run], note: Note) -> FloatArray:
-    """Return the time stamps of all parts, strictly increasing."""
+def _joined_time(parts: Sequence[Run], note: Note) -> tuple[FloatArray | None, list[bool]]:
+    """Return the time stamps of all parts, strictly increasing, and before which parts there was a pause.
+
+    A part whose clock goes on, one step or less than a gap after the part before, is its continuation.
+    After a pause, or where nobody can tell, the memory is another: a seam.
+    """
     times: list[FloatArray] = []
+    seams: list[bool] = []
     for part in parts:
         time_s = part.time_s
-        assert time_s is not None
-        if times and time_s[0] <= times[-1][-1]:
-            step = steps_of(times[-1]).median
-            shift = float(times[-1][-1]) + step - float(time_s[0])
-            note(f"the time of {part.signal} starts anew: it follows {step:.3g} s after the part before it")
-            time_s = time_s + shift
+        if time_s is None:
+            return None, [True] * (len(parts) - 1)
+        if times:
+            step, end = steps_of(times[-1]).median, float(times[-1][-1])
+            goes_on = 0 < time_s[0] - end <= GAP * step
+            seams.append(not goes_on)
+            if time_s[0] <= end:
+                note(
+                    f"the time of {part.signal} starts anew: it is put {step:.3g} s after the part before it"
+                )
+                time_s = time_s + (end + step - float(time_s[0]))
         times.append(time_s)
-    return np.concatenate(times)
+    return np.concatenate(times), seams

@@ -75,10 +75,12 @@ def identify(
     with screen.working("fitting") as context:
         result = flow.run(options, context)
     screen.result(plain(result))
-    unit = shown(result.output_unit)
     sure = {}
     if result.output_uncertainty is not None:
-        sure["output known within"] = f"{result.output_uncertainty:.2g} {unit} (90 % band)"
+        sure["output known within"] = (
+            f"{result.output_uncertainty:.2g} {shown(result.output_unit)} (90 % band)"
+        )
+    unit = shown(result.output_unit)
     screen.facts(
         f"{result.output}: Preisach model of {result.levels} levels, {result.cells} cells",
         {

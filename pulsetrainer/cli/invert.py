@@ -41,6 +41,14 @@ def invert(
     force_max: Annotated[
         float | None, typer.Option(help="Force at its top, N; default: the highest.", show_default=False)
     ] = None,
+    beat: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|mean",
+            help="Beat of a recorded pulse: its number from 1, or the mean. Default: all is one period.",
+            show_default=False,
+        ),
+    ] = None,
     periods: Annotated[
         int, typer.Option(help="Periods to play; the first is not scored.", envvar=variable("periods"))
     ] = 4,
@@ -64,6 +72,7 @@ def invert(
         model=model,
         output=out,
         inversion=method.value if method else None,
+        beat=beat,
         force_min=force_min,
         force_max=force_max,
         periods=periods,

@@ -8,7 +8,7 @@ IEE Proc. Control Theory Appl. 148, 2001, 185-192): the same loop wherever it is
 over neighbours along the diagonal, with g the mean of the Gram matrix's diagonal and m the cells' masses,
 leads from a free density (t = 0) to that model (t large). Where the data are no Preisach operator's at
 all, such as a force that follows the velocity, a free density learns one stretch by heart and predicts the
-next one worse than the stiff one: ``choose`` finds out on the last quarter of the records.
+next one worse than the stiff one: ``choose`` finds out on the second half of the records.
 """
 
 from __future__ import annotations
@@ -23,9 +23,12 @@ from pulsetrainer.core.equations import NormalEquations, Record, parted_sums
 from pulsetrainer.core.levels import thinned
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 
-STRENGTHS = (1.0, 100.0)  # 100 is within a few per cent of t -> infinity
-HELD_OUT = 0.25  # of the samples of each record, the last ones
-ENOUGH = 0.05  # the held-out error must fall by this share, else the density stays free
+STRENGTHS = (0.1, 1.0, 10.0, 100.0)  # 100 is within a few per cent of t -> infinity
+HELD_OUT = 0.5  # of the samples of each record, the last ones
+# The stiffest density wins whose held-out error is within this share of the best one: among models that
+# predict equally well the one with less freedom (the rule of one standard error, Breiman et al. 1984,
+# section 3.4).
+TOLERANCE = 0.05
 _LEVELS = 32  # on which t is chosen
 
 
@@ -56,7 +59,7 @@ def penalty(plane: Plane, diagonal: FloatArray, strength: float) -> sparse.csr_a
 
 
 def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
-    """Return t by the error on the last quarter of each record: 0, or one of ``STRENGTHS``."""
+    """Return t by the error on the second half of each record: 0, or one of ``STRENGTHS``."""
     coarse = plane if plane.n_h <= _LEVELS else thinned(plane, _LEVELS)
     parts = []
     for record in records:
@@ -65,10 +68,9 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
     fitted, held_out = (part.dense() for part in parted_sums(coarse, records, reading, parts, 2))
     if min(fitted.weight, held_out.weight) <= 0:
         return 0.0
-    free = _error(fitted, held_out, 0.0)
-    errors = {t: _error(fitted, held_out, t) for t in STRENGTHS}
-    best = min(errors, key=errors.__getitem__)
-    return best if errors[best] < (1.0 - ENOUGH) * free else 0.0
+    errors = {t: _error(fitted, held_out, t) for t in (0.0, *STRENGTHS)}
+    enough = (1.0 + TOLERANCE) * min(errors.values())
+    return max(t for t, error in errors.items() if error <= enough)
 
 
 def _error(fitted: NormalEquations, held_out: NormalEquations, strength: float) -> float:

@@ -161,6 +161,7 @@ def identify(
         if tried and equations.rms(masses, offset) > _POOR * _span(turned):
             stiffness = congruence.choose(turned, plane, reading)
         if stiffness:
+            smoothing = 0.0  # a density that is alike along the diagonal needs no other smoothing
             masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, stiffness)
     operator = Preisach(plane, masses / plane.areas, sign * offset, reading, polarity=sign)
     return Identified(operator, method, iterations, kkt, smoothing, tried, stiffness, samples)

@@ -43,6 +43,7 @@ class Measured:
     output: FloatArray  # (n,) polarity 1
     weight: FloatArray  # (n,) 0 or 1
     reference: FloatArray | None = None
+    timed: bool = True  # False: only the order of the samples is known, dt_s is 1
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ BoolArray = NDArray[np.bool_]
 
 _OUTLIER_SIGMAS = 8.0  # of Gaussian noise one sample in 10^15
 _STICKING_SIGMAS = 7.0  # of the difference of two short means
+_USED = 2  # times, on average, each value of a quantised output occurs at least
 _TRACKING_SHARE = 0.02  # of the input's range
 _OUTSIDE_SHARE = 0.01
 
@@ -159,7 +160,8 @@ def _sticking(record: Measured, reach: float) -> Firing | None:
 def _quantised(record: Measured) -> Firing | None:
     y = record.output
     step, span = spacing_of(y), float(np.ptp(y))
-    if span == 0 or step < 0.004 * span:
+    # steps show where values come again; in a short record all may differ, far apart as they are
+    if span == 0 or step < 0.004 * span or _USED * np.unique(y).size > y.size:
         return None
     return Firing(
         "quantisation",

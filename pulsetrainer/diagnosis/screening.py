@@ -20,7 +20,7 @@ import numpy as np
 from scipy import linalg, signal
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import RATE_FREE, library
 from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Fitted
@@ -112,10 +112,11 @@ def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Blo
     own = project(fitted.slopes)
     known = linalg.orth(own) if own.shape[1] else own
     parts = [problem.bins.even(residual, k) for k in range(len(problem.records))]
+    timed = all(record.timed for record in problem.records)
     tried: list[tuple[Cause, list[Values]]] = [
         (cause, values)
         for cause in library().values()
-        if cause.stage != "record" and cause.id not in fitted.names
+        if cause.stage != "record" and cause.id not in fitted.names and (timed or cause.id in RATE_FREE)
         for values in cause.starts(problem.frames, parts)
     ]
     if not tried:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,16 +12,19 @@ import numpy as np
 
 from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import Cause, Diagnosis, Extension, Model, Parameter, Profile, Run
+from pulsetrainer.core import input_noise
+from pulsetrainer.core.equations import Record
 from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.plane import FloatArray, Plane
-from pulsetrainer.diagnosis import residual, wording
+from pulsetrainer.diagnosis import condition, residual, velocity, wording
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import seen_input
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.selection import diagnose
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.flows.modelling import known_from, parts_of, predict, step_of
+from pulsetrainer.flows.modelling import known_from, parts_of, predict, start_of, step_of
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.answer import Answer, Finding
@@ -30,6 +33,10 @@ if TYPE_CHECKING:
 FASTEST_HZ = 1000.0  # more samples a second are averaged down
 MOST_LEVELS = 64  # of the extended model: the joint refit holds dense rows
 _TRACE_SAMPLES = 6000
+_UNTIMED = (
+    "The records have no time: only what depends on the order of the samples was tried (load-dependence, "
+    "accommodation, step, condition-change, and the gates on the raw data), nothing that depends on rate."
+)
 _GAP = 1.5  # median steps
 _MOST_FILLED = 0.5  # of a record on even steps: beyond that it is not one record
 
@@ -90,7 +97,7 @@ def run(options: Options, context: Context) -> Result:
         quick=options.quick,
         progress=lambda share: context.progress(0.9 * share),
     )
-    diagnosis = _artefact(answer, runs, records, model)
+    diagnosis = _against_the_model(_artefact(answer, runs, records, model), answer, records, model, runs[0])
     header = provenance.make_header(
         f"Diagnosis of {', '.join(path.stem for path in options.runs)}",
         argv=context.argv,
@@ -147,15 +154,15 @@ def measured_of(path: Path, one: Run, polarity: int, low: float, high: float) ->
     Raises
     ------
     DataError
-        The run has no time, is too short, or has more gaps than samples.
+        The run is too short, or has more gaps than samples.
     """
     step = step_of(one)
-    if step is None or one.time_s is None or one.input.size < 100:
+    if one.input.size < 100:
         raise DataError(
-            f"{path} has {'no time' if step is None else f'only {one.input.size} samples'}; "
-            "causes are told apart by their course in time",
-            hint="import it with --time COLUMN or --rate HZ, or record longer",
+            f"{path} has only {one.input.size} samples, too few to tell causes apart", hint="record longer"
         )
+    if step is None or one.time_s is None:
+        return _untimed(path, one, polarity, low, high)
     per = max(1, round(1.0 / (FASTEST_HZ * step)))
     t = one.time_s - one.time_s[0]
     count = round(float(t[-1]) / step) + 1
@@ -181,6 +188,90 @@ def measured_of(path: Path, one: Run, polarity: int, low: float, high: float) ->
         reference = None if reference is None else reference[:cut].reshape(-1, per).mean(axis=1)
         weight = np.where(weight < 1.0, 0.0, 1.0)
     return Measured(step * per, u, polarity * y, weight, reference)
+
+
+def _against_the_model(
+    diagnosis: Diagnosis, answer: Answer, records: Sequence[Measured], model: Model, first: Run
+) -> Diagnosis:
+    """Add what the records say of the model as given: another condition, or the wrong kind of model."""
+    timed = all(record.timed for record in records)
+    low, high = float(model.levels[0]), float(model.levels[-1])
+    # records have polarity 1: what the model says is turned alike; noise in the input is no motion
+    core = [
+        Record(input_noise.clean(r.input).input, r.output, r.weight, start_of(r.input, low, high))
+        for r in records
+    ]
+    said = [
+        model.polarity * predict(model, one.input, r.dt_s if r.timed else None, one.start)
+        for r, one in zip(records, core, strict=True)
+    ]
+    residuals = [one.output - p for one, p in zip(core, said, strict=True)]
+    kept = [one.weights > 0 for one in core]
+    evidence: list[str] = []
+    if not timed:
+        evidence.append(_UNTIMED)
+    compared = velocity.compare(core, [r.dt_s if r.timed else None for r in records], residuals)
+    wrong = velocity.warning(compared, first.input_quantity, first.output_quantity)
+    if wrong:
+        evidence.append(f"{wrong[0].upper()}{wrong[1:]}.")
+    measured = np.concatenate([one.output[k] for one, k in zip(core, kept, strict=True)])
+    predicted = np.concatenate([p[k] for p, k in zip(said, kept, strict=True)])
+    refitted, extended = _rms(answer.baseline.residual), _rms(answer.final.residual)
+    if condition.left_by(measured, predicted, answer.noise) <= extended:
+        # the search works on fewer levels: what it finds there is no fault of the model as given
+        diagnosis = _cleared(diagnosis)
+        evidence.append("The model as given leaves less than any extension on the levels of the search.")
+    changed = condition.change(measured, predicted, refitted, answer.noise)
+    causes, verdict = diagnosis.causes, diagnosis.verdict
+    if changed is not None and verdict != "condition-change":
+        found = _condition(changed, model.polarity, first)
+        causes = (found, *(one for one in causes if one.cause != found.cause))
+        verdict = found.cause
+        evidence.append(f"{found.cause}: {found.text}")
+    return replace(diagnosis, verdict=verdict, causes=causes, evidence=(*evidence, *diagnosis.evidence))
+
+
+def _condition(changed: condition.Change, polarity: int, first: Run) -> Cause:
+    """Return the finding that the device is not in the condition of the model."""
+    offset, unit = polarity * changed.offset, first.output_unit
+    sure, wide = 1.96 * changed.offset_error, 1.96 * changed.gain_error
+    return Cause(
+        cause="condition-change",
+        found=True,
+        p_value=0.0,
+        explains_percent=100.0 * changed.explains,
+        held_out_gain_percent=float("nan"),
+        parameters=(
+            Parameter("offset", offset, unit, offset - sure, offset + sure),
+            Parameter("gain", changed.gain, "1", changed.gain - wide, changed.gain + wide),
+        ),
+        text=(
+            "a Preisach model of the records' own fits them, the one given does not: the device is in "
+            "another condition (load, configuration, zero). Its output is "
+            f"{1 + changed.gain:.3f} times that of the model, shifted by {offset:.3g}"
+            f"{'' if unit == '1' else f' {unit}'}, and differs in shape by {changed.left:.2g} rms; "
+            "identify it again in this condition"
+        ),
+    )
+
+
+def _cleared(diagnosis: Diagnosis) -> Diagnosis:
+    """Return a diagnosis in which only what was read off the raw data stays found."""
+    known = library()
+    causes = tuple(
+        one if known[one.cause].stage == "record" else replace(one, found=False) for one in diagnosis.causes
+    )
+    verdict = next((one.cause for one in causes if one.found), "none")
+    return replace(diagnosis, verdict=verdict, causes=causes, extended=None)
+
+
+def _untimed(path: Path, one: Run, polarity: int, low: float, high: float) -> Measured:
+    """Return a run of which only the order of the samples is known."""
+    if not (np.isfinite(one.input).all() and np.isfinite(one.output).all()):
+        raise DataError(f"{path} holds samples that are no numbers", hint="record it again")
+    weight = np.ones(one.input.size)
+    weight[: known_from(one.input, low, high)] = 0.0
+    return Measured(1.0, one.input, polarity * one.output, weight, one.reference, timed=False)
 
 
 def _artefact(answer: Answer, runs: Sequence[Run], records: Sequence[Measured], model: Model) -> Diagnosis:
@@ -273,8 +364,8 @@ def _extended(answer: Answer, model: Model) -> Model | None:
         return None
     low, high = float(model.levels[0]), float(model.levels[-1])
     plane = Plane(model.levels)
-    if plane.n_h > MOST_LEVELS:
-        plane = Plane.uniform(low, high, MOST_LEVELS)
+    if plane.n_h > MOST_LEVELS or not np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]):
+        plane = Plane.uniform(low, high, min(plane.n_h, MOST_LEVELS))
     problem = problem_for(answer.problem.records, low, high, plane.n_h)
     if not np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]):
         raise DataError("only models with even levels can be extended", hint="identify the model again")

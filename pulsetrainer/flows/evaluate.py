@@ -222,13 +222,10 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
         low, high = operator.plane.low, operator.plane.high
         parts = parts_of(one)
         known = [known_from(part.input, low, high) for part in parts]
-        starts = [_start(model, part, k) for part, k in zip(parts, known, strict=True)]
         step_s = step_of(one)
+        start, state = _start(model, parts, known)
         predicted = np.concatenate(
-            [
-                predict(model, part.input, step_s, start)[k:]
-                for part, k, (start, _) in zip(parts, known, starts, strict=True)
-            ]
+            [predict(model, part.input, step_s, start)[k:] for part, k in zip(parts, known, strict=True)]
         )
         measured = np.concatenate([part.output[k:] for part, k in zip(parts, known, strict=True)])
         errors = metrics.prediction(measured, predicted)
@@ -244,7 +241,7 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 max_percent=errors.max_percent,
                 offset=shift,
                 shape_rms_percent=own.rms_percent,
-                start=next((state for _, state in starts if state != "known"), "known"),
+                start=state,
                 outside_percent=100.0 * float(np.mean(outside)),
                 gain_percent=100.0 * (1.0 - errors.rms / found[0].rms) if found else 0.0,
                 time_s=_times(parts, known, thin),
@@ -274,7 +271,7 @@ def _note_limits(path: Path, evaluation: Evaluation, context: Context) -> None:
             context.note(f"{path} does not reach the ends of {found.name}; state before it: {found.start}")
 
 
-def _start(model: Model, one: Run, known: int) -> tuple[State | None, str]:
+def _start(model: Model, parts: Sequence[Run], known: Sequence[int]) -> tuple[State | None, str]:
     """Return the state from which a run is followed, and what it is called.
 
     A run that never reaches an end of the model's range leaves open what came before it. Tried are both
@@ -282,7 +279,7 @@ def _start(model: Model, one: Run, known: int) -> tuple[State | None, str]:
     """
     low, high = float(model.levels[0]), float(model.levels[-1])
     near = 0.01 * (high - low)
-    if np.any((one.input <= low + near) | (one.input >= high - near)):
+    if any(np.any((one.input <= low + near) | (one.input >= high - near)) for one in parts):
         return None, "known"
     states = {
         "negative saturation": negative_saturation(low),
@@ -291,7 +288,10 @@ def _start(model: Model, one: Run, known: int) -> tuple[State | None, str]:
     }
     operator = operator_of(model)
     left = {
-        name: float(np.mean((operator(one.input, state)[known:] - one.output[known:]) ** 2))
+        name: sum(
+            float(np.sum((operator(one.input, state)[k:] - one.output[k:]) ** 2))
+            for one, k in zip(parts, known, strict=True)
+        )
         for name, state in states.items()
     }
     best = min(left, key=left.__getitem__)

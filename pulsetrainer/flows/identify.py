@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
 
 _TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
+_CROWDED_MISFIT = 0.02  # of the span, rms: beyond it levels do not crowd
 _WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
 
@@ -97,10 +98,9 @@ def run(options: Options, context: Context) -> Result:
     for path, one in zip(options.runs, runs, strict=True):
         if not one.complete:
             context.note(f"{path} is incomplete; fitting the {one.input.size} samples it has")
-    parts = [
-        (path.stem, part) for path, one in zip(options.runs, runs, strict=True) for part in parts_of(one)
-    ]
-    names, runs = [name for name, _ in parts], [part for _, part in parts]
+    cut = [parts_of(one) for one in runs]
+    names = [path.stem for path, parts in zip(options.runs, cut, strict=True) for _ in parts]
+    runs = [part for parts in cut for part in parts]
     ranges = [input_range(one) for one in runs]
     low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     _check_range(options.runs, low, high, runs[0].input_unit)
@@ -108,22 +108,8 @@ def run(options: Options, context: Context) -> Result:
     _note_noise(cleaned, runs[0].input_unit, context)
     runs = [replace(one, input=clean.input) for one, clean in zip(runs, cleaned, strict=True)]
     context.progress(0.1)
-    records = [record_of(one, low, high) for one in runs]
-    plane = _plane(records, low, high, options, context)
-    shifts = offsets_between(records, plane, options.operator)
-    if np.any(shifts):
-        _note_shifts(names, shifts, runs, context)
-        records = [record_of(one, low, high, shift) for one, shift in zip(runs, shifts, strict=True)]
-    smoothing = options.smoothing
-    if smoothing is None:
-        smoothing = 0.0 if options.operator == "relay" else "auto"
-    found = identify(
-        records,
-        plane,
-        reading=options.operator,
-        method=options.method,
-        smoothing=smoothing,
-    )
+    records, found, shifts = _fitted(runs, names, (low, high), options, context)
+    plane = found.operator.plane
     context.progress(0.4 if options.bootstrap else 0.8)
     ensemble = None
     if options.bootstrap:
@@ -138,10 +124,7 @@ def run(options: Options, context: Context) -> Result:
     if gap is not None and float(np.mean(covered)) < _WELL_COVERED:
         context.note(gap.words(plane, runs[0].input_unit))
     model = _model(runs, records, found, covered, ensemble)
-    compared = velocity.compare(records, [step_of(one) for one in runs], _residuals(records, found))
-    warning = velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
-    if warning:
-        context.note(warning)
+    warning = _warned(runs, records, found, context)
     context.progress(0.9)
     header = provenance.make_header(
         f"Preisach model of {', '.join(path.stem for path in options.runs)}",
@@ -171,12 +154,49 @@ def run(options: Options, context: Context) -> Result:
         output_uncertainty=_half_width(model.fit),
         polarity=model.polarity,
         offsets=tuple(float(shift) for shift in shifts),
-        spacing="even" if np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]) else "crowded",
+        spacing="even" if _is_even(plane) else "crowded",
         congruence=found.congruence,
         warning=warning,
         iterations=model.fit.iterations,
         seconds=time.perf_counter() - begun,
     )
+
+
+def _fitted(
+    runs: Sequence[Run],
+    names: Sequence[str],
+    reach: tuple[float, float],
+    options: Options,
+    context: Context,
+) -> tuple[list[Record], Identified, FloatArray]:
+    """Return the records as fitted, the operator, and the offset of each record against their mean."""
+    low, high = reach
+    records = [record_of(one, low, high) for one in runs]
+    plane = _plane(records, low, high, options)
+    shifts = offsets_between(records, plane, options.operator)
+    if np.any(shifts):
+        _note_shifts(names, shifts, runs, context)
+        records = [record_of(one, low, high, shift) for one, shift in zip(runs, shifts, strict=True)]
+    smoothing = options.smoothing
+    if smoothing is None:
+        smoothing = 0.0 if options.operator == "relay" else "auto"
+    found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
+    if not _is_even(plane) and _misfit(records, found) > _CROWDED_MISFIT:
+        # what is steep here is nothing that the operator can follow: closer levels would learn it by heart
+        plane = Plane.uniform(low, high, options.levels)
+        found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
+    if not _is_even(plane):
+        context.note("the loop is steep: the levels lie closer where the output changes")
+    return records, found, shifts
+
+
+def _warned(runs: Sequence[Run], records: Sequence[Record], found: Identified, context: Context) -> str:
+    """Say where the output follows the velocity of the input, not the input."""
+    compared = velocity.compare(records, [step_of(one) for one in runs], _residuals(records, found))
+    warning = velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
+    if warning:
+        context.note(warning)
+    return warning
 
 
 def _largest_noise(cleaned: Sequence[input_noise.Cleaned]) -> float | None:
@@ -234,14 +254,22 @@ def _half_width(fit: Fit) -> float | None:
     return 0.5 * float(np.mean(fit.predicted_upper - fit.predicted_lower))
 
 
-def _plane(records: Sequence[Record], low: float, high: float, options: Options, context: Context) -> Plane:
+def _plane(records: Sequence[Record], low: float, high: float, options: Options) -> Plane:
     """Return the levels: even for relays, as in the paper, else where the output changes."""
     if options.operator == "relay":
         return Plane.uniform(low, high, options.levels)
-    plane = plane_for(records, low, high, options.levels)
-    if not np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]):
-        context.note("the loop is steep: the levels lie closer where the output changes")
-    return plane
+    return plane_for(records, low, high, options.levels)
+
+
+def _is_even(plane: Plane) -> bool:
+    return bool(np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]))
+
+
+def _misfit(records: Sequence[Record], found: Identified) -> float:
+    """Rms error of the fit as a share of the output's span."""
+    left = [e[r.weights > 0] for e, r in zip(_residuals(records, found), records, strict=True)]
+    span = float(np.ptp(np.concatenate([r.output[r.weights > 0] for r in records])))
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) / span
 
 
 def _note_shifts(names: Sequence[str], shifts: FloatArray, runs: Sequence[Run], context: Context) -> None:

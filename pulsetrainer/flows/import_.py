@@ -110,7 +110,8 @@ def run(options: Options, context: Context) -> Result:
         whole = parts[0] if len(parts) == 1 else table_run.joined(parts, context.note)
         kept = whole
         if options.resample is not None:
-            kept = table_run.resampled(whole, options.resample or None)
+            evened = [table_run.resampled(part, options.resample or None) for part in parts]
+            kept = evened[0] if len(evened) == 1 else table_run.joined(evened)
         read.append((target, files, whole, kept))
         context.progress(0.7 * (k + 1) / len(groups))
     written = []

@@ -11,6 +11,7 @@ import numpy as np
 from pulsetrainer.artefacts import output, provenance, store, table
 from pulsetrainer.artefacts.kinds import Model, Waveform
 from pulsetrainer.core import inversion, signals
+from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.waveforms import Shape, train
 from pulsetrainer.errors import DataError, UsageError
@@ -36,6 +37,9 @@ class Options:
     waveform: str  # a library name or a CSV file
     model: Path
     output: Path
+    beat: str | None = (
+        None  # of a record of several beats: its number from 1, or "mean"; None: all is one period
+    )
     inversion: Inversion | None = None  # None: what suits the model's operator
     force_min: float | None = None  # None: the lowest the model can reach
     force_max: float | None = None
@@ -95,6 +99,23 @@ def read_shape(waveform: str) -> tuple[Shape, Path]:
     return Shape(path.stem, time_s, value, source or path.name), path
 
 
+def _one_beat(record: Shape, beat: str | None, context: Context) -> Shape:
+    """Return the beat that is asked for, out of a record of several."""
+    if beat is None:
+        return record
+    found = find_beats(record)
+    lengths = found.periods_s
+    context.note(
+        f"{record.name} holds {found.count} whole beats of {lengths.min():.3f} to {lengths.max():.3f} s "
+        f"({60.0 / float(np.mean(lengths)):.0f} a minute)"
+    )
+    if beat == "mean":
+        return found.mean()
+    if not beat.isdecimal():
+        raise UsageError(f"--beat must be a number from 1, or mean, got {beat!r}", hint="give --beat mean")
+    return found.single(int(beat))
+
+
 def run(options: Options, context: Context) -> Result:
     """Compute the compensated and the scaled drive and store both.
 
@@ -108,6 +129,7 @@ def run(options: Options, context: Context) -> Result:
     output.check_output(options.output, options.force)
     model = store.read(options.model, Model)
     shape, path = read_shape(options.waveform)
+    shape = _one_beat(shape, options.beat, context)
     operator = operator_of(model)
     usual: Inversion = "closest-match" if operator.reading == "relay" else "continuous"
     method = options.inversion or ("extended" if model.extensions else usual)

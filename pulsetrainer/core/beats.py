@@ -1,0 +1,120 @@
+"""Single beats of a recorded pulse: found by their peaks, cut at their feet.
+
+The systolic peaks are the maxima that stand out by half of the record's pulse height
+(``scipy.signal.find_peaks``), so that a dicrotic wave is none. A beat goes from foot to foot; the foot is
+the lowest sample between two peaks, the last one where several are equally low. What the next foot lies
+higher or lower is taken out as a straight line, so that the beat can be repeated without a jump.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.signal import find_peaks, savgol_filter
+
+from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.waveforms import Shape
+from pulsetrainer.errors import DataError
+
+_PROMINENCE = 0.5  # of the height between the 5th and the 95th percentile
+_SHORTEST_S = 0.25  # of a beat: 240 a minute
+_SMOOTH_S = 0.02  # of the local parabolas in which feet are sought
+_AT_FOOT = 0.1  # of the height: the record's own ends count as feet up to here
+
+
+@dataclass(frozen=True, slots=True)
+class Beats:
+    """The whole beats of a record."""
+
+    record: Shape
+    feet: IntArray  # (k + 1,) sample numbers; beat i goes from feet[i] to feet[i + 1]
+
+    @property
+    def count(self) -> int:
+        """How many whole beats there are."""
+        return self.feet.size - 1
+
+    @property
+    def periods_s(self) -> FloatArray:
+        """Length of each beat (k,), s."""
+        return np.diff(self.record.time_s[self.feet])
+
+    def single(self, number: int) -> Shape:
+        """Return one beat, the first is 1.
+
+        Raises
+        ------
+        DataError
+            There is no such beat.
+        """
+        if not 1 <= number <= self.count:
+            raise DataError(
+                f"{self.record.name} holds {self.count} whole beats, so there is no beat {number}",
+                hint=f"give --beat 1 .. {self.count}, or --beat mean",
+            )
+        begin, end = int(self.feet[number - 1]), int(self.feet[number])
+        time_s = self.record.time_s[begin:end] - self.record.time_s[begin]
+        value = self.record.value[begin:end]
+        rise = float(self.record.value[end] - self.record.value[begin])
+        level = value - rise * time_s / float(self.record.time_s[end] - self.record.time_s[begin])
+        return replace(self.record, name=f"{self.record.name}_beat{number}", time_s=time_s, value=level)
+
+    def mean(self) -> Shape:
+        """Return the mean of all beats, each stretched to the median length."""
+        singles = [self.single(k + 1) for k in range(self.count)]
+        period = float(np.median(self.periods_s))
+        count = max(round(period / float(np.median(np.diff(self.record.time_s)))), 4)
+        phase = np.arange(count) / count
+        total = np.zeros(count)
+        for beat, length in zip(singles, self.periods_s.tolist(), strict=True):
+            ends = np.append(beat.time_s / length, 1.0)
+            total += np.interp(phase, ends, np.append(beat.value, beat.value[0]))
+        return replace(
+            self.record,
+            name=f"{self.record.name}_mean",
+            time_s=phase * period,
+            value=total / self.count,
+        )
+
+
+def find_beats(record: Shape) -> Beats:
+    """Find the whole beats of a record of several.
+
+    Raises
+    ------
+    DataError
+        There is no whole beat in it.
+    """
+    t, p = record.time_s, record.value
+    step = float(np.median(np.diff(t)))
+    low, high = np.percentile(p, [5.0, 95.0])
+    height = float(high - low)
+    window = 2 * max(round(0.5 * _SMOOTH_S / step), 1) + 1
+    smooth = savgol_filter(p, window, min(2, window - 1)) if window < p.size else p
+    # a record may begin or end in a peak's flank: lower ends make the first and last peak whole
+    padded = np.concatenate(([low - height], smooth, [low - height]))
+    peaks, _ = find_peaks(padded, prominence=_PROMINENCE * height, distance=max(_SHORTEST_S / step, 1.0))
+    peaks = peaks - 1
+    if peaks.size == 0 or not height > 0:
+        raise DataError(f"{record.name} holds no pulse that stands out", hint="leave --beat out for one beat")
+    feet = [_lowest(smooth, a, b) for a, b in pairwise(peaks.tolist())]
+    foot = float(np.median(smooth[feet])) if feet else float(smooth.min())
+    before, after = _lowest(smooth, 0, int(peaks[0])), _lowest(smooth, int(peaks[-1]), p.size - 1)
+    if smooth[before] <= foot + _AT_FOOT * height:
+        feet.insert(0, before)
+    if smooth[after] <= foot + _AT_FOOT * height:
+        feet.append(after)
+    if len(feet) < 2:
+        raise DataError(
+            f"{record.name} holds no whole beat, only a part of one",
+            hint="leave --beat out, or record longer",
+        )
+    return Beats(record, np.asarray(feet, dtype=np.int64))
+
+
+def _lowest(values: FloatArray, begin: int, end: int) -> int:
+    """Last of the lowest samples in begin..end."""
+    part = values[begin : end + 1]
+    return begin + part.size - 1 - int(np.argmin(part[::-1]))

@@ -1,0 +1,91 @@
+"""Beats of a recorded pulse: as many as a person counts, cut at the feet, repeatable without a jump."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pulsetrainer.core.beats import find_beats
+from pulsetrainer.core.waveforms import Shape
+from pulsetrainer.errors import DataError
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+
+
+def _recorded(name: str) -> Shape:
+    t, p = np.loadtxt(DATA / f"{name}.csv", delimiter=",", skiprows=1).T
+    return Shape(name, t, p)
+
+
+# counted and measured by eye on the plotted records
+@pytest.mark.parametrize(
+    ("name", "count", "length"),
+    [("fingerbp_AAC249_0", 6, 1.01), ("fingerbp_AAC3_3", 6, 0.648), ("fingerbp_AAC409_0", 6, 0.82)],
+)
+def test_recorded_pulses(name, count, length):
+    """Dicrotic waves are no beats; every beat begins and ends at a foot, close to zero in these records."""
+    record = _recorded(name)
+    beats = find_beats(record)
+    assert beats.count == count
+    assert np.mean(beats.periods_s) == pytest.approx(length, abs=0.01)
+    height = np.ptp(record.value)
+    for k in range(count):
+        one = beats.single(k + 1)
+        assert one.time_s[0] == 0
+        assert abs(one.value[0] - one.value[-1]) < 0.01 * height
+        assert one.value.min() >= one.value[0] - 0.01 * height
+        assert np.ptp(one.value) > 0.85 * height
+    mean = beats.mean()
+    assert mean.period_s == pytest.approx(np.median(beats.periods_s), abs=2e-3)
+    assert 0.85 * height < np.ptp(mean.value) <= height
+
+
+@given(
+    beats=st.integers(2, 9),
+    rate=st.integers(60, 500),
+    gain=st.floats(1e-6, 1e6),
+    lift=st.floats(-5.0, 5.0),
+    cut=st.floats(0.0, 0.6),
+)
+def test_beats_of_a_train_are_found_whatever_unit_rate_and_cut(beats, rate, gain, lift, cut):
+    """Equal pulses with a dicrotic wave, begun somewhere in a beat: each whole one comes out alike."""
+    t = np.arange(0.0, beats * 0.8 + 1e-9, 1.0 / rate)
+    phase = (t / 0.8 + cut) % 1.0
+    pulse = np.exp(-(((phase - 0.2) / 0.08) ** 2)) + 0.35 * np.exp(-(((phase - 0.5) / 0.08) ** 2))
+    pulse += 0.2 * (1.0 - phase)  # diastole falls until the next foot
+    found = find_beats(Shape("train", t, gain * (pulse + lift)))
+    assert beats - 1 <= found.count <= beats
+    np.testing.assert_allclose(found.periods_s, 0.8, atol=0.06)
+    again = find_beats(Shape("train", t, pulse))
+    assert np.abs(found.feet - again.feet).max() <= 1
+
+
+def test_a_drifting_record_repeats_without_a_jump():
+    """What one foot lies above the other is taken out as a straight line."""
+    record = _recorded("fingerbp_AAC3_3")
+    tilted = Shape("tilted", record.time_s, record.value + 1.5 * record.time_s)
+    for k in (2, 3):
+        one, flat = find_beats(tilted).single(k), find_beats(record).single(k)
+        assert abs(one.value[-1] - one.value[0]) < 0.02 * np.ptp(one.value)
+        size = min(one.value.size, flat.value.size) - 20
+        apart = (one.value - one.value[0])[:size] - (flat.value - flat.value[0])[:size]
+        assert np.abs(apart).max() < 0.1 * np.ptp(flat.value)
+
+
+@pytest.mark.parametrize("number", [0, 7, -1])
+def test_a_beat_that_is_not_there(number):
+    """The message says how many there are."""
+    with pytest.raises(DataError, match="holds 6 whole beats") as caught:
+        find_beats(_recorded("fingerbp_AAC3_3")).single(number)
+    assert "1 .. 6" in caught.value.hint
+
+
+def test_no_beat_at_all():
+    """Half a beat is none."""
+    t = np.linspace(0.0, 0.3, 100)
+    with pytest.raises(DataError, match="no whole beat"):
+        find_beats(Shape("flank", t, np.sin(5.0 * t)))
