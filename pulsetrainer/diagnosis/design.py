@@ -258,6 +258,9 @@ class Projector:
     """Takes off what offset, start and the positive cells can fit: c - D (D'D + S)^-1 D'c."""
 
     def __init__(self, design: Design, free: IntArray) -> None:
+        # where a cause explains all, no cell is left: an unused one stands in, whose mass is close to nothing
+        if free.size == 0:
+            free = np.asarray([int(np.argmax(np.diagonal(design.gram)))], dtype=np.int64)
         self.design, self.free = design, free
         block = design.gram[np.ix_(free, free)].copy()
         block[np.diag_indices_from(block)] += 1e-10 * float(np.diagonal(block).max())

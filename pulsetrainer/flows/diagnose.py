@@ -37,6 +37,7 @@ _UNTIMED = (
     "The records have no time: only what depends on the order of the samples was tried (load-dependence, "
     "accommodation, step, condition-change, and the gates on the raw data), nothing that depends on rate."
 )
+_SPEED_MATTERS = 0.6  # f(v) must leave less than this share of what f(sign v) leaves
 _GAP = 1.5  # median steps
 _MOST_FILLED = 0.5  # of a record on even steps: beyond that it is not one record
 
@@ -213,11 +214,12 @@ def _against_the_model(
     compared = velocity.compare(core, [r.dt_s if r.timed else None for r in records], residuals)
     wrong = velocity.warning(compared, first.input_quantity, first.output_quantity)
     if wrong:
-        evidence.append(f"{wrong[0].upper()}{wrong[1:]}.")
+        diagnosis = _of_another_kind(diagnosis, core, residuals, compared, wrong)
+        evidence.append(wrong)
     measured = np.concatenate([one.output[k] for one, k in zip(core, kept, strict=True)])
     predicted = np.concatenate([p[k] for p, k in zip(said, kept, strict=True)])
     refitted, extended = _rms(answer.baseline.residual), _rms(answer.final.residual)
-    if condition.left_by(measured, predicted, answer.noise) <= extended:
+    if not wrong and condition.left_by(measured, predicted, answer.noise) <= extended:
         # the search works on fewer levels: what it finds there is no fault of the model as given
         diagnosis = _cleared(diagnosis)
         evidence.append("The model as given leaves less than any extension on the levels of the search.")
@@ -253,6 +255,27 @@ def _condition(changed: condition.Change, polarity: int, first: Run) -> Cause:
             "identify it again in this condition"
         ),
     )
+
+
+def _of_another_kind(
+    diagnosis: Diagnosis,
+    records: Sequence[Record],
+    residuals: Sequence[FloatArray],
+    compared: velocity.Comparison,
+    wrong: str,
+) -> Diagnosis:
+    """Return a diagnosis in which causes that were sought on top of the wrong model are not found.
+
+    Where the speed matters and not only the direction, the force is a viscous one; else it has no name here.
+    """
+    direction = velocity.compare(records, [None] * len(records), residuals)
+    cleared = _cleared(diagnosis)
+    if compared.velocity > _SPEED_MATTERS * direction.velocity:
+        return replace(cleared, verdict="unknown")
+    explains = 100.0 * (1.0 - (compared.velocity / compared.preisach) ** 2)
+    viscous = Cause("viscous", True, 0.0, explains, float("nan"), text=wrong)
+    others = tuple(one for one in cleared.causes if one.cause != "viscous")
+    return replace(cleared, verdict="viscous", causes=(viscous, *others))
 
 
 def _cleared(diagnosis: Diagnosis) -> Diagnosis:
