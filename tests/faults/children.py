@@ -73,6 +73,7 @@ class Child:
                 handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
                 os.dup2(handle, number)
             sys.argv = ["pulsetrainer", *self.words]
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
             before()
             app.main()
         except SystemExit as end:

@@ -13,6 +13,7 @@ import json
 import os
 import random
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -35,6 +36,7 @@ from kinds_of_fault import Tally, World  # noqa: E402
 def main() -> int:
     """Try all faults, print the table, return 1 where a count is not zero."""
     options = _options()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that disks are unmounted and folders removed
     scratch = Path(tempfile.mkdtemp(prefix="faults-"))
     try:
         begun = time.monotonic()
