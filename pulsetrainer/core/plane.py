@@ -98,6 +98,9 @@ def ascending(low: float, high: float, *, what: str = "the input range") -> None
         )
 
 
+MOST_LEVELS = 10_000  # fifty million cells
+
+
 @dataclass(frozen=True)
 class Plane:
     """The levels of a discrete Preisach plane; everything else follows from them."""
@@ -126,11 +129,12 @@ class Plane:
         Raises
         ------
         ArgumentError
-            Fewer than 2 levels, or a range that is zero or not finite.
+            Fewer than 2 levels, more than ``MOST_LEVELS``, or a range that is zero or not finite.
         """
-        if n_h < 2 or n_h != int(n_h):
+        if not 2 <= n_h <= MOST_LEVELS or n_h != int(n_h):
             raise ArgumentError(
-                f"n_h must be a whole number of at least 2, got {n_h}", hint="48 levels suit most devices"
+                f"n_h must be a whole number from 2 to {MOST_LEVELS}, got {n_h:.6g}",
+                hint="48 levels suit most devices",
             )
         ascending(low, high)
         return cls(np.linspace(low, high, n_h + 1))

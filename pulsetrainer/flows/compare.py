@@ -89,7 +89,7 @@ def run(options: Options, context: Context) -> Result:
             raise UsageError(
                 f"a comparison is written as {', '.join(render.FORMATS)} or csv, "
                 f"but {options.output} ends in {form!r}",
-                hint=f"name it {options.output.with_suffix('.png')}",
+                hint=f"name it {options.output.parent / (options.output.stem or 'figure')}.png",
             )
         output.check_output(options.output, options.force)
     evaluations = [store.read(path, Evaluation) for path in options.files]

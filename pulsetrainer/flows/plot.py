@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pulsetrainer.artefacts import output, store
-from pulsetrainer.errors import UsageError
+from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.report import figures, render
 
 if TYPE_CHECKING:
@@ -39,18 +39,24 @@ def run(options: Options, context: Context) -> Result:
     UsageError
         The output exists, or its format is unknown.
     DataError
-        The file cannot be read or is not an artefact.
+        The file cannot be read, is not an artefact, or holds values that no axis can show.
     """
     form = options.output.suffix.lower().lstrip(".")
     if form not in render.FORMATS:
         raise UsageError(
             f"a figure is written as {', '.join(render.FORMATS)}, but {options.output} ends in {form!r}",
-            hint=f"name it {options.output.with_suffix('.png')}",
+            hint=f"name it {options.output.parent / (options.output.stem or 'figure')}.png",
         )
     output.check_output(options.output, options.force)
     artefact = store.read_any(options.file)
     context.progress(0.3)
-    picture = render.encode(figures.draw(artefact), form)
+    try:
+        picture = render.encode(figures.draw(artefact), form)
+    except (ValueError, ArithmeticError) as error:
+        raise DataError(
+            f"{options.file} cannot be drawn: {error}",
+            hint=f"look at its values: pulsetrainer show {options.file}",
+        ) from error
     with output.replacing(options.output, force=options.force) as temporary:
         temporary.write_bytes(picture)
     context.progress(1.0)

@@ -7,6 +7,7 @@ and goes through ``cli.app.main``, as the installed program does.
 from __future__ import annotations
 
 import contextlib
+import gc
 import importlib
 import os
 import pkgutil
@@ -24,6 +25,8 @@ from pulsetrainer.cli import app
 for _module in pkgutil.walk_packages(pulsetrainer.__path__, "pulsetrainer."):
     if not _module.name.endswith("__main__"):
         importlib.import_module(_module.name)
+gc.collect()
+gc.freeze()  # else each child's collector visits, and so copies, all that the parent has imported
 
 HANG_S = 90.0
 DOCUMENTED = (0, 1, 2, 3, 4, 5, 130)
@@ -70,6 +73,7 @@ class Child:
                 handle = os.open(name, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o600)
                 os.dup2(handle, number)
             sys.argv = ["pulsetrainer", *self.words]
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
             before()
             app.main()
         except SystemExit as end:

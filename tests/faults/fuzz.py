@@ -28,6 +28,7 @@ _TEXTS = (
     "/dev/ttyNONE", "COM99", "auto:", "joint", "relay", "auto", "1", "nan", "out.png", "out.pdf", "out.svg",
     "no/such/folder/out.h5", "run.h5/out.h5",
 )  # fmt: skip
+_SLOW_S = 10.0
 _SKIP = {"doctor"}  # looks at this computer, for some seconds each time
 _MAIN_OPTIONS = ("--debug", "--verbose", "--version", "--help", "--json", "--force", "--nonsense", "-x")
 
@@ -47,6 +48,8 @@ def arguments(world: World, tries: int) -> Tally:
         with world.folder(everything) as folder:
             done = children.run(folder, words, world.log)
             tally.tries += 1
+            if done.seconds > _SLOW_S:
+                tally.slow.append(f"{done.seconds:.0f} s, code {done.code}: {' '.join(words)[:300]}")
             if "--debug" in words:
                 done = children.Ended(
                     words, done.code, done.out, _untraced(done.err), done.seconds, done.hung

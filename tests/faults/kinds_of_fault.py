@@ -34,8 +34,10 @@ class Tally:
     half_written: int = 0  # under the final name
     hangs: int = 0
     wrong_exits: int = 0  # wrong code, no message, or a traceback
+    busy: int = 0  # the device stopped because this computer was too busy, and said so
     seconds: float = 0.0
     complaints: list[str] = field(default_factory=list)
+    slow: list[str] = field(default_factory=list)  # what took long, though it ended
 
     def blame(self, what: str, done: Ended | None = None) -> None:
         """Keep the first reasons for a count above zero."""
@@ -46,7 +48,9 @@ class Tally:
 
     def judge(self, done: Ended, allowed: tuple[int, ...]) -> None:
         """Count a hang, a code that is not allowed, a message that is none."""
-        if done.hung:
+        if done.code == 4 and "too busy" in done.err and done.spoke:
+            self.busy += 1  # the device's own safety: the reference did not arrive in time
+        elif done.hung:
             self.hangs += 1
             self.blame("hung:", done)
         elif done.code not in allowed or not done.spoke:
@@ -164,7 +168,8 @@ def _go_on(world: World, writer: Writer, folder: Path, tally: Tally) -> None:
         return
     if writer.name == "capture (long)" and recordings:
         done = children.run(folder, (*writer.line(force=False), "--resume", "--force"), world.log)
-        if done.code == 2 and "nothing to resume" in done.err:  # killed before the first sample
+        if done.code in (2, 3) and not any(".partial" in path.name for path in folder.iterdir()):
+            # killed before the first sample: nothing to go on with
             done = children.run(folder, writer.line(force=True), world.log)
     else:
         done = children.run(folder, writer.line(force=True), world.log)
@@ -347,7 +352,7 @@ def together(world: World, tries: int) -> Tally:
             tally.tries += 1
             for done in ends:
                 tally.judge(done, (0,) if force else (0, 2))
-            if all(done.code != 0 for done in ends) and len(writer.outputs) == 1:
+            if all(done.code not in (0, 4) for done in ends) and len(writer.outputs) == 1:
                 tally.wrong_exits += 1
                 tally.blame("neither won:", ends[0])
             for path in outputs(writer, folder):

@@ -13,11 +13,12 @@ import json
 import os
 import random
 import shutil
+import signal
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # no threads before the forks
@@ -35,6 +36,7 @@ from kinds_of_fault import Tally, World  # noqa: E402
 def main() -> int:
     """Try all faults, print the table, return 1 where a count is not zero."""
     options = _options()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that disks are unmounted and folders removed
     scratch = Path(tempfile.mkdtemp(prefix="faults-"))
     try:
         begun = time.monotonic()
@@ -46,10 +48,9 @@ def main() -> int:
     if options.json:
         Path(options.json).write_text(json.dumps([asdict(row) for row in rows], indent=1))
     print(_table(rows))
+    if busy := sum(row.busy for row in rows):
+        print(f"\n{busy} times the device stopped by itself because this computer was too busy, and said so")
     print(f"\nseed {options.seed}, {sum(r.tries for r in rows)} tries, {time.monotonic() - begun:.0f} s")
-    for row in rows:
-        for complaint in row.complaints[:5]:
-            print(f"\n{row.fault}: {complaint}")
     return 0 if all(row.clean for row in rows) else 1
 
 
@@ -74,34 +75,36 @@ def _rows(world: World, options: argparse.Namespace) -> Iterator[Tally]:
         each, share, kills = 1, 3, world.rng.sample(kills, 10)
     jobs = [
         (
-            f"kill -9 {writer.name}",
-            lambda writer=writer, older=older: faults.kill(world, each, writer, older=older),
+            f"kill -9 {writer.name}{', older file there' if older else ''}",
+            lambda world, writer=writer, older=older: faults.kill(world, each, writer, older=older),
         )
         for writer, older in kills
     ]
     root = os.geteuid() == 0
-    jobs += [("full disk", lambda: faults.full_disk(world, share))] if root else []
+    jobs += [("full disk", lambda world: faults.full_disk(world, share))] if root else []
     jobs += [
-        ("full quota", lambda: faults.quota(world, share)),
-        ("read-only", lambda: faults.read_only(world, share)),
-        ("truncated", lambda: faults.truncated(world, share)),
-        ("bit-flipped", lambda: faults.flipped(world, share)),
-        ("unsealed", lambda: faults.unsealed(world, share)),
-        ("together", lambda: faults.together(world, share)),
-        ("locked", lambda: faults.locked(world, share)),
-        ("fuzzed arguments", lambda: fuzz.arguments(world, 2 * share)),
-        ("fuzzed tables", lambda: fuzz.tables(world, share)),
-        ("fuzzed artefacts", lambda: fuzz.artefacts(world, share)),
+        ("full quota", lambda world: faults.quota(world, share)),
+        ("read-only", lambda world: faults.read_only(world, share)),
+        ("truncated", lambda world: faults.truncated(world, share)),
+        ("bit-flipped", lambda world: faults.flipped(world, share)),
+        ("unsealed", lambda world: faults.unsealed(world, share)),
+        ("together", lambda world: faults.together(world, share)),
+        ("locked", lambda world: faults.locked(world, share)),
+        ("fuzzed arguments", lambda world: fuzz.arguments(world, 2 * share)),
+        ("fuzzed tables", lambda world: fuzz.tables(world, share)),
+        ("fuzzed artefacts", lambda world: fuzz.artefacts(world, share)),
     ]
     for name, job in jobs:
         if options.only and not any(part in name for part in options.only):
             continue
         begun = time.monotonic()
-        row = job()
+        row = job(replace(world, rng=random.Random(f"{options.seed} {name}")))
         row.seconds = time.monotonic() - begun
         sys.stderr.write(
             f"{row.fault}: {row.tries} tries, {row.seconds:.1f} s{'' if row.clean else ' FAILED'}\n"
         )
+        for text in (*row.slow, *row.complaints[:5]):
+            sys.stderr.write(f"  {text}\n")
         yield row
     if not root:
         sys.stderr.write("full disk: only root can mount a small one; the quota stands for it\n")
