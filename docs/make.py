@@ -159,6 +159,7 @@ down between levels j and j + 1 ([theory](theory.md)).
 
 # attributes have no words of their own in the file
 WORDS = {
+    "start": "state before the run: known, or the one that was estimated",
     "cause": "id of the cause",
     "clipped_samples": "targets outside the reachable range",
     "complete": "the recording was not interrupted",
