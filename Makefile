@@ -8,21 +8,24 @@ D      := build/demo
 
 FIRMWARE := $(shell find firmware -name '*.[ch]')
 CORE     := $(wildcard pulsetrainer/core/*.py)
+DIAGNOSE := $(wildcard pulsetrainer/diagnosis/*.py pulsetrainer/diagnosis/causes/*.py) pulsetrainer/flows/diagnose.py
 REPORT   := $(wildcard pulsetrainer/report/*.py pulsetrainer/report/templates/*) pulsetrainer/flows/evaluate.py
 PULSES   := normal bifid
-METHODS  := paper continuous
+METHODS  := paper continuous extended
 PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h5))
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo test lint bench docs bounds firmware-mps2 firmware-cost clean help
+.PHONY: demo test lint faults bench blind docs bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
 
-demo: $(D)/report.html  ## capture, identify, invert, play, evaluate: two pulses, two methods, one report
+# act one: the paper's method and the continuous inverse; act two: what the model gets wrong, extended, played again
+demo: $(D)/report.html $(D)/diagnosis.html $(D)/unseen.h5 $(D)/model-extended.h5  ## capture, identify, invert, play, evaluate; diagnose, extend, play again
 	@$(PT) evaluate $(PLAYED)
-	@echo "report: $(D)/report.html"
+	@$(PT) evaluate $(D)/unseen.h5 --model $(D)/model-continuous.h5 --model $(D)/model-extended.h5
+	@echo "reports: $(D)/report.html $(D)/diagnosis.html"
 
 # --- set-up -----------------------------------------------------------------------------------------
 $(VENV)/installed: pyproject.toml
@@ -46,6 +49,17 @@ $(D)/model-paper.h5: $(D)/run.h5 $(CORE)
 	$(PT) identify $< --operator relay -o $@ --force
 $(D)/model-continuous.h5: $(D)/run.h5 $(CORE)
 	$(PT) identify $< --operator continuous -o $@ --force
+
+# the second act: the same device, not told what it hides, on a signal that tells causes apart
+$(D)/diagnostic.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
+	$(PT) capture diagnostic --port '$(PORT)' -o $@ --force
+$(D)/diagnosis.h5 $(D)/diagnosis.html &: $(D)/diagnostic.h5 $(D)/model-continuous.h5 $(DIAGNOSE)
+	$(PT) diagnose $< --model $(D)/model-continuous.h5 -o $(D)/diagnosis.h5 --html $(D)/diagnosis.html --force
+$(D)/model-extended.h5: $(D)/diagnosis.h5 $(D)/model-continuous.h5
+	$(PT) extend $< --model $(D)/model-continuous.h5 -o $@ --force
+# a run that neither model was fitted to, at the rate of a pulse
+$(D)/unseen.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
+	$(PT) capture identification --speed 6 --port '$(PORT)' -o $@ --force
 
 define PULSE_RULES
 $(D)/drive-$(1)-$(2).h5: $(D)/model-$(2).h5 waveforms/$(1).csv pulsetrainer/flows/invert.py
@@ -72,8 +86,14 @@ lint: $(VENV)/installed-test  ## style, types, import contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+faults: $(VENV)/installed-test  ## kill -9, full disks, damaged files, fuzzing: hundreds of tries, one table
+	$(BIN)/python tests/faults/run.py --tries $(or $(TRIES),400) --seed $(or $(SEED),1)
+
 bench: $(VENV)/installed-test  ## speed and memory, as ratios in one run
 	$(BIN)/python -m pytest benchmarks -p no:xdist --timeout=0 -s
+
+blind: $(VENV)/installed-test  ## the full blind grid of the diagnosis on all cores (hours of processor time)
+	$(BIN)/python tests/blind/run.py -o build/blind.h5
 
 ARM_TOOLS := arm-none-eabi-gcc qemu-system-arm
 firmware-mps2 firmware-cost: arm-tools

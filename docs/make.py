@@ -159,7 +159,7 @@ down between levels j and j + 1 ([theory](theory.md)).
 
 # attributes have no words of their own in the file
 WORDS = {
-    "start": "state before the run: known, or the one that was estimated",
+    "start": "state before the run: known, or which one was estimated",
     "cause": "id of the cause",
     "clipped_samples": "targets outside the reachable range",
     "complete": "the recording was not interrupted",
@@ -260,7 +260,7 @@ def _units(plan: FieldPlan) -> str:
 
 def _quantity(plan: FieldPlan) -> str:
     if plan.data is None:
-        return "" if plan.role in ("group", "groups") else WORDS[plan.name]
+        return "" if plan.role in ("group", "groups") else WORDS.get(plan.name, plan.name.replace("_", " "))
     words = plan.data.quantity
     return f"as `{words[1:]}` says" if words.startswith("@") else _cell(words)
 

@@ -84,4 +84,5 @@ def root(
 
 def main() -> None:
     """Run the program and exit with its code."""
+    guard.end_like_ctrl_c()
     sys.exit(guard.funnel(app, sys.argv[1:]))

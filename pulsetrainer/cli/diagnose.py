@@ -12,7 +12,7 @@ from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.options import AsJson, Force, Out
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts.kinds import Cause, Diagnosis
+    from pulsetrainer.artefacts.kinds import Cause, Diagnosis, Parameter
 
 _SHOWN = 8
 
@@ -88,7 +88,7 @@ def tables(screen: Screen, found: Diagnosis) -> None:
             "model as given": f"{found.rms_percent:.3f} % rms of the span, single samples",
             "noise": f"{found.noise_percent:.3f} % rms, single samples",
             "weights refitted": f"{found.static_percent:.3f} % rms, short averages",
-            "extended": f"{found.extended_percent:.3f} % rms, short averages",
+            **({} if found.quick else {"extended": f"{found.extended_percent:.3f} % rms, short averages"}),
             "floor": f"{found.floor_percent:.3f} % rms: noise and levels",
         },
     )
@@ -96,25 +96,26 @@ def tables(screen: Screen, found: Diagnosis) -> None:
     others = [one for one in found.causes if not one.found][: max(_SHOWN - len(named), 0)]
     screen.table(
         "causes, strongest first",
-        ["cause", "found", "p", "explains %", "held-out gain %", "parameters", "not told from"],
+        ["cause", "found", "p", "explains %", "held-out gain %"],
         [_row(one) for one in (*named, *others)],
     )
+    if named:
+        screen.facts("found", {one.cause: _found(one) for one in named})
     screen.facts("evidence", {str(k): text for k, text in enumerate(found.evidence, start=1)})
     screen.facts("next", {"": found.next_experiment})
 
 
+def _found(one: Cause) -> str:
+    tied = f"; not told from {', '.join(one.confounded_with)}" if one.confounded_with else ""
+    return f"{one.text}: {'; '.join(_words(p) for p in one.parameters)}{tied}"
+
+
+def _words(p: Parameter) -> str:
+    interval = f" [{p.lower:.4g}, {p.upper:.4g}]" if math.isfinite(p.lower) else ""
+    return f"{p.name} {p.value:.4g} {p.unit}{interval}"
+
+
 def _row(one: Cause) -> list[Any]:
-    parameters = (
-        f"{p.name} {p.value:.4g} {p.unit} [{p.lower:.4g}, {p.upper:.4g}]" if one.found else p.name
-        for p in one.parameters
-    )
     measured = one.found and math.isfinite(one.held_out_gain_percent)
-    return [
-        one.cause,
-        one.found,
-        f"{one.p_value:.3f}",
-        one.explains_percent,
-        one.held_out_gain_percent if measured else None,
-        "; ".join(parameters),
-        ", ".join(one.confounded_with),
-    ]
+    gain = one.held_out_gain_percent if measured else None
+    return [one.cause, one.found, f"{one.p_value:.3f}", one.explains_percent, gain]

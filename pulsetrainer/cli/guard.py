@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import json
 import os
+import signal
 import sys
 import traceback
 from collections.abc import Callable, Sequence
+from types import FrameType
 from typing import Any
 
-from pulsetrainer.errors import Interrupted, PulsetrainerError, UsageError
+from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
 
+_NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _DEBUG_HINT = "run it again with --debug for the whole traceback, and report it"
 
 
@@ -23,21 +28,37 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     problem: PulsetrainerError
     try:
         code = program(args=words, standalone_mode=False, prog_name="pulsetrainer")
+        sys.stdout.flush()  # here, not at the end of the process, where a full disk has no words
     except PulsetrainerError as error:
         problem = error
         _trace(debug)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
         problem = Interrupted("stopped by you", hint="nothing was written")
+        for note in getattr(error, "__notes__", ()):
+            problem.add_note(note)
     except BrokenPipeError:  # the reader of our output went away: its business
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:  # noqa: BLE001 - the last resort, which is the point of this function
-        problem = _usage_of(error) or _bug_of(error)
+        problem = _usage_of(error) or _outside_of(error) or _bug_of(error)
         _trace(debug)
     else:
         return int(code or 0)
-    report(problem, command=next((w for w in words if not w.startswith("-")), ""), as_json="--json" in words)
+    with contextlib.suppress(OSError):  # nowhere to say it: the exit code still does
+        report(problem, command=next((w for w in words if w[:1] != "-"), ""), as_json="--json" in words)
     return problem.exit_code
+
+
+def end_like_ctrl_c() -> None:
+    """Let a closed terminal, or a batch system that ends the job, stop the output and keep the data."""
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:  # not under nohup
+            signal.signal(number, interrupt)
 
 
 def _be_verbose() -> None:
@@ -61,6 +82,8 @@ def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
         error = {"kind": problem.kind, "message": problem.message, "hint": problem.hint}
         sys.stdout.write(json.dumps({"schema": 1, "command": command, "error": error}) + "\n")
     sys.stderr.write(f"error: {problem.message}\n")
+    for note in getattr(problem, "__notes__", ()):
+        sys.stderr.write(f"note: {note}\n")
     if problem.hint:
         sys.stderr.write(f"  try: {problem.hint}\n")
 
@@ -73,6 +96,22 @@ def _usage_of(error: Exception) -> UsageError | None:
     context = getattr(error, "ctx", None)
     name = getattr(context, "command_path", "pulsetrainer")
     return UsageError(str(explain()).rstrip("."), hint=f"{name} --help")
+
+
+def _outside_of(error: Exception) -> PulsetrainerError | None:
+    """Return what lies outside the program: no memory, nowhere to write the results to."""
+    if isinstance(error, MemoryError):
+        return DataError(
+            "there is not enough memory for this",
+            hint="use fewer levels, or a shorter record",
+        )
+    if isinstance(error, OSError) and error.filename is None and error.errno in _NOWHERE:
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left would fail again
+        return DataError(
+            f"the results could not be printed: {error.strerror}", hint="free some space, or print elsewhere"
+        )
+    return None
 
 
 def _bug_of(error: Exception) -> PulsetrainerError:

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike
-from scipy.signal import savgol_filter
 
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, IntArray, finite_vector
@@ -147,7 +147,7 @@ def _local_polynomial(piece: FloatArray, sigma: float, n: int) -> FloatArray:
     """Filter a piece with the widest window that leaves noise of size ``sigma`` behind, and no more."""
     for window in _WINDOWS:
         if window <= piece.size:
-            path = savgol_filter(piece, window, 2)
+            path = scipy.signal.savgol_filter(piece, window, 2)
             rest = piece - path
             noise_only = np.std(rest) <= _NOISE_ONLY * sigma
             if noise_only and np.abs(rest).max() <= 0.5 * _NOISE_ONLY * dead_band(sigma, n):

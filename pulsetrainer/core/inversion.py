@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import UnivariateSpline
 
 from pulsetrainer.core.memory import State, negative_saturation, trace, trace_after
 from pulsetrainer.core.operator import Preisach
@@ -320,7 +320,7 @@ def smoothed(inputs: ArrayLike, time_s: ArrayLike, step: float, low: float, high
         )
     positive(step=step)
     ascending(low, high)
-    spline = UnivariateSpline(t, u, k=3, s=u.size * step**2 / 12.0)
+    spline = scipy.interpolate.UnivariateSpline(t, u, k=3, s=u.size * step**2 / 12.0)
     return np.clip(spline(t), low, high)
 
 

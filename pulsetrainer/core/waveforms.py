@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
@@ -60,7 +60,9 @@ def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float
     ascending(low, high, what="the range of the pulse")
     positive(rate=rate_Hz)
     t = shape.time_s - shape.time_s[0]
-    curve = PchipInterpolator(np.append(t, shape.period_s), np.append(shape.normalised, shape.normalised[0]))
+    curve = scipy.interpolate.PchipInterpolator(
+        np.append(t, shape.period_s), np.append(shape.normalised, shape.normalised[0])
+    )
     count = round(periods * shape.period_s * rate_Hz)
     if count < 1:
         raise ArgumentError(

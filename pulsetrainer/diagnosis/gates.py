@@ -14,6 +14,7 @@ from pulsetrainer.diagnosis.design import Measured
 BoolArray = NDArray[np.bool_]
 
 _OUTLIER_SIGMAS = 8.0  # of Gaussian noise one sample in 10^15
+_STICKING_SIGMAS = 7.0  # of the difference of two short means
 _USED = 2  # times, on average, each value of a quantised output occurs at least
 _TRACKING_SHARE = 0.02  # of the input's range
 _OUTSIDE_SHARE = 0.01
@@ -104,23 +105,20 @@ def _saturated(record: Measured) -> Firing | None:
 
 
 def _outliers(record: Measured) -> Firing | None:
-    """Samples far from both neighbours, on the same side of both, farther than fast turns go."""
+    """Samples far from the median around them, farther than fast turns go."""
     y = record.output
-    step = np.diff(y)
-    # a turn at full speed also stands out from both neighbours, by one step of the fast branches
-    usual = 4.0 * float(np.quantile(np.abs(step), 0.95))
+    apart = np.abs(y - ndimage.median_filter(y, 7, mode="nearest"))
+    # a tip at full speed also stands out from its median, by up to three steps of the fast branches
+    usual = 4.0 * float(np.quantile(np.abs(np.diff(y)), 0.95))
     limit = max(_OUTLIER_SIGMAS * np.sqrt(2.0) * noise_of(y), usual, 2.0 * spacing_of(y))
-    left, right = step[:-1], -step[1:]
-    wild = np.zeros(y.size, dtype=bool)
-    wild[1:-1] = (left * right > 0) & (np.minimum(np.abs(left), np.abs(right)) > limit)
+    wild = apart > limit
     if np.count_nonzero(wild) < 3:
         return None
-    size = float(np.minimum(np.abs(left), np.abs(right))[wild[1:-1]].max())
     return Firing(
         "outliers",
-        f"{np.count_nonzero(wild)} samples stand out from both their neighbours by more than {limit:.3g}",
+        f"{np.count_nonzero(wild)} samples stand out from those around them by more than {limit:.3g}",
         float(wild.mean()),
-        size,
+        float(apart[wild].max()),
         "y",
         wild,
     )
@@ -133,29 +131,28 @@ def _sticking(record: Measured, reach: float) -> Firing | None:
     if y.size < 20 * wide or coarse_step(y) > 0:
         return None
     total = np.concatenate(([0.0], np.cumsum(y)))
-    at = np.arange(y.size) + 1  # the first sample after a jump
-    ahead = (total[np.minimum(at + wide, y.size)] - total[at]) / np.maximum(
-        np.minimum(at + wide, y.size) - at, 1
-    )
-    behind = (total[at] - total[np.maximum(at - wide, 0)]) / (at - np.maximum(at - wide, 0))
-    jump = np.abs(np.append(np.diff(y), 0.0))
+    at = np.arange(wide, y.size - wide)  # the first sample after a jump
+    jump = np.zeros(y.size)
+    jump[at] = (total[at + wide] - 2.0 * total[at] + total[at - wide]) / wide
+    size = np.abs(jump)
     rate = ndimage.uniform_filter1d(np.gradient(record.input, record.dt_s), 5 * wide) / reach
     moved = np.abs(rate)
     # where the input changes its rate other causes make jumps too
     change = np.abs(np.roll(rate, -6 * wide) - np.roll(rate, 6 * wide))
     slow = (moved > 0.1) & (moved < 3.0) & (change < 0.2 * moved)
-    lasting = (jump > 0.6 * np.abs(ahead - behind)) & (jump > 6.0 * np.sqrt(2.0) * sigma)
-    usual = 8.0 * float(np.median(jump[slow])) if slow.any() else np.inf
-    # both sides must be flat: on a smooth branch the steps next to a jump are like it
-    found = slow & lasting & (jump > usual) & (np.abs(ahead - behind) > 0.5 * jump)
+    # a smooth branch has equal differences everywhere, a stuck one none between its jumps
+    around = ndimage.median_filter(size[::wide], 15, mode="nearest").repeat(wide)[: y.size]
+    least = _STICKING_SIGMAS * np.sqrt(2.0 / wide) * sigma
+    peak = (size == ndimage.maximum_filter1d(size, 2 * wide + 1)) & (size > least)
+    found = slow & peak & (size > 4.0 * around)
     if np.count_nonzero(found) < 15:
         return None
-    size = float(np.median(jump[found]))
+    typical = float(np.median(size[found]))
     return Firing(
         "stick-slip",
-        f"{np.count_nonzero(found)} jumps of about {size:.3g} between flat runs while the input moves slowly",
+        f"{np.count_nonzero(found)} jumps of about {typical:.3g} between flat runs in slow motion",
         float(found.mean()),
-        size,
+        typical,
         "y",
     )
 
@@ -193,11 +190,14 @@ def _tracking(record: Measured, reach: float) -> Firing | None:
 
 
 def _outside(record: Measured, low: float, high: float) -> Firing | None:
+    """Input beyond the range; what it leaves in the memory lasts until the other end is reached."""
     slack = _OUTSIDE_SHARE * (high - low)
-    outside = (record.input < low - slack) | (record.input > high + slack)
+    above, below = record.input > high + slack, record.input < low - slack
+    outside = above | below
     if not outside.any():
         return None
     beyond = float(np.max(np.maximum(low - record.input, record.input - high)))
+    at_low, at_high = record.input <= low + slack, record.input >= high - slack
     return Firing(
         "out-of-range",
         f"{np.count_nonzero(outside)} samples of the input lie outside {low:.4g} .. {high:.4g}, "
@@ -205,5 +205,13 @@ def _outside(record: Measured, low: float, high: float) -> Firing | None:
         float(outside.mean()),
         beyond,
         "u",
-        outside,
+        _lasting(above, at_low) | _lasting(below, at_high),
     )
+
+
+def _lasting(begins: BoolArray, ends: BoolArray) -> BoolArray:
+    """From every sample that ``begins`` to the next that ``ends``, which is not in it."""
+    number = np.arange(begins.size)
+    last_begin = np.maximum.accumulate(np.where(begins, number, -1))
+    last_end = np.maximum.accumulate(np.where(ends, number, -1))
+    return np.asarray(last_begin > last_end)

@@ -55,7 +55,7 @@ def groups(problem: Problem) -> list[Group]:
     at_time = np.asarray([time[by_time == k].mean() for k in range(_GROUPS)])
     direction = np.sign(np.where(speed < _RATE_EDGES[1], 0.0, rate)).astype(np.int64) + 1
     return [
-        Group("rate", "ranges/s", at_rate, by_rate),
+        Group("rate", "1/s", at_rate, by_rate),  # ranges of the input a second
         Group("level", "{u}", at_level, by_level),
         Group("direction", "1", np.asarray([-1.0, 0.0, 1.0]), direction),
         Group("time", "s", at_time, by_time),

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.equations import Record
 from pulsetrainer.core.plane import FloatArray
@@ -69,7 +69,7 @@ def _velocity(u: FloatArray, dt_s: float | None) -> FloatArray:
     """Slope of local parabolas (n,), input unit per s; without time its sign."""
     if u.size < _WINDOW:
         return np.sign(np.gradient(u)) if dt_s is None else np.gradient(u, dt_s)
-    slope = savgol_filter(u, _WINDOW, 2, deriv=1, delta=dt_s or 1.0)
+    slope = scipy.signal.savgol_filter(u, _WINDOW, 2, deriv=1, delta=dt_s or 1.0)
     return np.sign(slope) if dt_s is None else np.asarray(slope)
 
 

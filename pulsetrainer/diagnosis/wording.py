@@ -6,7 +6,7 @@ import numpy as np
 
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.answer import Answer
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.experiment import best_experiment
 
 
 def evidence(answer: Answer, lacks: list[str]) -> list[str]:
@@ -62,8 +62,13 @@ def next_experiment(answer: Answer, lacks: list[str]) -> str:
     tied = next((f for f in answer.findings if f.found and f.confounded_with), None)
     if tied is not None:
         names = (tied.cause.id, *tied.confounded_with)
-        wanted = "; ".join(dict.fromkeys(library()[name].excitation for name in names))
-        return f"To tell {' and '.join(names)} apart, record {wanted}: capture diagnostic has all of it."
+        best = best_experiment(answer, names)
+        percent = 100.0 / float(np.ptp(answer.problem.measured))
+        return (
+            f"To tell {', '.join(names[:-1])} and {names[-1]} apart, record {best.words}: there the two most "
+            f"alike differ by {percent * best.distance:.2g} % of the span (rms, weights taken off), on this "
+            f"record by {percent * best.distance_here:.2g} %. pulsetrainer capture diagnostic has all of it."
+        )
     if lacks:
         return (
             f"The record has {', '.join(lacks)}: record one with several rates, holds and repeats "

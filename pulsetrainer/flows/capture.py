@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
     from pulsetrainer.link import Device
 
+MOST_SAMPLES = 50_000_000  # of a signal from a file: half a day at 1 kHz
 EXCITATIONS = ("identification", "diagnostic")
 
 
@@ -155,7 +156,14 @@ def _from_file(path: Path, rate_Hz: float) -> Signal:
             f"the time in {path} does not increase at row {row + 1}: {time[row]:g} after {time[row - 1]:g}",
             hint="sort the rows by time and drop repeated ones",
         )
-    count = int(np.floor((time[-1] - time[0]) * rate_Hz + 1e-9)) + 1
+    lasts = (time[-1] - time[0]) * rate_Hz
+    if not lasts <= MOST_SAMPLES:
+        raise DataError(
+            f"{path} lasts {time[-1] - time[0]:g} s, {lasts:.3g} samples at {rate_Hz:g} Hz; "
+            f"{MOST_SAMPLES} are the most",
+            hint="give its time in s, a lower --rate, or a shorter signal with --repeats",
+        )
+    count = int(np.floor(lasts + 1e-9)) + 1
     value = np.interp(time[0] + np.arange(count) / rate_Hz, time, current)
     return Signal(value, rate_Hz, path.name)
 

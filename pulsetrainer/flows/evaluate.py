@@ -26,7 +26,6 @@ from pulsetrainer.core.memory import State, demagnetised, negative_saturation, p
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import DataError, QualityError, UsageError
 from pulsetrainer.flows.modelling import known_from, operator_of, parts_of, predict, step_of
-from pulsetrainer.report import html
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
@@ -115,6 +114,8 @@ def run(options: Options, context: Context) -> Result:
     if options.output is not None:
         store.write(options.output, evaluation, header, force=options.force)
     if options.html is not None:
+        from pulsetrainer.report import html  # draws: half a second that nobody else has to wait
+
         page = html.render_evaluation(
             evaluation,
             title=header.title,

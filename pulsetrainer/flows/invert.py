@@ -131,7 +131,6 @@ def run(options: Options, context: Context) -> Result:
     shape, path = read_shape(options.waveform)
     shape = _one_beat(shape, options.beat, context)
     operator = operator_of(model)
-    low, high = _force_range(options, operator, model.output_unit)
     usual: Inversion = "closest-match" if operator.reading == "relay" else "continuous"
     method = options.inversion or ("extended" if model.extensions else usual)
     if method == "extended" and not model.extensions:
@@ -144,6 +143,9 @@ def run(options: Options, context: Context) -> Result:
             f"{options.model} was identified with the relay operator, which has no continuous inverse",
             hint="give --method closest-match, or identify with --operator continuous",
         )
+    low, high = _force_range(options, operator, model.output_unit)
+    if method == "extended":
+        low, high = _within_beats(options, shape, model, (low, high))
     context.progress(0.2)
     waveform = _drives(shape, operator, model, method, (low, high), options, context)
     header = provenance.make_header(
@@ -199,6 +201,31 @@ def _force_range(options: Options, operator: Preisach, unit: str) -> tuple[float
             hint="swap or change the two",
         )
     return low, high
+
+
+def _within_beats(
+    options: Options, shape: Shape, model: Model, forces: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the force range, its free ends moved to what every beat reaches with the range of the input.
+
+    A lag, a creep or heat keep a pulse from the ends that the hysteresis would reach in a long time.
+    """
+    low, high = float(model.levels[0]), float(model.levels[-1])
+    rate = options.rate_Hz
+    rising = model.polarity > 0
+    inputs = train(shape, periods=4, rate_Hz=rate, low=low if rising else high, high=high if rising else low)
+    settle = np.full(round(rate), inputs[0])
+    lead = signals.conditioning(
+        low, high, speed=(high - low) / CONDITIONING_TIME_S, rate_Hz=rate, rest_s=REST_S
+    )
+    made = predict(model, np.concatenate((lead, settle, inputs)), 1.0 / rate)[lead.size + settle.size :]
+    period = round(shape.period_s * rate)
+    beats = [made[k * period : (k + 1) * period] for k in range(1, made.size // period)]
+    reached = max(float(b.min()) for b in beats), min(float(b.max()) for b in beats)
+    return (
+        max(forces[0], reached[0]) if options.force_min is None else forces[0],
+        min(forces[1], reached[1]) if options.force_max is None else forces[1],
+    )
 
 
 def _drives(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pulsetrainer.artefacts.kinds import Model, Run
@@ -9,8 +11,10 @@ from pulsetrainer.core.identification import Record
 from pulsetrainer.core.memory import State, positive_saturation
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
-from pulsetrainer.diagnosis.extended import Extended
 from pulsetrainer.errors import DataError
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.extended import Extended
 
 _SHORTEST_PART = 100  # samples
 
@@ -25,6 +29,8 @@ def extended_of(model: Model) -> Extended:
     DataError
         The model was extended by causes that this version does not know.
     """
+    from pulsetrainer.diagnosis.extended import Extended  # and with it scipy.signal and scipy.stats
+
     named = [(one.cause, tuple(p.value for p in one.parameters)) for one in model.extensions]
     return Extended.of(operator_of(model), named)
 

@@ -242,17 +242,15 @@ def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool
     found = interrupted(path)
     source = found[0][0] if found else None
     if path.exists():
-        final = store.read(path, Run)
-        if not final.complete and not is_abandoned(path):
-            raise UsageError(f"{path} is being continued by another program", hint="wait for it")
-        if final.complete and source is not None and not force:
+        final = _unfinished(path, must_read=source is None)
+        if final is None and source is not None and not force:
             raise UsageError(
-                f"{source} can be continued, but {path} exists already and is complete",
+                f"{source} can be continued, but {path} exists already",
                 hint="give --force too to replace it when the recording has ended",
             )
-        if final.complete and source is None:
+        if final is None and source is None:
             raise UsageError(f"there is nothing to resume: {path} is complete", hint="leave --resume out")
-        if not final.complete and (not found or final.input.size >= found[0][1]):
+        if final is not None and (not found or final.input.size >= found[0][1]):
             source = path
     if source is None:
         beside = sorted(entry.name for entry in path.parent.glob(f"{path.name}.partial*"))
@@ -269,6 +267,21 @@ def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool
     run, header = store.read(source, Run), store.read_header(source)
     _check_same(source, header.provenance.parameters, asked)
     return Earlier(source, run, header, _played(source, run, course), lease)
+
+
+def _unfinished(path: Path, *, must_read: bool) -> Run | None:
+    """Read a recording that a fault or Ctrl-C ended early; None for what will have to make room."""
+    try:
+        run = store.read(path, Run)
+    except DataError:
+        if must_read:
+            raise
+        return None
+    if run.complete:
+        return None
+    if not is_abandoned(path):
+        raise UsageError(f"{path} is being continued by another program", hint="wait for it")
+    return run
 
 
 def _check_same(source: Path, before: Mapping[str, Any], asked: Mapping[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""A real browser, and two reports that the program made: an evaluation and a diagnosis."""
+"""A real browser, and three reports that the program made: of pulses, of models on a run, of a diagnosis."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-# one short record for both: six seconds of the device, twelve levels
+# one short record for all: six seconds of the device, twelve levels
 STEPS = (
     "capture identification --levels 12 --speed 3 -o run.h5",
     "identify run.h5 --levels 12 -o model.h5",
@@ -22,6 +22,8 @@ STEPS = (
     "play drive2.h5 --repeats 2 -o played2.h5",
     "evaluate played.h5 played2.h5 -o evaluation.h5 --html evaluation.html",
     "diagnose run.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html",
+    "extend diagnosis.h5 --model model.h5 -o extended.h5",
+    "evaluate run.h5 --model model.h5 --model extended.h5 -o prediction.h5 --html prediction.html",
 )
 # one interpreter for all steps: numpy and matplotlib are imported once
 ONE_PROCESS = """
@@ -46,7 +48,7 @@ class Report:
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory) -> Path:
-    """A folder in which the program has made both reports."""
+    """A folder in which the program has made all reports."""
     here = tmp_path_factory.mktemp("reports")
     done = subprocess.run(
         [sys.executable, "-c", ONE_PROCESS, *STEPS],
@@ -60,11 +62,11 @@ def folder(tmp_path_factory) -> Path:
     return here
 
 
-@pytest.fixture(scope="session", params=["evaluation", "diagnosis"])
+@pytest.fixture(scope="session", params=["evaluation", "prediction", "diagnosis"])
 def report(request, folder) -> Report:
     """Each report in turn."""
     kind = request.param
-    figures = {"evaluation": 2 * 2 + 2, "diagnosis": 1 + 5 + 1}[kind]
+    figures = {"evaluation": 2 * 2 + 2, "prediction": 2 + 1, "diagnosis": 1 + 5 + 1}[kind]
     return Report(kind, folder / f"{kind}.html", folder / f"{kind}.h5", figures)
 
 

@@ -27,3 +27,22 @@ def as_built(tmp_path_factory) -> Path:
         document = chain(folder, "bench:", operator=operator, waveforms=("normal", "bifid"))
         (folder / f"{operator}.json").write_text(json.dumps(document))
     return folder
+
+
+@pytest.fixture(scope="session")
+def extended(as_built) -> Path:
+    """Return the same folder after the second act: diagnosed, extended, the pulses played again."""
+    steps = [
+        ["capture", "diagnostic", "-o", "diagnostic.h5"],
+        ["diagnose", "diagnostic.h5", "--model", "model-continuous.h5", "-o", "diagnosis.h5", "--json"],
+        ["extend", "diagnosis.h5", "--model", "model-continuous.h5", "-o", "model-extended.h5"],
+    ]
+    for name in ("normal", "bifid"):
+        steps.append(["invert", name, "--model", "model-extended.h5", "-o", f"drive-{name}-extended.h5"])
+        steps.append(["play", f"drive-{name}-extended.h5", "-o", f"played-{name}-extended.h5"])
+    for words in steps:
+        done = pulsetrainer(as_built, *words)
+        assert done.code == 0, (words, done)
+        if words[0] == "diagnose":
+            (as_built / "diagnosis.json").write_text(done.out)
+    return as_built

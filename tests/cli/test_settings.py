@@ -6,6 +6,10 @@ import json
 
 import h5py
 import pytest
+import typer
+
+from pulsetrainer.cli.app import app
+from pulsetrainer.cli.settings import SETTINGS
 
 PLAN = ("capture", "identification", "--dry-run", "--json", "-o", "run.h5")
 
@@ -113,6 +117,15 @@ def test_dry_run_of_a_play_is_what_the_play_does(run, tmp_path):
     with h5py.File(tmp_path / "played.h5") as file:
         peak = max(file["compensated/reference"][()].max(), file["scaled/reference"][()].max())
     assert plan["peak_current_A"] == pytest.approx(peak, abs=2e-4)
+
+
+def test_every_setting_reaches_its_options():
+    """The parameters that a setting names are there, and their environment variable is the setting's."""
+    command = typer.main.get_command(app)
+    for one in SETTINGS:
+        for name, parameter in one.options:
+            found = {p.name: p for p in command.commands[name].params}[parameter]
+            assert found.envvar == one.variable
 
 
 def test_verbose_says_what_is_done_on_stderr(run):

@@ -64,6 +64,7 @@ RUN = {
     ROOT / "README.md": ("scope.csv", "other-run.h5"),
     ROOT / "docs/tutorial.md": (),
     HOW_TO / "own-bench.md": ("scope.csv", "other.csv"),
+    HOW_TO / "settings.md": (),
     ROOT / "docs/measured.md": tuple(path.name for path in sorted((ROOT / "tests/data").glob("*.csv"))),
     HOW_TO / "ci.md": ("played.h5", "last-week.h5"),
     HOW_TO / "batches.md": ("workflow",),

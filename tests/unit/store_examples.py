@@ -64,7 +64,7 @@ def diagnosis(m: int = 12) -> kinds.Diagnosis:
     tau = kinds.Parameter("tau", 0.008, "s", 0.007, 0.009)
     cause = kinds.Cause("output-lag", True, 0.005, 98.0, 97.0, (tau,), ("delay",), "the sensor is slow")
     extended = model(extensions=(kinds.Extension("output-lag", (tau,)),))
-    profile = kinds.Profile("rate", "ranges/s", group, group, group)
+    profile = kinds.Profile("rate", "1/s", group, group, group)
     numbers = (0.1, 1.0, 0.3, 0.9, 0.2, 0.2)
     return kinds.Diagnosis(
         "output-lag", False, *numbers, (cause,), ("why",), "next", (profile,), time, *(ones,) * 4, extended
@@ -81,9 +81,18 @@ EXAMPLES = {
 }
 
 
+# Units of somebody's bench, all of them units that pint knows
+UNITS = st.sampled_from(
+    ["1", "s", "A", "N", "mN", "V", "A/m", "T", "percent", "N/A^2", "N/(A)^2", "1/s", "Hz"]
+)
+
+
 @st.composite
-def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None) -> Any:
-    """Draw an artefact: shapes, NaN, missing optional parts and texts at random, axes as annotated."""
+def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None, *, full: bool = False) -> Any:
+    """Draw an artefact: shapes, NaN, missing optional parts and texts at random, axes as annotated.
+
+    A ``full`` one has every optional part, at least one of each group, and units that are units.
+    """
     plans = plan_of(cls)
     own_time = any(plan.is_time_axis for plan in plans)
     level = draw(st.integers(1, 5))
@@ -96,14 +105,18 @@ def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None) -> Any:
     }
     values = {}
     for plan in plans:
-        if plan.optional and draw(st.booleans()):
+        if plan.optional and not full and draw(st.booleans()):
             values[plan.name] = None
+        elif full and plan.role == "attribute" and plan.name.endswith("unit"):
+            values[plan.name] = draw(UNITS)
+        elif full and plan.role == "attribute" and plan.name.endswith("quantity"):
+            values[plan.name] = draw(st.sampled_from(["current", "force", "field strength"]))
         else:
-            values[plan.name] = draw(_values(plan, lengths))
+            values[plan.name] = draw(_values(plan, lengths, full=full))
     return cls(**values)
 
 
-def _values(plan: FieldPlan, lengths: dict[str, int]) -> st.SearchStrategy[Any]:
+def _values(plan: FieldPlan, lengths: dict[str, int], *, full: bool) -> st.SearchStrategy[Any]:
     """Return the strategy for one field."""
     floats = (
         st.floats(allow_nan=not plan.data.finite, allow_infinity=not plan.data.finite) if plan.data else None
@@ -121,8 +134,8 @@ def _values(plan: FieldPlan, lengths: dict[str, int]) -> st.SearchStrategy[Any]:
         return ATTRIBUTES[plan.type]
     if plan.role == "list":
         return st.lists(ATTRIBUTES[plan.type], max_size=3).map(tuple)
-    inner = artefacts(plan.type, lengths[TIME])
-    return inner if plan.role == "group" else st.lists(inner, max_size=2).map(tuple)
+    inner = artefacts(plan.type, lengths[TIME], full=full)
+    return inner if plan.role == "group" else st.lists(inner, min_size=int(full), max_size=2).map(tuple)
 
 
 def equal(a: Any, b: Any) -> bool:

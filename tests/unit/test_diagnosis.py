@@ -8,11 +8,13 @@ import pytest
 from pulsetrainer.core import signals
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
-from pulsetrainer.diagnosis import gates, screening
+from pulsetrainer.diagnosis import experiment, gates, screening
 from pulsetrainer.diagnosis.causes import cause_named, library
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass
 from pulsetrainer.diagnosis.design import Measured
-from pulsetrainer.diagnosis.extended import Extended
+from pulsetrainer.diagnosis.extended import Extended, Term
+from pulsetrainer.diagnosis.fitting import refit, weights_for
+from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.selection import diagnose
 from pulsetrainer.errors import DataError
 
@@ -168,6 +170,93 @@ def test_gates_fire_on_what_they_are_for_and_not_otherwise():
             stuck = wanted - 0.2 * np.sign(wanted - stuck)
         held.append(stuck)
     assert set(_fired(_record(np.asarray(held) + 0.02 * rng.standard_normal(t.size), u))) == {"stick-slip"}
+
+
+def test_wild_samples_side_by_side_are_found():
+    """Two in a row stand out from those around them, though not from each other."""
+    rng = np.random.default_rng(4)
+    t = np.arange(20_000) * DT
+    u = 0.75 - 0.75 * np.cos(2 * np.pi * 0.5 * t)
+    y = np.round(6 * u + 0.03 * rng.standard_normal(t.size), 3)
+    at = np.concatenate([k + np.arange(2) for k in range(500, 20_000, 1500)])
+    y[at] += 3.0
+    np.testing.assert_array_equal(np.flatnonzero(_fired(_record(y, u))["outliers"].mask), at)
+
+
+def test_what_an_input_out_of_range_leaves_in_the_memory_is_left_out():
+    """Until the other end is reached the output depends on extremes that the plane does not hold."""
+    u = np.concatenate(
+        [np.linspace(a, b, 200) for a, b in ((0, 1), (1, 1.8), (1.8, 0.5), (0.5, 0), (0, 1.2))]
+    )
+    mask = _fired(_record(5 * u, u))["out-of-range"].mask
+    assert not mask[:300].any()
+    assert mask[400:600].all()
+    assert mask[700]
+    assert not mask[800:].any()
+
+
+def test_the_noise_is_that_of_the_samples_with_weight():
+    """Filled-in samples have none."""
+    rng = np.random.default_rng(6)
+    y = np.sin(np.arange(9000) / 300) + 0.05 * rng.standard_normal(9000)
+    weight = np.ones(9000)
+    weight[1000:7000] = 0.0
+    y[1000:7000] = 1.0
+    assert gates.noise_of(y, weight) == pytest.approx(0.05, rel=0.06)
+    assert gates.noise_of(y) < 0.01
+
+
+def _lagging(n_h: int = 24, rate_Hz: float = 200.0, **causes: tuple[float, ...]) -> Measured:
+    """A short diagnostic record of a device with some causes."""
+    u = signals.diagnostic(0.0, 1.5, rate_Hz=rate_Hz).value[: round(40 * rate_Hz)]
+    named = [(name.replace("_", "-"), values) for name, values in causes.items()]
+    y = Extended.of(_operator(n_h), named)(u, 1 / rate_Hz)
+    noise = 0.01 * np.random.default_rng(8).standard_normal(u.size)
+    return Measured(1 / rate_Hz, u, y + noise, np.ones(u.size))
+
+
+def test_what_happened_before_a_record_does_not_bend_the_creep():
+    """A finger that was pressed before goes on relaxing: it is fitted freely, and the constants are right."""
+    record = _lagging(creep=(0.08, 0.7))
+    t = np.arange(record.input.size) * record.dt_s
+    before = 0.4 * np.exp(-t / 0.7) + 0.3 * np.exp(-t / 2.8)
+    record = Measured(record.dt_s, record.input, record.output + before, record.weight)
+    problem = problem_for([record], 0.0, 1.5)
+    fitted = refit(problem, (Term(library()["creep"], (0.03, 1.0)),), weights_for(problem, (), None))
+    assert fitted.terms[0].values == pytest.approx((0.08, 0.7), rel=0.1)
+
+
+def test_a_strong_resonance_converges():
+    """It filters the rows: subtracted from the output it would not."""
+    record = _lagging(resonance=(8.0, 0.1))
+    problem = problem_for([record], 0.0, 1.5)
+    base = weights_for(problem, (), None)
+    fitted = refit(problem, (Term(library()["resonance"], (8.6, 0.2)),), base)
+    assert fitted.terms[0].values == pytest.approx((8.0, 0.1), rel=0.03)
+    assert fitted.squares < 0.01 * base.squares
+
+
+def test_the_best_experiment_tells_lags_apart_better_than_one_rate_does():
+    """On a record of one rate a lag before and one after the hysteresis are one; elsewhere they are not."""
+    u = signals.identification(0.0, 1.5, n_h=12, speed=1.5, rate_Hz=200.0).value
+    y = Extended.of(_operator(), [("output-lag", (0.02,))])(u, 0.005)
+    y += 0.01 * np.random.default_rng(9).standard_normal(u.size)
+    answer = diagnose([Measured(0.005, u, y, np.ones(u.size))], 0.0, 1.5, rng=np.random.default_rng(0))
+    best = experiment.best_experiment(answer, ("output-lag", "delay"))
+    assert best.distance > 3.0 * best.distance_here
+
+
+def test_a_step_is_found_where_it_is():
+    """The moment within a sample or two, the size within a few per cent."""
+    record = _lagging()
+    y = record.output + 0.15 * (np.arange(record.input.size) * record.dt_s > 17.3)
+    answer = diagnose(
+        [Measured(record.dt_s, record.input, y, record.weight)], 0.0, 1.5, rng=np.random.default_rng(0)
+    )
+    assert answer.verdict == "step"
+    values = {e.name: e for e in answer.findings[0].parameters}
+    assert values["time"].value == pytest.approx(17.3, abs=0.02)
+    assert values["offset"].value + values["gain"].value * 6 == pytest.approx(0.15, rel=0.2)
 
 
 def test_noise_is_measured_without_a_model():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cache
 from typing import Annotated, ClassVar
 
 import h5py
@@ -64,31 +65,44 @@ def _datasets(path):
         yield from found.items()
 
 
+@cache
+def _units():
+    return pint.UnitRegistry()
+
+
+def _fields(cls, group=""):
+    """Yield the plan of every field of a kind and of all that is inside it, with the group it lies in."""
+    for plan in plan_of(cls):
+        yield plan, group
+        if plan.role in ("group", "groups"):
+            inside = f"{group}/{plan.path}" if plan.role == "group" else f"{group}/{plan.path}/0000"
+            yield from _fields(plan.type, inside)
+
+
 @ANY_KIND
-def test_plain_h5py_sees_units_and_axes(kind, tmp_path):
-    """Every dataset has units and quantity, every axis of it a scale of the right length and name."""
-    full = kinds.Fit(1, 1, 1, 1, "A", "N", 1, 1, "joint", None, np.ones(5), np.ones(5), np.ones(5))
-    evaluated = kinds.WaveformEvaluation(
-        "n",
-        "i",
-        2,
-        np.arange(4.0),
-        np.ones(4),
-        *(kinds.DriveError(1, 1, 1, 1, 1, np.ones(4)),) * 2,
-        1,
-        1,
-        1,
-    )
-    artefact = {
-        "model": examples.model(fit=full),
-        "evaluation": kinds.Evaluation(waveforms=(evaluated,), model=examples.model(fit=full)),
-    }.get(kind) or examples.EXAMPLES[kind]()
-    write(tmp_path / "a.h5", artefact, examples.header())
-    count = 0
-    for name, dataset in _datasets(tmp_path / "a.h5"):
-        count += 1
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_every_field_of_every_kind_is_readable_without_us(kind, data, tmp_path_factory):
+    """Whatever fields a kind has: h5py finds each, xarray opens it with named axes, pint knows its units."""
+    artefact = data.draw(examples.artefacts(KINDS[kind], full=True))
+    path = tmp_path_factory.mktemp("foreign") / "a.h5"
+    write(path, artefact, examples.header())
+    registry = _units()
+    groups = set()
+    with h5py.File(path) as file:
+        for plan, group in _fields(KINDS[kind]):
+            place = file[group or "/"]
+            if plan.role in ("attribute", "list"):
+                assert plan.path in place.attrs, (group, plan.name)
+                continue
+            assert plan.path in place, (group, plan.name)
+            if plan.data is not None:
+                groups.add(place[plan.path].parent.name)
+                assert place[plan.path].attrs["quantity"], plan.name
+                registry.parse_units(place[plan.path].attrs["units"])
+    for name, dataset in _datasets(path):
         assert isinstance(dataset.attrs["units"], str), name
-        assert dataset.attrs["units"], name
+        registry.parse_units(dataset.attrs["units"])
         assert dataset.attrs["quantity"], name
         if dataset.is_scale:
             continue
@@ -96,7 +110,12 @@ def test_plain_h5py_sees_units_and_axes(kind, tmp_path):
             assert len(axis) == 1, name
             assert axis[0].shape == (length,)
             assert axis.keys() == [axis.label]
-    assert count
+    for group in groups:
+        with xarray.open_dataset(path, group=group, engine="h5netcdf") as opened:
+            assert opened.variables
+            assert all("phony" not in str(axis) for axis in opened.sizes), opened.sizes
+            for variable in opened.variables.values():
+                np.asarray(variable.values)
 
 
 def test_layout_of_a_run(tmp_path):
@@ -159,7 +178,7 @@ def test_xarray_opens_it(tmp_path):
 
 def test_pint_parses_every_unit():
     """The fixed units of the annotations are ones that pint knows."""
-    registry = pint.UnitRegistry()
+    registry = _units()
     for unit in ("1", "s", "percent", "A", "N", "N/A^2"):
         registry.parse_units(unit)
 

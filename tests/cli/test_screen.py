@@ -1,0 +1,101 @@
+"""The screen: completion in a real shell, no colour when NO_COLOR is set, nothing but text in a pipe."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import report_examples
+from program import PROGRAM
+from store_examples import header
+
+from pulsetrainer.artefacts import store
+
+BIN = Path(sys.executable).parent
+COLOUR = re.compile(rb"\x1b\[(?:[0-9;]*;)?(?:3[0-8]|4[0-8]|9[0-7]|10[0-7])(?:;[0-9;]*)?m")
+
+
+def completed(folder: Path, line: str) -> list[str]:
+    """Return what bash proposes for the last word of ``line``, by the script that the program hands out."""
+    words = line.split(" ")
+    asked = " ".join(f"'{word}'" for word in words)
+    script = f"""
+        eval "$(pulsetrainer --show-completion; true)"
+        COMP_WORDS=({asked}) COMP_CWORD={len(words) - 1}
+        $(complete -p pulsetrainer | sed 's/.*-F \\([^ ]*\\) .*/\\1/') pulsetrainer
+        printf '%s\\n' "${{COMPREPLY[@]}}"
+    """
+    environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+    done = subprocess.run(
+        ["bash", "--norc", "-c", script],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    return [line for line in done.stdout.splitlines() if line]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+def test_bash_completes_commands_and_options(tmp_path):
+    """Of a command the first letters, of an option the dashes."""
+    assert completed(tmp_path, "pulsetrainer id") == ["identify"]
+    assert {"capture", "compare"} <= set(completed(tmp_path, "pulsetrainer c"))
+    assert "--operator" in completed(tmp_path, "pulsetrainer identify --op")
+    assert {"--out", "--force", "--json"} <= set(completed(tmp_path, "pulsetrainer capture --"))
+
+
+def on_terminal(folder: Path, *words: str, **more: str) -> bytes:
+    """Return everything that a command writes to a terminal of its own."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
+    environment |= {"TERM": "xterm-256color", "COLUMNS": "100", **more}
+    main, terminal = pty.openpty()
+    program = subprocess.Popen(
+        [*PROGRAM, *words], cwd=folder, env=environment, stdin=terminal, stdout=terminal, stderr=terminal
+    )
+    os.close(terminal)
+    said = b""
+    try:
+        while piece := os.read(main, 4096):
+            said += piece
+    except OSError:  # the other end was closed: Linux says so with an error
+        pass
+    assert program.wait() == 0, said
+    os.close(main)
+    return said
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """A folder with a run."""
+    store.write(tmp_path / "run.h5", report_examples.run(), header())
+    return tmp_path
+
+
+def test_no_color_is_honoured(recorded):
+    """The progress bar is coloured on a terminal, and plain there when NO_COLOR is set."""
+    fitting = ("identify", "run.h5", "--levels", "6", "--force", "-o", "model.h5")
+    assert COLOUR.search(on_terminal(recorded, *fitting))
+    plain = on_terminal(recorded, *fitting, NO_COLOR="1")
+    assert not COLOUR.search(plain)
+    assert b"Preisach model of 6 levels" in plain
+
+
+def test_a_pipe_gets_text_alone(recorded):
+    """No escape sequence on either stream, whatever the terminal is said to be."""
+    done = subprocess.run(
+        [*PROGRAM, "identify", "run.h5", "--levels", "6", "-o", "model.h5"],
+        cwd=recorded,
+        env={**os.environ, "TERM": "xterm-256color"},
+        capture_output=True,
+        check=True,
+    )
+    assert b"\x1b" not in done.stdout + done.stderr

@@ -1,0 +1,32 @@
+"""A sample of the fault table in every test run; ``make faults`` tries all of it hundreds of times."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+_RUN = Path(__file__).with_name("run.py")
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory) -> list[dict]:
+    """The rows of a small table, tried once for all tests."""
+    path = tmp_path_factory.mktemp("faults") / "table.json"
+    words = [sys.executable, _RUN, "--sample", "--json", path]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=280, check=False)
+    assert path.exists(), done.stdout + done.stderr
+    return json.loads(path.read_text())
+
+
+@pytest.mark.xdist_group("faults")
+@pytest.mark.parametrize("fault", ["kill -9", "full", "read-only", "input", "output", "locked", "fuzzed"])
+def test_nothing_is_lost_and_every_failure_is_told(table, fault):
+    """Nothing lost, nothing half-written, no hang, no wrong exit."""
+    rows = [row for row in table if fault in row["fault"]]
+    assert sum(row["tries"] for row in rows) >= 3
+    for count in ("lost", "half_written", "hangs", "wrong_exits"):
+        assert sum(row[count] for row in rows) == 0, [row["complaints"] for row in rows]
