@@ -83,7 +83,8 @@ def import_(
         result = flow.run(options, context)
     screen.result(result)
     for one in result.runs:
-        screen.facts(f"{one.output}: {', '.join(Path(name).name for name in one.report.files)}", one.facts)
+        known = {name: value for name, value in one.facts.items() if value is not None}
+        screen.facts(f"{one.output}: {', '.join(Path(name).name for name in one.report.files)}", known)
 
 
 def _rate(text: str | None) -> float | None:

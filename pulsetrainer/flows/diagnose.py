@@ -236,6 +236,7 @@ def _against_the_model(
 def _condition(changed: condition.Change, polarity: int, first: Run) -> Cause:
     """Return the finding that the device is not in the condition of the model."""
     offset, unit = polarity * changed.offset, first.output_unit
+    named = "" if unit == "1" else f" {unit}"
     sure, wide = 1.96 * changed.offset_error, 1.96 * changed.gain_error
     return Cause(
         cause="condition-change",
@@ -251,7 +252,7 @@ def _condition(changed: condition.Change, polarity: int, first: Run) -> Cause:
             "a Preisach model of the records' own fits them, the one given does not: the device is in "
             "another condition (load, configuration, zero). Its output is "
             f"{1 + changed.gain:.3f} times that of the model, shifted by {offset:.3g}"
-            f"{'' if unit == '1' else f' {unit}'}, and differs in shape by {changed.left:.2g} rms; "
+            f"{named}, and differs in shape by {changed.left:.2g}{named} rms; "
             "identify it again in this condition"
         ),
     )
@@ -285,7 +286,11 @@ def _cleared(diagnosis: Diagnosis) -> Diagnosis:
         one if known[one.cause].stage == "record" else replace(one, found=False) for one in diagnosis.causes
     )
     verdict = next((one.cause for one in causes if one.found), "none")
-    return replace(diagnosis, verdict=verdict, causes=causes, extended=None)
+    gone = tuple(f"{one.cause}: " for one in causes if not one.found)
+    evidence = tuple(
+        said for said in diagnosis.evidence if not said.startswith((*gone, "With the causes found"))
+    )
+    return replace(diagnosis, verdict=verdict, causes=causes, evidence=evidence, extended=None)
 
 
 def _untimed(path: Path, one: Run, polarity: int, low: float, high: float) -> Measured:

@@ -235,6 +235,7 @@ def _facts(whole: Run, report: Report) -> dict[str, Any]:
     shown["coverage_percent"] = report.coverage_percent
     stamps = {True: "even", False: "uneven", None: "none: only the order counts"}[report.even]
     shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps
+    del shown["signal"]  # it is the title
     for name in ("complete", "dropped_samples"):  # of a device, not of a file
         shown.pop(name, None)
     return shown

@@ -64,6 +64,7 @@ RUN = {
     ROOT / "docs/tutorial.md": (),
     HOW_TO / "own-bench.md": ("scope.csv", "other.csv"),
     HOW_TO / "settings.md": (),
+    ROOT / "docs/measured.md": tuple(path.name for path in sorted((ROOT / "tests/data").glob("*.csv"))),
     HOW_TO / "ci.md": ("played.h5", "last-week.h5"),
     HOW_TO / "batches.md": ("workflow",),
 }  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
@@ -79,7 +80,8 @@ GROUPS = [
 def test_commands_of_a_page_run(page, given, tmp_path):
     """In the order of the page; what a page shows as output is what came out."""
     for name in RUN[page]:
-        there = given / name
+        there = ROOT / "tests/data" / name
+        there = there if there.exists() else given / name
         (shutil.copytree if there.is_dir() else shutil.copy)(there, tmp_path / name)
     for block in blocks(page, "toml"):  # a file that the page shows, its name in the first line
         name = re.match(r"# (\S+\.toml):", block.text)
