@@ -93,7 +93,14 @@ ROWS = {
     "max error, scaled": "scaled.max_abs_error_percent",
     "max error, compensated": "compensated.max_abs_error_percent",
 }
-COLUMNS = {2: "normal.closest-match", 3: "normal.continuous", 5: "bifid.closest-match", 6: "bifid.continuous"}
+COLUMNS = {
+    2: "normal.closest-match",
+    3: "normal.continuous",
+    4: "normal.extended",
+    6: "bifid.closest-match",
+    7: "bifid.continuous",
+    8: "bifid.extended",
+}
 
 
 def _flat(table, prefix=""):
