@@ -133,7 +133,7 @@ class Plane:
         """
         if not 2 <= n_h <= MOST_LEVELS or n_h != int(n_h):
             raise ArgumentError(
-                f"n_h must be a whole number from 2 to {MOST_LEVELS}, got {n_h:.6g}",
+                f"n_h must be a whole number of at least 2 and at most {MOST_LEVELS}, got {str(n_h)[:20]}",
                 hint="48 levels suit most devices",
             )
         ascending(low, high)

@@ -91,6 +91,7 @@ BAD = {
     # the plane
     "no levels": (lambda: Plane(np.array([])), ["levels", "at least 1", "(0,)"]),
     "one level": (lambda: Plane.uniform(0.0, 1.0, 1), ["n_h", "at least 2", "1"]),
+    "levels without end": (lambda: Plane.uniform(0.0, 1.0, 10**400), ["n_h", "at most 10000", "10000000"]),
     "no level count": (lambda: Plane.uniform(0.0, 1.0, 0), ["n_h", "at least 2", "0"]),
     "a fraction of a level": (lambda: Plane.uniform(0.0, 1.0, 2.5), ["n_h", "whole", "2.5"]),
     "two edges": (lambda: Plane(np.array([0.0, 1.0])), ["at least 2 levels", "3 edges", "2 edges"]),
