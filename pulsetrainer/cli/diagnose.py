@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,6 +32,8 @@ def diagnose(
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
+    # many small products: threads of BLAS that wait for each other take two to three times as long
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     from pulsetrainer.flows import diagnose as flow
 
     screen = Screen("diagnose", as_json=json)

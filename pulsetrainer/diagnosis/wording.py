@@ -62,6 +62,8 @@ def next_experiment(answer: Answer, lacks: list[str]) -> str:
     tied = next((f for f in answer.findings if f.found and f.confounded_with), None)
     if tied is not None:
         names = (tied.cause.id, *tied.confounded_with)
+        if answer.quick:
+            return f"Diagnose without --quick: a screen cannot tell {', '.join(names)} apart."
         best = best_experiment(answer, names)
         percent = 100.0 / float(np.ptp(answer.problem.measured))
         return (
