@@ -163,6 +163,8 @@ def test_control_c_stops_the_output_and_keeps_what_was_recorded(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         env=os.environ,
+        # what runs in the background of a shell has SIGINT ignored, and hands that on
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - one thread
     )
     deadline = time.monotonic() + 60
     while not any(path.stat().st_size > 100_000 for path in tmp_path.iterdir()):  # recording has begun
