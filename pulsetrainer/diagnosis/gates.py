@@ -18,6 +18,7 @@ _STICKING_SIGMAS = 7.0  # of the difference of two short means
 _USED = 2  # times, on average, each value of a quantised output occurs at least
 _TRACKING_SHARE = 0.02  # of the input's range
 _OUTSIDE_SHARE = 0.01
+_LEFT_OVER = 0.25  # of the samples with weight
 
 
 @dataclass(frozen=True)
@@ -198,6 +199,7 @@ def _outside(record: Measured, low: float, high: float) -> Firing | None:
         return None
     beyond = float(np.max(np.maximum(low - record.input, record.input - high)))
     at_low, at_high = record.input <= low + slack, record.input >= high - slack
+    lasting = _lasting(above, at_low) | _lasting(below, at_high)
     return Firing(
         "out-of-range",
         f"{np.count_nonzero(outside)} samples of the input lie outside {low:.4g} .. {high:.4g}, "
@@ -205,7 +207,8 @@ def _outside(record: Measured, low: float, high: float) -> Firing | None:
         float(outside.mean()),
         beyond,
         "u",
-        _lasting(above, at_low) | _lasting(below, at_high),
+        # an input that never comes to the other end leaves hardly any: then what is outside must do
+        lasting if record.weight[~lasting].sum() > _LEFT_OVER * record.weight.sum() else outside,
     )
 
 
