@@ -29,7 +29,7 @@ def test_single_hidden_causes_are_named(singles):
 
 
 def test_their_parameters_are_found(singles):
-    """Within an eighth, and within their 95 % intervals but for one (chance of two more: 3 %)."""
+    """Within an eighth, and all but one within their 95 % intervals: creep's amplitude, see docs/blind.md."""
     errors = [error for v in singles.values() for error in v.errors.values()]
     covered = [inside for v in singles.values() for inside in v.covered.values()]
     assert len(errors) >= 6
