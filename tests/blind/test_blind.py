@@ -29,11 +29,11 @@ def test_single_hidden_causes_are_named(singles):
 
 
 def test_their_parameters_are_found(singles):
-    """Within an eighth, and all but one within their 95 % intervals: creep's amplitude, see docs/blind.md."""
+    """Within 12 %, and all but one within their 95 % intervals: creep's amplitude, see docs/blind.md."""
     errors = [error for v in singles.values() for error in v.errors.values()]
     covered = [inside for v in singles.values() for inside in v.covered.values()]
     assert len(errors) >= 6
-    assert max(errors) < 0.125
+    assert max(errors) < 0.12
     assert sum(covered) >= len(covered) - 1
 
 
