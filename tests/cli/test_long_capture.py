@@ -35,15 +35,16 @@ def reference_of(run: Run) -> np.ndarray:
         rest = signal_[whole.size :]
         k = part.reference.size - rest.size if part is parts[-1] else None
         if k is None:  # cut off itself: find the place where it follows the course again
-            k = next(
-                j
-                for j in range(part.reference.size)
-                if np.all(
-                    np.abs(part.reference[j : j + 400] - rest[: part.reference[j : j + 400].size]) < STEP_A
-                )
-            )
+            k = next(j for j in range(part.reference.size) if follows(part.reference[j:], rest))
         played.append(part.reference[k:])
     return np.concatenate(played)
+
+
+def follows(played: np.ndarray, rest: np.ndarray) -> bool:
+    """All of it, not a beginning: the way back to the course has strokes that are as steep as its own."""
+    if np.any(np.abs(played[:400] - rest[:400][: played.size]) >= STEP_A):
+        return False
+    return bool(np.all(np.abs(played - rest[: played.size]) < STEP_A))
 
 
 def course() -> np.ndarray:
