@@ -112,9 +112,15 @@ _LISTS = (
     (0.0, 0.92, 0.12, 0.81, 0.22, 0.70, 0.33, 0.60, 0.43, 0.54, 0.0),
     (0.0, 1.0, 0.62, 1.0, 0.35, 0.75, 0.0, 0.38, 0.0, 0.55, 0.18, 0.0),
 )
-_HOLD_LEVELS = (0.8, 0.3, 0.6, 0.45, 0.9, 0.2, 0.7, 0.5, 1.0, 0.0)
-_HOLD_S = (1.2, 1.2, 2.4, 1.2, 1.2, 2.4, 1.2, 1.2, 6.0, 6.0)
-_BIASES = (0.2, 0.35, 0.5, 0.65, 0.8)
+_CURVE_RATES = (1, 2, 3, 1, 2, 3, 1, 2, 3, 2)
+_HOLD_LEVELS = (0.8, 0.3, 0.6, 0.45, 0.9, 0.2, 0.7, 1.0, 0.0, 0.5)
+_HOLD_S = (1.2, 1.2, 2.4, 1.2, 1.2, 2.4, 1.2, 6.0, 6.0, 0.8)
+# Equal minor loops, each from two histories: wide enough that a shift of the input shows in their shape.
+_BIASES = (0.1, 0.22, 0.34, 0.46)
+_LOOP_WIDTH = 0.2
+_LOOP_CYCLES = 3
+_BIAS_BLOCKS = (3, 7)
+_BIAS_RATE = 3.0
 _LOOP_RATE = 2.0  # of the reference loops and of the way to a hold
 
 
@@ -124,8 +130,8 @@ def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
     Ten blocks; each starts with the same major loop (a reference that repeats, and wipes the memory out),
     then plays one of two lists of reversals at one of four rates spanning 14 to 1, in an order that is
     not sorted, then holds: on the way up in even blocks, on the way down in odd ones. In between come
-    equal minor loops at five biases reached from below and from above, and twenty equal cycles at two
-    rates. The last two holds are a heating at the top and a rest at the bottom. Parts of reversal curves
+    equal minor loops at four biases reached from below and from above, and twenty equal cycles at two
+    rates. Two late holds are a heating at the top and a rest at the bottom. Parts of reversal curves
     between all these fill the plane, so that the weights can be fitted together with a cause.
 
     Parameters
@@ -153,10 +159,10 @@ def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
     for block, rate in enumerate(_ORDER):
         go((0.0, 1.0, 0.0), _LOOP_RATE)
         go(_LISTS[block % 2], _RATES[rate])
-        go(_curves(block), _RATES[1 + block % 3])
+        go(_curves(block), _RATES[_CURVE_RATES[block]])
         level = _HOLD_LEVELS[block]
         approach = (0.0, level) if block % 2 == 0 else (0.0, 1.0, level)
-        if block == 3:
+        if block in _BIAS_BLOCKS:
             _bias_loops(go)
         if block == 6:
             go((0.0, *(0.7, 0.3) * 20, 0.0), _RATES[2])
@@ -178,7 +184,12 @@ def _curves(block: int) -> tuple[float, ...]:
 
 
 def _bias_loops(go: Callable[[tuple[float, ...], float], None]) -> None:
-    """Equal minor loops around several biases, each reached from below and from above."""
-    for bias in _BIASES:
-        loop = (bias, bias + 0.12, bias, bias + 0.12, bias)
-        go((0.0, *loop, 1.0, *loop, 0.0), _RATES[2])
+    """Equal minor loops around several biases, each entered by the same stroke from below and from above."""
+    for bottom in _BIASES:
+        top = bottom + _LOOP_WIDTH
+        loops = (bottom, *(top, bottom) * (_LOOP_CYCLES), top)
+        go((0.0, bottom), _RATES[3])
+        go(loops, _BIAS_RATE)
+        go((top, 1.0, bottom), _RATES[3])
+        go(loops, _BIAS_RATE)
+        go((top, 0.0), _RATES[3])

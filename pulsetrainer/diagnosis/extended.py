@@ -25,7 +25,7 @@ from pulsetrainer.diagnosis.causes import cause_named
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
 
 STEP = 0.8
-_FEEDBACK_PASSES = 4  # each multiplies the error of the fed back output by k dP/du, some per cent
+_FEEDBACK_PASSES = 6  # each multiplies the error of the fed back output by k dP/du, some per cent
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,9 @@ class Extended:
     def frame(self, u: FloatArray, dt_s: float) -> Frame:
         """What the causes are told of an input."""
         plane = self.static.plane
-        return Frame(dt_s, u, 2.0 * self.static.total, plane.high - plane.low)
+        middle, half = self.static.offset, self.static.total
+        ends = (middle - half, middle + half)
+        return Frame(dt_s, u, 2.0 * half, plane.high - plane.low, low=plane.low, ends=ends)
 
     def __call__(self, u: FloatArray, dt_s: float) -> FloatArray:
         """Output (n,) for an input (n,) at even steps, from negative saturation and rest."""

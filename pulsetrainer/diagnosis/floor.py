@@ -1,7 +1,7 @@
 """How small an error can be, and how large an effect must be to matter.
 
 What no cause can lower is the noise of the averages and the discretisation error; an effect smaller than the
-latter, than 0.3 of the former or than a twentieth of a per cent of the span is irrelevant, however
+latter, than 0.3 of the former or than 0.03 % of the span is irrelevant, however
 significant it is.
 """
 
@@ -19,7 +19,7 @@ from pulsetrainer.diagnosis.problem import LEVELS, Problem
 
 COARSE_LEVELS = 22
 NOISE_SHARE = 0.3
-SPAN_SHARE = 0.0005  # a smaller effect than this is irrelevant on any device
+SPAN_SHARE = 0.0003  # a smaller effect than this is irrelevant on any device
 
 
 @dataclass(frozen=True)

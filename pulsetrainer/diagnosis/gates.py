@@ -14,6 +14,7 @@ from pulsetrainer.diagnosis.design import Measured
 BoolArray = NDArray[np.bool_]
 
 _OUTLIER_SIGMAS = 8.0  # of Gaussian noise one sample in 10^15
+_LINE = 5  # samples beside a suspect that may explain it
 _STICKING_SIGMAS = 7.0  # of the difference of two short means
 _USED = 2  # times, on average, each value of a quantised output occurs at least
 _TRACKING_SHARE = 0.02  # of the input's range
@@ -113,6 +114,8 @@ def _outliers(record: Measured) -> Firing | None:
     usual = 4.0 * float(np.quantile(np.abs(np.diff(y)), 0.95))
     limit = max(_OUTLIER_SIGMAS * np.sqrt(2.0) * noise_of(y), usual, 2.0 * spacing_of(y))
     wild = apart > limit
+    for at in np.flatnonzero(wild):  # where a stroke ends with a jump, its last sample still lies on it
+        wild[at] = min(_off_line(y, int(at), -1), _off_line(y, int(at), 1)) > limit
     if np.count_nonzero(wild) < 3:
         return None
     return Firing(
@@ -123,6 +126,17 @@ def _outliers(record: Measured) -> Firing | None:
         "y",
         wild,
     )
+
+
+def _off_line(y: FloatArray, at: int, side: int) -> float:
+    """Distance of a sample from the line through those on one side of it, robust against a wild one there."""
+    near = y[max(at - _LINE, 0) : at][::-1] if side < 0 else y[at + 1 : at + 1 + _LINE]
+    if near.size < _LINE:
+        return float("inf")
+    steps = np.arange(1, _LINE + 1)
+    first, second = np.triu_indices(_LINE, 1)
+    slope = np.median((near[second] - near[first]) / (steps[second] - steps[first]))  # Theil and Sen
+    return float(abs(y[at] - np.median(near - slope * steps)))
 
 
 def _sticking(record: Measured, reach: float) -> Firing | None:

@@ -2,8 +2,9 @@
 
 The spread is the larger of two: of the joint refit, linearised, on redrawn noise (a parametric bootstrap);
 and of the jackknife over blocks, which also sees what the fitted model misses. To it comes the
-discretisation error, as if a fifth of it were aligned, and the moment of sampling: input and output are
-taken to belong together to a tenth of a sample step, as converters that are read in turn do.
+discretisation error, as if a fifth of it were aligned; the moment of sampling, since input and output belong
+together to a fifth of a sample step only (each has its filter, and converters are read in turn); and what the
+estimates would be under formulas as plausible as those of the library (``Cause.variants``).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.answer import Estimate
+from pulsetrainer.diagnosis.extended import shown_output
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
@@ -19,7 +21,7 @@ from pulsetrainer.diagnosis.screening import Screen
 
 _STUDENT = 2.26  # 95 % of Student's t with nine degrees of freedom, of ten jackknife blocks
 _ALIGNED = 0.2
-_MOMENT = 0.1  # sample steps
+_MOMENT = 0.2  # sample steps
 
 
 def estimates_of(
@@ -35,9 +37,10 @@ def estimates_of(
     left_out = held_out.jackknife(fitted)
     if left_out is not None:
         variance = np.maximum(variance, left_out)
-    moment = np.abs(np.linalg.lstsq(columns / size, _late(fitted), rcond=None)[0]) / size
+    others = np.stack([_late(fitted), *_otherwise(fitted)], axis=1)
+    systematic = np.abs(np.linalg.lstsq(columns / size, others, rcond=None)[0]).sum(axis=1) / size
     aligned = _ALIGNED * floor.discretisation * np.sqrt(floor.count) / size
-    half = _STUDENT * np.sqrt(variance) + aligned + moment
+    half = _STUDENT * np.sqrt(variance) + aligned + systematic
     found: dict[str, tuple[Estimate, ...]] = {}
     at = 0
     for term in fitted.terms:
@@ -54,3 +57,21 @@ def _late(fitted: Fitted) -> FloatArray:
     """What a slightly later sample of the output would change (count,), weights projected off."""
     changes = [_MOMENT * np.gradient(y) for y in fitted.simulator.full(fitted.terms)]
     return fitted.projector(fitted.design.bins.average(changes)[:, None])[:, 0]
+
+
+def _otherwise(fitted: Fitted) -> list[FloatArray]:
+    """What other plausible formulas of the causes would change (count,), weights projected off."""
+    inner, frames = fitted.simulator.inner(fitted.terms), fitted.simulator.problem.frames
+    found = []
+    for k, term in enumerate(fitted.terms):
+        if term.cause.stage != "output":
+            continue
+        before = [shown_output(fitted.terms[:k], y, frame) for y, frame in zip(inner, frames, strict=True)]
+        each = [
+            [other - term.cause.on_output(y, term.values, frame) for other in others]
+            for y, frame in zip(before, frames, strict=True)
+            for others in [term.cause.variants(y, term.values, frame)]
+        ]
+        columns = [fitted.design.bins.average(list(one)) for one in zip(*each, strict=True)]
+        found += [fitted.projector(column[:, None])[:, 0] for column in columns]
+    return found

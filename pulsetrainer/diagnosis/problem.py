@@ -16,6 +16,7 @@ from pulsetrainer.errors import DataError
 
 LEVELS = 32  # of the plane on which causes are sought: finer ones take longer and decide the same
 SMOOTHING = 0.035  # share of the range
+_NEAR_END = 0.01  # of the range
 _KEPT = 6  # followed inputs: some ten megabytes each
 
 
@@ -62,5 +63,18 @@ def problem_for(records: Sequence[Measured], low: float, high: float, levels: in
             hint="record a signal that sweeps the range: pulsetrainer capture diagnostic -o run.h5",
         )
     span, reach = float(np.ptp(measured)), high - low
-    frames = tuple(Frame(r.dt_s, r.input, span, reach, k, len(records)) for k, r in enumerate(records))
+    ends = _ends(records, low, high)
+    frames = tuple(
+        Frame(r.dt_s, r.input, span, reach, k, len(records), low, ends) for k, r in enumerate(records)
+    )
     return Problem(tuple(records), frames, Plane.uniform(low, high, levels), bins, measured, SMOOTHING)
+
+
+def _ends(records: Sequence[Measured], low: float, high: float) -> tuple[float, float]:
+    """Mean outputs near both ends of the input's range, or as near as the records come to them."""
+    u = np.concatenate([r.input[r.weight > 0] for r in records])
+    y = np.concatenate([r.output[r.weight > 0] for r in records])
+    near = _NEAR_END * (high - low)
+    bottom = y[u <= max(low, float(u.min())) + near]
+    top = y[u >= min(high, float(u.max())) - near]
+    return float(bottom.mean()), float(top.mean())

@@ -2,8 +2,10 @@
 
 A cause is accepted when all hold: its score is beyond what noise alone reaches with probability 0.01 over
 the whole library; the joint refit lowers the held-out error by at least a twentieth of what can be
-lowered; what it repairs is relevant (``floor``). Then the next one is sought from the extended model. The
-answer is a set: causes that repair the data equally well are named together (``rivals``).
+lowered; what it repairs is relevant (``floor``). Then the next one is sought from the extended model, and
+each is exchanged for a better one of its family, since the others may have been missing when it was chosen.
+A cause that the weights can hold is sought last, where they cannot (``congruency``). The answer is a set:
+causes that repair the data equally well are named together (``rivals``).
 """
 
 from __future__ import annotations
@@ -13,11 +15,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.diagnosis import gates
+from pulsetrainer.diagnosis import congruency, gates, sticking
 from pulsetrainer.diagnosis.answer import Answer, Estimate, Finding
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.design import Measured
-from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Fitted, refit, weights_for
 from pulsetrainer.diagnosis.floor import COARSE_LEVELS, floor_of
 from pulsetrainer.diagnosis.held_out import HeldOut
@@ -30,7 +33,9 @@ from pulsetrainer.diagnosis.screening import Score, Screen, screen
 P_MAX = 0.01
 HELD_OUT_MIN = 0.05  # of the reducible part
 MOST = 5
+LINEARISED = 0.5  # of what a refit gains: less than that a linearised score hardly shows
 TRIED = 3  # candidates refitted in each round
+_FEW = 20  # draws where only start values are wanted
 # These leave a residual that no refit can take away: what is left is theirs.
 _JAGGED = ("stick-slip", "quantisation")
 
@@ -113,6 +118,10 @@ class _Search:
     def _significant(self, score: Score) -> bool:
         return score.p_value <= P_MAX and score.gain > self.floor.relevant
 
+    def _promising(self, score: Score) -> bool:
+        """Whether a refit, whose gain is larger, may make it relevant."""
+        return score.p_value <= P_MAX and score.gain > LINEARISED * self.floor.relevant
+
     def quick(self) -> Answer:
         """Screen only."""
         first = screen(self.problem, self.baseline, self.rng)
@@ -135,22 +144,21 @@ class _Search:
 
     def full(self) -> Answer:
         """Screen, refit, accept, repeat; then eliminate, bound and compare."""
-        current = self.baseline
         p_values: dict[str, float] = {}
-        for number in range(MOST):
-            scores = screen(self.problem, current, self.rng)
-            chosen = self._next(current, scores, number)
-            if chosen is None:
-                break
-            current, name, p_values[name] = chosen
-            self.floor = self.floor.at(self.coarse, current)
-            self.progress(_round_begins(number + 1))
-        self.progress(0.65)
-        current, without = self._eliminate(current)
+        current, scores = self._rounds(self.baseline, p_values)
+        self.progress(0.55)
+        current, scores = self._restarted(current, scores, p_values)
+        self.progress(0.6)
+        current, without = self._eliminate(self._exchanged(current, p_values))
         if set(current.names) != set(p_values):
             scores = screen(self.problem, current, self.rng)
+        self.progress(0.65)
+        if self._unexplained(current) and not self._jagged:
+            jumps = sticking.sawtooth(self.problem, current)
+            self.firings = [*self.firings, *([] if jumps is None else [(0, jumps)])]
+        current, sure = self._by_contrast(current, without, p_values)
         self.progress(0.7)
-        estimates = estimates_of(current, scores, self.held_out, self.floor)
+        estimates = estimates_of(current, scores, self.held_out, self.floor) | sure
         self.progress(0.75)
         found = []
         for term in current.terms:
@@ -164,12 +172,68 @@ class _Search:
         ]
         return self._answer([*found, *rest], current, estimates, quick=False)
 
+    @property
+    def _jagged(self) -> bool:
+        return any(firing.cause in _JAGGED for _, firing in self.firings)
+
+    def _by_contrast(
+        self, current: Fitted, without: dict[str, Fitted], p_values: dict[str, float]
+    ) -> tuple[Fitted, dict[str, tuple[Estimate, ...]]]:
+        """Add what only equal loops show, with its intervals; ``without`` and ``p_values`` are filled in."""
+        sure: dict[str, tuple[Estimate, ...]] = {}
+        if self._unexplained(current) or self._jagged:  # either makes equal loops differ
+            return current, sure
+        for cause in (c for c in library().values() if c.by_contrast and c.id not in current.names):
+            held = congruency.fitted_contrast(self.problem, current, cause, self.rng)
+            if held is None or held.p_value > P_MAX:
+                continue
+            extended = in_order((*current.terms, Term(cause, (held.value,))))
+            without[cause.id], p_values[cause.id] = current, held.p_value
+            current = weights_for(self.problem, extended, current, rebuild=True)
+            sure[cause.id] = (held.estimate(cause),)
+        return current, sure
+
+    def _rounds(self, current: Fitted, p_values: dict[str, float]) -> tuple[Fitted, Screen]:
+        """Add one cause after another; ``p_values`` is filled in."""
+        while True:
+            scores = screen(self.problem, current, self.rng)
+            number = len(current.terms)
+            chosen = self._next(current, scores, number) if number < MOST else None
+            if chosen is None:
+                return current, scores
+            current, name, p_values[name] = chosen
+            self.floor = self.floor.at(self.coarse, current)
+            self.progress(_round_begins(number + 1))
+
+    def _restarted(
+        self, current: Fitted, scores: Screen, p_values: dict[str, float]
+    ) -> tuple[Fitted, Screen]:
+        """Where one of a family leaves what another of it could explain, begin again with that one.
+
+        The wrong lag may fit better than the right one while a second cause is missing, and then hide it.
+        """
+        families = {term.cause.family for term in current.terms}
+        left = next((s for s in scores.scores if s.cause.family in families and self._significant(s)), None)
+        if left is None:
+            return current, scores
+        others = [t for t in current.terms if t.cause.family != left.cause.family]
+        anew = {t.cause.id: p_values[t.cause.id] for t in others} | {left.cause.id: left.p_value}
+        first = refit(self.problem, (*others, Term(left.cause, left.start)), current, rebuild=True)
+        floor = self.floor
+        found, known = self._rounds(first, anew)
+        if current.squares - found.squares < floor.relevant:
+            self.floor = floor
+            return current, scores
+        p_values.clear()
+        p_values.update(anew)
+        return found, known
+
     def _next(self, current: Fitted, scores: Screen, number: int) -> tuple[Fitted, str, float] | None:
         """The best acceptable cause after a joint refit, with its p-value."""
         trials: list[tuple[Fitted, Score]] = []
         begins, ends = _round_begins(number), _round_begins(number + 1)
         for score in scores.scores:
-            if len(trials) == TRIED or not self._significant(score):
+            if len(trials) == TRIED or not self._promising(score):
                 break
             if score.cause.family in {term.cause.family for term in current.terms}:
                 continue  # what a cause of its own kind leaves is its imperfect formula, not a second one
@@ -187,6 +251,29 @@ class _Search:
             refitted = refit(self.problem, trial.terms, trial, rebuild=changes_input)
             return refitted, score.cause.id, score.p_value
         return None
+
+    def _exchanged(self, current: Fitted, p_values: dict[str, float]) -> Fitted:
+        """Try the others of its family in the place of each cause; the new one inherits its p-value."""
+        for term in current.terms:
+            name, kin = term.cause.id, self._kin(term.cause, current)
+            if not kin:
+                continue
+            without = refit(self.problem, [t for t in current.terms if t is not term], current, rounds=1)
+            best, known = current, screen(self.problem, without, self.rng, draws=_FEW)
+            for score in known.scores:
+                if score.cause.id in kin:
+                    trial = refit(self.problem, (*without.terms, Term(score.cause, score.start)), without)
+                    best = min(best, trial, key=lambda fitted: fitted.squares)
+            if best is not current:
+                (new,) = set(best.names) - set(current.names)
+                p_values[new] = p_values.pop(name)
+                changes_input = any(t.cause.stage == "input" for t in best.terms)
+                current = refit(self.problem, best.terms, best, rebuild=changes_input)
+        return current
+
+    def _kin(self, cause: Cause, current: Fitted) -> set[str]:
+        """Causes of the same family that are not in the model."""
+        return {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
 
     def _eliminate(self, current: Fitted) -> tuple[Fitted, dict[str, Fitted]]:
         """Drop causes that the others have made superfluous; the rest with the fits that lack one each."""
@@ -210,9 +297,17 @@ class _Search:
             p_value=p_value,
             explains_percent=self._explains(without.squares - fitted.squares),
             parameters=estimates,
-            confounded_with=rivals(self.problem, fitted, without, term, self.floor, self.lacks, self.rng),
+            # equal loops differ by nothing else that is known here
+            confounded_with=()
+            if term.cause.by_contrast
+            else rivals(self.problem, fitted, without, term, self.floor, self.lacks, self.rng),
             held_out_gain_percent=100.0 * self.held_out.gain(without, fitted, self.floor),
         )
+
+    def _unexplained(self, fitted: Fitted) -> bool:
+        """Whether more than half of what can be explained is left, and enough to matter."""
+        left = fitted.squares - self.floor.squares
+        return left > max(0.5 * self.floor.reducible(self.baseline), 4.0 * self.floor.relevant)
 
     def _answer(
         self,
@@ -225,11 +320,8 @@ class _Search:
         found = sorted((f for f in findings if f.found), key=lambda f: -f.explains_percent)
         rest = sorted((f for f in findings if not f.found), key=lambda f: -f.explains_percent)
         gated = _gated(self.firings, len(self.problem.records))
-        left = final.squares - self.floor.squares
-        reducible = self.floor.reducible(self.baseline)
-        unexplained = left > max(0.5 * reducible, 4.0 * self.floor.relevant) and not quick
         verdict = "none"
-        if unexplained:
+        if self._unexplained(final) and not quick:
             verdict = next((f.cause.id for f in gated if f.cause.id in _JAGGED), "unknown")
         elif found:
             verdict = found[0].cause.id

@@ -18,6 +18,7 @@ from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis import condition, residual, velocity, wording
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Cause as LibraryCause
 from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import seen_input
 from pulsetrainer.diagnosis.fitting import weights_for
@@ -283,7 +284,7 @@ def _cleared(diagnosis: Diagnosis) -> Diagnosis:
     """Return a diagnosis in which only what was read off the raw data stays found."""
     known = library()
     causes = tuple(
-        one if known[one.cause].stage == "record" else replace(one, found=False) for one in diagnosis.causes
+        one if _not_of_the_model(known[one.cause]) else replace(one, found=False) for one in diagnosis.causes
     )
     verdict = next((one.cause for one in causes if one.found), "none")
     gone = tuple(f"{one.cause}: " for one in causes if not one.found)
@@ -291,6 +292,11 @@ def _cleared(diagnosis: Diagnosis) -> Diagnosis:
         said for said in diagnosis.evidence if not said.startswith((*gone, "With the causes found"))
     )
     return replace(diagnosis, verdict=verdict, causes=causes, evidence=evidence, extended=None)
+
+
+def _not_of_the_model(cause: LibraryCause) -> bool:
+    """Whether a cause is told by the data alone, however well a model fits them."""
+    return cause.stage == "record" or cause.by_contrast
 
 
 def _untimed(path: Path, one: Run, polarity: int, low: float, high: float) -> Measured:

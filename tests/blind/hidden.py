@@ -221,6 +221,9 @@ def _spoilt(case: Case, record: Measured) -> Measured:
     t, y = np.arange(record.output.size) * DT_S, record.output
     if "clock-skew" in case.causes:
         y = np.interp(t * (1.0 + case.truth["clock-skew"]["skew"]), t, y)
+        if "quantisation" in case.causes:  # the other clock's converter has the same steps
+            step = case.truth["quantisation"]["size"]
+            y = np.round(y / step) * step
     if case.outside == "gain wander":
         y = y * (1.0 + 0.02 * np.sin(2 * np.pi * t / rng.uniform(7, 13) + rng.uniform(0, 6)))
     if case.outside == "hidden load":  # somebody leans on the device now and then

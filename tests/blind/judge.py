@@ -16,7 +16,7 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.held_out import HeldOut
-from pulsetrainer.diagnosis.selection import diagnose
+from pulsetrainer.diagnosis.selection import HELD_OUT_MIN, diagnose
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _compare(case, named, found, tied):
 def _oracle_share(case, answer: Answer) -> float:
     """Gain on held-out blocks over that of the true causes with the true parameters.
 
-    NaN where the truth is no complete set of parameters: a phase, the moment of a step.
+    NaN where the truth is no complete set of parameters (a phase, the moment of a step), or gains nothing.
     """
     terms = []
     for name, truth in case.truth.items():
@@ -119,4 +119,6 @@ def _oracle_share(case, answer: Answer) -> float:
     held_out = HeldOut(answer.problem)
     before = held_out.error(answer.baseline)
     best = before - held_out.error(weights_for(answer.problem, terms, None))
-    return (before - held_out.error(answer.final)) / best if best > 0 else float("nan")
+    if best < HELD_OUT_MIN * before:  # the weights hold it: there is no gain to share
+        return float("nan")
+    return (before - held_out.error(answer.final)) / best

@@ -42,6 +42,8 @@ class Frame:
     reach: float  # range of the input, input unit
     record: int = 0  # which record of how many
     records: int = 1
+    low: float = 0.0  # end of the input's range
+    ends: tuple[float, float] = (0.0, 1.0)  # output at both ends of the input's range
 
     @property
     def time_s(self) -> FloatArray:
@@ -72,6 +74,7 @@ class Cause:
     lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model
     in_rows: ClassVar[bool] = False  # an output cause too strong to be subtracted: linear, filters the rows
     feeds_back: ClassVar[bool] = False  # needs the output to compute the input
+    by_contrast: ClassVar[bool] = False  # sought where the weights cannot hold it: see ``congruency``
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try; the columns of a block are fitted together.
@@ -87,6 +90,10 @@ class Cause:
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause, for the output ``y`` (n,) before it."""
         raise NotImplementedError
+
+    def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
+        """Outputs (n,) of an output cause under formulas that are as plausible as its own: for intervals."""
+        return []
 
 
 def low_pass(x: FloatArray, tau_s: float, dt_s: float) -> FloatArray:

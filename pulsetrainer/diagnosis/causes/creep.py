@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
 
@@ -31,5 +33,16 @@ class Creep(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        slow = sum(low_pass(y, values[1] * ratio, frame.dt_s) for ratio in (0.25, 1.0, 4.0))
-        return (y + values[0] * slow / 3.0) / (1.0 + values[0])
+        return _crept(y, values, frame, 1.0 / 3.0)
+
+    def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
+        """Half of the creep in the middle time constant: no record tells the shares of all three."""
+        return [_crept(y, values, frame, 0.5)]
+
+
+def _crept(y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
+    """Creep with a share ``middle`` of its amplitude in the middle time constant."""
+    slow = middle * low_pass(y, values[1], frame.dt_s)
+    for ratio in (0.25, 4.0):
+        slow = slow + 0.5 * (1.0 - middle) * low_pass(y, values[1] * ratio, frame.dt_s)
+    return np.asarray((y + values[0] * slow) / (1.0 + values[0]))

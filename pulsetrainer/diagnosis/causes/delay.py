@@ -1,4 +1,8 @@
-"""the output comes a fixed time late: P[u(t - d)]."""
+"""the output comes a fixed time late: P[u(t - d)].
+
+The operator does not know time, so P[u(t - d)] is its output shifted by d. Shifting the output is the better
+of the two: an input interpolated between samples loses the tips of its loops, which the memory keeps long.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +25,8 @@ class Delay(Cause):
     )
     excitation = "fast reversals followed by holds"
     source = "Ljung, System Identification, 1999, section 4.2"
-    stage = "input"
-    order = 10
+    stage = "output"
+    order = 45
     family = "lag"
     parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005),)
 
@@ -30,7 +34,7 @@ class Delay(Cause):
         """Blocks of parameter values to try."""
         return [[(0.002,)], [(0.01,)], [(0.03,)]]
 
-    def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Input (n,) that the hysteresis sees."""
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
         t = frame.time_s
-        return np.interp(t - values[0], t, u)
+        return np.interp(t - values[0], t, y)

@@ -1,4 +1,10 @@
-"""the effective input moves with the output: P[u + k y]."""
+"""the effective input moves with the output: P[u + k y].
+
+The static weights live on the range of the input; u + k y has a wider one. Any straight scale of the seen
+input is the weights' own, so it is brought back to the range of u: with y- and y+ the output at its ends,
+
+    v = low + (u - low + k (y - y-)) / (1 + k (y+ - y-) / (high - low)).
+"""
 
 from __future__ import annotations
 
@@ -6,6 +12,8 @@ from collections.abc import Sequence
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+_LEAST = 0.2  # of the range: a feedback that takes more of it away is none
 
 
 class LoadDependence(Cause):
@@ -22,6 +30,7 @@ class LoadDependence(Cause):
     family = "load"
     parameters = (Quantity("coefficient", "{u}/{y}", -0.1, 0.1, 2e-4),)
     feeds_back = True
+    by_contrast = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
@@ -29,4 +38,6 @@ class LoadDependence(Cause):
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Input (n,) that the hysteresis sees."""
-        return u + values[0] * y
+        k, (bottom, top) = values[0], frame.ends
+        wider = max(1.0 + k * (top - bottom) / frame.reach, _LEAST)
+        return frame.low + (u - frame.low + k * (y - bottom)) / wider

@@ -9,6 +9,8 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
 
+_NOT_COLD = 0.05  # of the heat that the largest input would lead to
+
 
 class ThermalDrift(Cause):
     """A gain that falls with heat."""
@@ -36,5 +38,14 @@ class ThermalDrift(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        heat = low_pass(np.append(0.0, frame.input**2), values[1], frame.dt_s)[1:]
-        return y * (1.0 - values[0] * heat)
+        return _weakened(y, values, frame, 0.0)
+
+    def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
+        """A coil that was not quite cold: no record tells what was played before it."""
+        return [_weakened(y, values, frame, _NOT_COLD * float(np.max(frame.input**2)))]
+
+
+def _weakened(y: FloatArray, values: Values, frame: Frame, begin: float) -> FloatArray:
+    """Output of a coil whose heat begins at ``begin``."""
+    heat = low_pass(np.append(begin, frame.input**2), values[1], frame.dt_s)[1:]
+    return np.asarray(y * (1.0 - values[0] * heat))

@@ -31,4 +31,5 @@ class Viscous(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return y + values[0] * np.gradient(frame.input, frame.dt_s)
+        # the rate before the sample, not around it: at a turn the output jumps after the turn
+        return y + values[0] * np.diff(frame.input, prepend=frame.input[0]) / frame.dt_s

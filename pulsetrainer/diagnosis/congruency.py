@@ -1,0 +1,186 @@
+"""Equal minor loops from unequal histories: what no static Preisach weights can explain.
+
+All minor loops between the same two turning points are congruent in a Preisach operator, whatever its
+weights and whatever came before (Mayergoyz, Mathematical Models of Hysteresis, 2003, section 1.2). So the
+differences between such loops hold nothing of the weights, of how finely they are drawn, or of anything
+that depends on the rate alone; a feedback of the output into the input is seen in them, since loops of
+another history lie at another output. On the whole record the weights would swallow nearly all of it.
+
+Of every loop between turns A and B the residual is averaged in places along its two branches; what is left
+after a constant, a slope in time and the mean over the loops of one kind are taken off is its contrast.
+The cause's own contrast, simulated with the fitted weights, is fitted to it. Under the null the loops of
+one kind may be exchanged, which gives an exact test (Good, Permutation Tests, 2000).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pulsetrainer.core import input_noise
+from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.diagnosis.answer import Estimate
+from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.design import Measured
+from pulsetrainer.diagnosis.extended import Term, in_order
+from pulsetrainer.diagnosis.fitting import Fitted, weights_for
+from pulsetrainer.diagnosis.problem import Problem
+
+_PLACES = 12  # along each branch
+_SAME = 0.015  # of the range: turns that near are equal
+_SAME_TIME = 0.1  # relative
+_NARROWEST = 0.04  # of the range: shorter loops than this say nothing
+_PERMUTATIONS = 1999
+_ROUNDS = 4
+_STUDENT = 1.96
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One closed minor loop B -> A -> B."""
+
+    record: int
+    kind: int  # loops of one kind have the same turns and took the same time
+    begin: int
+    turn: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """A cause fitted to the differences between equal loops."""
+
+    value: float  # its strength
+    error: float  # standard error
+    p_value: float
+    loops: int
+    kinds: int
+
+    def estimate(self, cause: Cause) -> Estimate:
+        """Return the strength with its 95 % interval."""
+        quantity, half = cause.parameters[0], _STUDENT * self.error
+        return Estimate(quantity.name, self.value, quantity.unit, self.value - half, self.value + half)
+
+
+def loops_of(records: Sequence[Measured], low: float, high: float) -> list[Loop]:
+    """Return the closed minor loops that were traced more than once, in equal time, by their kind."""
+    reach = high - low
+    found: list[tuple[int, int, int, int, float, float]] = []
+    for k, record in enumerate(records):
+        u = record.input
+        at = input_noise.real_turns(u, 0.5 * _NARROWEST * reach)
+        values = u[at]
+        for j in range(1, at.size - 2):
+            before, top, bottom, back = values[j - 1 : j + 3]
+            wide = top - bottom
+            closed = abs(back - top) < _SAME * reach and before < bottom + _SAME * reach
+            inside = top < high - _SAME * reach and bottom > low + _SAME * reach
+            if wide > _NARROWEST * reach and closed and inside:
+                whole = slice(int(at[j]), int(at[j + 2]) + 1)
+                if np.all(record.weight[whole] > 0):
+                    found.append((k, int(at[j]), int(at[j + 1]), int(at[j + 2]), float(bottom), float(top)))
+    kinds: list[tuple[float, float, float]] = []
+    loops = []
+    for k, begin, turn, end, bottom, top in found:
+        took = (end - begin) * records[k].dt_s
+        equal = [
+            kind
+            for kind, (a, b, seconds) in enumerate(kinds)
+            if max(abs(a - bottom), abs(b - top)) < _SAME * reach
+            and abs(seconds - took) < _SAME_TIME * seconds
+        ]
+        if not equal:
+            equal = [len(kinds)]
+            kinds.append((bottom, top, took))
+        loops.append(Loop(k, equal[0], begin, turn, end))
+    number = np.bincount([loop.kind for loop in loops], minlength=1)
+    return [loop for loop in loops if number[loop.kind] > 2]
+
+
+def contrasts(loops: Sequence[Loop], signals: Sequence[FloatArray]) -> FloatArray:
+    """Contrasts (loops, 2 places) of one signal (n,) per record."""
+    rows = np.stack([_along(loop, signals[loop.record]) for loop in loops])
+    drift = np.stack((np.ones(rows.shape[1]), np.linspace(-1.0, 1.0, rows.shape[1])), axis=1)
+    basis = np.linalg.qr(drift)[0]
+    rows -= rows @ basis @ basis.T
+    return _less_means(rows, np.asarray([loop.kind for loop in loops]))
+
+
+def _less_means(rows: FloatArray, kind: IntArray) -> FloatArray:
+    number = np.maximum(np.bincount(kind), 1)
+    means = np.zeros((number.size, rows.shape[1]))
+    np.add.at(means, kind, rows)
+    return np.asarray(rows - (means / number[:, None])[kind])
+
+
+def _along(loop: Loop, signal: FloatArray) -> FloatArray:
+    """Averages (2 places,) of a signal along the way down and the way up."""
+    parts = [
+        np.array_split(signal[begin:end], _PLACES)
+        for begin, end in ((loop.begin, loop.turn), (loop.turn, loop.end))
+    ]
+    return np.asarray([float(piece.mean()) for branch in parts for piece in branch])
+
+
+def fitted_contrast(
+    problem: Problem, fitted: Fitted, cause: Cause, rng: np.random.Generator
+) -> Contrast | None:
+    """Fit the strength of ``cause`` to the contrasts; None where the records hold no equal loops.
+
+    Parameters
+    ----------
+    fitted
+        A joint fit without the cause; its other causes stay in.
+    """
+    low, high = problem.plane.low, problem.plane.high
+    loops = [
+        loop
+        for loop in loops_of(problem.records, low, high)
+        if min(loop.turn - loop.begin, loop.end - loop.turn) >= _PLACES
+    ]
+    if not loops:
+        return None
+    kind = np.asarray([loop.kind for loop in loops])
+    measured = contrasts(loops, [r.output for r in problem.records])
+    quantity = cause.parameters[0]
+    first = cause.starts(problem.frames, [])[0][0][0]
+    value, p_value, error = 0.0, 1.0, float("inf")
+    current = fitted
+    for number in range(_ROUNDS):
+        terms = fitted.terms if number == 0 else (*fitted.terms, Term(cause, (value,)))
+        if number:
+            current = weights_for(problem, in_order(terms), current, rebuild=True)
+        base = current.simulator.full(in_order(terms))
+        step = 0.25 * first if number == 0 else max(0.1 * abs(value), quantity.small)
+        moved = current.simulator.full(in_order((*fitted.terms, Term(cause, (value + step,)))))
+        slope = contrasts(loops, [(b - a) / step for a, b in zip(base, moved, strict=True)])
+        left = measured - contrasts(loops, base)
+        squares = float(np.sum(slope**2))
+        if squares <= 0.0:
+            return None
+        change = float(np.sum(slope * left)) / squares
+        if number == 0:
+            p_value = _permuted(slope, left, kind, rng)
+        each = np.sum((left - change * slope) * slope, axis=1)
+        free = max(kind.size - np.unique(kind).size, 1)
+        error = float(np.sqrt(np.sum(each**2) * kind.size / free)) / squares
+        value = min(max(value + change, quantity.low), quantity.high)
+        if p_value > 0.05 or abs(change) < 0.1 * error:
+            break
+    return Contrast(value, error, p_value, kind.size, np.unique(kind).size)
+
+
+def _permuted(slope: FloatArray, left: FloatArray, kind: IntArray, rng: np.random.Generator) -> float:
+    """Probability that exchanged loops follow the cause as well."""
+    overlap = slope @ left.T  # (loops, loops)
+    same = [np.flatnonzero(kind == k) for k in np.unique(kind)]
+    reached = 0
+    observed = abs(float(np.trace(overlap)))
+    for _ in range(_PERMUTATIONS):
+        total = 0.0
+        for members in same:
+            total += float(overlap[members, rng.permutation(members)].sum())
+        reached += abs(total) >= observed
+    return (1.0 + reached) / (_PERMUTATIONS + 1.0)
