@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray, IntArray
@@ -146,6 +147,7 @@ def fitted_contrast(
     measured = contrasts(loops, [r.output for r in problem.records])
     quantity = cause.parameters[0]
     first = cause.starts(problem.frames, [])[0][0][0]
+    others = _movable(loops, fitted)
     value, p_value, error = 0.0, 1.0, float("inf")
     current = fitted
     for number in range(_ROUNDS):
@@ -157,6 +159,8 @@ def fitted_contrast(
         moved = current.simulator.full(in_order((*fitted.terms, Term(cause, (value + step,)))))
         slope = contrasts(loops, [(b - a) / step for a, b in zip(base, moved, strict=True)])
         left = measured - contrasts(loops, base)
+        if others.size:  # the other causes are known within some error only
+            slope, left = (x - (others @ (others.T @ x.ravel())).reshape(x.shape) for x in (slope, left))
         squares = float(np.sum(slope**2))
         if squares <= 0.0:
             return None
@@ -170,6 +174,19 @@ def fitted_contrast(
         if p_value > 0.05 or abs(change) < 0.1 * error:
             break
     return Contrast(value, error, p_value, kind.size, np.unique(kind).size)
+
+
+def _movable(loops: Sequence[Loop], fitted: Fitted) -> FloatArray:
+    """Orthonormal contrasts (loops times places, k) of the parameters of the causes in the model."""
+    base = fitted.simulator.full(fitted.terms)
+    columns = []
+    for moved, step in fitted.moves:
+        after = fitted.simulator.full(moved)
+        columns.append(contrasts(loops, [(b - a) / step for a, b in zip(base, after, strict=True)]).ravel())
+    if not columns:
+        return np.empty((0, 0))
+    matrix = np.stack(columns, axis=1)
+    return np.asarray(linalg.orth(matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)))
 
 
 def _permuted(slope: FloatArray, left: FloatArray, kind: IntArray, rng: np.random.Generator) -> float:

@@ -53,7 +53,13 @@ class Fitted:
     @cached_property
     def slopes(self) -> FloatArray:
         """Derivatives (count, p) of the averaged output with respect to all parameters, weights held."""
-        columns = []
+        columns = [(self.simulator(moved) - self.simulated) / step for moved, step in self.moves]
+        return np.stack(columns, axis=1) if columns else np.empty((self.simulated.size, 0))
+
+    @property
+    def moves(self) -> list[tuple[list[Term], float]]:
+        """The terms with each parameter moved by a small step, and that step."""
+        found = []
         for k, term in enumerate(self.terms):
             for j, quantity in enumerate(term.cause.parameters):
                 step = _difference(term, j)
@@ -62,8 +68,8 @@ class Fitted:
                 values = list(term.values)
                 values[j] += up
                 moved[k] = Term(term.cause, tuple(values))
-                columns.append((self.simulator(moved) - self.simulated) / up)
-        return np.stack(columns, axis=1) if columns else np.empty((self.simulated.size, 0))
+                found.append((moved, up))
+        return found
 
 
 class Simulator:

@@ -153,7 +153,7 @@ class _Search:
         if set(current.names) != set(p_values):
             scores = screen(self.problem, current, self.rng)
         self.progress(0.65)
-        if self._unexplained(current) and not self._jagged:
+        if current.squares - self.floor.squares > self.floor.relevant and not self._jagged:
             jumps = sticking.sawtooth(self.problem, current)
             self.firings = [*self.firings, *([] if jumps is None else [(0, jumps)])]
         current, sure = self._by_contrast(current, without, p_values)
