@@ -32,6 +32,9 @@ def diagnose(
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.check_files(outputs=(out, html), force=force, artefacts=(*runs, model))
     # many small products: threads of BLAS that wait for each other take two to three times as long
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     from pulsetrainer.flows import diagnose as flow

@@ -22,6 +22,9 @@ def show(
 
     Example: pulsetrainer show model.h5
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.check_files(artefacts=(file,))
     from pulsetrainer.artefacts.kinds import Evaluation
     from pulsetrainer.flows import show as flow
 
