@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from command_lines import READS_ONLY, WRITERS, Writer
+from command_lines import EXCITATION, READS_ONLY, WRITERS, Writer
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"  # enough to pass for an artefact until it is opened
 THERE = {"x.h5", "x.html", "x.png", "x.csv"}  # outputs that exist
@@ -81,7 +81,13 @@ def _line(one: Writer, outputs: dict[str, str] | None = None) -> tuple[str, ...]
     return (*one.words, *(word for pair in names.items() for word in pair))
 
 
-# in a folder with artefacts that are what their names say
+# for the rest the artefacts must be what their names say
+PREPARATION = (
+    (*EXCITATION, "-o", "run.h5"),
+    ("identify", "run.h5", "--levels", "12", "-o", "model.h5"),
+    ("invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--periods", "1"),
+    ("play", "drive.h5", "-o", "played.h5", "--repeats", "1"),
+)
 INSIDE = {
     "a run without a model": Mistake(("evaluate", "run.h5"), 2),
     "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),

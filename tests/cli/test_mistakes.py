@@ -7,9 +7,10 @@ import subprocess
 import sys
 
 import typer
+from program import pulsetrainer
 
 from command_lines import READS_ONLY, WRITERS
-from mistakes import at_once, lay_out
+from mistakes import INSIDE, PREPARATION, at_once, lay_out
 from pulsetrainer.cli.app import app
 
 HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich")
@@ -63,3 +64,16 @@ def test_every_command_that_takes_a_file_is_among_them():
     commands = typer.main.get_command(app).commands
     tried = {one.words[0] for one in (*WRITERS, *READS_ONLY)}
     assert tried | {"ports", "doctor"} == set(commands), "the two take no file"
+
+
+def test_a_mistake_that_a_look_inside_tells_is_a_usage_error(tmp_path):
+    """The artefacts are opened, or the device is asked: exit 2 in words, nothing written."""
+    for words in PREPARATION:
+        assert pulsetrainer(tmp_path, *words).code == 0
+    before = sorted(path.name for path in tmp_path.iterdir())
+    for name, (words, code) in INSIDE.items():
+        done = pulsetrainer(tmp_path, *words)
+        assert done.code == code, (name, done)
+        assert "error: " in done.err, (name, done)
+        assert "\n  try: " in done.err, (name, done)
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
