@@ -85,4 +85,5 @@ def root(
 def main() -> None:
     """Run the program and exit with its code."""
     guard.end_like_ctrl_c()
+    guard.speak_any_encoding()
     sys.exit(guard.funnel(app, sys.argv[1:]))

@@ -113,12 +113,15 @@ def tables(screen: Screen, found: Diagnosis) -> None:
 
 def _found(one: Cause) -> str:
     tied = f"; not told from {', '.join(one.confounded_with)}" if one.confounded_with else ""
-    return f"{one.text}: {'; '.join(_words(p) for p in one.parameters)}{tied}"
+    return f"{one.text}: {'; '.join(words_of(p) for p in one.parameters)}{tied}"
 
 
-def _words(p: Parameter) -> str:
+def words_of(p: Parameter) -> str:
+    """Return a parameter with its unit and its interval."""
     interval = f" [{p.lower:.4g}, {p.upper:.4g}]" if math.isfinite(p.lower) else ""
-    return f"{p.name} {p.value:.4g} {p.unit}{interval}"
+    from pulsetrainer.flows.show import shown
+
+    return " ".join(f"{p.name} {p.value:.4g} {shown(p.unit)}".split()) + interval
 
 
 def _row(one: Cause) -> list[Any]:
