@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,8 +34,6 @@ def diagnose(
     from pulsetrainer.flows import preflight
 
     preflight.check_files(outputs=(out, html), force=force, artefacts=(*runs, model))
-    # many small products: threads of BLAS that wait for each other take two to three times as long
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     from pulsetrainer.flows import diagnose as flow
 
     screen = Screen("diagnose", as_json=json)
