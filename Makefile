@@ -21,8 +21,6 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
 
-# threads that wait for each other cost more than they bring here, and three times as much on a busy machine
-demo bounds: export OMP_NUM_THREADS ?= 1
 # act one: the paper's method and the continuous inverse; act two: what the model gets wrong, extended, played again
 demo: $(D)/report.html $(D)/diagnosis.html $(D)/unseen.h5 $(D)/model-extended.h5  ## the whole chain, twice: as identified, and extended by what a diagnosis finds
 	@$(PT) evaluate $(PLAYED)

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import pytest
 from measuring import seconds
 
+from mistakes import INSIDE, PREPARATION, Mistake, at_once, lay_out
+
 ROUNDS = 7
 HELP_S, USAGE_S = 0.25, 0.5  # the bars, on a machine with nothing else to do
 EMPTY_S = 0.010  # there an empty interpreter takes as long: the bars as ratios are 25 and 50
@@ -39,14 +41,14 @@ def _once(command: list[str], environment: dict[str, str], code: int) -> tuple[f
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def starts(words: list[str], code: int, more: dict[str, str] | None = None) -> Start:
+def starts(words: list[str], code: int, more: dict[str, str] | None = None, rounds: int = ROUNDS) -> Start:
     """Start the program and ``python -c pass`` in turns."""
     program = [sys.executable, "-m", "pulsetrainer", *words]
     empty = [sys.executable, "-c", "pass"]
     environment = {**os.environ, **(more or {})}
     _once(program, environment, code)
     ours, theirs = [], []
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         theirs.append(_once(empty, dict(os.environ), 0))
         ours.append(_once(program, environment, code))
     walls, cpus = zip(*ours, strict=True)
@@ -61,20 +63,9 @@ def starts(words: list[str], code: int, more: dict[str, str] | None = None) -> S
 
 COMPLETION = {"_PULSETRAINER_COMPLETE": "complete_bash", "COMP_WORDS": "pulsetrainer i", "COMP_CWORD": "1"}
 JOBS = {
-    "pulsetrainer --help": (["--help"], 0, {}, HELP_S),
-    "pulsetrainer capture --help": (["capture", "--help"], 0, {}, USAGE_S),
-    "completion of a command": ([], 0, COMPLETION, USAGE_S),
-    "usage error: no such command": (["captur"], 2, {}, USAGE_S),
-    "usage error: no such option": (["capture", "identification", "--speeed", "1"], 2, {}, USAGE_S),
-    "usage error: an option is missing": (["capture", "identification"], 2, {}, USAGE_S),
-    "no such file": (["show", "nowhere.h5"], 3, {}, 2 * USAGE_S),
-    "usage error: no such signal": (["capture", "nothing", "-o", "run.h5"], 2, {}, USAGE_S),
-    "no such model": (
-        ["invert", "nothing", "--model", "no.h5", "-o", "x.h5"],
-        None,
-        {},
-        USAGE_S,
-    ),
+    "pulsetrainer --help": (["--help"], {}, HELP_S),
+    "pulsetrainer capture --help": (["capture", "--help"], {}, USAGE_S),
+    "completion of a command": ([], COMPLETION, USAGE_S),
 }
 
 
@@ -82,8 +73,8 @@ JOBS = {
 def test_start(table, job, tmp_path, monkeypatch):
     """The bar is held as a ratio of processor times: other work on the machine lengthens both."""
     monkeypatch.chdir(tmp_path)
-    words, code, more, bar = JOBS[job]
-    start = starts(words, code, more)
+    words, more, bar = JOBS[job]
+    start = starts(words, 0, more)
     table.add(
         job,
         ours=f"{start.wall_s:.3f} s, {start.cpu_s:.3f} s of processor",
@@ -92,3 +83,34 @@ def test_start(table, job, tmp_path, monkeypatch):
         bar=f"{bar} s, {bar / EMPTY_S:.0f} times",
     )
     assert start.cpu_ratio < bar / EMPTY_S
+
+
+def slowest(table, what: str, cases: dict[str, Mistake]) -> float:
+    """Time every mistake and add a row with the one that takes longest; return its ratio."""
+    found = {name: starts(list(one.words), one.code, rounds=3) for name, one in cases.items()}
+    for name, start in found.items():
+        print(f"{start.wall_s:.3f} s, {start.cpu_s:.3f} s of processor: {name}")
+    name, start = max(found.items(), key=lambda pair: pair[1].cpu_s)
+    table.add(
+        f"{what}: the slowest of {len(found)}, {name}",
+        ours=f"{start.wall_s:.3f} s, {start.cpu_s:.3f} s of processor",
+        baseline="python -c pass",
+        figure=f"{start.wall_ratio:.0f} times, {start.cpu_ratio:.0f} of processor",
+        bar=f"{USAGE_S} s, {USAGE_S / EMPTY_S:.0f} times",
+    )
+    return start.cpu_ratio
+
+
+def test_every_mistake_in_a_name(table, tmp_path, monkeypatch):
+    """Each command with each input absent and each output in the way, and every name that can be wrong."""
+    lay_out(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert slowest(table, "a mistake in a name", at_once()) < USAGE_S / EMPTY_S
+
+
+def test_every_mistake_that_a_look_inside_tells(table, tmp_path, monkeypatch):
+    """Usage errors for which an artefact is opened, or the device asked."""
+    monkeypatch.chdir(tmp_path)
+    for words in PREPARATION:
+        subprocess.run([sys.executable, "-m", "pulsetrainer", *words], check=True, capture_output=True)  # noqa: S603
+    assert slowest(table, "a mistake that a look inside tells", INSIDE) < USAGE_S / EMPTY_S

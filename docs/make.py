@@ -1,4 +1,4 @@
-"""Write the reference pages: ``python docs/make.py`` writes commands.md, format.md and decisions/README.md.
+"""Write the reference: ``python docs/make.py`` writes commands.md, pulsetrainer.1, format.md, decisions/README.md.
 
 They are read off the code: the commands off the program's own parser, the format off the annotations that
 the store writes by, the decisions off their titles. ``--check`` writes nothing and exits 1 where a page is not what the code says.
@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from pulsetrainer import __version__
 from pulsetrainer.artefacts.kinds import KINDS
 from pulsetrainer.artefacts.schema import FieldPlan, plan_of
 from pulsetrainer.cli.app import app
-from pulsetrainer.cli.settings import SETTINGS
+from pulsetrainer.cli.settings import SETTINGS, VARIABLE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,19 +39,22 @@ With `--json` a command writes one object to stdout: `{{"schema": 1, "command": 
 
 | exit code | what happened |
 |---|---|
-| 0 | it is done |
-| 1 | a quality gate failed: a bound of `evaluate --bounds`, a finding of `doctor` |
-| 2 | the command line, the settings, or an output that exists |
-| 3 | an artefact or its data |
-| 4 | the device or the line to it |
-| 5 | a fit or an inverse did not converge |
-| 70 | a bug of ours: `--debug` shows where |
-| 130 | you stopped it |
+{codes}
 
 `pulsetrainer --install-completion` teaches your shell the commands and options, `--show-completion` shows how.
 """
 
 
+CODES = {
+    0: "it is done",
+    1: "a quality gate failed: a bound of `evaluate --bounds`, a finding of `doctor`",
+    2: "the command line, the settings, or an output that exists",
+    3: "an artefact or its data",
+    4: "the device or the line to it",
+    5: "a fit or an inverse did not converge",
+    70: "a bug of ours: `--debug` shows where",
+    130: "you stopped it",
+}
 SETTINGS_WORDS = """\
 What stands in `pulsetrainer.toml` need not be typed. The file is that in the folder where you work, or the one that
 `--settings` or `PULSETRAINER_SETTINGS` names, or the one in your own configuration folder. A flag wins over the
@@ -63,7 +67,12 @@ def commands_page() -> str:
     """Return the reference of every command and option."""
     root: Any = typer.main.get_command(app)
     listed = [f"[{name}](#{name})" for name in root.commands]
-    parts = [COMMANDS.format(mark=MARK), ", ".join(listed) + "\n", *_options(root, of="every command")]
+    codes = "\n".join(f"| {code} | {what} |" for code, what in CODES.items())
+    parts = [
+        COMMANDS.format(mark=MARK, codes=codes),
+        ", ".join(listed) + "\n",
+        *_options(root, of="every command"),
+    ]
     for name, command in root.commands.items():
         parts += [
             f"## {name}\n",
@@ -269,6 +278,72 @@ def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|")
 
 
+# --- the manual page -----------------------------------------------------------------------------------------
+# click-man would write one, but not from typer's own parser, and without settings and exit codes.
+MANUAL = """\
+.\\" made by `make docs` from the code: change the code, not this page
+.TH PULSETRAINER 1 "" "pulsetrainer {version}" "User Commands"
+.SH NAME
+pulsetrainer \\- measure, model, invert, play and evaluate a hysteretic solenoid
+.SH SYNOPSIS
+.B pulsetrainer
+.RI [ OPTION ]...
+.I COMMAND
+.RI [ ARGUMENT ]...
+.SH DESCRIPTION
+"""
+
+
+def manual_page() -> str:
+    """Return the manual page, in the macros of man(7)."""
+    root: Any = typer.main.get_command(app)
+    lines = [MANUAL.format(version=__version__) + _roff(root.help), ".SH OPTIONS", *_listed(root)]
+    lines.append(".SH COMMANDS")
+    for name, command in root.commands.items():
+        lines.append(f".SS {name}")
+        for number, paragraph in enumerate(command.help.strip().split("\n\n")):
+            line = _roff(paragraph)
+            example = line.removeprefix("Example: ")
+            lines += [".PP"] if number and example == line else []
+            lines += [line] if example == line else [".PP", ".EX", example, ".EE"]
+        lines += _listed(command)
+    lines += [".SH SETTINGS", _roff(SETTINGS_WORDS)]
+    for one in SETTINGS:
+        unit = f", {one.unit}" if one.unit else ""
+        takers = ", ".join(sorted({command for command, _ in one.options}))
+        lines += [".TP", f".B {_roff(one.key)}", _roff(f"{one.what}{unit}; for {takers}.")]
+    lines.append(".SH ENVIRONMENT")
+    for one in SETTINGS:
+        lines += [".TP", f".B {_roff(one.variable)}", _roff(f"as {one.key} in the settings.")]
+    lines += [".TP", f".B {_roff(VARIABLE)}", "file of settings."]
+    lines += [".TP", ".B NO_COLOR", "no colours, whatever its value."]
+    lines.append(".SH EXIT STATUS")
+    for code, what in CODES.items():
+        lines += [".TP", f".B {code}", _roff(what)]
+    return "\n".join(lines) + "\n"
+
+
+def _roff(text: str) -> str:
+    """Return words as the macros take them: one line, nothing in it taken for a request."""
+    line = " ".join(text.replace("`", "").split()).replace("\\", "\\e").replace("-", "\\-")
+    return f"\\&{line}" if line.startswith((".", "'")) else line
+
+
+def _listed(command: Any) -> Iterator[str]:
+    """Yield the arguments and options of a command, each with what it is."""
+    for one in command.params:
+        if one.name == "help":
+            continue
+        if one.param_type_name == "argument":
+            head = f".I {_roff((one.metavar or one.name.upper()).strip('{}[]'))}"
+        else:
+            head = f".B {_roff(', '.join((*one.opts, *one.secondary_opts)))}"
+        default = _default(one) if one.param_type_name == "option" else ""
+        said = f" Default: {default}." if default and default != "must be given" else ""
+        variable = f" Environment: {one.envvar}." if one.envvar else ""
+        yield from (".TP", head, _roff(f"{one.help or ''}{said}{variable}"))
+
+
 # --- decisions --------------------------------------------------------------------------------------------
 DECISIONS = """\
 # Decisions
@@ -288,7 +363,12 @@ def decisions_page() -> str:
     return DECISIONS.format(mark=MARK) + "".join(lines)
 
 
-PAGES = {"commands.md": commands_page, "format.md": format_page, "decisions/README.md": decisions_page}
+PAGES = {
+    "commands.md": commands_page,
+    "pulsetrainer.1": manual_page,
+    "format.md": format_page,
+    "decisions/README.md": decisions_page,
+}
 
 
 def main() -> int:

@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import os
 
+# as the program does: two workers with two threads each wait for each other
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(

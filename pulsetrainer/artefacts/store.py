@@ -7,7 +7,6 @@ The file format: root attributes ``kind``, ``format_version``, ``title``, ``crea
 from __future__ import annotations
 
 import contextlib
-import difflib
 import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -24,6 +23,7 @@ from pulsetrainer.artefacts.output import check_output, replacing
 from pulsetrainer.artefacts.provenance import Header, Provenance, clean
 from pulsetrainer.artefacts.schema import TIME, kind_of, plan_of
 from pulsetrainer.artefacts.seal import check_seal, seal_of
+from pulsetrainer.artefacts.source import RESTORE, check_artefact
 from pulsetrainer.artefacts.steps import maker, next_step, with_article
 from pulsetrainer.errors import DataError
 
@@ -35,7 +35,6 @@ __all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "re
 FORMAT_VERSION = 1
 # from 1.10 on a file can be read while it grows, and HDF5 keeps checksums of most of its own structures
 LIBVER = ("v110", "v110")
-_DAMAGED = "restore it from a copy, or make it again: pulsetrainer --help lists the commands"
 _HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
 
 K = TypeVar("K")
@@ -185,7 +184,7 @@ def _trusted(file: h5py.File, path: Path | str) -> int | None:
     if samples is None:
         return None
     if np.ndim(samples) or not np.issubdtype(type(samples), np.integer) or samples < 0:
-        raise DataError(f"{path}: the attribute 'samples' is {samples!r}, expected a count", hint=_DAMAGED)
+        raise DataError(f"{path}: the attribute 'samples' is {samples!r}, expected a count", hint=RESTORE)
     return int(samples)
 
 
@@ -205,7 +204,7 @@ def _kind(file: h5py.File, path: Path | str) -> str:
     kind, version = text_of(file.attrs["kind"]), file.attrs["format_version"]
     if not np.issubdtype(type(version), np.integer):
         raise DataError(
-            f"{path}: the attribute 'format_version' is {version!r}, expected a whole number", hint=_DAMAGED
+            f"{path}: the attribute 'format_version' is {version!r}, expected a whole number", hint=RESTORE
         )
     if version > FORMAT_VERSION:
         raise DataError(
@@ -224,7 +223,7 @@ def _kind(file: h5py.File, path: Path | str) -> str:
 def _root_text(file: h5py.File, path: Path | str, name: str) -> str:
     value = file.attrs.get(name)
     if not isinstance(value, str | bytes):
-        raise DataError(f"{path}: the attribute {name!r} is missing or not a text", hint=_DAMAGED)
+        raise DataError(f"{path}: the attribute {name!r} is missing or not a text", hint=RESTORE)
     return text_of(value)
 
 
@@ -232,12 +231,7 @@ def _root_text(file: h5py.File, path: Path | str, name: str) -> str:
 def _opened(path: Path | str) -> Iterator[h5py.File]:
     """Open a file for reading; whatever HDF5 finds wrong with it is a DataError."""
     path = Path(path)
-    try:
-        _check_readable(path)
-    except OSError as error:
-        raise DataError(
-            f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
-        ) from error
+    check_artefact(path)
     check_seal(path)
     try:
         with _open(path) as file:
@@ -259,44 +253,15 @@ def _open(path: Path) -> Iterator[h5py.File]:
         yield file
 
 
-def _check_readable(path: Path) -> None:
-    """Raise DataError or OSError for what can be said before HDF5 looks at it."""
-    if path.is_dir():
-        raise DataError(f"{path} is a folder, expected a file", hint=_names_in(path, path))
-    if not path.exists():
-        raise DataError(f"{path} does not exist", hint=_names_in(path.parent, path))
-    if not path.is_file():
-        raise DataError(f"{path} is not an ordinary file", hint="name a file on disk")
-    with path.open("rb") as stream:
-        start = stream.read(8)
-    if not start:
-        raise DataError(f"{path} is empty", hint=_DAMAGED)
-    if start != b"\x89HDF\r\n\x1a\n":
-        table = path.suffix.lower() in (".csv", ".tsv", ".txt", ".dat")
-        hint = f"read the table in first: pulsetrainer import {path} -o run.h5" if table else _DAMAGED
-        raise DataError(f"{path} is not an HDF5 file", hint=hint)
-
-
-def _names_in(folder: Path, path: Path) -> str:
-    """Return a hint with the names in a folder that come nearest."""
-    if not folder.is_dir():
-        return f"the folder {folder} does not exist either"
-    names = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
-    near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
-    near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
-    near = near or [name for name in names if name.endswith(".h5")][:5]
-    return f"in that folder there is: {', '.join(near)}" if near else f"no artefact is in {folder}"
-
-
 def _damaged(path: Path, error: Exception) -> DataError:
     text = str(error)
     if "truncated file" in text:
         return DataError(
-            f"{path} is truncated: only {path.stat().st_size} bytes of it are there", hint=_DAMAGED
+            f"{path} is truncated: only {path.stat().st_size} bytes of it are there", hint=RESTORE
         )
     if "lock file" in text:
         return DataError(
             f"{path} is locked by another program", hint="close the program that has it open and try again"
         )
     reason = text.strip("'\"").split("\n")[0]
-    return DataError(f"{path} is damaged and cannot be read: {reason}", hint=_DAMAGED)
+    return DataError(f"{path} is damaged and cannot be read: {reason}", hint=RESTORE)

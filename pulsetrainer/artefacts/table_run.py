@@ -13,6 +13,7 @@ import numpy as np
 
 from pulsetrainer.artefacts.kinds import FloatArray, Run
 from pulsetrainer.artefacts.table import Table, split_unit
+from pulsetrainer.artefacts.timing import check_timing
 from pulsetrainer.artefacts.units import check_unit
 from pulsetrainer.errors import DataError, UsageError
 
@@ -91,7 +92,7 @@ def run_from_table(
         A column is missing or not finite, a unit is none, there are fewer than two rows, or time does not
         increase (the line is named).
     """
-    _check_timing(time_column, rate_Hz, no_time=no_time)
+    check_timing(time_column, rate_Hz, no_time=no_time)
     wanted = [name for name in (input_column, output_column, reference_column) if name is not None]
     columns = {name: np.ascontiguousarray(table.check_finite(name)) for name in wanted}
     rows = table.values.shape[0]
@@ -117,18 +118,6 @@ def run_from_table(
         output_quantity=split_unit(table.names[table.index(output_column)])[0],
         signal=table.path.name,
     )
-
-
-def _check_timing(time_column: str | None, rate_Hz: float | None, *, no_time: bool) -> None:
-    if time_column is not None and rate_Hz is not None:
-        raise UsageError(
-            f"both a time column ({time_column}) and a rate ({rate_Hz:g} Hz) were given",
-            hint="give --time or --rate, not both",
-        )
-    if no_time and (time_column is not None or rate_Hz is not None):
-        raise UsageError("--no-time was given together with --time or --rate", hint="give one of the three")
-    if rate_Hz is not None and not 0 < rate_Hz < np.inf:
-        raise UsageError(f"the rate must be positive, got {rate_Hz:g} Hz", hint="for instance --rate 1000")
 
 
 def _unit(table: Table, column: str, given: str | None, option: str) -> str:

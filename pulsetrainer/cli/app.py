@@ -84,5 +84,9 @@ def root(
 
 def main() -> None:
     """Run the program and exit with its code."""
+    # many small products: threads of BLAS that wait for each other take two to three times as long, and ten
+    # times on a busy computer; who wants them sets the variable
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     guard.end_like_ctrl_c()
+    guard.speak_any_encoding()
     sys.exit(guard.funnel(app, sys.argv[1:]))

@@ -46,6 +46,10 @@ def capture(
 
     Example: pulsetrainer capture identification -o run.h5
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.signal_file(signal)
+    preflight.check_files(outputs=() if resume else (out,), force=force)
     from pulsetrainer.flows import capture as flow
     from pulsetrainer.link import Limits
 

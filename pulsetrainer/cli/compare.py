@@ -29,6 +29,10 @@ def compare(
 
     Example: pulsetrainer compare before.h5 after.h5 -o change.png
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.comparison_form(files, out)
+    preflight.check_files(outputs=(out,), force=force, artefacts=files)
     from pulsetrainer.flows import compare as flow
 
     screen = Screen("compare", as_json=json)

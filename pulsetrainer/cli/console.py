@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 import sys
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
@@ -39,7 +41,8 @@ class Screen:
     def __init__(self, command: str, *, as_json: bool) -> None:
         self.command = command
         self.as_json = as_json
-        self.width = shutil.get_terminal_size().columns if sys.stdout.isatty() else _PIPE_WIDTH
+        self.is_terminal = sys.stdout.isatty()
+        self.width = shutil.get_terminal_size().columns if self.is_terminal else _PIPE_WIDTH
 
     def note(self, text: str) -> None:
         """Say one line to the person, beside the results."""
@@ -69,34 +72,98 @@ class Screen:
         """Write the one JSON object of this command, a mapping or a dataclass, when it was asked for."""
         if self.as_json:
             document = {"schema": 1, "command": self.command} | plain(payload)
-            sys.stdout.write(json.dumps(document, ensure_ascii=False) + "\n")
+            universal = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
+            sys.stdout.write(json.dumps(document, ensure_ascii=not universal) + "\n")
 
     def facts(self, title: str, rows: Mapping[str, Any]) -> None:
         """Print names and values, one a line, unless JSON was asked for."""
         if self.as_json:
             return
-        width = max((len(name) for name in rows), default=0)
-        lines = [
-            title,
-            *(f"  {name.replace('_', ' '):<{width}}  {_text(value)}" for name, value in rows.items()),
-        ]
-        sys.stdout.write("\n".join(lines) + "\n")
+        names = [_label(name) for name in rows]
+        width = max((len(name) for name in names), default=0)
+        self.line("", title, indent=2)
+        for name, value in zip(names, rows.values(), strict=True):
+            self.line(f"  {name:<{width}}  ", _text(value))
 
-    def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-        """Print a table, unless JSON was asked for; the first column is text, the others are numbers."""
+    def line(self, lead: str, text: str, *, indent: int | None = None) -> None:
+        """Print a line; on a terminal that is too narrow, on several, broken between words below ``lead``."""
         if self.as_json:
             return
-        from rich import box
-        from rich.console import Console
-        from rich.table import Table
-        from rich.text import Text
+        sys.stdout.write(folded(lead, text, self.width if self.is_terminal else None, indent) + "\n")
 
-        table = Table(title=Text(title), title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1))
-        for number, name in enumerate(columns):
-            table.add_column(Text(name), justify="right" if number else "left", no_wrap=not number)
-        for row in rows:
-            table.add_row(*(Text(_text(cell)) for cell in row))
-        Console(width=self.width, markup=False, highlight=False).print(table)
+    def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+        """Print a table, unless JSON was asked for; the first column is text, the others are numbers.
+
+        Where the terminal is too narrow for it: the same, one figure a line.
+        """
+        if self.as_json:
+            return
+        drawn = _drawn(title, columns, rows)
+        if self.is_terminal and max(len(line) for line in _ESCAPE.sub("", drawn).splitlines()) > self.width:
+            drawn = "\n".join(_listed(title, columns, rows)) + "\n"
+        sys.stdout.write(drawn)
+
+
+_ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
+_BROAD = 10_000  # as wide as the table needs: figures are never cut
+_NARROWEST = 24  # beside a lead; less, and the lines go on further left
+
+
+def folded(lead: str, text: str, width: int | None, indent: int | None = None) -> str:
+    """Return a line, folded between words to a width; None: not folded."""
+    if width is None or len(lead) + len(text) <= width:
+        return lead + text
+    if indent is None:
+        indent = len(lead) if width - len(lead) >= _NARROWEST else 4
+    return textwrap.fill(
+        text,
+        width,
+        initial_indent=lead,
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def _drawn(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Return a table, no wider than its figures, without blanks at the ends of its lines."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1))
+    for number, name in enumerate(columns):
+        table.add_column(Text(name), justify="right" if number else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*(Text(_text(cell)) for cell in row))
+    console = Console(width=_BROAD, markup=False, highlight=False)
+    with console.capture() as captured:
+        console.print(table)
+    lines = [line.rstrip() for line in captured.get().splitlines()]
+    while lines and not _ESCAPE.sub("", lines[0]).strip():
+        lines.pop(0)
+    return "\n".join([title, *lines]) + "\n"
+
+
+def _listed(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> Iterator[str]:
+    """Yield a table as a list: each row's name, below it its figures with the names of their columns."""
+    heads = [name.replace("-\n", "-").replace("\n", " ") for name in columns]
+    width = max((len(head) for head in heads[1:]), default=0)
+    yield title
+    for row in rows:
+        yield f"  {_text(row[0])}"
+        for head, cell in zip(heads[1:], row[1:], strict=True):
+            if cell not in (None, ""):
+                yield f"    {head:<{width}}  {_text(cell)}"
+
+
+def _label(name: str) -> str:
+    """Return the name of a figure as a person writes it, its unit behind a comma."""
+    for ending, unit in (("_percent", "%"), ("_Hz", "Hz")):
+        if name.endswith(ending):
+            name = f"{name.removesuffix(ending)}, {unit}"
+    return name.replace("_", " ")
 
 
 def _text(value: Any) -> str:

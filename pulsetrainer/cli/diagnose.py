@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,8 +31,9 @@ def diagnose(
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
-    # many small products: threads of BLAS that wait for each other take two to three times as long
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    from pulsetrainer.flows import preflight
+
+    preflight.check_files(outputs=(out, html), force=force, artefacts=(*runs, model))
     from pulsetrainer.flows import diagnose as flow
 
     screen = Screen("diagnose", as_json=json)
@@ -110,12 +110,15 @@ def tables(screen: Screen, found: Diagnosis) -> None:
 
 def _found(one: Cause) -> str:
     tied = f"; not told from {', '.join(one.confounded_with)}" if one.confounded_with else ""
-    return f"{one.text}: {'; '.join(_words(p) for p in one.parameters)}{tied}"
+    return f"{one.text}: {'; '.join(words_of(p) for p in one.parameters)}{tied}"
 
 
-def _words(p: Parameter) -> str:
+def words_of(p: Parameter) -> str:
+    """Return a parameter with its unit and its interval."""
     interval = f" [{p.lower:.4g}, {p.upper:.4g}]" if math.isfinite(p.lower) else ""
-    return f"{p.name} {p.value:.4g} {p.unit}{interval}"
+    from pulsetrainer.flows.show import shown
+
+    return " ".join(f"{p.name} {p.value:.4g} {shown(p.unit)}".split()) + interval
 
 
 def _row(one: Cause) -> list[Any]:

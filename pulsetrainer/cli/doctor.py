@@ -46,9 +46,9 @@ def doctor(
     if not json:
         width = max(len(one.name) for one in result.findings)
         for one in result.findings:
-            typer.echo(f"{_MARKS[one.state]:<8} {one.name:<{width}}  {one.found}")
+            screen.line(f"{_MARKS[one.state]:<8} {one.name:<{width}}  ", one.found)
             if one.fix and one.state != "ok":
-                typer.echo(f"{'':<8} {'':<{width}}  fix: {one.fix}")
+                typer.echo(f"{'':<8} fix: {one.fix}")  # not folded: a command in it is copied in one piece
     if result.problems:
         typer.echo(f"error: {problem}\n  try: {hint}", err=True)
         raise typer.Exit(QualityError.exit_code)

@@ -36,6 +36,9 @@ def evaluate(
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.check_files(outputs=(out, html), force=force, artefacts=(*inputs, *model), others=(bounds,))
     from pulsetrainer.errors import QualityError
     from pulsetrainer.flows import evaluate as flow
 

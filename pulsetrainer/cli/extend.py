@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pulsetrainer.cli.console import Screen
+from pulsetrainer.cli.diagnose import words_of
 from pulsetrainer.cli.options import AsJson, Force, Out
 
 
@@ -22,18 +23,16 @@ def extend(
 
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.check_files(outputs=(out,), force=force, artefacts=(diagnosis, model))
     from pulsetrainer.flows import extend as flow
 
     screen = Screen("extend", as_json=json)
     with screen.working("extending") as context:
         result = flow.run(flow.Options(diagnosis, model, out, force), context)
     screen.result(result)
-    rows = {
-        extension.cause: "; ".join(
-            f"{p.name} {p.value:.4g} {p.unit} [{p.lower:.4g}, {p.upper:.4g}]" for p in extension.parameters
-        )
-        for extension in result.extensions
-    }
+    rows = {one.cause: "; ".join(words_of(p) for p in one.parameters) for one in result.extensions}
     screen.facts(
         f"{result.output}: extended model of {result.levels} levels",
         rows

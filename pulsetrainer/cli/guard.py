@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import json
 import os
+import shutil
 import signal
 import sys
 import traceback
@@ -13,6 +15,7 @@ from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
+from pulsetrainer.cli.console import folded
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
 
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -61,6 +64,15 @@ def end_like_ctrl_c() -> None:
             signal.signal(number, interrupt)
 
 
+def speak_any_encoding() -> None:
+    """Let a terminal or pipe without Unicode show what it cannot spell as escapes, instead of failing."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            spelled = stream.encoding.lower().replace("-", "") == "utf8" and stream.errors != "strict"
+            if not spelled:
+                stream.reconfigure(errors="backslashreplace")
+
+
 def _be_verbose() -> None:
     """Let the package's log lines through to stderr, each with its time."""
     import logging
@@ -81,10 +93,11 @@ def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
     if as_json:
         error = {"kind": problem.kind, "message": problem.message, "hint": problem.hint}
         sys.stdout.write(json.dumps({"schema": 1, "command": command, "error": error}) + "\n")
-    sys.stderr.write(f"error: {problem.message}\n")
+    width = shutil.get_terminal_size().columns if sys.stderr.isatty() else None
+    sys.stderr.write(folded("error: ", problem.message, width, indent=2) + "\n")
     for note in getattr(problem, "__notes__", ()):
-        sys.stderr.write(f"note: {note}\n")
-    if problem.hint:
+        sys.stderr.write(folded("note: ", str(note), width, indent=2) + "\n")
+    if problem.hint:  # not folded: a command in it is copied in one piece
         sys.stderr.write(f"  try: {problem.hint}\n")
 
 

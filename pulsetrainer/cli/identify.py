@@ -57,6 +57,10 @@ def identify(
 
     Example: pulsetrainer identify run.h5 -o model.h5
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.check_files(outputs=(out,), force=force, artefacts=runs)
+    smooth = _smoothing(smoothing)
     from pulsetrainer.flows import identify as flow
     from pulsetrainer.flows.show import shown
 
@@ -67,7 +71,7 @@ def identify(
         levels,
         operator.value,
         method.value,
-        _smoothing(smoothing),
+        smooth,
         bootstrap,
         seed,
         force,

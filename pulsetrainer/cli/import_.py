@@ -62,6 +62,12 @@ def import_(
 
     Example: pulsetrainer import scope.csv --input current_A --output force_N -o run.h5
     """
+    from pulsetrainer.flows import preflight
+
+    outputs = preflight.import_groups(files, out)
+    preflight.check_files(outputs=outputs, force=force, others=files)
+    preflight.check_timing(time_column, rate, no_time=no_time, resampled=resample is not None)
+    even_rate = _rate(resample)
     from pulsetrainer.flows import import_ as flow
 
     screen = Screen("import", as_json=json)
@@ -76,7 +82,7 @@ def import_(
         output_unit=output_unit,
         rate_Hz=rate,
         no_time=no_time,
-        resample=_rate(resample),
+        resample=even_rate,
         force=force,
     )
     with screen.working(f"reading {', '.join(path.name for path in files)}") as context:

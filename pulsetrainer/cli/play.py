@@ -34,6 +34,9 @@ def play(
 
     Example: pulsetrainer play drive.h5 -o played.h5
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.check_files(outputs=(out,), force=force, artefacts=(drive,))
     from pulsetrainer.flows import play as flow
     from pulsetrainer.link import Limits
 

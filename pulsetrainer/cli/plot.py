@@ -21,6 +21,10 @@ def plot(
 
     Example: pulsetrainer plot model.h5 -o model.png
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.figure_form(out, "a figure")
+    preflight.check_files(outputs=(out,), force=force, artefacts=(file,))
     from pulsetrainer.flows import plot as flow
 
     screen = Screen("plot", as_json=json)

@@ -22,6 +22,9 @@ def show(
 
     Example: pulsetrainer show model.h5
     """
+    from pulsetrainer.flows import preflight
+
+    preflight.check_files(artefacts=(file,))
     from pulsetrainer.artefacts.kinds import Evaluation
     from pulsetrainer.flows import show as flow
 
@@ -40,10 +43,11 @@ def show(
         }
     )
     title = f"{file}: {result.kind}, {header.title}, {header.created}"
+    known = {name: value for name, value in result.facts.items() if value is not None}
     if isinstance(result.artefact, Evaluation):
         screen.facts(title, {})
         tables(screen, result.artefact)
     else:
-        screen.facts(title, result.facts)
+        screen.facts(title, known)
     if not json:
         typer.echo("history\n" + "\n".join(f"  {line}" for line in header.history))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import find_peaks, savgol_filter
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.waveforms import Shape
@@ -92,10 +92,12 @@ def find_beats(record: Shape) -> Beats:
     low, high = np.percentile(p, [5.0, 95.0])
     height = float(high - low)
     window = 2 * max(round(0.5 * _SMOOTH_S / step), 1) + 1
-    smooth = savgol_filter(p, window, min(2, window - 1)) if window < p.size else p
+    smooth = scipy.signal.savgol_filter(p, window, min(2, window - 1)) if window < p.size else p
     # a record may begin or end in a peak's flank: lower ends make the first and last peak whole
     padded = np.concatenate(([low - height], smooth, [low - height]))
-    peaks, _ = find_peaks(padded, prominence=_PROMINENCE * height, distance=max(_SHORTEST_S / step, 1.0))
+    peaks, _ = scipy.signal.find_peaks(
+        padded, prominence=_PROMINENCE * height, distance=max(_SHORTEST_S / step, 1.0)
+    )
     peaks = peaks - 1
     if peaks.size == 0 or not height > 0:
         raise DataError(f"{record.name} holds no pulse that stands out", hint="leave --beat out for one beat")

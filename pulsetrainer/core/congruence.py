@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import sparse
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.equations import NormalEquations, Record, parted_sums
@@ -32,7 +32,7 @@ TOLERANCE = 0.05
 _LEVELS = 32  # on which t is chosen
 
 
-def penalty(plane: Plane, diagonal: FloatArray, strength: float) -> sparse.csr_array:
+def penalty(plane: Plane, diagonal: FloatArray, strength: float) -> scipy.sparse.csr_array:
     """Return t g D'D (n_q, n_q) on the masses.
 
     Parameters
@@ -54,7 +54,9 @@ def penalty(plane: Plane, diagonal: FloatArray, strength: float) -> sparse.csr_a
     count = here.size
     value = np.concatenate((np.ones(count), -np.ones(count)))
     row = np.concatenate((np.arange(count), np.arange(count)))
-    difference = sparse.csr_array((value, (row, np.concatenate((here, there)))), shape=(count, plane.n_q))
+    difference = scipy.sparse.csr_array(
+        (value, (row, np.concatenate((here, there)))), shape=(count, plane.n_q)
+    )
     return (difference.T @ difference) * (strength * float(diagonal.sum()) / plane.n_q)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.memory import State, Trace
 from pulsetrainer.core.operator import base_rows, follow, steps
@@ -113,7 +113,7 @@ class NodeSums:
     """
 
     plane: Plane
-    gram: sparse.csr_array  # (n_q, n_q) sum v r r'
+    gram: scipy.sparse.csr_array  # (n_q, n_q) sum v r r'
     moment: FloatArray  # (n_q,) sum v r y
     row_sum: FloatArray  # (n_q,) sum v r
     weight: float  # sum v
@@ -124,7 +124,7 @@ class NodeSums:
     def nothing(cls, plane: Plane) -> NodeSums:
         """Sums over no samples."""
         zero = np.zeros(plane.n_q)
-        return cls(plane, sparse.csr_array((plane.n_q, plane.n_q)), zero, zero, 0.0, 0.0, 0.0)
+        return cls(plane, scipy.sparse.csr_array((plane.n_q, plane.n_q)), zero, zero, 0.0, 0.0, 0.0)
 
     def __add__(self, other: NodeSums) -> NodeSums:
         """Sums over both sets of samples."""
@@ -157,7 +157,7 @@ class NodeSums:
 
 
 def _part_sums(
-    plane: Plane, path: Trace, base: sparse.csr_array, samples: IntArray, y: FloatArray, v: FloatArray
+    plane: Plane, path: Trace, base: scipy.sparse.csr_array, samples: IntArray, y: FloatArray, v: FloatArray
 ) -> NodeSums:
     """Node-space sums of the chosen samples of one record.
 
@@ -166,8 +166,8 @@ def _part_sums(
     """
     used, anchors = np.unique(path.anchor[samples], return_inverse=True)
     base, nodes = base[used], used.size
-    gram = sparse.csr_array((plane.n_q, plane.n_q))
-    by_anchor = sparse.csr_array((nodes, plane.n_q))  # sum of v own over the samples of an anchor
+    gram = scipy.sparse.csr_array((plane.n_q, plane.n_q))
+    by_anchor = scipy.sparse.csr_array((nodes, plane.n_q))  # sum of v own over the samples of an anchor
     own_sum, own_y = np.zeros(plane.n_q), np.zeros(plane.n_q)
     for begin in range(0, samples.size, _CHUNK):
         part = samples[begin : begin + _CHUNK]
@@ -176,7 +176,7 @@ def _part_sums(
         scaled = own.multiply(v[part, None]).tocsr()
         gram = gram + own.T @ scaled
         size = own.shape[0]
-        gather = sparse.csr_array((np.ones(size), (anchor, np.arange(size))), shape=(nodes, size))
+        gather = scipy.sparse.csr_array((np.ones(size), (anchor, np.arange(size))), shape=(nodes, size))
         by_anchor = by_anchor + gather @ scaled
         own_sum += scaled.sum(axis=0)
         own_y += scaled.T @ y[part]

@@ -20,9 +20,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.equations import NodeSums
@@ -126,7 +125,7 @@ class _Problem:
         largest = float(diagonal.max())
         self.usable = diagonal > nnls.SMALLEST_DIAGONAL * largest
         # cells the data never touch are not part of the problem: any curvature keeps them at zero
-        extra = sparse.diags_array(np.where(self.usable, _RIDGE, 1.0) * largest)
+        extra = scipy.sparse.diags_array(np.where(self.usable, _RIDGE, 1.0) * largest)
         self.extra = (extra + penalty(self.plane, diagonal, smoothing)).tocsr()
         self.mean = sums.row_sum / np.sqrt(sums.weight)
         self.rhs_nodes = sums.moment - sums.row_sum * (sums.output_sum / sums.weight)
@@ -167,15 +166,17 @@ class _System:
     def factorise(self, barrier: FloatArray) -> None:
         """Prepare solutions with diag(``barrier``) in the cells."""
         self.barrier = barrier
-        curvature = self.undo.T @ sparse.diags_array(barrier) @ self.undo
+        curvature = self.undo.T @ scipy.sparse.diags_array(barrier) @ self.undo
         self.matrix = (self.fixed + curvature).tocsr()
         matrix = self.matrix if self.near is self.fixed else (self.near + curvature).tocsr()
         options = {"SymmetricMode": True}
         if self.order is None:  # the pattern stays: order it once
-            factor = splu(matrix.tocsc(), "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+            factor = scipy.sparse.linalg.splu(
+                matrix.tocsc(), "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+            )
             self.order = np.argsort(factor.perm_c).astype(np.int64)
         permuted = matrix[self.order][:, self.order].tocsc()
-        self.factor = splu(permuted, "NATURAL", diag_pivot_thresh=0.0, options=options)
+        self.factor = scipy.sparse.linalg.splu(permuted, "NATURAL", diag_pivot_thresh=0.0, options=options)
 
     def _precondition(self, residual: FloatArray) -> FloatArray:
         assert self.order is not None
@@ -213,7 +214,7 @@ class _System:
         return self.undo @ x
 
 
-def difference(plane: Plane) -> sparse.csr_array:
+def difference(plane: Plane) -> scipy.sparse.csr_array:
     """The stencil D (n_q, n_q) that takes Everett nodes to masses: the inverse of the cumulative sums.
 
     m[i, j] = E[i + 1, j] - E[i, j] - E[i + 1, j + 1] + E[i, j + 1].
@@ -226,7 +227,7 @@ def difference(plane: Plane) -> sparse.csr_array:
         column.append((a * (a - 1) // 2 + b)[inside])
         value.append(np.full(int(inside.sum()), sign))
     entries = (np.concatenate(value), (np.concatenate(row), np.concatenate(column)))
-    return sparse.csr_array(entries, shape=(plane.n_q, plane.n_q))
+    return scipy.sparse.csr_array(entries, shape=(plane.n_q, plane.n_q))
 
 
 def centred_diagonal(sums: NodeSums) -> FloatArray:
@@ -250,12 +251,12 @@ def centred_diagonal(sums: NodeSums) -> FloatArray:
     return diagonal
 
 
-def _near_part(gram: sparse.csr_array, plane: Plane) -> sparse.csr_array:
+def _near_part(gram: scipy.sparse.csr_array, plane: Plane) -> scipy.sparse.csr_array:
     """Entries of S between nodes that touch; a share of the others goes to the diagonal."""
     i, j = plane.cell_indices
     pairs = gram.tocoo()
     row, column = pairs.row, pairs.col
     touching = (np.abs(i[row] - i[column]) <= 1) & (np.abs(j[row] - j[column]) <= 1)
     far = np.bincount(row[~touching], weights=np.abs(pairs.data[~touching]), minlength=plane.n_q)
-    near = sparse.csr_array((pairs.data[touching], (row[touching], column[touching])), shape=gram.shape)
-    return (near + sparse.diags_array(_LUMPED * far)).tocsr()
+    near = scipy.sparse.csr_array((pairs.data[touching], (row[touching], column[touching])), shape=gram.shape)
+    return (near + scipy.sparse.diags_array(_LUMPED * far)).tocsr()

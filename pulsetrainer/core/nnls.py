@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import linalg
 
 from pulsetrainer.core.plane import FloatArray, finite_vector
 from pulsetrainer.errors import ArgumentError, ConvergenceError
@@ -176,12 +176,12 @@ def _solve_free(gram: FloatArray, rhs: FloatArray, free: NDArray[np.bool_], scal
     while True:
         block[np.diag_indices_from(block)] += ridge
         try:
-            factor = linalg.cho_factor(block, lower=True, check_finite=False)
-        except linalg.LinAlgError:
+            factor = scipy.linalg.cho_factor(block, lower=True, check_finite=False)
+        except scipy.linalg.LinAlgError:
             block = gram[np.ix_(index, index)]
             ridge *= 10.0  # cells the data cannot tell apart: share their mass
             continue
-        x[index] = linalg.cho_solve(factor, rhs[index], check_finite=False)
+        x[index] = scipy.linalg.cho_solve(factor, rhs[index], check_finite=False)
         return x
 
 

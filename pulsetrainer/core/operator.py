@@ -15,8 +15,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike
-from scipy import sparse
 
 from pulsetrainer.core.memory import State, Trace, negative_saturation, trace, trace_after
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading, finite_vector, float_array
@@ -28,17 +28,19 @@ _CHUNK = 4096  # samples at a time: their arrays stay in the cache
 class Rows(NamedTuple):
     """Design rows in node space: row of sample t = own[t] + base[anchor[t]], the constant -W is left out."""
 
-    own: sparse.csr_array  # (n, n_q) the step from the anchor to the sample
-    base: sparse.csr_array  # (m, n_q) all steps up to each turning point
+    own: scipy.sparse.csr_array  # (n, n_q) the step from the anchor to the sample
+    base: scipy.sparse.csr_array  # (m, n_q) all steps up to each turning point
 
 
-def steps(plane: Plane, to: FloatArray, origin: FloatArray) -> sparse.csr_array:
+def steps(plane: Plane, to: FloatArray, origin: FloatArray) -> scipy.sparse.csr_array:
     """Rows (n, n_q) in node space of the signed output steps 2 G(to, origin)."""
     corner, weight = plane.corners(to, origin)
     number, sign = plane.signed_nodes
     weight *= 2.0 * sign[corner]
     pointer = np.arange(to.size + 1, dtype=np.int64) * 4
-    rows = sparse.csr_array((weight.T.ravel(), number[corner].T.ravel(), pointer), shape=(to.size, plane.n_q))
+    rows = scipy.sparse.csr_array(
+        (weight.T.ravel(), number[corner].T.ravel(), pointer), shape=(to.size, plane.n_q)
+    )
     rows.sum_duplicates()
     rows.eliminate_zeros()
     return rows
@@ -74,7 +76,7 @@ def rows(plane: Plane, path: Trace) -> Rows:
     return Rows(own, base_rows(plane, path))
 
 
-def base_rows(plane: Plane, path: Trace) -> sparse.csr_array:
+def base_rows(plane: Plane, path: Trace) -> scipy.sparse.csr_array:
     """Rows (m, n_q) of all turning points: each is its parent's row plus one step.
 
     The ancestors of all nodes are listed by doubling: log2(depth) sparse products.
@@ -83,7 +85,7 @@ def base_rows(plane: Plane, path: Trace) -> sparse.csr_array:
     count = path.parent.size
     jump, total = path.parent.copy(), step
     while np.any(jump != 0):
-        take = sparse.csr_array(
+        take = scipy.sparse.csr_array(
             (np.ones(count), jump, np.arange(count + 1, dtype=np.int64)), shape=(count, count)
         )
         total = total + take @ total  # row 0 is empty, so the root adds nothing

@@ -24,8 +24,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import sparse
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.equations import NodeSums, NormalEquations, Record, parted_sums
@@ -52,7 +52,7 @@ class Choice:
     tried: tuple[tuple[float, float], ...]  # (s, rms error on held-out blocks, output unit), s rising
 
 
-def bending(plane: Plane, usable: NDArray[np.bool_]) -> sparse.csr_array:
+def bending(plane: Plane, usable: NDArray[np.bool_]) -> scipy.sparse.csr_array:
     """Rows (k, n_q) whose products with the masses, squared and summed, are the bending B.
 
     Rows are second differences over three neighbouring cells of which all are ``usable`` (n_q,): where
@@ -87,7 +87,7 @@ def bending(plane: Plane, usable: NDArray[np.bool_]) -> sparse.csr_array:
             plane.n_q,
         ),
     ]
-    return sparse.vstack(pieces, format="csr")
+    return scipy.sparse.vstack(pieces, format="csr")
 
 
 def _second_differences(x: FloatArray) -> FloatArray:
@@ -103,17 +103,19 @@ def _rows(
     share: FloatArray,
     per_mass: FloatArray,
     n_q: int,
-) -> sparse.csr_array:
+) -> scipy.sparse.csr_array:
     """One row for each triple of cells that exist, of second differences of density times ``share``."""
     triple = np.stack(cells, axis=-1)
     exists = np.all(triple >= 0, axis=-1)
     chosen = triple[exists]
     coefficient = (second * share[..., None])[exists] * per_mass[chosen]
     pointer = 3 * np.arange(chosen.shape[0] + 1)
-    return sparse.csr_array((coefficient.ravel(), chosen.ravel(), pointer), shape=(chosen.shape[0], n_q))
+    return scipy.sparse.csr_array(
+        (coefficient.ravel(), chosen.ravel(), pointer), shape=(chosen.shape[0], n_q)
+    )
 
 
-def penalty(plane: Plane, diagonal: FloatArray, smoothing: float) -> sparse.csr_array:
+def penalty(plane: Plane, diagonal: FloatArray, smoothing: float) -> scipy.sparse.csr_array:
     """Return s^8 g B as a matrix (n_q, n_q) on the masses.
 
     Parameters

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike, NDArray
-from scipy import sparse
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.equations import NodeSums, Record, parted_sums
@@ -190,7 +190,7 @@ class _Stack:
         self.place, column = np.unique(place, return_inverse=True)
         row = np.repeat(np.arange(len(sums)), [p.nnz for p in pairs])
         entries = (np.concatenate([p.data for p in pairs]), (column, row))
-        self.gram = sparse.csr_array(entries, shape=(self.place.size, len(sums)))
+        self.gram = scipy.sparse.csr_array(entries, shape=(self.place.size, len(sums)))
         self.moment = np.stack([s.moment for s in sums])
         self.row_sum = np.stack([s.row_sum for s in sums])
         self.scalars = np.asarray([(s.weight, s.output_sum, s.output_square) for s in sums])
@@ -198,6 +198,8 @@ class _Stack:
     def weighted(self, drawn: FloatArray) -> NodeSums:
         """Sums over a resample in which block k comes ``drawn[k]`` times."""
         n_q = self.plane.n_q
-        gram = sparse.csr_array((self.gram @ drawn, (self.place // n_q, self.place % n_q)), shape=(n_q, n_q))
+        gram = scipy.sparse.csr_array(
+            (self.gram @ drawn, (self.place // n_q, self.place % n_q)), shape=(n_q, n_q)
+        )
         weight, output, square = (drawn @ self.scalars).tolist()
         return NodeSums(self.plane, gram, drawn @ self.moment, drawn @ self.row_sum, weight, output, square)

@@ -15,8 +15,8 @@ from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.signals import Signal
-from pulsetrainer.errors import DataError, DeviceError, UsageError
-from pulsetrainer.flows import recording
+from pulsetrainer.errors import DataError, DeviceError
+from pulsetrainer.flows import preflight, recording
 from pulsetrainer.flows.recording import Earlier, Tally, check_ended, conditioning_loop
 from pulsetrainer.link import DEFAULT_PORT, Limits, open_device, redact
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from pulsetrainer.link import Device
 
 MOST_SAMPLES = 50_000_000  # of a signal from a file: half a day at 1 kHz
-EXCITATIONS = ("identification", "diagnostic")
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +121,8 @@ def reference(options: Options) -> Signal:
     DataError
         The file cannot be used.
     """
-    if options.signal == "identification":
+    path = preflight.signal_file(options.signal)
+    if path is None and options.signal == "identification":
         return signals.identification(
             0.0,
             options.current_max_A,
@@ -130,14 +130,8 @@ def reference(options: Options) -> Signal:
             speed=options.speed_A_per_s,
             rate_Hz=options.rate_Hz,
         )
-    if options.signal == "diagnostic":
+    if path is None:
         return signals.diagnostic(0.0, options.current_max_A, rate_Hz=options.rate_Hz)
-    path = Path(options.signal)
-    if path.suffix.lower() != ".csv" and not path.exists():
-        raise UsageError(
-            f"there is no signal {options.signal!r}; known signals: {', '.join(EXCITATIONS)}, or a CSV file",
-            hint="pulsetrainer capture identification -o run.h5",
-        )
     return _from_file(path, options.rate_Hz)
 
 
@@ -284,7 +278,8 @@ def _take_over(recorder: RunRecorder, tally: Tally, earlier: Earlier) -> None:
 
 
 def _inputs(options: Options) -> dict[str, str]:
-    return provenance.digests([] if options.signal in EXCITATIONS else [options.signal])
+    path = preflight.signal_file(options.signal)
+    return provenance.digests([] if path is None else [path])
 
 
 def _same(options: Options) -> dict[str, object]:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from pulsetrainer.artefacts import output, store
 from pulsetrainer.artefacts.kinds import Evaluation
-from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.errors import DataError
+from pulsetrainer.flows import preflight
 from pulsetrainer.flows.evaluate import metrics_of
-from pulsetrainer.report import comparison_figure, render
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
@@ -78,20 +78,8 @@ def run(options: Options, context: Context) -> Result:
     DataError
         A file is no evaluation, or the evaluations have no figure in common.
     """
-    if len(options.files) < 2:
-        raise UsageError(
-            f"compare needs at least two evaluations, got {len(options.files)}",
-            hint="pulsetrainer compare before.h5 after.h5",
-        )
-    form = options.output.suffix.lower().lstrip(".") if options.output else ""
-    if options.output is not None:
-        if form not in (*render.FORMATS, "csv"):
-            raise UsageError(
-                f"a comparison is written as {', '.join(render.FORMATS)} or csv, "
-                f"but {options.output} ends in {form!r}",
-                hint=f"name it {options.output.parent / (options.output.stem or 'figure')}.png",
-            )
-        output.check_output(options.output, options.force)
+    form = preflight.comparison_form(options.files, options.output)
+    preflight.check_files(outputs=(options.output,), force=options.force)
     evaluations = [store.read(path, Evaluation) for path in options.files]
     headers = [store.read_header(path) for path in options.files]
     context.progress(0.4)
@@ -158,6 +146,8 @@ def _write(options: Options, form: str, sources: tuple[Source, ...], metrics: tu
         writer.writerows([m.name, *m.values, m.change] for m in metrics)
         content = text.getvalue().encode()
     else:
+        from pulsetrainer.report import comparison_figure, render  # draws: a table need not wait for it
+
         labels = labels_of(options.files)
         picture = comparison_figure.draw(labels, {m.name: m.values for m in metrics})
         content = render.encode(picture, form)

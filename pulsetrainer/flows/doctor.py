@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from scipy import signal
+import scipy  # its parts load when they are first used
 
 from pulsetrainer import __version__
 from pulsetrainer.core import signals
@@ -250,7 +250,7 @@ def _noise(recording: Recording, held: slice, range_A: float) -> Iterator[Findin
         ),
     ):
         still = values[held]
-        sigma = float(np.std(signal.detrend(still)))  # creep is a slope on so short a hold
+        sigma = float(np.std(scipy.signal.detrend(still)))  # creep is a slope on so short a hold
         share = sigma / full if full > 0 else 0.0
         words = f"{1e3 * sigma:.2g} m{unit} rms, {100 * share:.2g} % of {full:.3g} {unit}"
         if sigma == 0.0:

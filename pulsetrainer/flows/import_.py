@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pulsetrainer.artefacts import output, provenance, store, table, table_run
+from pulsetrainer.artefacts import provenance, store, table, table_run
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.equations import Record
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
-from pulsetrainer.errors import UsageError
+from pulsetrainer.flows import preflight
 from pulsetrainer.flows.show import facts
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range
 _LOOKED_AT = 1_000_000  # samples; of a longer record every so many are looked at
-_NAME = "{name}"  # in the output: one run for each file
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +100,11 @@ def run(options: Options, context: Context) -> Result:
         A file cannot be read, lacks a column, or holds what is not a number; a unit is none; time does not
         increase.
     """
-    groups = _groups(options)
-    for target in groups:
-        output.check_output(target, options.force)
-    read: list[tuple[Path, Sequence[Path], Run, Run]] = []
+    groups = preflight.import_groups(options.files, options.output)
+    resampled = options.resample is not None
+    preflight.check_timing(options.time_column, options.rate_Hz, no_time=options.no_time, resampled=resampled)
+    preflight.check_files(outputs=groups, force=options.force, others=options.files)
+    read: list[tuple[Path, tuple[Path, ...], Run, Run]] = []
     for k, (target, files) in enumerate(groups.items()):
         parts = [_read(path, options, context) for path in files]
         whole = parts[0] if len(parts) == 1 else table_run.joined(parts, context.note)
@@ -122,22 +122,6 @@ def run(options: Options, context: Context) -> Result:
         written.append(Imported(target, report, _facts(kept, report)))
     context.progress(1.0)
     return Result(written[0].output, written[0].facts, tuple(written))
-
-
-def _groups(options: Options) -> dict[Path, Sequence[Path]]:
-    """Return the files that go into each output."""
-    if _NAME not in str(options.output):
-        return {options.output: options.files}
-    groups: dict[Path, Sequence[Path]] = {}
-    for path in options.files:
-        target = Path(str(options.output).replace(_NAME, path.stem))
-        if target in groups:
-            raise UsageError(
-                f"{groups[target][0]} and {path} would both be written to {target}",
-                hint="import them one by one, under other names",
-            )
-        groups[target] = (path,)
-    return groups
 
 
 def _read(path: Path, options: Options, context: Context) -> Run:

@@ -15,8 +15,8 @@ from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.waveforms import Shape, train
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.flows import preflight
 from pulsetrainer.flows.modelling import extended_of, operator_of, predict
-from pulsetrainer.resources import waveforms_dir
 
 if TYPE_CHECKING:
     from pulsetrainer.core.operator import Preisach
@@ -66,11 +66,6 @@ class Result:
     output_unit: str
 
 
-def library() -> dict[str, Path]:
-    """Names and files of the pulse library."""
-    return {path.stem: path for path in sorted(waveforms_dir().glob("*.csv"))}
-
-
 def read_shape(waveform: str) -> tuple[Shape, Path]:
     """Return a pulse shape from the library or a file, and the file it came from.
 
@@ -81,13 +76,7 @@ def read_shape(waveform: str) -> tuple[Shape, Path]:
     DataError
         The file cannot be used.
     """
-    known = library()
-    path = known.get(waveform, Path(waveform))
-    if waveform not in known and path.suffix.lower() != ".csv" and not path.exists():
-        raise UsageError(
-            f"there is no waveform {waveform!r}; the library has {', '.join(known)}",
-            hint="name one of them, or a CSV file with the columns t_s and p",
-        )
+    path = preflight.waveform_file(waveform)
     columns = table.read_table(path)
     if len(columns.names) < 2:
         raise DataError(
@@ -111,8 +100,6 @@ def _one_beat(record: Shape, beat: str | None, context: Context) -> Shape:
     )
     if beat == "mean":
         return found.mean()
-    if not beat.isdecimal():
-        raise UsageError(f"--beat must be a number from 1, or mean, got {beat!r}", hint="give --beat mean")
     return found.single(int(beat))
 
 
@@ -127,6 +114,7 @@ def run(options: Options, context: Context) -> Result:
         The model or the waveform cannot be used, or the force range is beyond the model's reach.
     """
     output.check_output(options.output, options.force)
+    preflight.check_beat(options.beat)
     model = store.read(options.model, Model)
     shape, path = read_shape(options.waveform)
     shape = _one_beat(shape, options.beat, context)
@@ -195,11 +183,7 @@ def _force_range(options: Options, operator: Preisach, unit: str) -> tuple[float
             hint=f"choose --force-min and --force-max inside, such as "
             f"--force-min {np.ceil(reach[0] * 10) / 10:g} --force-max {np.floor(reach[1] * 10) / 10:g}",
         )
-    if not high > low:
-        raise UsageError(
-            f"the force range is empty: --force-min {low:g} is not below --force-max {high:g}",
-            hint="swap or change the two",
-        )
+    preflight.check_force_range(low, high)
     return low, high
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pulsetrainer.artefacts import output, store
-from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.report import figures, render
+from pulsetrainer.errors import DataError
+from pulsetrainer.flows import preflight
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
@@ -41,14 +41,11 @@ def run(options: Options, context: Context) -> Result:
     DataError
         The file cannot be read, is not an artefact, or holds values that no axis can show.
     """
-    form = options.output.suffix.lower().lstrip(".")
-    if form not in render.FORMATS:
-        raise UsageError(
-            f"a figure is written as {', '.join(render.FORMATS)}, but {options.output} ends in {form!r}",
-            hint=f"name it {options.output.parent / (options.output.stem or 'figure')}.png",
-        )
+    form = preflight.figure_form(options.output, "a figure")
     output.check_output(options.output, options.force)
     artefact = store.read_any(options.file)
+    from pulsetrainer.report import figures, render  # draws: half a second that an error need not wait for
+
     context.progress(0.3)
     try:
         picture = render.encode(figures.draw(artefact), form)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pulsetrainer.artefacts import store
-from pulsetrainer.artefacts.kinds import Diagnosis, Evaluation, Model, Playback, Run, Waveform
+from pulsetrainer.artefacts.kinds import Diagnosis, Evaluation, Model, Parameter, Playback, Run, Waveform
 from pulsetrainer.artefacts.provenance import Header
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray
@@ -132,14 +132,16 @@ def _waveform(waveform: Waveform) -> dict[str, Any]:
     }
 
 
+def _parameter(one: Parameter) -> str:
+    return f"{one.name} {one.value:.4g} {shown(one.unit)}".rstrip()
+
+
 def _diagnosis(found: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": found.verdict,
         "quick": found.quick,
         "found": [
-            f"{one.cause} ({', '.join(f'{p.name} {p.value:.4g} {p.unit}' for p in one.parameters)})"
-            for one in found.causes
-            if one.found
+            f"{one.cause} ({', '.join(map(_parameter, one.parameters))})" for one in found.causes if one.found
         ],
         "rms_percent": found.rms_percent,
         "noise_percent": found.noise_percent,

@@ -10,12 +10,12 @@ from xml.etree import ElementTree as ET
 from matplotlib import rc_context
 
 from pulsetrainer.errors import UsageError
+from pulsetrainer.report.forms import FORMATS
 from pulsetrainer.report.style import SETTINGS, THEME
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS: Final = ("png", "svg", "pdf")
 _DPI: Final = 200
 # keys that each format would otherwise fill with the time of writing
 _UNDATED: Final[dict[str, dict[str, str | None]]] = {

@@ -53,7 +53,7 @@ def folder(tmp_path_factory) -> Path:
     done = subprocess.run(
         [sys.executable, "-c", ONE_PROCESS, *STEPS],
         cwd=here,
-        env={**os.environ, "PULSETRAINER_PORT": "bench:?seed=1"},
+        env={**os.environ, "PULSETRAINER_PORT": "bench:?seed=1", "OMP_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
         check=False,

@@ -147,6 +147,8 @@ def test_a_wheel_carries_firmware_and_waveforms(tmp_path):
     site = tmp_path / "site"
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(site)
+    (page,) = site.glob("*.data/data/share/man/man1/pulsetrainer.1")
+    assert page.read_text() == (ROOT / "docs" / "pulsetrainer.1").read_text()
     env = {"PYTHONPATH": str(site)}
     where = [sys.executable, "-c", "import pulsetrainer; print(pulsetrainer.__file__)"]
     found = subprocess.run(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
 import re
@@ -99,3 +100,79 @@ def test_a_pipe_gets_text_alone(recorded):
         check=True,
     )
     assert b"\x1b" not in done.stdout + done.stderr
+
+
+ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
+
+
+@pytest.mark.parametrize("columns", [40, 60, 80, 200])
+def test_no_figure_is_cut_on_a_narrow_terminal(tmp_path, columns):
+    """Where a table does not fit there is a list of the same figures; no line is too long."""
+    store.write(tmp_path / "evaluation.h5", report_examples.evaluation(), header())
+    words = ("show", "evaluation.h5")
+    said = ESCAPE.sub("", on_terminal(tmp_path, *words, COLUMNS=str(columns)).decode())
+    piped = subprocess.run(
+        [*PROGRAM, *words], cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True, check=True
+    ).stdout
+    table = re.compile(r"(?<![\w.-])-?\d+\.\d\d(?![\w.-])")
+    figures, _, _ = said.partition("history")
+    expected, _, _ = piped.partition("history")
+    assert sorted(table.findall(figures)) == sorted(table.findall(expected))
+    assert len(table.findall(expected)) > 5
+    assert "…" not in said
+    lines = figures.replace("\r", "").splitlines()
+    assert max(len(line) for line in lines if "reading" not in line) <= columns
+
+
+def test_long_words_are_folded_between_words_and_commands_are_not(tmp_path):
+    """A message reads well on a narrow terminal; what is to be copied stays in one piece."""
+    main, terminal = pty.openpty()
+    words = [*PROGRAM, "capture", "nothing", "-o", "run.h5"]
+    environment = {**os.environ, "COLUMNS": "40"}
+    program = subprocess.Popen(
+        words, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=terminal
+    )
+    os.close(terminal)
+    assert program.wait() == 2
+    said = os.read(main, 4096).decode().replace("\r", "").splitlines()
+    os.close(main)
+    assert len(said) > 2
+    assert all(len(line) <= 40 for line in said[:-1])
+    assert " ".join(" ".join(said[:-1]).split()).endswith(
+        "known signals: identification, diagnostic, or a CSV file"
+    )
+    assert said[-1] == "  try: pulsetrainer capture identification -o run.h5"
+
+
+def test_a_pipe_gets_whole_lines_without_blanks_at_their_ends(tmp_path):
+    """One row of a table a line, however long: a pipe has no width."""
+    store.write(tmp_path / "evaluation.h5", report_examples.evaluation(), header())
+    done = subprocess.run(
+        [*PROGRAM, "compare", *["evaluation.h5"] * 12],
+        cwd=tmp_path,
+        env={**os.environ, "COLUMNS": "40"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    lines = done.stdout.splitlines()
+    assert all(line == line.rstrip() for line in lines)
+    assert any(line.count("evaluation.h5") == 12 for line in lines)
+    assert "…" not in done.stdout
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_name_that_the_terminal_cannot_spell_is_no_error(tmp_path, encoding):
+    """Escapes for a person; the JSON is the same everywhere."""
+    name = "größe-脈.h5"
+    store.write(tmp_path / name, report_examples.run(), header())
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    for more in ([], ["--json"]):
+        done = subprocess.run(
+            [*PROGRAM, "show", name, *more], cwd=tmp_path, env=environment, capture_output=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        if more:
+            assert json.loads(done.stdout.decode("utf-8"))["file"] == name
+        else:
+            assert done.stdout.startswith(name.encode(encoding, "backslashreplace"))

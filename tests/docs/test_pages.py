@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import shutil
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -60,6 +61,22 @@ def test_every_page_can_be_found():
 def test_reference_is_what_the_code_says(name):
     """A command, option, dataset or unit that changed shows here; `make docs` writes the page."""
     assert (ROOT / "docs" / name).read_text() == script("make").PAGES[name]()
+
+
+@pytest.mark.skipif(shutil.which("groff") is None, reason="groff is not here; man would format the page")
+def test_manual_page_is_formatted_without_a_warning():
+    """What `man pulsetrainer` shows: every command with its example, every exit code."""
+    page = ROOT / "docs" / "pulsetrainer.1"
+    words_ = ["groff", "-man", "-ww", "-Tascii", "-P-cbou", "-rLL=200n", str(page)]
+    done = subprocess.run(words_, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    said = " ".join(done.stdout.split())
+    for name, command in typer.main.get_command(app).commands.items():
+        example = command.help.rpartition("Example: ")[2]
+        assert f"pulsetrainer {name}" in example
+        assert " ".join(example.split()) in said
+    for code in (0, 1, 2, 3, 4, 5, 70, 130):
+        assert re.search(rf"^ +{code} +\w", done.stdout, re.MULTILINE), code
 
 
 def test_commands_on_all_pages_exist():

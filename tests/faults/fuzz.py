@@ -12,8 +12,8 @@ import numpy as np
 import ready
 import typer
 from kinds_of_fault import Tally, World, documented, readers
-from ready import WRITERS, Writer
 
+from command_lines import READS_ONLY, WRITERS, Writer
 from pulsetrainer.cli import app
 
 _NUMBERS = (
@@ -29,21 +29,31 @@ _TEXTS = (
     "no/such/folder/out.h5", "run.h5/out.h5",
 )  # fmt: skip
 _SLOW_S = 10.0
-_SKIP = {"doctor"}  # looks at this computer, for some seconds each time
-_MAIN_OPTIONS = ("--debug", "--verbose", "--version", "--help", "--json", "--force", "--nonsense", "-x")
+_MAIN_OPTIONS = (
+    "--debug",
+    "--verbose",
+    "--version",
+    "--help",
+    "--json",
+    "--force",
+    "--nonsense",
+    "-x",
+    "--settings",
+)
 
 
 def arguments(world: World, tries: int) -> Tally:
     """Run random command lines: real commands and options, values of all kinds, words missing or twice."""
     tally = Tally("fuzzed arguments")
-    commands = typer.main.get_command(app.app).commands
-    names = world.rng.sample([name for name in commands if name not in _SKIP], len(commands) - len(_SKIP))
+    commands = typer.main.get_command(app.app).commands  # every one there is: none can be forgotten
+    names = world.rng.sample(list(commands), len(commands))
+    tally.commands = sorted(names)
     everything = Writer(
         "all", (), (), tuple(f.name for f in world.ready.iterdir() if f.suffix in {".h5", ".csv"})
     )
-    for number in range(tries):
+    for number in range(max(tries, len(names))):
         name = names[number % len(names)]
-        good = next((w for w in WRITERS if w.words[0] == name), None)
+        good = next((w for w in (*WRITERS, *READS_ONLY) if w.words[0] == name), None)
         words = _line(world.rng, name, commands[name].params, good)
         with world.folder(everything) as folder:
             done = children.run(folder, words, world.log)
@@ -74,7 +84,7 @@ def _line(rng: random.Random, name: str, parameters: list[Any], good: Writer | N
     if good is not None and rng.random() < 0.8:
         words = list(good.line(force=rng.random() < 0.5))
         valued = [p for p in parameters if p.opts[0].startswith("-") and not getattr(p, "is_flag", False)]
-        if rng.random() < 0.7:  # all is well but for one value
+        if valued and rng.random() < 0.7:  # all is well but for one value
             return (*words, rng.choice(rng.choice(valued).opts), rng.choice(_NUMBERS).replace("\0", ""))
     for parameter in parameters:
         options = [o for o in (*parameter.opts, *parameter.secondary_opts) if o.startswith("-")]

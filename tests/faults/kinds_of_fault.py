@@ -17,8 +17,8 @@ from pathlib import Path
 import children
 import ready
 from children import DOCUMENTED, Child, Ended
-from ready import READS_ONLY, WRITERS, Writer
 
+from command_lines import READS_ONLY, WRITERS, Writer
 from pulsetrainer.artefacts.seal import SEAL_LENGTH
 
 _SETTLE_S = 0.004  # the moments around a new file's appearance
@@ -38,6 +38,7 @@ class Tally:
     seconds: float = 0.0
     complaints: list[str] = field(default_factory=list)
     slow: list[str] = field(default_factory=list)  # what took long, though it ended
+    commands: list[str] = field(default_factory=list)  # what it was tried on, where that is all of them
 
     def blame(self, what: str, done: Ended | None = None) -> None:
         """Keep the first reasons for a count above zero."""

@@ -1,71 +1,17 @@
-"""One artefact of every kind, and the commands that write: what the faults are tried on."""
+"""One artefact of every kind: what the faults are tried on."""
 
 from __future__ import annotations
 
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 
 import children
 import store_examples as examples
 
+from command_lines import EXCITATION, WRITERS
 from pulsetrainer.artefacts import store
 from pulsetrainer.artefacts.kinds import Model
 from pulsetrainer.errors import DataError
-
-
-@dataclass(frozen=True)
-class Writer:
-    """A command that writes: its words without outputs, its options for them, and what it reads."""
-
-    name: str
-    words: tuple[str, ...]
-    outputs: tuple[tuple[str, str], ...]  # option, file name
-    reads: tuple[str, ...]
-
-    def line(self, *, force: bool, folder: str = "") -> tuple[str, ...]:
-        """Return the whole command line, its outputs in ``folder``."""
-        options = [word for option, name in self.outputs for word in (option, f"{folder}{name}")]
-        return (*self.words, *options, *(["--force"] if force else []))
-
-
-def _h5(name: str = "out.h5") -> tuple[tuple[str, str], ...]:
-    return (("-o", name),)
-
-
-_EXCITATION = ("capture", "identification", "--levels", "12", "--speed", "12")
-WRITERS = (
-    Writer("capture", _EXCITATION, _h5(), ()),
-    Writer("capture (long)", (*_EXCITATION, "--repeats", "40"), _h5(), ()),
-    Writer(
-        "import", ("import", "run.csv", "--input", "current_A", "--output", "force_N"), _h5(), ("run.csv",)
-    ),
-    Writer("identify", ("identify", "run.h5", "--levels", "12"), _h5(), ("run.h5",)),
-    Writer("invert", ("invert", "normal", "--model", "model.h5", "--periods", "1"), _h5(), ("model.h5",)),
-    Writer("play", ("play", "drive.h5", "--repeats", "1"), _h5(), ("drive.h5",)),
-    Writer("evaluate", ("evaluate", "played.h5"), _h5(), ("played.h5",)),
-    Writer("evaluate --html", ("evaluate", "played.h5"), (*_h5(), ("--html", "out.html")), ("played.h5",)),
-    Writer("evaluate --model", ("evaluate", "run.h5", "--model", "model.h5"), _h5(), ("run.h5", "model.h5")),
-    Writer(
-        "diagnose --quick",
-        ("diagnose", "run.h5", "--model", "model.h5", "--quick"),
-        (*_h5(), ("--html", "out.html")),
-        ("run.h5", "model.h5"),
-    ),
-    Writer("extend", ("extend", "diagnosis.h5", "--model", "model.h5"), _h5(), ("diagnosis.h5", "model.h5")),
-    Writer("plot", ("plot", "model.h5"), _h5("out.png"), ("model.h5",)),
-    Writer(
-        "compare",
-        ("compare", "evaluation.h5", "evaluation.h5"),
-        _h5("out.csv"),
-        ("evaluation.h5",),
-    ),
-)
-READS_ONLY = (
-    Writer("show", ("show", "run.h5"), (), ("run.h5",)),
-    Writer("show (any kind)", ("show", "played.h5"), (), ("played.h5",)),
-    Writer("show (diagnosis)", ("show", "diagnosis.h5"), (), ("diagnosis.h5",)),
-)
 
 
 def prepare(folder: Path) -> dict[str, float]:
@@ -73,7 +19,7 @@ def prepare(folder: Path) -> dict[str, float]:
     folder.mkdir(parents=True, exist_ok=True)
     log = folder / "log"
     steps: tuple[tuple[str, ...], ...] = (
-        (*_EXCITATION, "-o", "run.h5"),
+        (*EXCITATION, "-o", "run.h5"),
         ("identify", "run.h5", "--levels", "12", "-o", "model.h5"),
         ("invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--periods", "1"),
         ("play", "drive.h5", "-o", "played.h5", "--repeats", "1"),

@@ -32,6 +32,8 @@ import kinds_of_fault as faults  # noqa: E402
 import ready  # noqa: E402
 from kinds_of_fault import Tally, World  # noqa: E402
 
+from command_lines import WRITERS  # noqa: E402
+
 
 def main() -> int:
     """Try all faults, print the table, return 1 where a count is not zero."""
@@ -68,9 +70,9 @@ def _options() -> argparse.Namespace:
 
 def _rows(world: World, options: argparse.Namespace) -> Iterator[Tally]:
     """Yield one row after the other, and say on stderr where we are."""
-    each = max(1, options.tries // (2 * len(ready.WRITERS)))
-    share = max(len(ready.WRITERS), options.tries // 5)
-    kills = [(writer, older) for writer in ready.WRITERS for older in (False, True)]
+    each = max(1, options.tries // (2 * len(WRITERS)))
+    share = max(len(WRITERS), options.tries // 5)
+    kills = [(writer, older) for writer in WRITERS for older in (False, True)]
     if options.sample:
         each, share, kills = 1, 3, world.rng.sample(kills, 10)
     jobs = [

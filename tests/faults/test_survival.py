@@ -8,6 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
+
+from pulsetrainer.cli.app import app
 
 _RUN = Path(__file__).with_name("run.py")
 
@@ -30,3 +33,11 @@ def test_nothing_is_lost_and_every_failure_is_told(table, fault):
     assert sum(row["tries"] for row in rows) >= 3
     for count in ("lost", "half_written", "hangs", "wrong_exits"):
         assert sum(row[count] for row in rows) == 0, [row["complaints"] for row in rows]
+
+
+@pytest.mark.xdist_group("faults")
+def test_the_arguments_of_every_command_are_fuzzed(table):
+    """Taken from the program's own list: a new command is among them without being named here."""
+    (row,) = (row for row in table if row["fault"] == "fuzzed arguments")
+    assert row["commands"] == sorted(typer.main.get_command(app).commands)
+    assert row["tries"] >= len(row["commands"])

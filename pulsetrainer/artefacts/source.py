@@ -1,0 +1,72 @@
+"""What can be said about an input before it is read: absent, a folder, empty, not HDF5.
+
+Nothing heavy is loaded here, so that a mistyped name is answered at once.
+"""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+from pulsetrainer.errors import DataError
+
+RESTORE = "restore it from a copy, or make it again: pulsetrainer --help lists the commands"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_TABLES = (".csv", ".tsv", ".txt", ".dat")
+
+
+def check_file(path: Path | str) -> None:
+    """Refuse an input that is no file that can be read, with the names that come nearest.
+
+    Raises
+    ------
+    DataError
+        It is absent, a folder, not an ordinary file, or not permitted.
+    """
+    _first_bytes(Path(path))
+
+
+def check_artefact(path: Path | str) -> None:
+    """Refuse an input that cannot be an artefact, by its first bytes.
+
+    Raises
+    ------
+    DataError
+        As ``check_file``; or it is empty or no HDF5 file.
+    """
+    path = Path(path)
+    start = _first_bytes(path)
+    if not start:
+        raise DataError(f"{path} is empty", hint=RESTORE)
+    if start != _HDF5:
+        table = path.suffix.lower() in _TABLES
+        hint = f"read the table in first: pulsetrainer import {path} -o run.h5" if table else RESTORE
+        raise DataError(f"{path} is not an HDF5 file", hint=hint)
+
+
+def _first_bytes(path: Path) -> bytes:
+    """Return as many bytes as tell an HDF5 file."""
+    try:
+        if path.is_dir():
+            raise DataError(f"{path} is a folder, expected a file", hint=_names_in(path, path))
+        if not path.exists():
+            raise DataError(f"{path} does not exist", hint=_names_in(path.parent, path))
+        if not path.is_file():
+            raise DataError(f"{path} is not an ordinary file", hint="name a file on disk")
+        with path.open("rb") as stream:
+            return stream.read(len(_HDF5))
+    except OSError as error:
+        raise DataError(
+            f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
+        ) from error
+
+
+def _names_in(folder: Path, path: Path) -> str:
+    """Return a hint with the names in a folder that come nearest."""
+    if not folder.is_dir():
+        return f"the folder {folder} does not exist either"
+    names = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
+    near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
+    near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
+    near = near or [name for name in names if name.endswith(path.suffix or ".h5")][:5]
+    return f"in that folder there is: {', '.join(near)}" if near else f"nothing like it is in {folder}"

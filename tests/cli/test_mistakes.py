@@ -1,0 +1,79 @@
+"""A mistake in a name is told before anything heavy is loaded, whatever the command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import typer
+from program import pulsetrainer
+
+from command_lines import READS_ONLY, WRITERS
+from mistakes import INSIDE, PREPARATION, at_once, lay_out
+from pulsetrainer.cli.app import app
+
+HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich")
+# each in a child of one interpreter that has loaded the parser and nothing else
+JOB = """
+import json, os, sys
+from pulsetrainer.cli import app, guard
+ended = {}
+for name, (words, _) in json.load(sys.stdin).items():
+    reading, writing = os.pipe()
+    if os.fork() == 0:
+        os.dup2(writing, 2)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        code = guard.funnel(app.app, words)
+        sys.stderr.write(json.dumps([name for name in HEAVY if name in sys.modules]))
+        sys.stderr.flush()
+        os._exit(code)
+    os.close(writing)
+    with open(reading) as pipe:
+        said = pipe.read()
+    ended[name] = [os.waitstatus_to_exitcode(os.wait()[1]), said]
+print(json.dumps(ended))
+"""
+
+
+def test_a_mistake_in_a_name_loads_nothing_heavy(tmp_path):
+    """Speed is not timed here: what would make the answer slow is not there."""
+    lay_out(tmp_path)
+    before = sorted(path.name for path in tmp_path.iterdir())
+    cases = at_once()
+    job = f"HEAVY = {HEAVY!r}\n{JOB}"
+    done = subprocess.run(
+        [sys.executable, "-c", job],
+        input=json.dumps(cases),
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=True,
+    )
+    wrong = {}
+    for name, (code, said) in json.loads(done.stdout).items():
+        told = said.startswith("error: ") and "\n  try: " in said and "Traceback" not in said
+        if code != cases[name].code or not told or not said.endswith("\n[]"):
+            wrong[name] = (code, said)
+    assert not wrong
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+def test_every_command_that_takes_a_file_is_among_them():
+    """A new command cannot be forgotten: its file arguments and its outputs need a line of their own."""
+    commands = typer.main.get_command(app).commands
+    tried = {one.words[0] for one in (*WRITERS, *READS_ONLY)}
+    assert tried | {"ports", "doctor"} == set(commands), "the two take no file"
+
+
+def test_a_mistake_that_a_look_inside_tells_is_a_usage_error(tmp_path):
+    """The artefacts are opened, or the device is asked: exit 2 in words, nothing written."""
+    for words in PREPARATION:
+        assert pulsetrainer(tmp_path, *words).code == 0
+    before = sorted(path.name for path in tmp_path.iterdir())
+    for name, (words, code) in INSIDE.items():
+        done = pulsetrainer(tmp_path, *words)
+        assert done.code == code, (name, done)
+        assert "error: " in done.err, (name, done)
+        assert "\n  try: " in done.err, (name, done)
+    assert sorted(path.name for path in tmp_path.iterdir()) == before

@@ -1,0 +1,103 @@
+"""Command lines with a mistake that can be told before a flow is loaded, and those that need a look inside.
+
+Used by the test that nothing heavy is loaded for the first, and by the benchmark that times both.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from command_lines import EXCITATION, READS_ONLY, WRITERS, Writer
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"  # enough to pass for an artefact until it is opened
+THERE = {"x.h5", "x.html", "x.png", "x.csv"}  # outputs that exist
+
+
+class Mistake(NamedTuple):
+    """A command line and the exit code that it must end with."""
+
+    words: tuple[str, ...]
+    code: int
+
+
+def lay_out(folder: Path) -> None:
+    """Put down what the mistakes need: inputs that are there, outputs that exist."""
+    names = {name for one in (*WRITERS, *READS_ONLY) for name in one.reads} | THERE
+    for name in names:
+        (folder / name).write_bytes(SIGNATURE)
+    (folder / "other").mkdir()
+    (folder / "other" / "run.csv").write_text("t_s,current_A,force_N\n0,0,0\n")
+    (folder / "wrong.toml").write_text("levles = 48\n")
+
+
+def at_once() -> dict[str, Mistake]:
+    """Mistakes in names: every command with each of its inputs absent and each of its outputs in the way."""
+    found = {}
+    for one in (*WRITERS, *READS_ONLY):
+        for name in one.reads:
+            absent = tuple(f"absent{Path(word).suffix}" if word == name else word for word in _line(one))
+            found[f"{one.name}: {name} is absent"] = Mistake(absent, 3)
+        for option, name in one.outputs:
+            there = _line(one, {option: f"x{Path(name).suffix}"})
+            found[f"{one.name}: {option} exists"] = Mistake(there, 2)
+            nowhere = _line(one, {option: f"no/{name}"})
+            found[f"{one.name}: {option} has no folder"] = Mistake(nowhere, 2)
+    table = ("import", "run.csv", "--input", "u", "--output", "y", "-o", "out.h5")
+    words = {
+        "no such command": ("captur",),
+        "no such option": ("capture", "identification", "--speeed", "1"),
+        "an option is missing": ("capture", "identification"),
+        "a number is none": ("capture", "identification", "-o", "out.h5", "--levels", "many"),
+        "no such signal": ("capture", "nothing", "-o", "out.h5"),
+        "no such waveform": ("invert", "nothing", "--model", "model.h5", "-o", "out.h5"),
+        "no such beat": ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--beat", "first"),
+        "an empty force range": (
+            *("invert", "normal", "--model", "model.h5", "-o", "out.h5"),
+            *("--force-min", "5", "--force-max", "2"),
+        ),
+        "no such smoothing": ("identify", "run.h5", "-o", "out.h5", "--smoothing", "much"),
+        "a figure of no format": ("plot", "run.h5", "-o", "out.txt"),
+        "a comparison of one": ("compare", "evaluation.h5"),
+        "a comparison of no format": ("compare", "evaluation.h5", "evaluation.h5", "-o", "out.txt"),
+        "a time column and a rate": (*table, "--time", "t", "--rate", "5"),
+        "no time and a rate": (*table, "--no-time", "--rate", "5"),
+        "a rate of zero": (*table, "--rate", "0"),
+        "even steps of no time": (*table, "--no-time", "--resample", "even"),
+        "no such resampling": (*table, "--resample", "often"),
+        "two files into one": (*table[:2], "other/run.csv", *table[2:-1], "{name}.h5"),
+        "no such file of settings": ("--settings", "absent.toml", "ports"),
+        "no such setting": ("--settings", "wrong.toml", "ports"),
+    }
+    found |= {name: Mistake(line, 2) for name, line in words.items()}
+    found["no such file of bounds"] = Mistake(("evaluate", "played.h5", "--bounds", "absent.toml"), 3)
+    found["no such CSV signal"] = Mistake(("capture", "absent.csv", "-o", "out.h5"), 3)
+    return found
+
+
+def _line(one: Writer, outputs: dict[str, str] | None = None) -> tuple[str, ...]:
+    """Return a command line, some of its outputs elsewhere."""
+    names = dict(one.outputs) | (outputs or {})
+    return (*one.words, *(word for pair in names.items() for word in pair))
+
+
+# for the rest the artefacts must be what their names say
+PREPARATION = (
+    (*EXCITATION, "-o", "run.h5"),
+    ("identify", "run.h5", "--levels", "12", "-o", "model.h5"),
+    ("invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--periods", "1"),
+    ("play", "drive.h5", "-o", "played.h5", "--repeats", "1"),
+)
+INSIDE = {
+    "a run without a model": Mistake(("evaluate", "run.h5"), 2),
+    "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),
+    "no extended inverse": Mistake(
+        ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"), 2
+    ),
+    "no such bench parameter": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--port", "bench:?crep=1"), 2
+    ),
+    "no such wire": Mistake(("capture", "identification", "-o", "out.h5", "--port", "bench:?wire=9"), 2),
+    "no such emulator": Mistake(("play", "drive.h5", "-o", "out.h5", "--port", "qemu:?seed=1"), 2),
+    "nothing to resume": Mistake(("capture", "identification", "-o", "out.h5", "--resume"), 2),
+}
