@@ -1,18 +1,15 @@
-"""How a text file is a table: its delimiter, decimal sign, header and comments; and its numbers.
+"""How a text file is a table: its delimiter, decimal sign, header and comments.
 
 Every rule is explicit: the delimiter is the one that makes most cells numbers; a comma is a decimal sign
 only where something else separates; the first line is a header if it has text where the next one has a
-number; a column that starts with text is a column of text. Numpy parses all rows at once; only if that fails
-are the cells looked at one by one, to fill what is missing or to name the one that is to blame.
+number; a column that starts with text is a column of text. The rows themselves are read by ``table_rows``.
 """
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from itertools import islice
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,16 +19,12 @@ from pulsetrainer.errors import DataError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pulsetrainer.artefacts.kinds import FloatArray
-
 _DELIMITERS = ("\t", ";", ",", None)  # None: blanks
 _SAMPLE_LINES = 60
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
-_MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
+MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
-
-Lines = Iterator[tuple[int, str]]  # line number, line
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +48,6 @@ class Dialect:
         return cells
 
 
-@dataclass(slots=True)
-class Rows:
-    """Where in the file the rows are: comments and blank lines shift them."""
-
-    shifts: list[tuple[int, int]] = field(default_factory=list)  # (row, line) wherever the distance changes
-
-
 def split(line: str, delimiter: str | None) -> list[str]:
     """Return the cells of a line, stripped."""
     if delimiter is None:
@@ -79,7 +65,7 @@ def number(cell: str, *, decimal_comma: bool) -> float | None:
     except ValueError:
         if decimal_comma and _COMMA_DECIMAL.fullmatch(cell):
             return float(cell.replace(",", "."))
-        return np.nan if cell.lower() in _MISSING else None
+        return np.nan if cell.lower() in MISSING else None
 
 
 def detect(path: Path) -> Dialect:
@@ -103,9 +89,9 @@ def detect(path: Path) -> Dialect:
                 declared = found[1]
             elif text.startswith("#"):
                 if len(lines) <= 2:
-                    comments.append((count, _readable(text.lstrip("# "))))
+                    comments.append((count, readable(text.lstrip("# "))))
             elif text:
-                lines.append((count, _readable(line.strip("\r\n"))))
+                lines.append((count, readable(line.strip("\r\n"))))
             if len(lines) == _SAMPLE_LINES:
                 break
     if not lines:
@@ -128,7 +114,7 @@ def _encoding(path: Path) -> str:
     return "utf-8-sig"
 
 
-def _readable(line: str) -> str:
+def readable(line: str) -> str:
     """Return a line in which bytes that are not UTF-8 are read as Western Windows letters."""
     if line.isascii():
         return line
@@ -226,110 +212,3 @@ def _commented_names(comments: tuple[str, ...], delimiter: str | None, count: in
         if len(cells) == count and all(number(cell, decimal_comma=True) is None for cell in cells):
             return cells
     return [f"column{k + 1}" for k in range(count)]
-
-
-def parse(path: Path, dialect: Dialect) -> tuple[FloatArray, Rows]:
-    """Return the numbers (rows, columns) and where they are in the file; a column of text is NaN.
-
-    Raises
-    ------
-    DataError
-        A row is too short or too long, or a cell in a column of numbers is text: both are named.
-    OSError
-        The file cannot be read.
-    """
-    if not dialect.text_columns:
-        try:
-            return _load(path, dialect, careful=False)
-        except ValueError:
-            pass  # something is missing or wrong: look closer
-    return _load(path, _surveyed(path, dialect), careful=True)
-
-
-def _load(path: Path, dialect: Dialect, *, careful: bool) -> tuple[FloatArray, Rows]:
-    rows = Rows()
-    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
-        lines = _numbered(stream, dialect, rows)
-        texts = _cell_by_cell(lines, dialect) if careful else _as_they_are(lines, dialect)
-        values: FloatArray = np.loadtxt(
-            texts, delimiter="," if careful else dialect.delimiter, comments=None, quotechar='"', ndmin=2
-        )
-    return values, rows
-
-
-def _numbered(stream: Iterator[str], dialect: Dialect, rows: Rows) -> Lines:
-    """Yield the rows with their line numbers, and note where these jump."""
-    row, distance = 0, -1
-    for count, line in enumerate(islice(stream, dialect.first_line - 1, None), dialect.first_line):
-        if line.isspace() or line.lstrip().startswith("#"):
-            continue
-        if count - row != distance:
-            distance = count - row
-            rows.shifts.append((row, count))
-        row += 1
-        yield count, line
-
-
-def _as_they_are(lines: Lines, dialect: Dialect) -> Iterator[str]:
-    """Yield lines as numpy takes them; ValueError where the decimal sign changes."""
-    for _, line in lines:
-        if not dialect.decimal_comma:
-            yield line
-        elif "." in line:
-            raise ValueError(line)
-        else:
-            yield line.replace(",", ".")
-
-
-def _cell_by_cell(lines: Lines, dialect: Dialect) -> Iterator[str]:
-    """Yield lines with NaN for what is missing and for text in a column of text."""
-    for _, line in lines:
-        cells = dialect.split(line.strip("\r\n"))
-        for k, cell in enumerate(cells):
-            if k in dialect.text_columns or cell.lower() in _MISSING:
-                cells[k] = "nan"
-            elif dialect.decimal_comma:
-                cells[k] = cell.replace(",", ".")
-        yield ",".join(cells)
-
-
-def _surveyed(path: Path, dialect: Dialect) -> Dialect:
-    """Look at every cell; return the dialect with the decimal sign that the whole file uses.
-
-    Raises
-    ------
-    DataError
-        See ``parse``.
-    """
-    point = comma = ""
-    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
-        for count, line in _numbered(stream, dialect, Rows()):
-            cells = dialect.split(line.strip("\r\n"))
-            if len(cells) != len(dialect.names):
-                raise DataError(
-                    f"{path} has {len(cells)} columns in line {count}, expected {len(dialect.names)}: "
-                    f"{', '.join(dialect.names)}",
-                    hint="mend or remove that line, or export the record again",
-                )
-            for k, cell in enumerate(cells):
-                if k in dialect.text_columns:
-                    continue
-                if number(cell, decimal_comma=dialect.delimiter != ",") is None:
-                    raise DataError(
-                        f"{path} has {_place(cell, k, count, dialect)}: not a number",
-                        hint="mend or remove that line",
-                    )
-                if not point and "." in cell:
-                    point = _place(cell, k, count, dialect)
-                if not comma and "," in cell:
-                    comma = _place(cell, k, count, dialect)
-            if point and comma:
-                raise DataError(
-                    f"{path} mixes decimal signs: {point}, but {comma}",
-                    hint="export it with one decimal sign",
-                )
-    return replace(dialect, decimal_comma=bool(comma))
-
-
-def _place(cell: str, column: int, line: int, dialect: Dialect) -> str:
-    return f"{_readable(cell)!r} in column {dialect.names[column]}, line {line}"

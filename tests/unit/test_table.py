@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pulsetrainer.artefacts.table import read_table, write_table
-from pulsetrainer.artefacts.table_run import run_from_table
+from pulsetrainer.artefacts.table_run import read_run
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -27,6 +27,11 @@ def table(tmp_path):
         return read_table(path)
 
     return read
+
+
+def _numbers(read):
+    """Return all columns side by side."""
+    return np.column_stack(list(read.columns.values()))
 
 
 def _refused(table, text, *words):
@@ -61,7 +66,7 @@ def test_every_dialect_reads_to_the_same_numbers(data, tmp_path_factory):
     path = tmp_path_factory.mktemp("dialect") / "t.csv"
     path.write_bytes(text.encode(data.draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))))
     read = read_table(path)
-    np.testing.assert_array_equal(read.values, rows)
+    np.testing.assert_array_equal(_numbers(read), rows)
     assert read.names == tuple(names or [f"column{k + 1}" for k in range(width)])
     for row, line in enumerate(written):
         assert text.splitlines()[read.line_of(row) - 1] == line
@@ -145,7 +150,7 @@ def test_habits_of_programs(table, text):
     """A declared delimiter, a header in a comment, delimiters at line ends, quotes, blanks."""
     read = table(text)
     assert read.names == ("t", "u")
-    np.testing.assert_array_equal(read.values, [[0, 1.5], [1, 2.5]])
+    np.testing.assert_array_equal(_numbers(read), [[0, 1.5], [1, 2.5]])
 
 
 def test_comments_are_those_above_the_first_row(table):
@@ -163,7 +168,7 @@ def test_letters_of_old_programs(table):
 def test_a_single_column(table):
     """One column is a table too, with or without a name."""
     assert table("u\n1\n2\n").names == ("u",)
-    np.testing.assert_array_equal(table("1.5\n2.5\n").values, [[1.5], [2.5]])
+    np.testing.assert_array_equal(_numbers(table("1.5\n2.5\n")), [[1.5], [2.5]])
 
 
 def test_columns_of_text_are_passed_over(table):
@@ -183,7 +188,7 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
     with pytest.raises(DataError, match=r"nan in column u, line 5 \(1 of 3 rows"):
         read.check_finite("u")
     with pytest.raises(DataError, match="line 5"):
-        run_from_table(read, **COLUMNS)
+        read_run(read.path, **COLUMNS)
 
 
 @pytest.mark.parametrize(
@@ -253,8 +258,8 @@ def test_whatever_the_bytes_it_is_a_table_or_a_data_error(lines, raw, tmp_path_f
     except DataError as error:
         said = (str(path) in error.message, bool(error.hint))
     else:
-        assert read.values.shape[1] == len(read.names)
-        said = (all(read.line_of(row) >= 1 for row in range(len(read.values))),)
+        assert tuple(read.columns) == read.names
+        said = (all(read.line_of(row) >= 1 for row in range(read.rows)),)
     assert all(said)
 
 
@@ -263,8 +268,8 @@ def test_whatever_the_bytes_it_is_a_table_or_a_data_error(lines, raw, tmp_path_f
 
 def test_a_run_with_units_of_any_bench(table):
     """Names, units and quantities come from the header; time in ms becomes seconds."""
-    run = run_from_table(
-        table("time [ms],H (A/m),B (T),set (A/m)\n0,1,2,1.1\n2,3,4,3.1\n"),
+    run = read_run(
+        table("time [ms],H (A/m),B (T),set (A/m)\n0,1,2,1.1\n2,3,4,3.1\n").path,
         input_column="H",
         output_column="B",
         reference_column="set",
@@ -279,24 +284,24 @@ def test_a_run_with_units_of_any_bench(table):
 def test_units_given_win(table):
     """What the user says about units is right; without any the unit is 1."""
     read = table("t,u_V,y\n0,1,2\n1,2,3\n")
-    run = run_from_table(read, **COLUMNS, input_unit="mV")
+    run = read_run(read.path, **COLUMNS, input_unit="mV")
     assert (run.input_unit, run.output_unit) == ("mV", "1")
 
 
 def test_a_rate_instead_of_a_time(table):
     """Samples a second; both a rate and a time column are too much, a rate of nothing too little."""
     read = table("t,u,y\n9,1,2\n8,2,3\n")
-    np.testing.assert_array_equal(run_from_table(read, **COLUMNS, rate_Hz=4).time_s, [0, 0.25])
+    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, rate_Hz=4).time_s, [0, 0.25])
     for bad in ({"rate_Hz": 4, "time_column": "t"}, {"rate_Hz": 0}, {"rate_Hz": np.nan}, {"rate_Hz": np.inf}):
         with pytest.raises(UsageError, match="rate"):
-            run_from_table(read, **COLUMNS, **bad)
+            read_run(read.path, **COLUMNS, **bad)
 
 
 def test_without_time_only_the_order_counts(table):
     """Where the first column is the input there is no time; another column may be named."""
     read = table("u,y,t\n1,2,0\n2,3,1\n")
-    assert run_from_table(read, **COLUMNS).time_s is None
-    np.testing.assert_array_equal(run_from_table(read, **COLUMNS, time_column="t").time_s, [0, 1])
+    assert read_run(read.path, **COLUMNS).time_s is None
+    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, time_column="t").time_s, [0, 1])
 
 
 def test_time_that_does_not_increase_names_the_line(table):
@@ -305,26 +310,26 @@ def test_time_that_does_not_increase_names_the_line(table):
         with pytest.raises(
             DataError, match=rf"t\.csv, column t, does not increase at line 6: {stamp} s after 1 s"
         ):
-            run_from_table(table(f"# c\nt,u,y\n0,1,2\n1,1,2\n\n{stamp},1,2\n"), **COLUMNS)
+            read_run(table(f"# c\nt,u,y\n0,1,2\n1,1,2\n\n{stamp},1,2\n").path, **COLUMNS)
 
 
 def test_time_in_an_unknown_unit(table):
     """Samples are no time."""
     with pytest.raises(DataError, match="time t in 'samples'"):
-        run_from_table(table("t (samples),u,y\n0,1,2\n1,2,3\n"), **COLUMNS, time_column="t")
+        read_run(table("t (samples),u,y\n0,1,2\n1,2,3\n").path, **COLUMNS, time_column="t")
 
 
 def test_one_row_is_no_run(table):
     """A run needs two samples."""
     with pytest.raises(DataError, match="has 1 row"):
-        run_from_table(table("t,u,y\n0,1,2\n"), **COLUMNS)
+        read_run(table("t,u,y\n0,1,2\n").path, **COLUMNS)
 
 
 @pytest.mark.parametrize(("name", "rows"), [("bh_ferrite_mnzn_1.csv", 129), ("bh_steel_m130_27s_1.csv", 256)])
 def test_measured_records(name, rows):
     """Real records read whole: their first and last rows are those of the file."""
     read, units = read_table(DATA / name), {"input_unit": "A/m", "output_unit": "T"}
-    run = run_from_table(read, **COLUMNS, **units, time_column="t_s")
+    run = read_run(read.path, **COLUMNS, **units, time_column="t_s")
     lines = (DATA / name).read_text().splitlines()
     assert len(run.input) == rows == len(lines) - 1
     for k in (0, -1):
