@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from pulsetrainer.artefacts.kinds import FloatArray
 
-_PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
+PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
 _SPARE = 1.02  # of the room that the first piece lets expect; what is never written to takes no memory
 _GROWTH = 1.125
 
@@ -33,10 +33,11 @@ class Rows:
     shifts: tuple[tuple[int, int], ...]  # (row, line) wherever comments or blank lines change the distance
 
 
-def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None) -> Rows:
+def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece: int = PIECE) -> Rows:
     """Return the columns whose numbers are in ``keep``, in that order; all by default. Text becomes NaN.
 
-    Every cell of the file is checked, those of other columns too.
+    Every cell of the file is checked, those of other columns too. A ``piece`` has so many characters, and the
+    rest of its last line.
 
     Raises
     ------
@@ -52,16 +53,11 @@ def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None) -> Ro
         for _ in range(dialect.first_line - 1):
             stream.readline()
         size = path.stat().st_size
-        while text := _next_piece(stream):
+        while text := stream.read(piece) + stream.readline():
             values = reader.read(text)
             # a character is a byte, or, in UTF-16, two of them
             kept.append(values, expected=len(values) * size / len(text))
     return Rows(kept.finished(), tuple(reader.shifts))
-
-
-def _next_piece(stream: TextIO) -> str:
-    """Return some whole lines."""
-    return stream.read(_PIECE) + stream.readline()
 
 
 class _Kept:

@@ -236,7 +236,7 @@ def test_one_bad_file_of_many_writes_none(run, tmp_path):
 
 
 def test_a_large_file_is_streamed(tmp_path):
-    """Peak memory grows by less than three times what the file grows: it is never held as text."""
+    """Memory grows by the numbers kept, 24 bytes of each row of 28, and a fifth: there is no second copy."""
 
     def peak(rows: int) -> tuple[int, int]:
         path = tmp_path / f"{rows}.csv"
@@ -261,4 +261,4 @@ def test_a_large_file_is_streamed(tmp_path):
     print(
         f"peak memory {low / 1e6:.0f} MB at {small / 1e6:.0f} MB, {high / 1e6:.0f} MB at {large / 1e6:.0f} MB"
     )
-    assert growth < 3.0
+    assert growth < 1.2 * 24 / 28

@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pulsetrainer.artefacts.table import read_table, write_table
+from pulsetrainer.artefacts.table_rows import PIECE, parse
 from pulsetrainer.artefacts.table_run import read_run
+from pulsetrainer.artefacts.table_text import detect
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -67,6 +69,9 @@ def test_every_dialect_reads_to_the_same_numbers(data, tmp_path_factory):
     path.write_bytes(text.encode(data.draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))))
     read = read_table(path)
     np.testing.assert_array_equal(_numbers(read), rows)
+    pieces = parse(path, detect(path), piece=data.draw(st.integers(1, 60)))
+    np.testing.assert_array_equal(np.column_stack(pieces.columns), rows)
+    assert pieces.shifts == read.shifts
     assert read.names == tuple(names or [f"column{k + 1}" for k in range(width)])
     for row, line in enumerate(written):
         assert text.splitlines()[read.line_of(row) - 1] == line
@@ -263,6 +268,40 @@ def test_whatever_the_bytes_it_is_a_table_or_a_data_error(lines, raw, tmp_path_f
     assert all(said)
 
 
+@settings(max_examples=300, deadline=None)
+@given(
+    cells=st.lists(
+        st.tuples(st.sampled_from(["0", "1.5", "2,5", "7", "x", "", "1;2", "# c", " "]), st.integers(0, 9)),
+        min_size=1,
+        max_size=12,
+    ),
+    piece=st.integers(1, 40),
+)
+def test_pieces_change_nothing(cells, piece, tmp_path_factory):
+    """Whatever the file and wherever it is cut: the same numbers and lines, or the same words of refusal."""
+    path = tmp_path_factory.mktemp("pieces") / "t.csv"
+    path.write_text("t;u\n0;1\n" + "".join(f"{k};{cell}\n" for cell, k in cells))
+
+    def outcome(**size):
+        try:
+            rows = parse(path, detect(path), **size)
+        except DataError as error:
+            return error.message
+        return [column.tolist() for column in rows.columns], rows.shifts
+
+    assert repr(outcome(piece=piece)) == repr(outcome())
+
+
+def test_only_what_is_kept_stays(tmp_path):
+    """Columns that nobody asked for are checked, but not kept."""
+    path = tmp_path / "t.csv"
+    path.write_text("a,b,c\n1,2,3\n4,5,6\n")
+    assert list(read_table(path, lambda head: {head.index("c"), 0}).columns) == ["a", "c"]
+    path.write_text("a,b,c\n1,2,3\n4,x,6\n")
+    with pytest.raises(DataError, match="'x' in column b, line 3"):
+        read_table(path, lambda _: {0})
+
+
 # --- runs -------------------------------------------------------------------------------------------
 
 
@@ -311,6 +350,31 @@ def test_time_that_does_not_increase_names_the_line(table):
             DataError, match=rf"t\.csv, column t, does not increase at line 6: {stamp} s after 1 s"
         ):
             read_run(table(f"# c\nt,u,y\n0,1,2\n1,1,2\n\n{stamp},1,2\n").path, **COLUMNS)
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("1e6;0,5;abc", "'abc' in column y, line {line}: not a number"),
+        ("1e6;0,5", "2 columns in line {line}, expected 3"),
+        ("1e6;0.5;1", "mixes decimal signs: '0.5' in column u, line {line}, but '0,5' in column u, line 2"),
+        ("{last};0,5;1", "does not increase at line {line}"),
+        ("3;0,5;1", "does not increase at line {line}"),
+        ("1e6;;1", "nan in column u, line {line}"),
+        ("1e6;inf;1", "inf in column u, line {line}"),
+    ],
+)
+def test_what_is_wrong_far_from_the_start_is_named(tmp_path, row, said):
+    """The same promises in a later piece, behind comments and blank lines."""
+    rows = PIECE // 9
+    good = "".join(f"{k};0,5;1\n" for k in range(rows))
+    assert len(good) > 1.3 * PIECE
+    (tmp_path / "t.csv").write_text(
+        f"t;u;y\n{good}\n# pause\n{row.format(last=rows - 1)}\n2e6;0,5;1\n", encoding="utf-8"
+    )
+    with pytest.raises(DataError) as caught:
+        read_run(tmp_path / "t.csv", **COLUMNS)
+    assert said.format(line=rows + 4) in caught.value.message
 
 
 def test_time_in_an_unknown_unit(table):
