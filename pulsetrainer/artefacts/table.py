@@ -25,6 +25,7 @@ from pulsetrainer.artefacts.output import replacing
 from pulsetrainer.artefacts.table_arrays import Columns, reader_of
 from pulsetrainer.artefacts.table_rows import parse
 from pulsetrainer.artefacts.table_text import Dialect, detect
+from pulsetrainer.artefacts.units import symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ class Table:
         if self.names[k] in self.text_names:
             raise DataError(
                 f"{self.path} has text, not numbers, in column {self.names[k]}, as in {self.place(0)}",
-                hint="name another column",
+                hint="name another column; times may be numbers, 12:34:56.7 or 2024-05-01T12:34:56",
             )
         return k
 
@@ -202,6 +203,7 @@ def _head(path: Path, dialect: Dialect) -> Table:
         dialect.comments,
         frozenset(dialect.names[k] for k in dialect.text_columns),
         ((0, dialect.first_line),),
+        dialect.rate_Hz,
     )
 
 
@@ -225,7 +227,7 @@ def _of_arrays(path: Path, columns: Columns) -> Table:
 def _units(dialect: Dialect) -> dict[str, str]:
     """Return the unit of each column that has one, in its heading or in the line below."""
     pairs = zip(dialect.names, dialect.units, strict=True)
-    units = {name: split_unit(name)[1] or below for name, below in pairs}
+    units = {name: symbol_of(split_unit(name)[1] or below) for name, below in pairs}
     return {name: unit for name, unit in units.items() if unit}
 
 

@@ -36,19 +36,20 @@ class Rows:
 def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece: int = PIECE) -> Rows:
     """Return the columns whose numbers are in ``keep``, in that order; all by default. Text becomes NaN.
 
-    Every cell of the file is checked, those of other columns too. A ``piece`` has so many characters, and the
+    Text in other columns, a remark for instance, is passed over. A ``piece`` has so many characters, and the
     rest of its last line.
 
     Raises
     ------
     DataError
-        A row is too short or too long, a cell in a column of numbers is text, or the decimal sign changes:
-        line and column are named.
+        A row is too short or too long, a cell in a kept column of numbers is text, or the decimal sign
+        changes: line and column are named.
     OSError
         The file cannot be read.
     """
-    reader = _Reader(path, dialect)
-    kept = _Kept(list(range(len(dialect.names))) if keep is None else list(keep))
+    places = list(range(len(dialect.names)) if keep is None else keep)
+    reader = _Reader(path, dialect, frozenset(places))
+    kept = _Kept(places)
     with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
         for _ in range(dialect.first_line - 1):
             stream.readline()
@@ -94,6 +95,7 @@ class _Reader:
 
     path: Path
     dialect: Dialect
+    needed: frozenset[int]  # columns that must hold numbers
     shifts: list[tuple[int, int]] = field(default_factory=list)
     line: int = 0  # of the next piece
     row: int = 0
@@ -132,6 +134,8 @@ class _Reader:
             rows = [line[:-1] for line in lines]
         if dialect.text_columns or not any(line.strip() for line in rows):
             return None
+        if dialect.decimal_comma and dialect.delimiter == ",":  # in quotes
+            return None
         if dialect.decimal_comma:
             if any("." in line for line in rows):
                 return None
@@ -156,7 +160,7 @@ class _Reader:
         rows: list[str] = []
         places: list[int] = []
         for count, line in enumerate(found, self.line):
-            if line and not line.isspace() and not line.lstrip().startswith("#"):
+            if line and not line.isspace() and not line.lstrip().startswith(self.dialect.remarks):
                 self._note_shift(count, self.row + len(rows))
                 rows.append(line)
                 places.append(count)
@@ -181,7 +185,9 @@ class _Reader:
             for k, cell in enumerate(cells):
                 if k in dialect.text_columns or cell.lower() in MISSING:
                     continue
-                value = number(cell, decimal_comma=dialect.delimiter != ",")
+                value = number(cell)
+                if value is None and k not in self.needed:
+                    continue
                 if value is None:
                     raise DataError(
                         f"{self.path} has {self._place(cell, k, count)}: not a number",
@@ -196,11 +202,12 @@ class _Reader:
     def _look_for_signs(self, line: int, cells: Sequence[str]) -> None:
         """Note the first decimal point and the first decimal comma; raise DataError where there are both."""
         for k, cell in enumerate(cells):
-            if k in self.dialect.text_columns:
+            # a remark has no decimal sign, a time of day one of its own
+            if k in self.dialect.text_columns or ":" in cell:
                 continue
-            if not self.point and "." in cell:
+            if not self.point and "." in cell and number(cell) is not None:
                 self.point = self._place(cell, k, line)
-            if not self.comma and "," in cell:
+            if not self.comma and "," in cell and number(cell) is not None:
                 self.comma = self._place(cell, k, line)
         if self.point and self.comma:
             raise DataError(

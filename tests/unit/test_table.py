@@ -158,6 +158,72 @@ def test_habits_of_programs(table, text):
     np.testing.assert_array_equal(_numbers(read), [[0, 1.5], [1, 2.5]])
 
 
+_ROWS = [(k / 100, k % 7 / 2, k % 5 / 4) for k in range(12)]
+_POINT = "".join("%.2f,%.1f,%.2f\n" % row for row in _ROWS)  # noqa: UP031 - as an instrument does
+_TABS = _POINT.replace(",", "\t").replace(".", ",")
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "units"),
+    [
+        (
+            "Model,MSO24\n\nSample Interval,0.01\nLabels,,\nTIME,CH1,CH2\n" + _POINT,
+            ("TIME", "CH1", "CH2"),
+            {},
+        ),
+        ("Time,A,B\n(s),(V),(mV)\n\n" + _POINT, ("Time", "A", "B"), {"Time": "s", "A": "V", "B": "mV"}),
+        ("Measurement\t\nSign\t,\n***End***\t\n\t\nX\tU\tF\n" + _TABS, ("X", "U", "F"), {}),
+        ("% t u y\n" + _POINT.replace(",", " "), ("t", "u", "y"), {}),
+        ("// rig 7\n// by me\nt,u,y\n" + _POINT, ("t", "u", "y"), {}),
+        ("; generator 0.5\n; 2 channels\nt,u,y\n" + _POINT, ("t", "u", "y"), {}),
+        ("t|u|y\n" + _POINT.replace(",", "|"), ("t", "u", "y"), {}),
+        ('t,u,y\n"0,00","0,0","0,00"\n' + '"0,01","0,5","0,25"\n', ("t", "u", "y"), {}),
+        (_POINT.replace(",", "D+00  ").replace("\n", "d0\n"), ("column1", "column2", "column3"), {}),
+    ],
+)
+def test_habits_of_instruments(table, text, names, units):
+    """Words above the table, remarks of any sign, bars, commas in quotes, the exponents of Fortran."""
+    read = table(text)
+    assert read.names == names
+    assert read.units == units
+    np.testing.assert_array_equal(_numbers(read), _ROWS[: read.rows])
+    assert read.rows in (2, 12)
+    assert text.splitlines()[read.line_of(read.rows - 1) - 1] == text.splitlines()[-1]
+
+
+@pytest.mark.parametrize("end", ["", ","])
+def test_an_oscilloscope_that_writes_its_step_beside_the_names(table, end):
+    """The rows are counted; the increment gives them their time."""
+    rows = "".join(f"{k},{k % 7},{k % 5}{end}\n" for k in range(20))
+    read = table(f"X,CH1,CH2,Start,Increment{end}\nSequence,Volt,Volt,-1.0,2.0e-3\n{rows}")
+    assert read.names == ("X", "CH1", "CH2")
+    assert read.unit("CH1") == "V"
+    run = read_run(read.path, input_column="CH1", output_column="CH2")
+    np.testing.assert_allclose(run.time_s, 2e-3 * np.arange(20), rtol=1e-12)
+
+
+def test_a_header_of_another_count_is_still_an_error(table):
+    """However many rows follow."""
+    _refused(table, "t,u\n" + _POINT, "2 column names", "3 columns in line 2")
+    _refused(table, "t,u,y\n" + 3 * "1,2\n" + _POINT, "3 column names", "2 columns in line 2")
+
+
+@pytest.mark.parametrize(
+    ("cells", "seconds"),
+    [
+        (("12:00:01", "12:00:02.25"), (43201, 43202.25)),
+        (("2024-05-01T12:00:00", "2024-05-01 12:00:00.5"), (1714564800, 1714564800.5)),
+        (("2024-05-01T14:00:00+02:00", "2024-05-01T12:00:00,5Z"), (1714564800, 1714564800.5)),
+    ],
+)
+def test_times_of_day_and_time_stamps_are_seconds(table, cells, seconds):
+    """Loggers write them; a decimal comma elsewhere is no second decimal sign."""
+    path = table(f"when;u;y\n{cells[0]};0,5;1\n{cells[1]};1,5;1\n").path
+    np.testing.assert_array_equal(read_run(path, **COLUMNS).time_s, seconds)
+    read = table("when;u;y\n2024-02-30T12:00:00;1;2\n25;1;2\n")
+    assert read.text_names == {"when"}
+
+
 def test_comments_are_those_above_the_first_row(table):
     """A remark between the rows is no header, and no comment on the record."""
     read = table("# source: here\n0,1\n# a,b\n1,2\n")
@@ -177,8 +243,8 @@ def test_a_single_column(table):
 
 
 def test_columns_of_text_are_passed_over(table):
-    """A column of time stamps does not spoil the others; asking for it says what it is."""
-    read = table("when,u,y\n12:00:01,1,2\n12:00:02,,4\n")
+    """A column of words does not spoil the others; asking for it says what it is."""
+    read = table("when,u,y\nnoon,1,2\nlater,,4\n")
     np.testing.assert_array_equal(read.column("y"), [2, 4])
     np.testing.assert_array_equal(read.column("u"), [1, np.nan])
     with pytest.raises(DataError, match="has text, not numbers, in column when, as in line 2"):
@@ -293,13 +359,14 @@ def test_pieces_change_nothing(cells, piece, tmp_path_factory):
 
 
 def test_only_what_is_kept_stays(tmp_path):
-    """Columns that nobody asked for are checked, but not kept."""
+    """Columns that nobody asked for are not kept, and may hold a remark; the others may not."""
     path = tmp_path / "t.csv"
     path.write_text("a,b,c\n1,2,3\n4,5,6\n")
     assert list(read_table(path, lambda head: {head.index("c"), 0}).columns) == ["a", "c"]
     path.write_text("a,b,c\n1,2,3\n4,x,6\n")
+    np.testing.assert_array_equal(read_table(path, lambda _: {0}).column("a"), [1, 4])
     with pytest.raises(DataError, match="'x' in column b, line 3"):
-        read_table(path, lambda _: {0})
+        read_table(path, lambda _: {1})
 
 
 # --- runs -------------------------------------------------------------------------------------------

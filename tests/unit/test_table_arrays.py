@@ -38,6 +38,12 @@ def test_npz_with_a_rate(tmp_path):
     _same(tmp_path / "r.npz", "data1", "data2")
 
 
+def test_npz_with_objects(tmp_path):
+    """What numpy would only load by running code is left alone; the numbers beside it are read."""
+    np.savez(tmp_path / "r.npz", who=np.array([{}], dtype=object), t=T, u=U, y=Y)
+    _same(tmp_path / "r.npz", "u", "y")
+
+
 def test_npy_with_named_fields(tmp_path):
     """A structured array has its fields for columns."""
     array = np.zeros(N, dtype=[("t", float), ("u", float), ("y", float)])
