@@ -81,7 +81,11 @@ def shown(unit: str) -> str:
 def _span(values: FloatArray, unit: str) -> str:
     if values.size == 0:
         return "no samples"
-    return f"{np.min(values):.4g} .. {np.max(values):.4g} {shown(unit)}".rstrip()
+    low, high = float(np.min(values)), float(np.max(values))
+    # a small swing about a large value needs more digits than four to be seen
+    share = (high - low) / max(abs(low), abs(high)) if high > low else 1.0
+    digits = min(4 + max(0, int(-np.log10(share))), 12)
+    return f"{low:.{digits}g} .. {high:.{digits}g} {shown(unit)}".rstrip()
 
 
 def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:

@@ -198,6 +198,27 @@ ROWS = "".join(f"{k / 10},{k % 7},{k % 5}\n" for k in range(40))
 GOOD = f"t_s,current_A,force_N\n{ROWS}"
 
 
+def test_units_far_from_one(run, tmp_path):
+    """Picoamperes and a small swing about a large offset: the fit is the same, and the swing can be read."""
+    angle = np.arange(600) / 40
+    for name, u_scale, y_scale, y_offset in (
+        ("a", 1.0, 1.0, 0.0),
+        ("b", 1e-12, 1e-15, 0.0),
+        ("c", 1e12, 1e3, 1e9),
+    ):
+        rows = zip(angle, u_scale * np.sin(angle), y_offset + y_scale * np.sin(angle) ** 3, strict=True)
+        lines = "".join(f"{t!r},{u!r},{y!r}\n" for t, u, y in (map(float, row) for row in rows))
+        (tmp_path / f"{name}.csv").write_text(f"t_s,u_V,y_nm\n{lines}")
+    words = ["--input", "u", "--output", "y", "-o", "{name}.h5"]
+    done = run("import", "a.csv", "b.csv", "c.csv", *words)
+    assert done.code == 0, done.err
+    assert "999999000 .. 1.000001e+09 nm" in done.out
+    fits = [
+        run("identify", f"{n}.h5", "-o", f"{n}-model.h5", "--json").json["fit_rms_percent"] for n in "abc"
+    ]
+    assert fits[1:] == pytest.approx(2 * [fits[0]], rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("text", "more", "said"),
     [
