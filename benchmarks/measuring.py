@@ -72,6 +72,37 @@ def taking_turns(ours: Callable[[], object], baseline: Callable[[], object], rou
     return Times(statistics.median(mine), statistics.median(theirs), statistics.median(ratios))
 
 
+class Cost(NamedTuple):
+    """What a command took."""
+
+    peak_MB: float
+    processor_s: float
+    wall_s: float
+
+
+# a small process in between: a child is charged with the memory of who starts it
+_PEAK = """
+import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)
+usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(usage.ru_maxrss, usage.ru_utime + usage.ru_stime)
+"""
+
+
+def of_command(folder: Path, *words: str) -> Cost:
+    """Run a command of pulsetrainer in a folder."""
+    begun = time.perf_counter()
+    done = subprocess.run(  # noqa: S603
+        [sys.executable, "-c", _PEAK, sys.executable, "-m", "pulsetrainer", *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    peak, processor = done.stdout.splitlines()[-1].split()
+    return Cost(int(peak) * 1024 / 1e6, float(processor), time.perf_counter() - begun)
+
+
 class Peak(NamedTuple):
     """What a job took in a process of its own."""
 

@@ -2,43 +2,23 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import time
-
 import pytest
+from measuring import Cost, of_command
 
 from pulsetrainer.artefacts.kinds import Run
 from pulsetrainer.artefacts.store import read
 
-# a small process in between: a child is charged with the memory of who starts it
-_PEAK = """
-import resource, subprocess, sys
-subprocess.run(sys.argv[1:], check=True)
-usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-print(usage.ru_maxrss, usage.ru_utime + usage.ru_stime)
-"""
 
-
-def _capture(folder, repeats):
-    """Capture the diagnostic signal so often; return the peak of memory [MB], CPU time [s], wall time [s]."""
+def _capture(folder, repeats) -> Cost:
+    """Capture the diagnostic signal so often."""
     words = ["capture", "diagnostic", "--repeats", str(repeats), "--force", "-o", "run.h5"]
-    begun = time.perf_counter()
-    done = subprocess.run(  # noqa: S603
-        [sys.executable, "-c", _PEAK, sys.executable, "-m", "pulsetrainer", *words],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    peak, cpu = done.stdout.splitlines()[-1].split()
-    return int(peak) / 1024, float(cpu), time.perf_counter() - begun
+    return of_command(folder, *words)
 
 
 @pytest.mark.timeout(0)
 def test_an_hour_takes_the_memory_of_a_quarter_of_one(tmp_path, table):
     """The hour is 40 repeats of 91 s, a quarter of it 10; its samples alone are 116 MB."""
-    short, _, _ = _capture(tmp_path, 10)
+    short = _capture(tmp_path, 10).peak_MB
     long, cpu, wall = _capture(tmp_path, 40)
     run = read(tmp_path / "run.h5", Run)
     assert run.complete

@@ -103,7 +103,9 @@ def _put_array(
     array = _checked(plan, np.asarray(values[plan.name]))
     is_bool = plan.type is np.bool_
     dataset = group.create_dataset(
-        plan.path, data=array.astype(np.uint8 if is_bool else plan.type), **_storage(array, growing=growing)
+        plan.path,
+        data=array.astype(np.uint8 if is_bool else plan.type, copy=False),
+        **_storage(array, growing=growing),
     )
     _describe(dataset, plan, values)
     if is_bool:

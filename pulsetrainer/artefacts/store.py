@@ -7,7 +7,6 @@ The file format: root attributes ``kind``, ``format_version``, ``title``, ``crea
 from __future__ import annotations
 
 import contextlib
-import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -22,7 +21,8 @@ from pulsetrainer.artefacts.kinds import KINDS
 from pulsetrainer.artefacts.output import check_output, replacing
 from pulsetrainer.artefacts.provenance import Header, Provenance, clean
 from pulsetrainer.artefacts.schema import TIME, kind_of, plan_of
-from pulsetrainer.artefacts.seal import check_seal, seal_of
+from pulsetrainer.artefacts.seal import append_seal, check_seal
+from pulsetrainer.artefacts.sheltered import Sheltered
 from pulsetrainer.artefacts.source import RESTORE, check_artefact
 from pulsetrainer.artefacts.steps import maker, next_step, with_article
 from pulsetrainer.errors import DataError
@@ -54,25 +54,16 @@ def write(path: Path | str, artefact: Any, header: Header, *, force: bool = Fals
     values = values_of(artefact)
     with replacing(path, force=force) as temporary:
         try:
-            image = _image(cls, values, header)
+            with Sheltered(temporary) as stream:
+                try:
+                    with h5py.File(stream, "w", libver=LIBVER) as file:
+                        write_root(file, cls, header, samples=_samples(cls, values))
+                        encode(file, cls, values)
+                finally:
+                    stream.check()  # also where HDF5 missed what had been dropped
         except DataError as error:
             raise DataError(f"{path} was not written: {error.message}", hint=error.hint) from error
-        with temporary.open("wb") as stream:
-            stream.write(image)
-            stream.write(seal_of(zlib.crc32(image)))
-
-
-def _image(cls: type, values: Mapping[str, Any], header: Header) -> bytes:
-    """Return the whole HDF5 file as bytes.
-
-    Built in memory: a disk that is full makes HDF5 fail while closing and crash when the program ends.
-    """
-    with h5py.File(kind_of(cls), "w", driver="core", backing_store=False, libver=LIBVER) as file:
-        write_root(file, cls, header, samples=_samples(cls, values))
-        encode(file, cls, values)
-        file.flush()
-        image: bytes = file.id.get_file_image()
-        return image
+        append_seal(temporary)
 
 
 def _samples(cls: type, values: Mapping[str, Any]) -> int | None:

@@ -1,8 +1,8 @@
 """Tables from any bench: text of any dialect, .npz, .mat, .wav.
 
-What a text is taken for is decided in ``table_text``, by explicit rules; what is no text is read by
-``table_arrays``. Units are what a header says: ``current_A``, ``Force (N)``, ``time [ms]``, ``Kraft / N``,
-or a line of units below it.
+What a text is taken for is decided in ``table_text``, by explicit rules, and its rows are read by
+``table_rows``; what is no text is read by ``table_arrays``. Units are what a header says: ``current_A``,
+``Force (N)``, ``time [ms]``, ``Kraft / N``, or a line of units below it.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import difflib
 import io
 import re
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +23,9 @@ import numpy as np
 from pulsetrainer.artefacts.kinds import FloatArray
 from pulsetrainer.artefacts.output import replacing
 from pulsetrainer.artefacts.table_arrays import Columns, reader_of
-from pulsetrainer.artefacts.table_text import Dialect, detect, parse
+from pulsetrainer.artefacts.table_rows import parse
+from pulsetrainer.artefacts.table_text import Dialect, detect
+from pulsetrainer.artefacts.units import symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 
 if TYPE_CHECKING:
@@ -47,13 +49,18 @@ class Table:
 
     path: Path
     names: tuple[str, ...]
-    values: FloatArray  # (rows, columns); NaN in columns of text
+    columns: Mapping[str, FloatArray]  # those that were kept, each (rows,); NaN where there is text
     units: Mapping[str, str]  # by name, where the header says one
     comments: tuple[str, ...]
     text_names: frozenset[str] = frozenset()  # columns of text
     # (row, line) wherever their distance changes; empty where the file has no lines
     shifts: Sequence[tuple[int, int]] = ((0, 1),)
     rate_Hz: float | None = None  # where the file itself says one
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return next((column.size for column in self.columns.values()), 0)
 
     def column(self, name: str) -> FloatArray:
         """Return a column (rows,) by its name, or by the name without its unit, whatever the case.
@@ -63,7 +70,7 @@ class Table:
         DataError
             There is no such column, or it holds text.
         """
-        return self.values[:, self.index(name)]
+        return self.columns[self.names[self.index(name)]]
 
     def unit(self, name: str) -> str:
         """Return the unit of a column, empty where the header says none.
@@ -129,7 +136,7 @@ class Table:
         if self.names[k] in self.text_names:
             raise DataError(
                 f"{self.path} has text, not numbers, in column {self.names[k]}, as in {self.place(0)}",
-                hint="name another column",
+                hint="name another column; times may be numbers, 12:34:56.7 or 2024-05-01T12:34:56",
             )
         return k
 
@@ -145,8 +152,14 @@ def split_unit(heading: str) -> tuple[str, str]:
     return heading, ""
 
 
-def read_table(path: Path | str) -> Table:
-    """Read a table of numbers.
+def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None = None) -> Table:
+    """Read a table of numbers, a text of any size piece by piece.
+
+    Parameters
+    ----------
+    keep
+        Gets the table without its numbers and returns the places of the columns that are to stay in memory;
+        all by default.
 
     Raises
     ------
@@ -158,12 +171,14 @@ def read_table(path: Path | str) -> Table:
     try:
         reader = reader_of(path)
         if reader is not None:
-            return _of_arrays(path, reader(path))
+            return _only(_of_arrays(path, reader(path)), keep)
         dialect = detect(path)
         if len(set(dialect.names)) < len(dialect.names):
             twice = next(name for name in dialect.names if dialect.names.count(name) > 1)
             raise DataError(f"{path} has two columns named {twice!r}", hint="rename one of them")
-        values, rows = parse(path, dialect)
+        table = _head(path, dialect)
+        kept = sorted(set(keep(table))) if keep else list(range(len(table.names)))
+        rows = parse(path, dialect, kept)
     except OSError as error:
         raise DataError(
             f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
@@ -174,30 +189,45 @@ def read_table(path: Path | str) -> Table:
         raise DataError(
             f"{path} is no table of numbers: {error}", hint="export it as CSV with one column a quantity"
         ) from error
+    columns = {table.names[k]: column for k, column in zip(kept, rows.columns, strict=True)}
+    return replace(table, columns=columns, shifts=rows.shifts)
+
+
+def _head(path: Path, dialect: Dialect) -> Table:
+    """Return the table of a text without its numbers."""
     return Table(
         path,
         dialect.names,
-        values,
+        {},
         _units(dialect),
         dialect.comments,
         frozenset(dialect.names[k] for k in dialect.text_columns),
-        tuple(rows.shifts),
+        ((0, dialect.first_line),),
+        dialect.rate_Hz,
+    )
+
+
+def _only(table: Table, keep: Callable[[Table], Collection[int]] | None) -> Table:
+    """Return a table with no other columns than these."""
+    if keep is None:
+        return table
+    return replace(
+        table, columns={name: table.columns[name] for name in (table.names[k] for k in keep(table))}
     )
 
 
 def _of_arrays(path: Path, columns: Columns) -> Table:
     """Return the table of a file that is no text."""
     names = tuple(columns.values)
-    values = np.stack([columns.values[name] for name in names], axis=1)
     units = {name: columns.units.get(name) or split_unit(name)[1] for name in names}
     named = {name: unit for name, unit in units.items() if unit}
-    return Table(path, names, values, named, (), shifts=(), rate_Hz=columns.rate_Hz)
+    return Table(path, names, columns.values, named, (), shifts=(), rate_Hz=columns.rate_Hz)
 
 
 def _units(dialect: Dialect) -> dict[str, str]:
     """Return the unit of each column that has one, in its heading or in the line below."""
     pairs = zip(dialect.names, dialect.units, strict=True)
-    units = {name: split_unit(name)[1] or below for name, below in pairs}
+    units = {name: symbol_of(split_unit(name)[1] or below) for name, below in pairs}
     return {name: unit for name, unit in units.items() if unit}
 
 

@@ -47,9 +47,24 @@ def reader_of(path: Path) -> Callable[[Path], Columns] | None:
 def _read_npz(path: Path) -> Columns:
     try:
         with np.load(path, allow_pickle=False) as file:
-            return _columns(path, {name: file[name] for name in file.files})
+            return _columns(path, {name: file[name] for name in file.files if not _holds_objects(file, name)})
     except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError) as error:
         raise _unreadable(path, "an .npz archive of numbers", error) from error
+
+
+def _holds_objects(file: Any, name: str) -> bool:
+    """Whether a member is no array of numbers but Python's own, which is never loaded: it could run code."""
+    try:
+        with file.zip.open(f"{name}.npy") as member:
+            version = np.lib.format.read_magic(member)
+            read = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            return bool(read(member)[2].hasobject)
+    except KeyError:
+        return False
 
 
 def _read_npy(path: Path) -> Columns:

@@ -6,13 +6,14 @@ about its time, and what was made of it, goes to the ``note`` of the caller.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from pulsetrainer.artefacts.kinds import FloatArray, Run
-from pulsetrainer.artefacts.table import Table, split_unit
+from pulsetrainer.artefacts.table import Table, read_table, split_unit
 from pulsetrainer.artefacts.timing import check_timing
 from pulsetrainer.artefacts.units import check_unit
 from pulsetrainer.errors import DataError, UsageError
@@ -28,6 +29,8 @@ GAP = 1.5  # a step longer than this times the median one is a gap
 EVEN = 0.02
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
 _MOST = 50_000_000  # samples that resampling may make
+_LOOKED_AT = 1_000_000  # steps for their median
+_BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
 
 def _silent(_text: str) -> None:
@@ -52,21 +55,25 @@ class Steps:
 
 
 def steps_of(time_s: FloatArray) -> Steps:
-    """Sum up the steps between time stamps (n,), n >= 2."""
-    step = np.diff(time_s)
-    median = float(np.median(step))
-    is_gap = step > GAP * median
-    return Steps(
-        median,
-        float(step.min()),
-        float(step[~is_gap].max()),
-        int(is_gap.sum()),
-        float(step[is_gap].max(initial=0.0)),
-    )
+    """Sum up the steps between time stamps (n,), n >= 2.
+
+    Of more than a million steps, the median is that of a million that lie evenly among them.
+    """
+    every = -(-(time_s.size - 1) // _LOOKED_AT)
+    median = float(np.median(time_s[1::every] - time_s[:-1:every]))
+    shortest, longest, gaps, longest_gap = np.inf, -np.inf, 0, 0.0
+    for k in range(0, time_s.size - 1, _BLOCK):
+        step = np.diff(time_s[k : k + _BLOCK + 1])
+        is_gap = step > GAP * median
+        shortest = min(shortest, float(step.min()))
+        longest = max(longest, float(step[~is_gap].max(initial=-np.inf)))
+        gaps += int(is_gap.sum())
+        longest_gap = max(longest_gap, float(step[is_gap].max(initial=0.0)))
+    return Steps(median, shortest, longest, gaps, longest_gap)
 
 
-def run_from_table(
-    table: Table,
+def read_run(
+    path: Path | str,
     *,
     input_column: str,
     output_column: str,
@@ -78,7 +85,7 @@ def run_from_table(
     no_time: bool = False,
     note: Note = _silent,
 ) -> Run:
-    """Make a run of named columns.
+    """Read a run out of a file: named columns, and no more of it than these in memory.
 
     Without ``time_column`` and ``rate_Hz`` the time is the file's own rate, a column named so, or, in a
     text, the first column where that is neither input, output nor reference; otherwise the run has no time
@@ -89,13 +96,16 @@ def run_from_table(
     UsageError
         More than one of a time column, a rate and ``no_time`` is given, or the rate is not positive.
     DataError
-        A column is missing or not finite, a unit is none, there are fewer than two rows, or time does not
-        increase (the line is named).
+        The file is no table, a column is missing or not finite, a unit is none, there are fewer than two
+        rows, or time does not increase (the line is named).
     """
     check_timing(time_column, rate_Hz, no_time=no_time)
     wanted = [name for name in (input_column, output_column, reference_column) if name is not None]
+    table = read_table(
+        path, lambda head: _needed(head, wanted, time_column, automatic=rate_Hz is None and not no_time)
+    )
     columns = {name: np.ascontiguousarray(table.check_finite(name)) for name in wanted}
-    rows = table.values.shape[0]
+    rows = table.rows
     if rows < 2:
         raise DataError(
             f"{table.path} has {rows} row, a run needs two or more", hint="export the record again"
@@ -131,28 +141,52 @@ def _unit(table: Table, column: str, given: str | None, option: str) -> str:
     return check_unit(own, f"the heading {heading!r} of {table.path}", option)
 
 
-def _own_time(table: Table, used: Sequence[int], note: Note) -> FloatArray | None:
-    """Return the time that a file has by itself, if it has one."""
+def _needed(table: Table, wanted: Sequence[str], time_column: str | None, *, automatic: bool) -> set[int]:
+    """Return the places of the columns that a run is made of."""
+    places = {table.index(name) for name in wanted}
+    if time_column is not None:
+        return places | {table.index(time_column)}
+    return places | set(_free(table, places)[:1]) if automatic else places
+
+
+def _free(table: Table, used: Collection[int]) -> list[int]:
+    """Return the places of the columns that may be the file's own time."""
     if table.rate_Hz is not None:
-        return np.arange(table.values.shape[0]) / table.rate_Hz
+        return []
     if table.shifts:
         candidates = [0]  # of a text, where columns have an order
     else:
         words = [split_unit(name)[0].rpartition(".")[2].lower() for name in table.names]
         candidates = [k for k, word in enumerate(words) if word in _TIME_NAMES]
-    free = [k for k in candidates if k not in used and table.names[k] not in table.text_names]
+    return [k for k in candidates if k not in used and table.names[k] not in table.text_names]
+
+
+def _own_time(table: Table, used: Collection[int], note: Note) -> FloatArray | None:
+    """Return the time that a file has by itself, if it has one."""
+    if table.rate_Hz is not None:
+        return np.arange(table.rows) / table.rate_Hz
+    free = _free(table, used)
     if not free:
         note(f"{table.path} has no time: only the order of its samples counts (give --time or --rate)")
         return None
-    name, values = table.names[free[0]], table.values[:, free[0]]
-    counts = values.size >= _COUNTED and values[0] in (0.0, 1.0)
-    if counts and np.array_equal(values, values[0] + np.arange(values.size)):
+    name = table.names[free[0]]
+    if _merely_counts(table.columns[name]):
         note(
             f"the column {name} of {table.path} merely counts the rows, so it is no time: only the order of "
             f"the samples counts (if it is seconds, give --time {name})"
         )
         return None
     return _time(table, name)
+
+
+def _merely_counts(values: FloatArray) -> bool:
+    """Whether a column is 0, 1, 2, or 1, 2, 3."""
+    if values.size < _COUNTED or values[0] not in (0.0, 1.0):
+        return False
+    return all(
+        np.array_equal(values[k : k + _BLOCK], values[0] + np.arange(k, min(k + _BLOCK, values.size)))
+        for k in range(0, values.size, _BLOCK)
+    )
 
 
 def _time(table: Table, name: str) -> FloatArray:
@@ -163,8 +197,10 @@ def _time(table: Table, name: str) -> FloatArray:
             f"{table.path} gives the time {name} in {unit!r}, which is not one of s, ms, us, min, h",
             hint="name another --time column, or give --rate",
         )
-    time_s = table.check_finite(name) * _SECONDS[unit]
-    back = np.flatnonzero(np.diff(time_s) <= 0)
+    time_s = table.check_finite(name)
+    if _SECONDS[unit] != 1.0:
+        time_s = time_s * _SECONDS[unit]
+    back = np.flatnonzero(time_s[1:] <= time_s[:-1])
     if back.size:
         row = int(back[0]) + 1
         same = time_s[row] == time_s[row - 1]

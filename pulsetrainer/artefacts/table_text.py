@@ -1,18 +1,18 @@
-"""How a text file is a table: its delimiter, decimal sign, header and comments; and its numbers.
+"""How a text file is a table: its delimiter, decimal sign, header and comments.
 
 Every rule is explicit: the delimiter is the one that makes most cells numbers; a comma is a decimal sign
 only where something else separates; the first line is a header if it has text where the next one has a
-number; a column that starts with text is a column of text. Numpy parses all rows at once; only if that fails
-are the cells looked at one by one, to fill what is missing or to name the one that is to blame.
+number; a column that starts with text is a column of text; what an instrument writes about itself above the
+table is a comment. Times of day and ISO 8601 time stamps are numbers: seconds. The rows themselves are read
+by ``table_rows``.
 """
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from itertools import islice
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,16 +22,18 @@ from pulsetrainer.errors import DataError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from pulsetrainer.artefacts.kinds import FloatArray
-
-_DELIMITERS = ("\t", ";", ",", None)  # None: blanks
-_SAMPLE_LINES = 60
+_DELIMITERS = ("\t", ";", ",", "|", None)  # None: blanks
+_REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
+_SAMPLE_LINES = 200
+_TABLE = 10  # rows of one kind make a table of what stands below a text
+_STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
+_CLOCK = re.compile(r"(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+_STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
+_FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
-_MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
+MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
-
-Lines = Iterator[tuple[int, str]]  # line number, line
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,8 @@ class Dialect:
     comments: tuple[str, ...]  # above the first row
     first_line: int  # of the first row
     text_columns: frozenset[int]
+    remarks: tuple[str, ...] = _REMARKS  # what a line that is no row begins with
+    rate_Hz: float | None = None  # where the heading says a step
 
     def split(self, line: str) -> list[str]:
         """Return the cells of a line, without one that only a delimiter at the end makes."""
@@ -53,13 +57,6 @@ class Dialect:
         if len(cells) == len(self.names) + 1 and not cells[-1]:
             cells.pop()
         return cells
-
-
-@dataclass(slots=True)
-class Rows:
-    """Where in the file the rows are: comments and blank lines shift them."""
-
-    shifts: list[tuple[int, int]] = field(default_factory=list)  # (row, line) wherever the distance changes
 
 
 def split(line: str, delimiter: str | None) -> list[str]:
@@ -71,15 +68,34 @@ def split(line: str, delimiter: str | None) -> list[str]:
     return [cell.strip() for cell in line.split(delimiter)]
 
 
-def number(cell: str, *, decimal_comma: bool) -> float | None:
-    """Return the number in a cell, NaN where it says that the value is missing, None where it is text."""
+def number(cell: str) -> float | None:
+    """Return the number in a cell, NaN where it says that the value is missing, None where it is text.
+
+    A comma in a cell is a decimal sign: where commas separate, only quotes can hold one. A time of day is in
+    seconds since midnight, a time stamp in seconds since 1970.
+    """
     try:
         # Python reads 1_000 as a number; no instrument writes it
         return None if "_" in cell else float(cell)
     except ValueError:
-        if decimal_comma and _COMMA_DECIMAL.fullmatch(cell):
+        if _COMMA_DECIMAL.fullmatch(cell):
             return float(cell.replace(",", "."))
-        return np.nan if cell.lower() in _MISSING else None
+        if cell.lower() in MISSING:
+            return np.nan
+        return float(re.sub("[dD]", "e", cell)) if _FORTRAN.fullmatch(cell) else _seconds(cell)
+
+
+def _seconds(cell: str) -> float | None:
+    """Return a time of day or a time stamp in seconds, None where it is neither."""
+    if found := _CLOCK.fullmatch(cell):
+        return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3].replace(",", "."))
+    if not _STAMP.fullmatch(cell):
+        return None
+    try:
+        moment = datetime.fromisoformat(cell)
+    except ValueError:  # the 31st of February
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
 def detect(path: Path) -> Dialect:
@@ -101,17 +117,29 @@ def detect(path: Path) -> Dialect:
             text = line.strip()
             if count == 1 and (found := _SIGNED_DELIMITER.fullmatch(text)):
                 declared = found[1]
-            elif text.startswith("#"):
+            elif text.startswith(_REMARKS):
                 if len(lines) <= 2:
-                    comments.append((count, _readable(text.lstrip("# "))))
+                    comments.append((count, _remark(text)))
             elif text:
-                lines.append((count, _readable(line.strip("\r\n"))))
+                lines.append((count, readable(line.strip("\r\n"))))
             if len(lines) == _SAMPLE_LINES:
                 break
     if not lines:
         raise DataError(f"{path} is empty", hint="export the record again")
     delimiter = declared or _delimiter([line for _, line in lines])
-    return _with_header(path, encoding, delimiter, lines, comments)
+    remarks = _REMARKS if delimiter == ";" else (*_REMARKS, ";")
+    comments += [(count, _remark(line)) for count, line in lines if line.startswith(remarks)]
+    lines = [(count, line) for count, line in lines if not line.startswith(remarks)]
+    if not lines:
+        raise DataError(f"{path} is empty", hint="export the record again")
+    above = _above([split(line, delimiter) for _, line in lines])
+    comments += [(count, line.strip()) for count, line in lines[:above]]
+    dialect = _with_header(path, encoding, delimiter, lines[above:], sorted(comments))
+    return replace(dialect, remarks=remarks)
+
+
+def _remark(line: str) -> str:
+    return readable(line.strip().lstrip("#%/; "))
 
 
 def _encoding(path: Path) -> str:
@@ -128,7 +156,7 @@ def _encoding(path: Path) -> str:
     return "utf-8-sig"
 
 
-def _readable(line: str) -> str:
+def readable(line: str) -> str:
     """Return a line in which bytes that are not UTF-8 are read as Western Windows letters."""
     if line.isascii():
         return line
@@ -141,22 +169,43 @@ def _readable(line: str) -> str:
 
 def _delimiter(lines: list[str]) -> str | None:
     """Return the delimiter that makes the largest share of cells numbers, the first of equals."""
-    body = lines[1:] or lines  # the first line may be a header
+    # the first line may be a header, and more may stand above it
+    body = lines[len(lines) // 2 :] if len(lines) > 2 * _TABLE else lines[1:] or lines
 
     def share(delimiter: str | None) -> float:
         rows = [split(line, delimiter) for line in body]
         if max(map(len, rows)) < 2:
             return -1.0
         cells = [cell for row in rows for cell in row if cell]
-        comma = delimiter != ","
-        return (
-            float(np.mean([number(cell, decimal_comma=comma) is not None for cell in cells]))
-            if cells
-            else 0.0
-        )
+        return float(np.mean([number(cell) is not None for cell in cells])) if cells else 0.0
 
     shares = [share(delimiter) for delimiter in _DELIMITERS]
     return "," if max(shares) < 0 else _DELIMITERS[int(np.argmax(shares))]
+
+
+def _above(rows: list[list[str]]) -> int:
+    """Return how many lines stand above the table and its headings: what an instrument says about itself.
+
+    The table is the rows at the end of the sample that are of one kind, ten or more. Rows of numbers above,
+    or headings of another count, are in error, and 0 is returned.
+    """
+    kinds = [[number(cell) is None for cell in row] for row in rows]
+    width = len(rows[-1])
+    start = len(rows)
+    while (
+        start
+        and len(rows[start - 1]) == width
+        and not any(here and not last for here, last in zip(kinds[start - 1], kinds[-1], strict=True))
+    ):
+        start -= 1
+    if len(rows) - start < _TABLE or not all(any(kind) for kind in kinds[:start]):
+        return 0
+    named = width - (not rows[-1][-1])  # a delimiter at the end makes no column
+    head = start
+    while head > max(start - 2, 0) and len(kinds[head - 1]) >= named and all(kinds[head - 1][:named]):
+        head -= 1
+    misfit = 0 < head == start and len(kinds[head - 1]) > 1 and all(kinds[head - 1])
+    return 0 if misfit else head
 
 
 def _with_header(
@@ -168,10 +217,9 @@ def _with_header(
 ) -> Dialect:
     """Return the dialect, with what the lines above the first row say."""
     rows = [split(line, delimiter) for _, line in lines]
-    decimal_comma = delimiter != "," and any(
-        _COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row
-    )
-    text = [[number(cell, decimal_comma=decimal_comma) is None for cell in row] for row in rows]
+    decimal_comma = any(_COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row)
+    rate = _cut_settings(rows)
+    text = [[number(cell) is None for cell in row] for row in rows]
     heads = _heading_lines(text)
     if heads == len(rows):
         raise DataError(f"{path} is empty below its header", hint="export the record again")
@@ -199,7 +247,27 @@ def _with_header(
         comments,
         lines[heads][0],
         frozenset(k for k, is_text in enumerate(text[heads][: len(first)]) if is_text),
+        rate_Hz=rate,
     )
+
+
+def _cut_settings(rows: list[list[str]]) -> float | None:
+    """Take from the headings what is beside the columns, in place; return the rate if a step is there.
+
+    Some oscilloscopes write ``X,CH1,Start,Increment`` over ``Sequence,Volt,0.0,1e-3`` over rows ``0,1.5``.
+    """
+    if len(rows) < 3:
+        return None
+    names, units, first = rows[:3]
+    width = len(first) - (not first[-1])
+    beside = [number(cell) for cell in units[width:] if cell]
+    if not beside or None in beside or not all(number(cell) is None for cell in units[:width]):
+        return None
+    step = next(
+        (value for name, value in zip(names[width:], beside, strict=False) if name.lower() in _STEPS), None
+    )
+    rows[:2] = [names[:width], units[:width]]
+    return 1.0 / step if step else None
 
 
 def _heading_lines(text: list[list[bool]]) -> int:
@@ -223,113 +291,6 @@ def _commented_names(comments: tuple[str, ...], delimiter: str | None, count: in
     """Return names from the last comment, if it is a header (numpy writes it so), or numbers."""
     if comments:
         cells = split(comments[-1], delimiter)
-        if len(cells) == count and all(number(cell, decimal_comma=True) is None for cell in cells):
+        if len(cells) == count and all(number(cell) is None for cell in cells):
             return cells
     return [f"column{k + 1}" for k in range(count)]
-
-
-def parse(path: Path, dialect: Dialect) -> tuple[FloatArray, Rows]:
-    """Return the numbers (rows, columns) and where they are in the file; a column of text is NaN.
-
-    Raises
-    ------
-    DataError
-        A row is too short or too long, or a cell in a column of numbers is text: both are named.
-    OSError
-        The file cannot be read.
-    """
-    if not dialect.text_columns:
-        try:
-            return _load(path, dialect, careful=False)
-        except ValueError:
-            pass  # something is missing or wrong: look closer
-    return _load(path, _surveyed(path, dialect), careful=True)
-
-
-def _load(path: Path, dialect: Dialect, *, careful: bool) -> tuple[FloatArray, Rows]:
-    rows = Rows()
-    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
-        lines = _numbered(stream, dialect, rows)
-        texts = _cell_by_cell(lines, dialect) if careful else _as_they_are(lines, dialect)
-        values: FloatArray = np.loadtxt(
-            texts, delimiter="," if careful else dialect.delimiter, comments=None, quotechar='"', ndmin=2
-        )
-    return values, rows
-
-
-def _numbered(stream: Iterator[str], dialect: Dialect, rows: Rows) -> Lines:
-    """Yield the rows with their line numbers, and note where these jump."""
-    row, distance = 0, -1
-    for count, line in enumerate(islice(stream, dialect.first_line - 1, None), dialect.first_line):
-        if line.isspace() or line.lstrip().startswith("#"):
-            continue
-        if count - row != distance:
-            distance = count - row
-            rows.shifts.append((row, count))
-        row += 1
-        yield count, line
-
-
-def _as_they_are(lines: Lines, dialect: Dialect) -> Iterator[str]:
-    """Yield lines as numpy takes them; ValueError where the decimal sign changes."""
-    for _, line in lines:
-        if not dialect.decimal_comma:
-            yield line
-        elif "." in line:
-            raise ValueError(line)
-        else:
-            yield line.replace(",", ".")
-
-
-def _cell_by_cell(lines: Lines, dialect: Dialect) -> Iterator[str]:
-    """Yield lines with NaN for what is missing and for text in a column of text."""
-    for _, line in lines:
-        cells = dialect.split(line.strip("\r\n"))
-        for k, cell in enumerate(cells):
-            if k in dialect.text_columns or cell.lower() in _MISSING:
-                cells[k] = "nan"
-            elif dialect.decimal_comma:
-                cells[k] = cell.replace(",", ".")
-        yield ",".join(cells)
-
-
-def _surveyed(path: Path, dialect: Dialect) -> Dialect:
-    """Look at every cell; return the dialect with the decimal sign that the whole file uses.
-
-    Raises
-    ------
-    DataError
-        See ``parse``.
-    """
-    point = comma = ""
-    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
-        for count, line in _numbered(stream, dialect, Rows()):
-            cells = dialect.split(line.strip("\r\n"))
-            if len(cells) != len(dialect.names):
-                raise DataError(
-                    f"{path} has {len(cells)} columns in line {count}, expected {len(dialect.names)}: "
-                    f"{', '.join(dialect.names)}",
-                    hint="mend or remove that line, or export the record again",
-                )
-            for k, cell in enumerate(cells):
-                if k in dialect.text_columns:
-                    continue
-                if number(cell, decimal_comma=dialect.delimiter != ",") is None:
-                    raise DataError(
-                        f"{path} has {_place(cell, k, count, dialect)}: not a number",
-                        hint="mend or remove that line",
-                    )
-                if not point and "." in cell:
-                    point = _place(cell, k, count, dialect)
-                if not comma and "," in cell:
-                    comma = _place(cell, k, count, dialect)
-            if point and comma:
-                raise DataError(
-                    f"{path} mixes decimal signs: {point}, but {comma}",
-                    hint="export it with one decimal sign",
-                )
-    return replace(dialect, decimal_comma=bool(comma))
-
-
-def _place(cell: str, column: int, line: int, dialect: Dialect) -> str:
-    return f"{_readable(cell)!r} in column {dialect.names[column]}, line {line}"

@@ -22,6 +22,13 @@ _BARE = """
 _PREFIXES = ("da", *"YZEPTGMkhdcmunpfazyµμ")
 _SYMBOLS = frozenset(_PREFIXED.split())
 _WHOLE = frozenset(_BARE.split())
+# as oscilloscopes spell them
+_SPELLED = {
+    **dict.fromkeys(["second", "seconds", "sec"], "s"),
+    **dict.fromkeys(["volt", "volts"], "V"),
+    **dict.fromkeys(["amp", "amps", "ampere", "amperes"], "A"),
+    **dict.fromkeys(["newton", "newtons"], "N"),
+}
 _EXPONENT = re.compile(r"(?:\^|\*\*)?(?P<exponent>[-+]?\d)$|(?P<raised>[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹])$")
 _SEPARATOR = re.compile(r"\s*[*·/×]\s*|\s+|(?<=[A-Za-zΩµ])\.(?=[A-Za-zΩµ])")
 
@@ -34,6 +41,11 @@ def is_unit(text: str) -> bool:
     bare = text.replace("(", " ").replace(")", " ").strip()
     factors = _SEPARATOR.split(bare)
     return bool(bare) and all(_is_factor(factor) for factor in factors)
+
+
+def symbol_of(text: str) -> str:
+    """Return the symbol of a unit that is spelled out, any other text as it is."""
+    return _SPELLED.get(text.lower(), text)
 
 
 def _is_factor(text: str) -> bool:

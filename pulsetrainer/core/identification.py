@@ -240,12 +240,23 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
 _Fitted = tuple[FloatArray, float, int, float]  # masses, offset, iterations, relative KKT violation
 
 
-def _fit_dense(equations: NormalEquations, method: Method, smoothing: float, stiffness: float) -> _Fitted:
-    """Fit with the Gram matrix of the cells in memory."""
+def penalised(
+    equations: NormalEquations, smoothing: float, stiffness: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the centred Gram matrix (n_q, n_q) and right side (n_q,) with the penalties of a fit.
+
+    See ``core.smoothing`` for the length, ``core.congruence`` for the stiffness; 0 is none of either.
+    """
     gram, rhs = smoothed(equations, smoothing)
     if stiffness:
         centred = equations.centred()[0]
         gram += congruence.penalty(equations.plane, np.diagonal(centred).copy(), stiffness).toarray()
+    return gram, rhs
+
+
+def _fit_dense(equations: NormalEquations, method: Method, smoothing: float, stiffness: float) -> _Fitted:
+    """Fit with the Gram matrix of the cells in memory."""
+    gram, rhs = penalised(equations, smoothing, stiffness)
     if method == "joint":
         found = nnls.solve(gram, rhs)
         masses, offset, iterations = found.x, equations.offset(found.x), found.iterations

@@ -21,11 +21,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.equations import NodeSums, Record, parted_sums
-from pulsetrainer.core.identification import Identified, fits_dense
+from pulsetrainer.core.identification import Identified, fits_dense, penalised
 from pulsetrainer.core.memory import State
 from pulsetrainer.core.operator import Preisach, outputs
 from pulsetrainer.core.plane import FloatArray, IntArray
-from pulsetrainer.core.smoothing import smoothed
 from pulsetrainer.errors import ArgumentError
 
 # More blocks cost memory and time, and do not change the intervals any more.
@@ -122,7 +121,7 @@ def bootstrap(
     Parameters
     ----------
     records, fit
-        What was fitted, and the result; its smoothing and polarity are kept.
+        What was fitted, and the result; its smoothing, stiffness and polarity are kept.
     block
         Samples a block; None to read it off the residuals.
 
@@ -156,7 +155,7 @@ def bootstrap(
     for k in range(draws):
         drawn = rng.multinomial(count, np.full(count, 1.0 / count)).astype(np.float64)
         equations = stack.weighted(drawn).dense()
-        gram, rhs = smoothed(equations, fit.smoothing)
+        gram, rhs = penalised(equations, fit.smoothing, fit.congruence)
         found = nnls.solve(gram, rhs, passive=passive)
         weights[k], offsets[k] = found.x / plane.areas, sign * equations.offset(found.x)
     return Ensemble(operator, weights, offsets, length)

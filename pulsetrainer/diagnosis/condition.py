@@ -29,6 +29,18 @@ class Change(NamedTuple):
     offset_error: float
     explains: float  # share of the given model's squared error that refitted weights take away
     left: float  # rms of what gain and offset alone leave, output unit
+    shift: float  # mean of measured less predicted, output unit; the offset is that where the model is 0
+    span: float  # of the records, output unit
+
+    @property
+    def gain_matters(self) -> bool:
+        """Whether another gain alone, about the middle of the output, would put the model in question."""
+        return abs(self.gain) > 2.0 * FAR
+
+    @property
+    def shape_matters(self) -> bool:
+        """Whether what gain and offset leave would put the model in question."""
+        return self.left > FAR * self.span
 
 
 def left_by(measured: FloatArray, predicted: FloatArray, noise_rms: float) -> float:
@@ -66,6 +78,8 @@ def change(
         float(spread[1]),
         1.0 - (refitted_rms / given) ** 2,
         float(np.sqrt(np.mean(left**2))),
+        float(np.mean(measured - predicted)),
+        float(np.ptp(measured)),
     )
 
 

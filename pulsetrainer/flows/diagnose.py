@@ -251,11 +251,22 @@ def _condition(changed: condition.Change, polarity: int, first: Run) -> Cause:
         ),
         text=(
             "a Preisach model of the records' own fits them, the one given does not: the device is in "
-            "another condition (load, configuration, zero). Its output is "
-            f"{1 + changed.gain:.3f} times that of the model, shifted by {offset:.3g}"
-            f"{named}, and differs in shape by {changed.left:.2g}{named} rms; "
-            "identify it again in this condition"
+            f"another condition (load, configuration, zero). {_difference(changed, polarity, named)}"
         ),
+    )
+
+
+def _difference(changed: condition.Change, polarity: int, named: str) -> str:
+    """Say how the output differs from the model's: what is within 1 % of the span is unchanged."""
+    shift = f"shifted by {polarity * changed.shift:.2g}{named} on average"
+    if not changed.gain_matters and not changed.shape_matters:
+        return (
+            f"Its output is {shift}; gain and shape are unchanged ({100.0 * changed.gain:+.1f} %, "
+            f"{changed.left:.2g}{named} rms); set the zero again before each use, or identify it again"
+        )
+    return (
+        f"Its output is {shift}, {1.0 + changed.gain:.3f} times that of the model, and differs in shape by "
+        f"{changed.left:.2g}{named} rms; identify it again in this condition"
     )
 
 

@@ -241,8 +241,9 @@ def _check_range(paths: Sequence[Path], low: float, high: float, unit: str) -> N
     """Raise DataError when the input does not move."""
     if not high > low:
         names = ", ".join(str(path) for path in paths)
+        value = f"{low:g} {shown_unit(unit)}".rstrip()
         raise DataError(
-            f"the input of {names} does not move: it is {low:g} {unit} in all samples",
+            f"the input of {names} does not move: it is {value} in all samples",
             hint="record a run that sweeps the range: pulsetrainer capture identification -o run.h5",
         )
 

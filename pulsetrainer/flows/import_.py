@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pulsetrainer.artefacts import provenance, store, table, table_run
+from pulsetrainer.artefacts import provenance, store, table_run
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.equations import Record
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.flows import preflight
-from pulsetrainer.flows.show import facts
+from pulsetrainer.flows.show import run_facts
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts.kinds import Run
@@ -104,19 +104,12 @@ def run(options: Options, context: Context) -> Result:
     resampled = options.resample is not None
     preflight.check_timing(options.time_column, options.rate_Hz, no_time=options.no_time, resampled=resampled)
     preflight.check_files(outputs=groups, force=options.force, others=options.files)
-    read: list[tuple[Path, tuple[Path, ...], Run, Run]] = []
+    read: list[tuple[Path, tuple[Path, ...], Report, Run]] = []
     for k, (target, files) in enumerate(groups.items()):
-        parts = [_read(path, options, context) for path in files]
-        whole = parts[0] if len(parts) == 1 else table_run.joined(parts, context.note)
-        kept = whole
-        if options.resample is not None:
-            evened = [table_run.resampled(part, options.resample or None) for part in parts]
-            kept = evened[0] if len(evened) == 1 else table_run.joined(evened)
-        read.append((target, files, whole, kept))
+        read.append((target, files, *_read_group(files, options, context)))
         context.progress(0.7 * (k + 1) / len(groups))
     written = []
-    for target, files, whole, kept in read:
-        report = report_of(whole, files, resampled=options.resample is not None)
+    for target, files, report, kept in read:
         _note_time(report, context)
         _store(target, files, kept, options, context)
         written.append(Imported(target, report, _facts(kept, report)))
@@ -124,9 +117,21 @@ def run(options: Options, context: Context) -> Result:
     return Result(written[0].output, written[0].facts, tuple(written))
 
 
+def _read_group(files: Sequence[Path], options: Options, context: Context) -> tuple[Report, Run]:
+    """Return what the files of one run hold, and the run that is kept: no other copy stays in memory."""
+    parts = [_read(path, options, context) for path in files]
+    whole = parts[0] if len(parts) == 1 else table_run.joined(parts, context.note)
+    report = report_of(whole, files, resampled=options.resample is not None)
+    if options.resample is None:
+        return report, whole
+    del whole
+    evened = [table_run.resampled(part, options.resample or None) for part in parts]
+    return report, evened[0] if len(evened) == 1 else table_run.joined(evened)
+
+
 def _read(path: Path, options: Options, context: Context) -> Run:
-    return table_run.run_from_table(
-        table.read_table(path),
+    return table_run.read_run(
+        path,
         input_column=options.input_column,
         output_column=options.output_column,
         time_column=options.time_column,
@@ -207,8 +212,7 @@ def _note_time(report: Report, context: Context) -> None:
 
 def _facts(whole: Run, report: Report) -> dict[str, Any]:
     """Return the main figures in the order in which a person would ask."""
-    shown = facts(replace(whole, signal=", ".join(Path(name).name for name in report.files)))
-    shown["reversals"] = report.reversals
+    shown = run_facts(whole, report.reversals)
     unit = "" if report.input_unit == "1" else f" {report.input_unit}"
     if report.false_reversals:
         shown["noise in the input"] = (

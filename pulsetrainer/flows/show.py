@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pulsetrainer.artefacts import store
+from pulsetrainer.artefacts import store, table_run
 from pulsetrainer.artefacts.kinds import Diagnosis, Evaluation, Model, Parameter, Playback, Run, Waveform
 from pulsetrainer.artefacts.provenance import Header
 from pulsetrainer.core.memory import turning_points
@@ -55,7 +55,7 @@ def run(options: Options, context: Context) -> Result:
 def facts(artefact: Any) -> dict[str, Any]:
     """Return the main figures of an artefact."""
     summaries: dict[type, Callable[[Any], dict[str, Any]]] = {
-        Run: _run,
+        Run: run_facts,
         Model: _model,
         Waveform: _waveform,
         Playback: _playback,
@@ -81,23 +81,30 @@ def shown(unit: str) -> str:
 def _span(values: FloatArray, unit: str) -> str:
     if values.size == 0:
         return "no samples"
-    return f"{np.min(values):.4g} .. {np.max(values):.4g} {shown(unit)}".rstrip()
+    low, high = float(np.min(values)), float(np.max(values))
+    # a small swing about a large value needs more digits than four to be seen
+    share = (high - low) / max(abs(low), abs(high)) if high > low else 1.0
+    digits = min(4 + max(0, int(-np.log10(share))), 12)
+    return f"{low:.{digits}g} .. {high:.{digits}g} {shown(unit)}".rstrip()
 
 
-def _run(run: Run) -> dict[str, Any]:
-    timed = run.time_s is not None and run.time_s.size > 1
-    steps = np.diff(run.time_s) if run.time_s is not None and timed else np.zeros(0)
+def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
+    """Return the main figures of a run; its ``reversals`` are counted unless they are given."""
+    steps = table_run.steps_of(run.time_s) if run.time_s is not None and run.time_s.size > 1 else None
+    if reversals is None:
+        turns = turning_points(run.input if run.reference is None else run.reference)
+        reversals = max(turns.size - 1, 0)
     parts = len(run.parts())
     return {
         "signal": run.signal,
         "samples": run.input.size,
-        "seconds": float(run.time_s[-1] - run.time_s[0]) if run.time_s is not None and timed else None,
-        "rate_Hz": float(1.0 / np.median(steps)) if timed else None,
-        "gaps": int(np.sum(steps > 1.5 * np.median(steps))) - (parts - 1) if timed else None,
+        "seconds": float(run.time_s[-1] - run.time_s[0]) if run.time_s is not None and steps else None,
+        "rate_Hz": 1.0 / steps.median if steps else None,
+        "gaps": steps.gaps - (parts - 1) if steps else None,
         **({"parts": parts} if parts > 1 else {}),
         f"input ({run.input_quantity})": _span(run.input, run.input_unit),
         f"output ({run.output_quantity})": _span(run.output, run.output_unit),
-        "reversals": max(turning_points(run.input if run.reference is None else run.reference).size - 1, 0),
+        "reversals": reversals,
         "complete": run.complete,
         "dropped_samples": run.dropped_samples,
     }

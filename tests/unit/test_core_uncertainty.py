@@ -108,6 +108,29 @@ def test_masked_samples_are_in_no_block():
     assert np.all(np.isfinite(ensemble.weights))
 
 
+def test_a_stiff_density_stays_stiff():
+    """A force that follows the velocity gets a density alike along the diagonal; so do all of its refits."""
+    rng = np.random.default_rng(8)
+    time = np.arange(4000) / 4000
+    path = np.sin(40 * time) * (0.6 + 0.4 * np.sin(7 * time))
+    force = path + np.tanh(3.0 * np.gradient(path, time) / 40) + 0.05 * rng.normal(size=path.size)
+    record = Record(path, force)
+    fit = identify([record], PLANE, smoothing="auto", polarity=1)
+    ensemble = uncertainty.bootstrap([record], fit, rng=rng, draws=20)
+    i, j = PLANE.cell_indices
+
+    def change_along_the_diagonal(weights):
+        density = np.zeros((N_H, N_H))
+        density[i, j] = weights
+        return np.abs(density[1:, 1:] - density[:-1, :-1]).max() / weights.max()
+
+    own = change_along_the_diagonal(fit.operator.weights)
+    refits = [change_along_the_diagonal(weights) for weights in ensemble.weights]
+    print(f"stiffness {fit.congruence:g}: {own:.3f} in the fit, {max(refits):.3f} in the refits at most")
+    assert fit.congruence > 0
+    assert max(refits) < 0.1  # of its largest value; refits without the penalty come to 1
+
+
 def test_bad_requests_are_named(monkeypatch):
     """Draws, block length, level, and planes that do not fit."""
     record = Record(INPUT, CLEAN)

@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pulsetrainer.artefacts.table import read_table, write_table
-from pulsetrainer.artefacts.table_run import run_from_table
+from pulsetrainer.artefacts.table_rows import PIECE, parse
+from pulsetrainer.artefacts.table_run import read_run
+from pulsetrainer.artefacts.table_text import detect
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -27,6 +29,11 @@ def table(tmp_path):
         return read_table(path)
 
     return read
+
+
+def _numbers(read):
+    """Return all columns side by side."""
+    return np.column_stack(list(read.columns.values()))
 
 
 def _refused(table, text, *words):
@@ -61,7 +68,10 @@ def test_every_dialect_reads_to_the_same_numbers(data, tmp_path_factory):
     path = tmp_path_factory.mktemp("dialect") / "t.csv"
     path.write_bytes(text.encode(data.draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))))
     read = read_table(path)
-    np.testing.assert_array_equal(read.values, rows)
+    np.testing.assert_array_equal(_numbers(read), rows)
+    pieces = parse(path, detect(path), piece=data.draw(st.integers(1, 60)))
+    np.testing.assert_array_equal(np.column_stack(pieces.columns), rows)
+    assert pieces.shifts == read.shifts
     assert read.names == tuple(names or [f"column{k + 1}" for k in range(width)])
     for row, line in enumerate(written):
         assert text.splitlines()[read.line_of(row) - 1] == line
@@ -145,7 +155,73 @@ def test_habits_of_programs(table, text):
     """A declared delimiter, a header in a comment, delimiters at line ends, quotes, blanks."""
     read = table(text)
     assert read.names == ("t", "u")
-    np.testing.assert_array_equal(read.values, [[0, 1.5], [1, 2.5]])
+    np.testing.assert_array_equal(_numbers(read), [[0, 1.5], [1, 2.5]])
+
+
+_ROWS = [(k / 100, k % 7 / 2, k % 5 / 4) for k in range(12)]
+_POINT = "".join("%.2f,%.1f,%.2f\n" % row for row in _ROWS)  # noqa: UP031 - as an instrument does
+_TABS = _POINT.replace(",", "\t").replace(".", ",")
+
+
+@pytest.mark.parametrize(
+    ("text", "names", "units"),
+    [
+        (
+            "Model,MSO24\n\nSample Interval,0.01\nLabels,,\nTIME,CH1,CH2\n" + _POINT,
+            ("TIME", "CH1", "CH2"),
+            {},
+        ),
+        ("Time,A,B\n(s),(V),(mV)\n\n" + _POINT, ("Time", "A", "B"), {"Time": "s", "A": "V", "B": "mV"}),
+        ("Measurement\t\nSign\t,\n***End***\t\n\t\nX\tU\tF\n" + _TABS, ("X", "U", "F"), {}),
+        ("% t u y\n" + _POINT.replace(",", " "), ("t", "u", "y"), {}),
+        ("// rig 7\n// by me\nt,u,y\n" + _POINT, ("t", "u", "y"), {}),
+        ("; generator 0.5\n; 2 channels\nt,u,y\n" + _POINT, ("t", "u", "y"), {}),
+        ("t|u|y\n" + _POINT.replace(",", "|"), ("t", "u", "y"), {}),
+        ('t,u,y\n"0,00","0,0","0,00"\n' + '"0,01","0,5","0,25"\n', ("t", "u", "y"), {}),
+        (_POINT.replace(",", "D+00  ").replace("\n", "d0\n"), ("column1", "column2", "column3"), {}),
+    ],
+)
+def test_habits_of_instruments(table, text, names, units):
+    """Words above the table, remarks of any sign, bars, commas in quotes, the exponents of Fortran."""
+    read = table(text)
+    assert read.names == names
+    assert read.units == units
+    np.testing.assert_array_equal(_numbers(read), _ROWS[: read.rows])
+    assert read.rows in (2, 12)
+    assert text.splitlines()[read.line_of(read.rows - 1) - 1] == text.splitlines()[-1]
+
+
+@pytest.mark.parametrize("end", ["", ","])
+def test_an_oscilloscope_that_writes_its_step_beside_the_names(table, end):
+    """The rows are counted; the increment gives them their time."""
+    rows = "".join(f"{k},{k % 7},{k % 5}{end}\n" for k in range(20))
+    read = table(f"X,CH1,CH2,Start,Increment{end}\nSequence,Volt,Volt,-1.0,2.0e-3\n{rows}")
+    assert read.names == ("X", "CH1", "CH2")
+    assert read.unit("CH1") == "V"
+    run = read_run(read.path, input_column="CH1", output_column="CH2")
+    np.testing.assert_allclose(run.time_s, 2e-3 * np.arange(20), rtol=1e-12)
+
+
+def test_a_header_of_another_count_is_still_an_error(table):
+    """However many rows follow."""
+    _refused(table, "t,u\n" + _POINT, "2 column names", "3 columns in line 2")
+    _refused(table, "t,u,y\n" + 3 * "1,2\n" + _POINT, "3 column names", "2 columns in line 2")
+
+
+@pytest.mark.parametrize(
+    ("cells", "seconds"),
+    [
+        (("12:00:01", "12:00:02.25"), (43201, 43202.25)),
+        (("2024-05-01T12:00:00", "2024-05-01 12:00:00.5"), (1714564800, 1714564800.5)),
+        (("2024-05-01T14:00:00+02:00", "2024-05-01T12:00:00,5Z"), (1714564800, 1714564800.5)),
+    ],
+)
+def test_times_of_day_and_time_stamps_are_seconds(table, cells, seconds):
+    """Loggers write them; a decimal comma elsewhere is no second decimal sign."""
+    path = table(f"when;u;y\n{cells[0]};0,5;1\n{cells[1]};1,5;1\n").path
+    np.testing.assert_array_equal(read_run(path, **COLUMNS).time_s, seconds)
+    read = table("when;u;y\n2024-02-30T12:00:00;1;2\n25;1;2\n")
+    assert read.text_names == {"when"}
 
 
 def test_comments_are_those_above_the_first_row(table):
@@ -163,12 +239,12 @@ def test_letters_of_old_programs(table):
 def test_a_single_column(table):
     """One column is a table too, with or without a name."""
     assert table("u\n1\n2\n").names == ("u",)
-    np.testing.assert_array_equal(table("1.5\n2.5\n").values, [[1.5], [2.5]])
+    np.testing.assert_array_equal(_numbers(table("1.5\n2.5\n")), [[1.5], [2.5]])
 
 
 def test_columns_of_text_are_passed_over(table):
-    """A column of time stamps does not spoil the others; asking for it says what it is."""
-    read = table("when,u,y\n12:00:01,1,2\n12:00:02,,4\n")
+    """A column of words does not spoil the others; asking for it says what it is."""
+    read = table("when,u,y\nnoon,1,2\nlater,,4\n")
     np.testing.assert_array_equal(read.column("y"), [2, 4])
     np.testing.assert_array_equal(read.column("u"), [1, np.nan])
     with pytest.raises(DataError, match="has text, not numbers, in column when, as in line 2"):
@@ -183,7 +259,7 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
     with pytest.raises(DataError, match=r"nan in column u, line 5 \(1 of 3 rows"):
         read.check_finite("u")
     with pytest.raises(DataError, match="line 5"):
-        run_from_table(read, **COLUMNS)
+        read_run(read.path, **COLUMNS)
 
 
 @pytest.mark.parametrize(
@@ -253,9 +329,44 @@ def test_whatever_the_bytes_it_is_a_table_or_a_data_error(lines, raw, tmp_path_f
     except DataError as error:
         said = (str(path) in error.message, bool(error.hint))
     else:
-        assert read.values.shape[1] == len(read.names)
-        said = (all(read.line_of(row) >= 1 for row in range(len(read.values))),)
+        assert tuple(read.columns) == read.names
+        said = (all(read.line_of(row) >= 1 for row in range(read.rows)),)
     assert all(said)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    cells=st.lists(
+        st.tuples(st.sampled_from(["0", "1.5", "2,5", "7", "x", "", "1;2", "# c", " "]), st.integers(0, 9)),
+        min_size=1,
+        max_size=12,
+    ),
+    piece=st.integers(1, 40),
+)
+def test_pieces_change_nothing(cells, piece, tmp_path_factory):
+    """Whatever the file and wherever it is cut: the same numbers and lines, or the same words of refusal."""
+    path = tmp_path_factory.mktemp("pieces") / "t.csv"
+    path.write_text("t;u\n0;1\n" + "".join(f"{k};{cell}\n" for cell, k in cells))
+
+    def outcome(**size):
+        try:
+            rows = parse(path, detect(path), **size)
+        except DataError as error:
+            return error.message
+        return [column.tolist() for column in rows.columns], rows.shifts
+
+    assert repr(outcome(piece=piece)) == repr(outcome())
+
+
+def test_only_what_is_kept_stays(tmp_path):
+    """Columns that nobody asked for are not kept, and may hold a remark; the others may not."""
+    path = tmp_path / "t.csv"
+    path.write_text("a,b,c\n1,2,3\n4,5,6\n")
+    assert list(read_table(path, lambda head: {head.index("c"), 0}).columns) == ["a", "c"]
+    path.write_text("a,b,c\n1,2,3\n4,x,6\n")
+    np.testing.assert_array_equal(read_table(path, lambda _: {0}).column("a"), [1, 4])
+    with pytest.raises(DataError, match="'x' in column b, line 3"):
+        read_table(path, lambda _: {1})
 
 
 # --- runs -------------------------------------------------------------------------------------------
@@ -263,8 +374,8 @@ def test_whatever_the_bytes_it_is_a_table_or_a_data_error(lines, raw, tmp_path_f
 
 def test_a_run_with_units_of_any_bench(table):
     """Names, units and quantities come from the header; time in ms becomes seconds."""
-    run = run_from_table(
-        table("time [ms],H (A/m),B (T),set (A/m)\n0,1,2,1.1\n2,3,4,3.1\n"),
+    run = read_run(
+        table("time [ms],H (A/m),B (T),set (A/m)\n0,1,2,1.1\n2,3,4,3.1\n").path,
         input_column="H",
         output_column="B",
         reference_column="set",
@@ -279,24 +390,24 @@ def test_a_run_with_units_of_any_bench(table):
 def test_units_given_win(table):
     """What the user says about units is right; without any the unit is 1."""
     read = table("t,u_V,y\n0,1,2\n1,2,3\n")
-    run = run_from_table(read, **COLUMNS, input_unit="mV")
+    run = read_run(read.path, **COLUMNS, input_unit="mV")
     assert (run.input_unit, run.output_unit) == ("mV", "1")
 
 
 def test_a_rate_instead_of_a_time(table):
     """Samples a second; both a rate and a time column are too much, a rate of nothing too little."""
     read = table("t,u,y\n9,1,2\n8,2,3\n")
-    np.testing.assert_array_equal(run_from_table(read, **COLUMNS, rate_Hz=4).time_s, [0, 0.25])
+    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, rate_Hz=4).time_s, [0, 0.25])
     for bad in ({"rate_Hz": 4, "time_column": "t"}, {"rate_Hz": 0}, {"rate_Hz": np.nan}, {"rate_Hz": np.inf}):
         with pytest.raises(UsageError, match="rate"):
-            run_from_table(read, **COLUMNS, **bad)
+            read_run(read.path, **COLUMNS, **bad)
 
 
 def test_without_time_only_the_order_counts(table):
     """Where the first column is the input there is no time; another column may be named."""
     read = table("u,y,t\n1,2,0\n2,3,1\n")
-    assert run_from_table(read, **COLUMNS).time_s is None
-    np.testing.assert_array_equal(run_from_table(read, **COLUMNS, time_column="t").time_s, [0, 1])
+    assert read_run(read.path, **COLUMNS).time_s is None
+    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, time_column="t").time_s, [0, 1])
 
 
 def test_time_that_does_not_increase_names_the_line(table):
@@ -305,26 +416,51 @@ def test_time_that_does_not_increase_names_the_line(table):
         with pytest.raises(
             DataError, match=rf"t\.csv, column t, does not increase at line 6: {stamp} s after 1 s"
         ):
-            run_from_table(table(f"# c\nt,u,y\n0,1,2\n1,1,2\n\n{stamp},1,2\n"), **COLUMNS)
+            read_run(table(f"# c\nt,u,y\n0,1,2\n1,1,2\n\n{stamp},1,2\n").path, **COLUMNS)
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("1e6;0,5;abc", "'abc' in column y, line {line}: not a number"),
+        ("1e6;0,5", "2 columns in line {line}, expected 3"),
+        ("1e6;0.5;1", "mixes decimal signs: '0.5' in column u, line {line}, but '0,5' in column u, line 2"),
+        ("{last};0,5;1", "does not increase at line {line}"),
+        ("3;0,5;1", "does not increase at line {line}"),
+        ("1e6;;1", "nan in column u, line {line}"),
+        ("1e6;inf;1", "inf in column u, line {line}"),
+    ],
+)
+def test_what_is_wrong_far_from_the_start_is_named(tmp_path, row, said):
+    """The same promises in a later piece, behind comments and blank lines."""
+    rows = PIECE // 9
+    good = "".join(f"{k};0,5;1\n" for k in range(rows))
+    assert len(good) > 1.3 * PIECE
+    (tmp_path / "t.csv").write_text(
+        f"t;u;y\n{good}\n# pause\n{row.format(last=rows - 1)}\n2e6;0,5;1\n", encoding="utf-8"
+    )
+    with pytest.raises(DataError) as caught:
+        read_run(tmp_path / "t.csv", **COLUMNS)
+    assert said.format(line=rows + 4) in caught.value.message
 
 
 def test_time_in_an_unknown_unit(table):
     """Samples are no time."""
     with pytest.raises(DataError, match="time t in 'samples'"):
-        run_from_table(table("t (samples),u,y\n0,1,2\n1,2,3\n"), **COLUMNS, time_column="t")
+        read_run(table("t (samples),u,y\n0,1,2\n1,2,3\n").path, **COLUMNS, time_column="t")
 
 
 def test_one_row_is_no_run(table):
     """A run needs two samples."""
     with pytest.raises(DataError, match="has 1 row"):
-        run_from_table(table("t,u,y\n0,1,2\n"), **COLUMNS)
+        read_run(table("t,u,y\n0,1,2\n").path, **COLUMNS)
 
 
 @pytest.mark.parametrize(("name", "rows"), [("bh_ferrite_mnzn_1.csv", 129), ("bh_steel_m130_27s_1.csv", 256)])
 def test_measured_records(name, rows):
     """Real records read whole: their first and last rows are those of the file."""
     read, units = read_table(DATA / name), {"input_unit": "A/m", "output_unit": "T"}
-    run = run_from_table(read, **COLUMNS, **units, time_column="t_s")
+    run = read_run(read.path, **COLUMNS, **units, time_column="t_s")
     lines = (DATA / name).read_text().splitlines()
     assert len(run.input) == rows == len(lines) - 1
     for k in (0, -1):
