@@ -166,7 +166,7 @@ def fitted_contrast(
             return None
         change = float(np.sum(slope * left)) / squares
         if number == 0:
-            p_value = _permuted(slope, left, kind, rng)
+            p_value = permuted(slope, left, kind, rng)
         each = np.sum((left - change * slope) * slope, axis=1)
         free = max(kind.size - np.unique(kind).size, 1)
         error = float(np.sqrt(np.sum(each**2) * kind.size / free)) / squares
@@ -189,7 +189,7 @@ def _movable(loops: Sequence[Loop], fitted: Fitted) -> FloatArray:
     return np.asarray(linalg.orth(matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)))
 
 
-def _permuted(slope: FloatArray, left: FloatArray, kind: IntArray, rng: np.random.Generator) -> float:
+def permuted(slope: FloatArray, left: FloatArray, kind: IntArray, rng: np.random.Generator) -> float:
     """Probability that exchanged loops follow the cause as well."""
     overlap = slope @ left.T  # (loops, loops)
     same = [np.flatnonzero(kind == k) for k in np.unique(kind)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from pulsetrainer.core import signals
 from pulsetrainer.core.operator import Preisach
@@ -181,6 +182,35 @@ def test_wild_samples_side_by_side_are_found():
     at = np.concatenate([k + np.arange(2) for k in range(500, 20_000, 1500)])
     y[at] += 3.0
     np.testing.assert_array_equal(np.flatnonzero(_fired(_record(y, u))["outliers"].mask), at)
+
+
+def test_the_tip_of_a_stroke_that_ends_with_a_jump_is_not_wild():
+    """A viscous force jumps when the input turns: a stroke's last sample is alone there, but on its line."""
+    rng = np.random.default_rng(5)
+    u = signals.diagnostic(0.0, 1.5, rate_Hz=1 / DT).value[:30_000]
+    rate = np.diff(u, prepend=u[0]) / DT
+    y = np.round(8 * u + 0.04 * rate + 0.03 * rng.standard_normal(u.size), 3)
+    apart = np.abs(y - ndimage.median_filter(y, 7))  # the naive rule alone would name some of these
+    assert apart.max() > 4.0 * np.quantile(np.abs(np.diff(y)), 0.95)
+    assert "outliers" not in _fired(_record(y, u))
+    wild = np.arange(500, 30_000, 2500)
+    y[wild] += 4.0
+    np.testing.assert_array_equal(np.flatnonzero(_fired(_record(y, u))["outliers"].mask), wild)
+
+
+def test_a_delay_keeps_the_tips_that_the_memory_remembers():
+    """Whole samples late it is a copy; in between it errs far less than an interpolated input would."""
+    fine = signals.diagnostic(0.0, 1.5, rate_Hz=10_000.0).value[:80_000]
+    operator = _operator()
+    truth, u = operator(fine), fine[::10]
+    late = Extended.of(operator, [("delay", (0.005,))])(u, DT)
+    np.testing.assert_allclose(late[5:], operator(u)[:-5], atol=1e-12)
+    late = Extended.of(operator, [("delay", (0.0035,))])(u, DT)
+    t = np.arange(u.size) * DT
+    naive = operator(np.interp(t - 0.0035, t, u))
+    exact = np.interp(t - 0.0035, np.arange(fine.size) * 1e-4, truth)
+    ours = np.sqrt(np.mean((late - exact) ** 2))
+    assert ours < 0.25 * np.sqrt(np.mean((naive - exact) ** 2))
 
 
 def test_what_an_input_out_of_range_leaves_in_the_memory_is_left_out():

@@ -1,0 +1,133 @@
+"""Equal minor loops: no static weights make them differ, a feedback of the output does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pulsetrainer.core import signals
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.diagnosis import congruency
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.design import Measured
+from pulsetrainer.diagnosis.extended import Extended, Term
+from pulsetrainer.diagnosis.fitting import refit, weights_for
+from pulsetrainer.diagnosis.problem import problem_for
+
+DT = 1e-3
+HIGH = 1.5
+LOAD = library()["load-dependence"]
+INPUT = signals.diagnostic(0.0, HIGH, rate_Hz=1 / DT).value
+
+
+def _operator(n_h: int, weights: np.ndarray | None = None) -> Preisach:
+    """A density that is largest at small inputs, as of a solenoid: 14 N in all."""
+    plane = Plane.uniform(0.0, HIGH, n_h)
+    i, j = plane.cell_indices
+    if weights is None:
+        weights = np.exp(-(((i / n_h - 0.35) / 0.2) ** 2) - ((j / n_h - 0.22) / 0.15) ** 2) + 0.02
+    total = float((weights * plane.areas).sum())
+    return Preisach(plane, weights * 7.0 / total, 7.0)
+
+
+def _measured(k: float, noise: float, seed: int) -> Measured:
+    model = Extended.of(_operator(90), [("load-dependence", (k,))] if k else [])
+    y = model(INPUT, DT) + noise * np.random.default_rng(seed).standard_normal(INPUT.size)
+    return Measured(DT, INPUT, y, np.ones(INPUT.size))
+
+
+def _contrast(k: float, noise: float, seed: int) -> congruency.Contrast:
+    problem = problem_for([_measured(k, noise, seed)], 0.0, HIGH)
+    fitted = weights_for(problem, (), None)
+    found = congruency.fitted_contrast(problem, fitted, LOAD, np.random.default_rng(seed))
+    assert found is not None
+    return found
+
+
+def test_the_diagnostic_signal_has_equal_loops_from_unequal_histories():
+    """Ten of each of four kinds, each kind at two outputs that differ; every loop closes."""
+    record = _measured(0.0, 0.0, 0)
+    loops = congruency.loops_of([record], 0.0, HIGH)
+    for loop in loops:
+        assert INPUT[loop.begin] == pytest.approx(INPUT[loop.end], abs=0.02)
+        assert INPUT[loop.turn] < INPUT[loop.begin] - 0.05
+    kinds = [[loop for loop in loops if loop.kind == k] for k in {loop.kind for loop in loops}]
+    biased = [k for k in kinds if len(k) == 10]
+    assert len(biased) == 4
+    for kind in biased:
+        level = [record.output[loop.begin : loop.end].mean() for loop in kind]
+        assert np.ptp(level) > 0.05 * np.ptp(record.output)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(4, 20))
+def test_no_weights_make_equal_loops_differ(seed, n_h):
+    """Congruency: the contrasts of any Preisach operator's output are zero."""
+    rng = np.random.default_rng(seed)
+    weights = rng.exponential(size=n_h * (n_h + 1) // 2) ** 3
+    bottom, top = 0.3, 0.9
+    turns = (0.0, bottom, *(top, bottom) * 4, HIGH, bottom, *(top, bottom) * 4, 0.0)
+    u = signals.through(
+        np.asarray(turns), 6.0, 1 / DT
+    )  # a hundred samples a stroke: loops equal to the sample
+    output = _operator(n_h, weights)(u)
+    loops = congruency.loops_of([Measured(DT, u, output, np.ones(u.size))], 0.0, HIGH)
+    assert len(loops) == 6
+    assert np.ptp([output[loop.begin] for loop in loops]) > 0 or n_h < 6
+    assert np.abs(congruency.contrasts(loops, [output])).max() < 1e-9 * np.ptp(output)
+
+
+@pytest.mark.parametrize("k", [0.008, -0.008])
+def test_a_feedback_of_the_output_is_measured(k):
+    """Found beyond doubt, its strength within three standard errors or a tenth."""
+    found = _contrast(k, 0.02, 5)
+    assert found.p_value < 0.002
+    assert abs(found.value - k) < max(3.0 * found.error, 0.1 * abs(k))
+
+
+def test_the_weights_swallow_it_on_the_whole_record():
+    """Why the contrasts are needed: refitted weights leave next to nothing of it."""
+    static, fed_back = (
+        weights_for(problem_for([_measured(k, 0.0, 0)], 0.0, HIGH), (), None) for k in (0.0, 0.008)
+    )
+    span = 14.0
+    rms = [np.sqrt(np.mean(f.residual**2)) / span for f in (static, fed_back)]
+    difference = np.abs(_measured(0.008, 0.0, 0).output - _measured(0.0, 0.0, 0).output).max() / span
+    assert difference > 0.05
+    assert np.sqrt(max(rms[1] ** 2 - rms[0] ** 2, 0.0)) < 0.02 * difference
+
+
+def test_the_permutations_are_exact():
+    """Under the null p is uniform: as many values fall below a twentieth as should, within chance."""
+    rng = np.random.default_rng(20260107)
+    kind = np.repeat([0, 1, 2], 6)
+    slope = rng.standard_normal((18, 8))
+    p = [congruency.permuted(slope, rng.standard_normal((18, 8)), kind, rng) for _ in range(100)]
+    assert 1 <= np.sum(np.asarray(p) <= 0.05) <= 13
+    assert 0.4 < np.median(p) < 0.6
+
+
+def test_what_another_cause_may_still_change_is_taken_off():
+    """A lag in the model whose constant is known within some error must not pass for a feedback."""
+    model = Extended.of(_operator(90), [("output-lag", (0.01,))])
+    y = model(INPUT, DT) + 0.02 * np.random.default_rng(3).standard_normal(INPUT.size)
+    problem = problem_for([Measured(DT, INPUT, y, np.ones(INPUT.size))], 0.0, HIGH)
+    fitted = refit(problem, (Term(library()["output-lag"], (0.008,)),), None)
+    wrong = weights_for(problem, (Term(fitted.terms[0].cause, (0.0095,)),), fitted)
+    found = congruency.fitted_contrast(problem, wrong, LOAD, np.random.default_rng(3))
+    assert found is not None
+    assert found.p_value > 0.01
+
+
+@given(st.floats(-0.02, 0.05), st.floats(0.1, 3.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_the_seen_input_stays_in_its_range(k, rise, x, z):
+    """Both ends of the input are themselves again, whatever k; between them nothing leaves the range."""
+    frame = Frame(DT, INPUT, rise, HIGH, low=0.2, ends=(1.0, 1.0 + rise))
+    u = 0.2 + HIGH * np.asarray([0.0, x, 1.0])
+    y = 1.0 + rise * np.asarray([0.0, z, 1.0])
+    seen = LOAD.on_input(u, y, (k,), frame)
+    assert seen[[0, 2]] == pytest.approx([0.2, 0.2 + HIGH])
+    assert 0.2 - 1e-9 <= LOAD.on_input(u, 1.0 + rise * (u - 0.2) / HIGH, (k,), frame)[1] <= 0.2 + HIGH + 1e-9
