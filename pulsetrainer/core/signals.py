@@ -118,9 +118,9 @@ _HOLD_S = (1.2, 1.2, 2.4, 1.2, 1.2, 2.4, 1.2, 6.0, 6.0, 0.8)
 # Equal minor loops, each from two histories: wide enough that a shift of the input shows in their shape.
 _BIASES = (0.1, 0.22, 0.34, 0.46)
 _LOOP_WIDTH = 0.2
-_LOOP_CYCLES = 3
+_LOOP_CYCLES = 4
 _BIAS_BLOCKS = (3, 7)
-_BIAS_RATE = 3.0
+_BIAS_RATE = 4.0  # 50 samples each way at 1 kHz: a whole number, so that the loops are equal to the sample
 _LOOP_RATE = 2.0  # of the reference loops and of the way to a hold
 
 

@@ -31,6 +31,7 @@ from pulsetrainer.diagnosis.rivals import alike, rivals
 from pulsetrainer.diagnosis.screening import Score, Screen, screen
 
 P_MAX = 0.01
+_CONTRAST_P_MAX = 0.005  # the second of two tests: together they alarm in one or two of a hundred
 HELD_OUT_MIN = 0.05  # of the reducible part
 MOST = 5
 LINEARISED = 0.5  # of what a refit gains: less than that a linearised score hardly shows
@@ -185,11 +186,14 @@ class _Search:
             return current, sure
         for cause in (c for c in library().values() if c.by_contrast and c.id not in current.names):
             held = congruency.fitted_contrast(self.problem, current, cause, self.rng)
-            if held is None or held.p_value > P_MAX:
+            if held is None or held.p_value > _CONTRAST_P_MAX or held.at_bound:
                 continue
-            extended = in_order((*current.terms, Term(cause, (held.value,))))
+            terms = in_order((*current.terms, Term(cause, (held.value,))))
+            extended = weights_for(self.problem, terms, current, rebuild=True)
+            if extended.squares - current.squares > self.floor.relevant:
+                continue  # what the loops say the rest of the record denies
             without[cause.id], p_values[cause.id] = current, held.p_value
-            current = weights_for(self.problem, extended, current, rebuild=True)
+            current = extended
             sure[cause.id] = (held.estimate(cause),)
         return current, sure
 

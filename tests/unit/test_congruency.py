@@ -49,14 +49,14 @@ def _contrast(k: float, noise: float, seed: int) -> congruency.Contrast:
 
 
 def test_the_diagnostic_signal_has_equal_loops_from_unequal_histories():
-    """Ten of each of four kinds, each kind at two outputs that differ; every loop closes."""
+    """Fourteen of each of four kinds, each kind at two outputs that differ; every loop closes."""
     record = _measured(0.0, 0.0, 0)
     loops = congruency.loops_of([record], 0.0, HIGH)
     for loop in loops:
         assert INPUT[loop.begin] == pytest.approx(INPUT[loop.end], abs=0.02)
         assert INPUT[loop.turn] < INPUT[loop.begin] - 0.05
     kinds = [[loop for loop in loops if loop.kind == k] for k in {loop.kind for loop in loops}]
-    biased = [k for k in kinds if len(k) == 10]
+    biased = [k for k in kinds if len(k) == 14]
     assert len(biased) == 4
     for kind in biased:
         level = [record.output[loop.begin : loop.end].mean() for loop in kind]
