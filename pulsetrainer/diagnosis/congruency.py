@@ -36,8 +36,8 @@ _NARROWEST = 0.04  # of the range: shorter loops than this say nothing
 _PERMUTATIONS = 1999
 _ROUNDS = 4
 _STUDENT = 1.96
-# Of the strength: the slope of the loops is that of a density smoothed over the levels. Without noise the bench's
-# feedbacks come out as 0.80 to 1.08 of what they are.
+# Of the strength: the slope of the loops is that of a density smoothed over the levels. Without noise the
+# bench's feedbacks come out as 0.80 to 1.08 of what they are.
 _SLOPE = 0.2
 
 
