@@ -119,3 +119,18 @@ def test_friction_is_held_by_the_weights_and_not_named():
     assert force < -0.1
     assert named > 0.3
     assert _diagnosed({"coulomb": 0.3}).verdict == "none"
+
+
+def test_the_wrong_lag_does_not_hide_a_resonance():
+    """A delay explains most of a field lag and a resonance together; what it leaves is not its own kind."""
+    settings = {"field-lag": 0.0121, "resonance": 17.2, "resonance-zeta": 0.27, "noise": 0.002}
+    data = hidden.measure(hidden.Case(0, (), settings))
+    problem = problem_for(data.records, 0.0, data.high)
+    answer = diagnose(data.records, 0.0, data.high, rng=np.random.default_rng(0))
+    assert {f.cause.id for f in answer.findings if f.found} == {"field-lag", "resonance"}
+    # naive: the best single cause first, and what it leaves is sought next to it
+    alone = [
+        refit(problem, (Term(library()[name], (0.012,)),), None, rebuild=True)
+        for name in ("delay", "field-lag", "output-lag")
+    ]
+    assert min(alone, key=lambda fitted: fitted.squares).names == ("delay",)
