@@ -74,7 +74,7 @@ def check(record: Measured, low: float, high: float) -> list[Firing]:
         cut,
         wild,
         _quantised(record),
-        None if cut is not None else _sticking(calm, high - low),
+        None if cut is not None else jumps(calm, high - low),
         _tracking(record, high - low),
         _outside(record, low, high),
     ]
@@ -139,7 +139,7 @@ def _off_line(y: FloatArray, at: int, side: int) -> float:
     return float(abs(y[at] - np.median(near - slope * steps)))
 
 
-def _sticking(record: Measured, reach: float) -> Firing | None:
+def jumps(record: Measured, reach: float) -> Firing | None:
     """Jumps that last, while the input moves slowly: far more than noise or a smooth branch makes."""
     y, sigma = record.output, noise_of(record.output)
     wide = max(3, round(0.006 / record.dt_s))

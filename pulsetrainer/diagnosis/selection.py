@@ -154,6 +154,7 @@ class _Search:
         if set(current.names) != set(p_values):
             scores = screen(self.problem, current, self.rng)
         self.progress(0.65)
+        self.firings = [(k, f) for k, f in self.firings if not self._told_otherwise(k, f, current)]
         if current.squares - self.floor.squares > self.floor.relevant and not self._jagged:
             jumps = sticking.sawtooth(self.problem, current)
             self.firings = [*self.firings, *([] if jumps is None else [(0, jumps)])]
@@ -172,6 +173,15 @@ class _Search:
             if s.cause.id not in current.names
         ]
         return self._answer([*found, *rest], current, estimates, quick=False)
+
+    def _told_otherwise(self, k: int, firing: gates.Firing, current: Fitted) -> bool:
+        """Whether the jumps of a record are those of the causes found: a hum also jumps between rests."""
+        if firing.cause != "stick-slip" or not current.terms:
+            return False
+        record, simulator = self.problem.records[k], current.simulator
+        added = simulator.full(current.terms)[k] - simulator.inner(current.terms)[k]
+        reach = self.problem.plane.high - self.problem.plane.low
+        return gates.jumps(replace(record, output=record.output - added), reach) is None
 
     @property
     def _jagged(self) -> bool:
@@ -258,11 +268,13 @@ class _Search:
 
     def _exchanged(self, current: Fitted, p_values: dict[str, float]) -> Fitted:
         """Try the others of its family in the place of each cause; the new one inherits its p-value."""
-        for term in current.terms:
-            name, kin = term.cause.id, self._kin(term.cause, current)
+        for cause in [term.cause for term in current.terms]:
+            name, kin = cause.id, self._kin(cause, current)
             if not kin:
                 continue
-            without = refit(self.problem, [t for t in current.terms if t is not term], current, rounds=1)
+            # by its cause: an exchange before this one has moved all terms
+            others = [t for t in current.terms if t.cause is not cause]
+            without = refit(self.problem, others, current, rounds=1)
             best, known = current, screen(self.problem, without, self.rng, draws=_FEW)
             for score in known.scores:
                 if score.cause.id in kin:

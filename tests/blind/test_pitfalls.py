@@ -1,4 +1,4 @@
-"""The five pitfalls of a pilot, each as a case in which the naive method fails and this one must not."""
+"""Pitfalls (five of a pilot, then our own), each a case in which the naive method fails and this one must not."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import hidden
 
 from pulsetrainer.core import signals
-from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis import gates, residual
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import Term
@@ -134,3 +134,13 @@ def test_the_wrong_lag_does_not_hide_a_resonance():
         for name in ("delay", "field-lag", "output-lag")
     ]
     assert min(alone, key=lambda fitted: fitted.squares).names == ("delay",)
+
+
+def test_a_hum_is_not_taken_for_sticking_as_well():
+    """It jumps between flat runs too, as the gate on the raw data says; less the hum nothing jumps."""
+    device = {"seed": 4901, "noise-seed": 504, "noise": 0.00121}
+    settings = device | {"periodic": 0.179, "periodic-frequency": 12.657}
+    data = hidden.measure(hidden.Case(0, (), settings))
+    assert "stick-slip" in {f.cause for f in gates.check(data.records[0], 0.0, data.high)}
+    answer = diagnose(data.records, 0.0, data.high, rng=np.random.default_rng(0))
+    assert [f.cause.id for f in answer.findings if f.found] == ["periodic"]
