@@ -1,4 +1,4 @@
-"""Pitfalls (five of a pilot, then our own), each a case in which the naive method fails and this one must not."""
+"""Pitfalls, five of a pilot and our own: the naive method fails on each, and this one must not."""
 
 from __future__ import annotations
 
