@@ -33,6 +33,7 @@ class Finding:
     confounded_with: tuple[str, ...] = ()
     held_out_gain_percent: float = 0.0  # of the reducible part
     text: str = ""
+    by_contrast: bool = False  # told by differences between equal loops, whatever a model leaves
 
 
 @dataclass(frozen=True)

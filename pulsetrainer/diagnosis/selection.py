@@ -165,7 +165,8 @@ class _Search:
         found = []
         for term in current.terms:
             name = term.cause.id
-            found.append(self._finding(current, without[name], term, p_values[name], estimates[name]))
+            finding = self._finding(current, without[name], term, p_values[name], estimates[name])
+            found.append(replace(finding, by_contrast=name in sure))
             self.progress(0.75 + 0.2 * len(found) / len(current.terms))
         rest = [
             Finding(s.cause, False, s.p_value, self._explains(s.gain))

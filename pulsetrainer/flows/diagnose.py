@@ -18,7 +18,6 @@ from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis import condition, residual, velocity, wording
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Cause as LibraryCause
 from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import seen_input
 from pulsetrainer.diagnosis.fitting import weights_for
@@ -222,7 +221,7 @@ def _against_the_model(
     refitted, extended = _rms(answer.baseline.residual), _rms(answer.final.residual)
     if not wrong and condition.left_by(measured, predicted, answer.noise) <= extended:
         # the search works on fewer levels: what it finds there is no fault of the model as given
-        diagnosis = _cleared(diagnosis)
+        diagnosis = _cleared(diagnosis, [f.cause.id for f in answer.findings if f.by_contrast])
         evidence.append("The model as given leaves less than any extension on the levels of the search.")
     changed = condition.change(measured, predicted, refitted, answer.noise)
     causes, verdict = diagnosis.causes, diagnosis.verdict
@@ -291,11 +290,12 @@ def _of_another_kind(
     return replace(cleared, verdict="viscous", causes=(viscous, *others))
 
 
-def _cleared(diagnosis: Diagnosis) -> Diagnosis:
-    """Return a diagnosis in which only what was read off the raw data stays found."""
+def _cleared(diagnosis: Diagnosis, told: Sequence[str] = ()) -> Diagnosis:
+    """Return a diagnosis in which only what was read off the raw data, and what is ``told``, stays found."""
     known = library()
     causes = tuple(
-        one if _not_of_the_model(known[one.cause]) else replace(one, found=False) for one in diagnosis.causes
+        one if known[one.cause].stage == "record" or one.cause in told else replace(one, found=False)
+        for one in diagnosis.causes
     )
     verdict = next((one.cause for one in causes if one.found), "none")
     gone = tuple(f"{one.cause}: " for one in causes if not one.found)
@@ -303,11 +303,6 @@ def _cleared(diagnosis: Diagnosis) -> Diagnosis:
         said for said in diagnosis.evidence if not said.startswith((*gone, "With the causes found"))
     )
     return replace(diagnosis, verdict=verdict, causes=causes, evidence=evidence, extended=None)
-
-
-def _not_of_the_model(cause: LibraryCause) -> bool:
-    """Whether a cause is told by the data alone, however well a model fits them."""
-    return cause.stage == "record" or cause.by_contrast
 
 
 def _untimed(path: Path, one: Run, polarity: int, low: float, high: float) -> Measured:
