@@ -17,13 +17,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pulsetrainer.core import congruence, large, nnls
+from pulsetrainer.core import large, nnls
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.equations import NormalEquations, Record, node_sums, normal_equations
 from pulsetrainer.core.levels import thinned
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.core.smoothing import choose, smoothed
+from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
 __all__ = [
@@ -66,7 +67,7 @@ class Identified:
     kkt: float  # largest violation of the optimality conditions, relative
     smoothing: float = 0.0  # s, share of the input's range; see ``core.smoothing``
     tried: tuple[tuple[float, float], ...] = ()  # (s, held-out rms) when it was chosen, output unit
-    congruence: float = 0.0  # t, how alike the loops are along the diagonal; see ``core.congruence``
+    stiffness: float = 0.0  # t, how alike the loops are along the diagonal; see ``core.stiffness``
     samples: int = 0  # with weight; fewer than cells: what the data do not ask for is zero
 
 
@@ -159,7 +160,7 @@ def identify(
         equations = normal_equations(plane, turned, reading)
         masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, 0.0)
         if tried and equations.rms(masses, offset) > _POOR * _span(turned):
-            stiffness = congruence.choose(turned, plane, reading)
+            stiffness = choose_stiffness(turned, plane, reading)
         if stiffness:
             smoothing = 0.0  # a density that is alike along the diagonal needs no other smoothing
             masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, stiffness)
@@ -245,12 +246,12 @@ def penalised(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the centred Gram matrix (n_q, n_q) and right side (n_q,) with the penalties of a fit.
 
-    See ``core.smoothing`` for the length, ``core.congruence`` for the stiffness; 0 is none of either.
+    See ``core.smoothing`` for the length, ``core.stiffness`` for the stiffness; 0 is none of either.
     """
     gram, rhs = smoothed(equations, smoothing)
     if stiffness:
         centred = equations.centred()[0]
-        gram += congruence.penalty(equations.plane, np.diagonal(centred).copy(), stiffness).toarray()
+        gram += stiffness_penalty(equations.plane, np.diagonal(centred).copy(), stiffness).toarray()
     return gram, rhs
 
 

@@ -155,7 +155,7 @@ def bootstrap(
     for k in range(draws):
         drawn = rng.multinomial(count, np.full(count, 1.0 / count)).astype(np.float64)
         equations = stack.weighted(drawn).dense()
-        gram, rhs = penalised(equations, fit.smoothing, fit.congruence)
+        gram, rhs = penalised(equations, fit.smoothing, fit.stiffness)
         found = nnls.solve(gram, rhs, passive=passive)
         weights[k], offsets[k] = found.x / plane.areas, sign * equations.offset(found.x)
     return Ensemble(operator, weights, offsets, length)

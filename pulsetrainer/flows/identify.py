@@ -73,7 +73,7 @@ class Result:
     polarity: int
     offsets: tuple[float, ...]  # of each run's output against their mean; zeros where one offset serves all
     spacing: str  # of the levels: "even", or "crowded" where the loop is steep
-    congruence: float  # t; 0: the density is free
+    stiffness: float  # t; 0: the density is free
     warning: str  # that this kind of model is the wrong one; empty where it is not
     iterations: int
     seconds: float
@@ -155,7 +155,7 @@ def run(options: Options, context: Context) -> Result:
         polarity=model.polarity,
         offsets=tuple(float(shift) for shift in shifts),
         spacing="even" if _is_even(plane) else "crowded",
-        congruence=found.congruence,
+        stiffness=found.stiffness,
         warning=warning,
         iterations=model.fit.iterations,
         seconds=time.perf_counter() - begun,

@@ -126,8 +126,8 @@ def test_a_stiff_density_stays_stiff():
 
     own = change_along_the_diagonal(fit.operator.weights)
     refits = [change_along_the_diagonal(weights) for weights in ensemble.weights]
-    print(f"stiffness {fit.congruence:g}: {own:.3f} in the fit, {max(refits):.3f} in the refits at most")
-    assert fit.congruence > 0
+    print(f"stiffness {fit.stiffness:g}: {own:.3f} in the fit, {max(refits):.3f} in the refits at most")
+    assert fit.stiffness > 0
     assert max(refits) < 0.1  # of its largest value; refits without the penalty come to 1
 
 

@@ -23,7 +23,7 @@ class LoadDependence(Cause):
     title = "the effective input moves with the output"
     formula = "P[u + k y]"
     signature = "equal minor loops at different bias are not congruent"
-    excitation = "equal minor loops at five biases"
+    excitation = "equal minor loops, entered from below and from above"
     source = "Della Torre, Magnetic Hysteresis, 1999, chapter 4: the moving model"
     stage = "input"
     order = 40

@@ -8,7 +8,7 @@ IEE Proc. Control Theory Appl. 148, 2001, 185-192): the same loop wherever it is
 over neighbours along the diagonal, with g the mean of the Gram matrix's diagonal and m the cells' masses,
 leads from a free density (t = 0) to that model (t large). Where the data are no Preisach operator's at
 all, such as a force that follows the velocity, a free density learns one stretch by heart and predicts the
-next one worse than the stiff one: ``choose`` finds out on the second half of the records.
+next one worse than the stiff one: ``choose_stiffness`` finds out on the second half of the records.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TOLERANCE = 0.05
 _LEVELS = 32  # on which t is chosen
 
 
-def penalty(plane: Plane, diagonal: FloatArray, strength: float) -> scipy.sparse.csr_array:
+def stiffness_penalty(plane: Plane, diagonal: FloatArray, strength: float) -> scipy.sparse.csr_array:
     """Return t g D'D (n_q, n_q) on the masses.
 
     Parameters
@@ -60,7 +60,7 @@ def penalty(plane: Plane, diagonal: FloatArray, strength: float) -> scipy.sparse
     return (difference.T @ difference) * (strength * float(diagonal.sum()) / plane.n_q)
 
 
-def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
+def choose_stiffness(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
     """Return t by the error on the second half of each record: 0, or one of ``STRENGTHS``."""
     coarse = plane if plane.n_h <= _LEVELS else thinned(plane, _LEVELS)
     parts = []
@@ -78,7 +78,7 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
 def _error(fitted: NormalEquations, held_out: NormalEquations, strength: float) -> float:
     gram, rhs = fitted.centred()
     if strength:
-        gram += penalty(fitted.plane, np.diagonal(gram).copy(), strength).toarray()
+        gram += stiffness_penalty(fitted.plane, np.diagonal(gram).copy(), strength).toarray()
     found = nnls.solve(gram, rhs)
     squares = held_out.sum_of_squares(found.x, fitted.offset(found.x))
     return float(np.sqrt(max(squares, 0.0) / held_out.weight))
