@@ -136,7 +136,8 @@ class Table:
         if self.names[k] in self.text_names:
             raise DataError(
                 f"{self.path} has text, not numbers, in column {self.names[k]}, as in {self.place(0)}",
-                hint="name another column; times may be numbers, 12:34:56.7 or 2024-05-01T12:34:56",
+                hint="name another column; times may be numbers, 12:34:56.7, 2024-05-01T12:34:56 or "
+                "01.05.2024 12:34:56",
             )
         return k
 
@@ -152,6 +153,21 @@ def split_unit(heading: str) -> tuple[str, str]:
     return heading, ""
 
 
+def numbered(names: Sequence[str]) -> tuple[str, ...]:
+    """Return headings with a number behind the name wherever several columns have one heading.
+
+    ``t, Volt (V), Volt (V)`` become ``t, Volt#1 (V), Volt#2 (V)``.
+    """
+    found: list[str] = []
+    for k, name in enumerate(names):
+        if names.count(name) > 1:
+            bare = split_unit(name)[0]
+            found.append(f"{bare}#{names[: k + 1].count(name)}{name.removeprefix(bare)}")
+        else:
+            found.append(name)
+    return tuple(found)
+
+
 def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None = None) -> Table:
     """Read a table of numbers, a text of any size piece by piece.
 
@@ -164,8 +180,8 @@ def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None
     Raises
     ------
     DataError
-        The file cannot be read, is empty or no table, has two columns of one name, or holds text in a column
-        of numbers or two decimal signs (line and column are named).
+        The file cannot be read, is empty or no table, or holds text in a column of numbers or two
+        decimal signs (line and column are named).
     """
     path = Path(path)
     try:
@@ -173,9 +189,7 @@ def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None
         if reader is not None:
             return _only(_of_arrays(path, reader(path)), keep)
         dialect = detect(path)
-        if len(set(dialect.names)) < len(dialect.names):
-            twice = next(name for name in dialect.names if dialect.names.count(name) > 1)
-            raise DataError(f"{path} has two columns named {twice!r}", hint="rename one of them")
+        dialect = replace(dialect, names=numbered(dialect.names))
         table = _head(path, dialect)
         kept = sorted(set(keep(table))) if keep else list(range(len(table.names)))
         rows = parse(path, dialect, kept)

@@ -27,7 +27,9 @@ _REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
 _SAMPLE_LINES = 200
 _TABLE = 10  # rows of one kind make a table of what stands below a text
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
-_CLOCK = re.compile(r"(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")
+_CLOCK = re.compile(r"(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)(?: ?([AaPp])[Mm])?")
+# the day comes first where points part it from the month; where slashes do, nobody can tell
+_GERMAN_STAMP = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4}),? (\d{1,2}):([0-5]\d)(:[0-5]\d(?:[.,]\d+)?)?")
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 _FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
@@ -88,7 +90,11 @@ def number(cell: str) -> float | None:
 def _seconds(cell: str) -> float | None:
     """Return a time of day or a time stamp in seconds, None where it is neither."""
     if found := _CLOCK.fullmatch(cell):
-        return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3].replace(",", "."))
+        hour = int(found[1]) if found[4] is None else int(found[1]) % 12 + 12 * (found[4] in "Pp")
+        return 3600.0 * hour + 60.0 * int(found[2]) + float(found[3].replace(",", "."))
+    if found := _GERMAN_STAMP.fullmatch(cell):
+        day, month, year, hour_, minute, seconds = found.groups()
+        cell = f"{year}-{int(month):02}-{int(day):02} {int(hour_):02}:{minute}{seconds or ''}"
     if not _STAMP.fullmatch(cell):
         return None
     try:

@@ -48,8 +48,8 @@ def compare(
             for m in result.metrics
         ],
     )
-    if result.output is not None and not json:
-        typer.echo(f"wrote {result.output}")
+    if result.output is not None:
+        screen.whole(f"wrote {result.output}")
 
 
 _SHORT = {

@@ -91,6 +91,11 @@ class Screen:
             return
         sys.stdout.write(folded(lead, text, self.width if self.is_terminal else None, indent) + "\n")
 
+    def whole(self, text: str) -> None:
+        """Print a line that is never folded, since a path or a command in it is copied in one piece."""
+        if not self.as_json:
+            sys.stdout.write(text + "\n")
+
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
         """Print a table, unless JSON was asked for; the first column is text, the others are numbers.
 

@@ -43,10 +43,9 @@ def diagnose(
     found = result.diagnosis
     screen.result(payload(found) | {"output": result.output, "html": result.html, "seconds": result.seconds})
     tables(screen, found)
-    if not json:
-        for path in (result.output, result.html):
-            if path is not None:
-                typer.echo(f"wrote {path}")
+    for path in (result.output, result.html):
+        if path is not None:
+            screen.whole(f"wrote {path}")
 
 
 def payload(found: Diagnosis) -> dict[str, Any]:

@@ -48,7 +48,7 @@ def doctor(
         for one in result.findings:
             screen.line(f"{_MARKS[one.state]:<8} {one.name:<{width}}  ", one.found)
             if one.fix and one.state != "ok":
-                typer.echo(f"{'':<8} fix: {one.fix}")  # not folded: a command in it is copied in one piece
+                screen.whole(f"{'':<8} fix: {one.fix}")
     if result.problems:
         typer.echo(f"error: {problem}\n  try: {hint}", err=True)
         raise typer.Exit(QualityError.exit_code)

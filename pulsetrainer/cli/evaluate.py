@@ -53,13 +53,13 @@ def evaluate(
     screen.result(payload)
     tables(screen, result.evaluation)
     for path in (result.output, result.html):
-        if path is not None and not json:
-            typer.echo(f"wrote {path}")
+        if path is not None:
+            screen.whole(f"wrote {path}")
     if problem:
         typer.echo(f"error: {problem}\n  try: {_HINT}", err=True)
         raise typer.Exit(QualityError.exit_code)
-    if result.checked and not json:
-        typer.echo(f"all {result.checked} bounds of {bounds} hold")
+    if result.checked:
+        screen.whole(f"all {result.checked} bounds of {bounds} hold")
 
 
 _HINT = "look at what changed; if the new figure is right, change the bound knowingly"

@@ -31,5 +31,4 @@ def plot(
     with screen.working(f"drawing {file.name}") as context:
         result = flow.run(flow.Options(file, out, force), context)
     screen.result(result)
-    if not json:
-        typer.echo(f"wrote {result.output}: a {result.kind}")
+    screen.whole(f"wrote {result.output}: a {result.kind}")

@@ -49,5 +49,4 @@ def show(
         tables(screen, result.artefact)
     else:
         screen.facts(title, known)
-    if not json:
-        typer.echo("history\n" + "\n".join(f"  {line}" for line in header.history))
+    screen.whole("\n".join(["history", *(f"  {line}" for line in header.history)]))

@@ -18,6 +18,7 @@ from pulsetrainer.core.plane import FloatArray
 
 FAR = 0.01  # of the output's span: a model nearer than this is not in question
 REFITTED = 0.2  # the refitted weights must leave less than this share of what the given ones leave
+ALL_BUT = 0.001  # of the squared error: beside such a change nothing that is left over matters
 
 
 class Change(NamedTuple):
@@ -31,6 +32,11 @@ class Change(NamedTuple):
     left: float  # rms of what gain and offset alone leave, output unit
     shift: float  # mean of measured less predicted, output unit; the offset is that where the model is 0
     span: float  # of the records, output unit
+
+    @property
+    def is_everything(self) -> bool:
+        """Whether it leaves so little that nothing else can be named before the device is identified anew."""
+        return self.explains > 1.0 - ALL_BUT
 
     @property
     def gain_matters(self) -> bool:

@@ -71,6 +71,11 @@ def test_speed_is_predicted_and_torque_is_another_condition(folder):
     for speed in ("f0p1", "f0p3", "f0p5"):
         found = _diagnosed(folder, f"davinci_{speed}_torque40", "davinci_f0p1_torque10")
         assert found["verdict"] == "condition-change"
+        # no effect of the rate besides: what the record's own weights leave is a fiftieth of the change
+        assert {one["id"] for one in found["causes"] if one["found"]} == {
+            "condition-change",
+            "out-of-range",
+        }
         gain = found["causes"][0]["parameters"]["gain"]
         assert gain["value"] == pytest.approx(0.064, abs=0.02)
         assert gain["interval"][0] < gain["value"] < gain["interval"][1]

@@ -16,6 +16,7 @@ import report_examples
 from program import PROGRAM
 from store_examples import header
 
+import pulsetrainer.cli
 from pulsetrainer.artefacts import store
 
 BIN = Path(sys.executable).parent
@@ -176,3 +177,14 @@ def test_a_name_that_the_terminal_cannot_spell_is_no_error(tmp_path, encoding):
             assert json.loads(done.stdout.decode("utf-8"))["file"] == name
         else:
             assert done.stdout.startswith(name.encode(encoding, "backslashreplace"))
+
+
+def test_results_have_one_writer():
+    """Two writers to one stream, each with its own memory, leave the order of the lines to luck."""
+    other = re.compile(r"typer\.echo\((?!.*err=True)|click\.echo|\bprint\(")
+    found = {
+        path.name
+        for path in Path(pulsetrainer.cli.__file__).parent.glob("*.py")
+        if other.search(path.read_text().replace("console.print(", ""))
+    }
+    assert found == {"app.py"}  # --version, before any command
