@@ -57,7 +57,7 @@ def test_libfuzzer_finds_nothing_in_seconds(tmp_path):
     if subprocess.run(words, capture_output=True, check=False).returncode != 0:
         pytest.skip("this clang has no fuzzer library: apt-get install libclang-rt-14-dev")
     program = _built("fuzz-clang", tmp_path)
-    # no limit on resident memory: where the kernel gives the sanitizer's shadow huge pages, that is 1 GB at once
+    # no limit on resident memory: with huge pages the sanitizer's shadow alone is 1 GB
     limits = ["-malloc_limit_mb=64", "-rss_limit_mb=0"]
     words = [program, "-seed=1", "-max_len=1024", "-runs=20000", *limits]
     done = subprocess.run(words, capture_output=True, text=True, check=False, cwd=tmp_path)
