@@ -12,6 +12,8 @@ from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
 
+MOST_SAMPLES = 100_000_000  # of one signal: a day at 1 kHz
+
 
 @dataclass(frozen=True, slots=True)
 class Signal:
@@ -43,12 +45,21 @@ def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
     Raises
     ------
     ArgumentError
-        No points, one that is not finite, or a speed or rate that is not positive.
+        No points, one that is not finite, a speed or rate that is not positive, or such that the path has
+        more than ``MOST_SAMPLES``.
     """
     points = finite_vector("points", points)
     positive(speed=speed, rate=rate_Hz)
-    distance = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(points)))))
-    count = int(np.ceil(distance[-1] / speed * rate_Hz)) + 1
+    with np.errstate(over="ignore"):
+        distance = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(points)))))
+        steps = float(distance[-1] / speed * rate_Hz)
+    if not steps <= MOST_SAMPLES or not np.isfinite(speed / rate_Hz):
+        raise ArgumentError(
+            f"a path of {distance[-1]:.3g} at a speed of {speed:g} would have {steps:.3g} samples "
+            f"at {rate_Hz:g} Hz",
+            hint="another speed or rate",
+        )
+    count = int(np.ceil(steps)) + 1
     path = np.interp(np.arange(count) * (speed / rate_Hz), distance, points)
     # a turn between two samples would be cut short: put it on the nearest sample
     path[np.minimum(np.round(distance / speed * rate_Hz).astype(np.int64), count - 1)] = points
@@ -76,13 +87,24 @@ def identification(low: float, high: float, *, n_h: int, speed: float, rate_Hz: 
     Raises
     ------
     ArgumentError
-        An empty range, fewer than 2 levels, or a speed or rate that is not positive.
+        An empty range, fewer than 2 levels, a speed or rate that is not positive, or a step from one
+        sample to the next that is wider than the range.
     """
     levels = Plane.uniform(low, high, n_h).levels
+    _check_step(speed / rate_Hz if rate_Hz > 0 else 0.0, high - low)
     bottoms = levels[-2::-1]
     turns = np.empty(2 * n_h + 1)
     turns[0], turns[1::2], turns[2::2] = low, high, bottoms
     return Signal(through(turns, speed, rate_Hz), rate_Hz, "identification")
+
+
+def _check_step(step: float, reach: float) -> None:
+    """Raise ArgumentError where the signal would jump over its whole range (``reach``) between samples."""
+    if step > reach:
+        raise ArgumentError(
+            f"from one sample to the next the signal would go {step:.3g}, but its range is {reach:.3g}",
+            hint="a lower speed or a higher rate",
+        )
 
 
 def conditioning(low: float, high: float, *, speed: float, rate_Hz: float, rest_s: float) -> FloatArray:
@@ -144,10 +166,11 @@ def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
     Raises
     ------
     ArgumentError
-        An empty range, or a rate that is not positive.
+        An empty range, or a rate that is not positive, or so low that a stroke has no sample.
     """
     ascending(low, high)
     positive(rate=rate_Hz)
+    _check_step(max(_RATES) / rate_Hz * (high - low), high - low)
     parts: list[FloatArray] = []
 
     def go(points: tuple[float, ...], ranges_per_s: float) -> None:

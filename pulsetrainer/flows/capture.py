@@ -19,6 +19,7 @@ from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.flows import preflight, recording
 from pulsetrainer.flows.recording import Earlier, Tally, check_ended, conditioning_loop
 from pulsetrainer.link import DEFAULT_PORT, Limits, open_device, redact
+from pulsetrainer.link.codes import TICK_RATE_HZ
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
@@ -119,9 +120,10 @@ def reference(options: Options) -> Signal:
     UsageError
         The signal is neither an excitation nor a file.
     DataError
-        The file cannot be used.
+        The file cannot be used, or no device samples at that rate.
     """
     path = preflight.signal_file(options.signal)
+    recording.decimation_for(TICK_RATE_HZ, options.rate_Hz)
     if path is None and options.signal == "identification":
         return signals.identification(
             0.0,

@@ -27,6 +27,7 @@ from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError, Interrupted, UsageError
+from pulsetrainer.link.codes import MAX_DECIMATION
 
 if TYPE_CHECKING:
     from pulsetrainer.link import Block, Device
@@ -170,9 +171,10 @@ def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:
     Raises
     ------
     ArgumentError
-        The rate does not divide the device's.
+        The rate does not divide the device's, or is too low for it.
     """
-    decimation = round(tick_rate_Hz / rate_Hz) if rate_Hz > 0 else 0
+    slowest = tick_rate_Hz / MAX_DECIMATION
+    decimation = round(tick_rate_Hz / rate_Hz) if rate_Hz >= slowest else 0
     if decimation < 1 or not np.isclose(decimation * rate_Hz, tick_rate_Hz):
         raise ArgumentError(
             f"the rate must divide the device's {tick_rate_Hz:g} Hz, got {rate_Hz:g} Hz",

@@ -128,6 +128,27 @@ def test_no_compiler_names_both_remedies(ready, tmp_path):
     assert re.search(r"apt|gcc|build-essential", err)
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "said"),
+    [
+        ("--rate", "1e-308", "the rate must divide the device's 10000 Hz, got 1e-308 Hz"),
+        ("--rate", "1e308", "the rate must divide"),
+        ("--rate", "nan", "the rate must divide"),
+        ("--speed", "1e-300", "would have 7.35e+304 samples"),
+        ("--speed", "1e300", "from one sample to the next the signal would go 1e+297"),
+        ("--current-max", "1e308", "would have inf samples"),
+        ("--current-max", "inf", "both finite"),
+    ],
+)
+def test_numbers_no_device_can_follow_are_refused_before_anything_moves(run, option, value, said):
+    """The smallest and the largest number of the machine: in words, also in a dry run."""
+    for name in ("identification", "diagnostic") if option != "--speed" else ("identification",):
+        shown = run("capture", name, option, value, "--dry-run", "-o", "never.h5")
+        assert shown.code == 3
+        assert said in shown.err
+        assert "try:" in shown.err
+
+
 def test_usage_errors_are_exit_2_in_words(run):
     """A missing option, an unknown command, an unknown signal or waveform."""
     for words in (["identify", "run.h5"], ["frobnicate"], ["capture", "noise", "-o", "x.h5"]):
