@@ -98,7 +98,8 @@ static uint8_t sensors(struct safety *s, const struct safety_input *in)
     int32_t span = still_span(&s->current_still, in->current_counts, in->reference);
     if (span >= SAFETY_FROZEN_CURRENT_SPAN && s->current_still.ticks >= SAFETY_FROZEN_CURRENT_TICKS)
         return PT_FAULT_CURRENT_FROZEN;
-    if (still_span(&s->force_still, in->force_counts, in->current) >= SAFETY_FROZEN_FORCE_SPAN)
+    span = still_span(&s->force_still, in->force_counts, in->current);
+    if (span >= SAFETY_FROZEN_FORCE_SPAN && s->force_still.ticks >= SAFETY_FROZEN_FORCE_TICKS)
         return PT_FAULT_FORCE_FROZEN;
 
     bool dead = in->duty > in->full / 4u && in->current < SAFETY_NO_CURRENT_LEVEL;

@@ -17,7 +17,8 @@
 #define SAFETY_RAIL_HIGH 4093u
 #define SAFETY_FROZEN_CURRENT_SPAN 500   /* the reference moved by 50 mA ... */
 #define SAFETY_FROZEN_CURRENT_TICKS 100u /* ... within at least 10 ms, the reading by not one count */
-#define SAFETY_FROZEN_FORCE_SPAN 13000   /* the current moved by 1.3 A, the force by not one count */
+#define SAFETY_FROZEN_FORCE_SPAN 13000   /* the current moved by 1.3 A ... */
+#define SAFETY_FROZEN_FORCE_TICKS 100u   /* ... within at least 10 ms: a lost current reading falls in one tick */
 #define SAFETY_NO_CURRENT_LEVEL 500      /* 50 mA at a quarter of the full drive, for 5 ms: a dead shunt */
 #define SAFETY_NO_CURRENT_TICKS 50u
 #define SAFETY_WEAK_TICKS 300u           /* half the reference at full drive, for 30 ms: a weak supply */

@@ -38,8 +38,8 @@ def make(tmp_path_factory):
     """Make a target of firmware/Makefile in a folder of its own and return what it printed."""
     build = tmp_path_factory.mktemp("mps2")
 
-    def run(target: str) -> str:
-        words = ["make", "-s", "-C", str(FIRMWARE), target, f"BUILD={build}"]
+    def run(target: str, *flags: str) -> str:
+        words = ["make", "-s", *flags, "-C", str(FIRMWARE), target, f"BUILD={build}"]
         env = os.environ | {"MAKEFLAGS": ""}
         done = subprocess.run(words, capture_output=True, text=True, check=False, env=env)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -91,7 +91,7 @@ def test_loop_and_plant_give_the_same_bits_on_the_emulated_device(make, tmp_path
 
 def test_the_control_interrupt_and_the_core_stay_within_the_real_device(make):
     """7000 cycles a tick, 8 KB of RAM, 64 KB of flash; twice the instructions of today is a failure too."""
-    told = make("cost")
+    told = make("cost", "-w")  # as `make -C firmware cost` at a shell, which tells the folders too
     print(told)
     worst = {name: int(most) for name, _, most in re.findall(r"^  (\w+) +(\d+) +(\d+)$", told, re.MULTILINE)}
     assert set(worst) == {"idle", "armed", "running", "ramping", "fault"}

@@ -105,7 +105,7 @@ def test_what_the_safety_unit_counts_is_what_is_told():
     assert told["FORCE_RAIL"].startswith("three")
     for fault, words in {
         "CURRENT_FROZEN": [milli("FROZEN_CURRENT_SPAN", "mA"), milli("FROZEN_CURRENT_TICKS", "ms")],
-        "FORCE_FROZEN": [amperes("FROZEN_FORCE_SPAN")],
+        "FORCE_FROZEN": [amperes("FROZEN_FORCE_SPAN"), milli("FROZEN_FORCE_TICKS", "ms")],
         "NO_CURRENT": [
             milli("NO_CURRENT_LEVEL", "mA"),
             milli("NO_CURRENT_TICKS", "ms"),
