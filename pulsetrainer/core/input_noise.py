@@ -14,10 +14,10 @@ which lags on neither side.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike
 
 from pulsetrainer.core.memory import turning_points
@@ -147,29 +147,12 @@ def _local_polynomial(piece: FloatArray, sigma: float, n: int) -> FloatArray:
     """Filter a piece with the widest window that leaves noise of size ``sigma`` behind, and no more."""
     for window in _WINDOWS:
         if window <= piece.size:
-            path = parabolas(piece, window)
+            path = scipy.signal.savgol_filter(piece, window, 2)
             rest = piece - path
             noise_only = np.std(rest) <= _NOISE_ONLY * sigma
             if noise_only and np.abs(rest).max() <= 0.5 * _NOISE_ONLY * dead_band(sigma, n):
                 return path
     return piece
-
-
-def parabolas(piece: FloatArray, window: int) -> FloatArray:
-    """Parabola fitted to the ``window`` samples around each sample (n,); at the ends the last one goes on.
-
-    What ``scipy.signal.savgol_filter(piece, window, 2)`` gives, without a new fit for every piece.
-    """
-    hat, half = _hat(window), window // 2
-    inner = np.convolve(piece, hat[half][::-1], mode="valid")
-    return np.concatenate((hat[:half] @ piece[:window], inner, hat[-half:] @ piece[-window:]))
-
-
-@cache
-def _hat(window: int) -> FloatArray:
-    """Projection (window, window) of so many samples on their parabola."""
-    basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, window), 3))[0]
-    return np.asarray(basis @ basis.T)
 
 
 def _monotone(piece: FloatArray) -> FloatArray:

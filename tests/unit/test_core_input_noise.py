@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from core_jobs import job
-from scipy import signal
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.identification import Record, identify
@@ -110,12 +109,3 @@ def test_bad_input_is_named():
     """NaN is refused by name."""
     with pytest.raises(ArgumentError, match="input must be finite"):
         input_noise.clean([0.0, np.nan])
-
-
-@pytest.mark.parametrize("window", [5, 9, 15, 21, 31])
-@pytest.mark.parametrize("more", [0, 1, 40])
-def test_local_parabolas_are_those_of_scipy(window, more):
-    """The naive twin fits anew every time."""
-    piece = np.random.default_rng(window + more).standard_normal(window + more).cumsum()
-    wanted = signal.savgol_filter(piece, window, 2)
-    np.testing.assert_allclose(input_noise.parabolas(piece, window), wanted, atol=1e-10)
