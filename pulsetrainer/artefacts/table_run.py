@@ -16,6 +16,7 @@ from pulsetrainer.artefacts.kinds import FloatArray, Run
 from pulsetrainer.artefacts.table import Table, read_table, split_unit
 from pulsetrainer.artefacts.timing import check_timing
 from pulsetrainer.artefacts.units import check_unit
+from pulsetrainer.core.signals import MOST_SAMPLES
 from pulsetrainer.errors import DataError, UsageError
 
 Note = Callable[[str], None]
@@ -28,7 +29,6 @@ GAP = 1.5  # a step longer than this times the median one is a gap
 # Steps within this share of the median are even: time stamps are written with few digits.
 EVEN = 0.02
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
-_MOST = 50_000_000  # samples that resampling may make
 _LOOKED_AT = 1_000_000  # steps for their median
 _BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
@@ -230,7 +230,7 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
         )
     step = steps_of(run.time_s).median if rate_Hz is None else 1.0 / rate_Hz
     count = int(np.floor((run.time_s[-1] - run.time_s[0]) / step + 1e-9)) + 1
-    if not 2 <= count <= _MOST:
+    if not 2 <= count <= MOST_SAMPLES:
         raise UsageError(
             f"resampling to steps of {step:.3g} s would make {count} samples of {run.input.size}",
             hint="choose another rate",

@@ -40,7 +40,12 @@ def tracking(target: ArrayLike, measured: ArrayLike, full: float) -> Tracking:
             hint="play the waveform again",
         )
     size = np.abs(error) * (100.0 / full)
-    return Tracking(float(size.mean()), float(size.max()), float(np.sqrt(np.mean(size**2))))
+    return Tracking(float(size.mean()), float(size.max()), root_mean_square(size))
+
+
+def root_mean_square(values: FloatArray) -> float:
+    """Root of the mean of the squares of all ``values`` (...), in their unit."""
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def loop_area(x: ArrayLike, y: ArrayLike) -> float:
@@ -99,7 +104,7 @@ def prediction(measured: ArrayLike, predicted: ArrayLike) -> Prediction:
             hint="check the sensor's wiring",
         )
     error = said - was
-    rms, worst = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+    rms, worst = root_mean_square(error), float(np.abs(error).max())
     return Prediction(rms, 100.0 * rms / span, worst, 100.0 * worst / span)
 
 

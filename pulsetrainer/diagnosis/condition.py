@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 
 FAR = 0.01  # of the output's span: a model nearer than this is not in question
@@ -83,7 +84,7 @@ def change(
         float(whole[1]),
         float(spread[1]),
         1.0 - (refitted_rms / given) ** 2,
-        float(np.sqrt(np.mean(left**2))),
+        root_mean_square(left),
         float(np.mean(measured - predicted)),
         float(np.ptp(measured)),
     )

@@ -19,6 +19,7 @@ import numpy as np
 from scipy import signal
 
 from pulsetrainer.core import inversion
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import cause_named
@@ -146,7 +147,7 @@ class Extended:
             found = inversion.invert(self.static, wanted, state)
             predicted = upright(np.concatenate((lead, found.input)), dt_s)[lead.size :]
             error = target - predicted
-            rms = float(np.sqrt(np.mean(error**2)))
+            rms = root_mean_square(error)
             if best is None:
                 best = Tracked(found.input, predicted, found.clipped, 0, rms, rms)
             elif rms < best.rms:

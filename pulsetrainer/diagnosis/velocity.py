@@ -15,6 +15,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.equations import Record
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 
 POOR = 0.05  # of the output's span: a fit better than this needs no such question
@@ -62,7 +63,7 @@ def compare(
     count = np.bincount(group)
     mean = np.bincount(group, weights=output) / np.maximum(count, 1)
     rest = output - mean[group]
-    return Comparison(_rms(left), _rms(rest), float(np.ptp(output)))
+    return Comparison(root_mean_square(left), root_mean_square(rest), float(np.ptp(output)))
 
 
 def _velocity(u: FloatArray, dt_s: float | None) -> FloatArray:
@@ -71,10 +72,6 @@ def _velocity(u: FloatArray, dt_s: float | None) -> FloatArray:
         return np.sign(np.gradient(u)) if dt_s is None else np.gradient(u, dt_s)
     slope = scipy.signal.savgol_filter(u, _WINDOW, 2, deriv=1, delta=dt_s or 1.0)
     return np.sign(slope) if dt_s is None else np.asarray(slope)
-
-
-def _rms(x: FloatArray) -> float:
-    return float(np.sqrt(np.mean(x**2)))
 
 
 def warning(found: Comparison, input_quantity: str, output_quantity: str) -> str:

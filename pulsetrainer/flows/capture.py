@@ -13,6 +13,7 @@ from pulsetrainer.artefacts.recorder import RunRecorder, interrupted
 from pulsetrainer.core import signals
 from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.signals import Signal
 from pulsetrainer.errors import DataError, DeviceError
@@ -24,8 +25,6 @@ from pulsetrainer.link.codes import TICK_RATE_HZ
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
     from pulsetrainer.link import Device
-
-MOST_SAMPLES = 50_000_000  # of a signal from a file: half a day at 1 kHz
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +105,7 @@ def plan(options: Options) -> Plan:
         reversals=course.reversals,
         coverage_percent=100.0 * float(covered.mean()),
         peak_current_A=float(np.abs(signal.value).max()),
-        rms_current_A=float(np.sqrt(np.mean(signal.value**2))),
+        rms_current_A=root_mean_square(signal.value),
         port=redact(options.port or DEFAULT_PORT),
         output=options.output,
     )
@@ -153,10 +152,10 @@ def _from_file(path: Path, rate_Hz: float) -> Signal:
             hint="sort the rows by time and drop repeated ones",
         )
     lasts = (time[-1] - time[0]) * rate_Hz
-    if not lasts <= MOST_SAMPLES:
+    if not lasts <= signals.MOST_SAMPLES:
         raise DataError(
             f"{path} lasts {time[-1] - time[0]:g} s, {lasts:.3g} samples at {rate_Hz:g} Hz; "
-            f"{MOST_SAMPLES} are the most",
+            f"{signals.MOST_SAMPLES} are the most",
             hint="give its time in s, a lower --rate, or a shorter signal with --repeats",
         )
     count = int(np.floor(lasts + 1e-9)) + 1

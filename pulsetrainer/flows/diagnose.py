@@ -13,7 +13,8 @@ import numpy as np
 from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import Cause, Diagnosis, Extension, Model, Parameter, Profile, Run
 from pulsetrainer.core.identification import coverage
-from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core.plane import Plane
 from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import seen_input
@@ -200,7 +201,7 @@ def _artefact(answer: Answer, runs: Sequence[Run], records: Sequence[Measured], 
         (predict(model, r.input, r.dt_s) * model.polarity - r.output)[r.weight > 0]
         for r in answer.problem.records
     ]
-    rms = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+    left = root_mean_square(np.concatenate(errors))
     after_residual = answer.final.residual
     extended = None if answer.quick else _extended(answer, model)
     thin = slice(None, None, max(1, problem.bins.count // _TRACE_SAMPLES))
@@ -214,11 +215,11 @@ def _artefact(answer: Answer, runs: Sequence[Run], records: Sequence[Measured], 
     return Diagnosis(
         verdict=answer.verdict,
         quick=answer.quick,
-        rms=rms,
-        rms_percent=rms * percent,
+        rms=left,
+        rms_percent=left * percent,
         noise_percent=answer.noise * percent,
-        static_percent=_rms(answer.baseline.residual) * percent,
-        extended_percent=_rms(after_residual) * percent,
+        static_percent=root_mean_square(answer.baseline.residual) * percent,
+        extended_percent=root_mean_square(after_residual) * percent,
         floor_percent=answer.floor * percent,
         causes=tuple(_cause(finding, units) for finding in answer.findings),
         evidence=tuple(wording.evidence(answer, lacks)),
@@ -233,10 +234,6 @@ def _artefact(answer: Answer, runs: Sequence[Run], records: Sequence[Measured], 
         input_unit=first.input_unit,
         output_unit=first.output_unit,
     )
-
-
-def _rms(x: FloatArray) -> float:
-    return float(np.sqrt(np.mean(x**2)))
 
 
 def _unit(text: str, units: dict[str, str]) -> str:

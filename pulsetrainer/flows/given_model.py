@@ -15,6 +15,7 @@ import numpy as np
 from pulsetrainer.artefacts.kinds import Cause, Diagnosis, Model, Parameter, Run
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.equations import Record
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import condition, velocity
 from pulsetrainer.diagnosis.causes import library
@@ -62,10 +63,10 @@ def judged(
         evidence.append(wrong)
     measured = np.concatenate([one.output[k] for one, k in zip(core, kept, strict=True)])
     predicted = np.concatenate([p[k] for p, k in zip(said, kept, strict=True)])
-    refitted, extended = _rms(answer.baseline.residual), _rms(answer.final.residual)
+    refitted, extended = root_mean_square(answer.baseline.residual), root_mean_square(answer.final.residual)
     if not wrong and condition.left_by(measured, predicted, answer.noise) <= extended:
         # the search works on fewer levels: what it finds there is no fault of the model as given
-        diagnosis = _cleared(diagnosis, [f.cause.id for f in answer.findings if f.by_contrast])
+        diagnosis = _cleared(diagnosis, _by_contrast(answer))
         evidence.append("The model as given leaves less than any extension on the levels of the search.")
     changed = condition.change(measured, predicted, refitted, answer.noise)
     if changed is not None and changed.is_everything:
@@ -84,13 +85,12 @@ def _overshadowed(
     diagnosis: Diagnosis, answer: Answer, changed: condition.Change
 ) -> tuple[Diagnosis, list[str]]:
     """Return a diagnosis without the causes that only repair the rest that a changed condition leaves."""
-    told = [f.cause.id for f in answer.findings if f.by_contrast]
-    cleared = _cleared(diagnosis, told)
+    cleared = _cleared(diagnosis, _by_contrast(answer))
     pairs = zip(diagnosis.causes, cleared.causes, strict=True)
     gone = [before.cause for before, after in pairs if before.found > after.found]
     if not gone:
         return diagnosis, []
-    left = 100.0 * _rms(answer.baseline.residual) / changed.span
+    left = 100.0 * root_mean_square(answer.baseline.residual) / changed.span
     said = (
         f"The change is {100.0 * changed.explains:.2f} % of the squared error. {' and '.join(gone)} would "
         f"lower what is left, {left:.2g} % of the span: too little beside it to be named."
@@ -155,6 +155,11 @@ def _of_another_kind(
     return replace(cleared, verdict="viscous", causes=(viscous, *others))
 
 
+def _by_contrast(answer: Answer) -> list[str]:
+    """Causes that equal inputs with unequal outputs show, whatever the model."""
+    return [f.cause.id for f in answer.findings if f.by_contrast]
+
+
 def _cleared(diagnosis: Diagnosis, told: Sequence[str] = ()) -> Diagnosis:
     """Return a diagnosis in which only what was read off the raw data, and what is ``told``, stays found."""
     known = library()
@@ -175,7 +180,3 @@ def _cleared(diagnosis: Diagnosis, told: Sequence[str] = ()) -> Diagnosis:
         extended=None,
         extended_percent=diagnosis.static_percent,
     )
-
-
-def _rms(x: FloatArray) -> float:
-    return float(np.sqrt(np.mean(x**2)))

@@ -270,7 +270,7 @@ def _misfit(records: Sequence[Record], found: Identified) -> float:
     """Rms error of the fit as a share of the output's span."""
     left = [e[r.weights > 0] for e, r in zip(_residuals(records, found), records, strict=True)]
     span = float(np.ptp(np.concatenate([r.output[r.weights > 0] for r in records])))
-    return float(np.sqrt(np.mean(np.concatenate(left) ** 2))) / span
+    return metrics.root_mean_square(np.concatenate(left)) / span
 
 
 def _note_shifts(names: Sequence[str], shifts: FloatArray, runs: Sequence[Run], context: Context) -> None:

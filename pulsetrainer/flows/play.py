@@ -11,6 +11,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import DrivePlayback, Playback, Waveform
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.flows.recording import check_ended
@@ -89,7 +90,7 @@ def plan(options: Options) -> Plan:
         seconds=waveform.time_s.size * step * options.repeats * len(DRIVES),
         rate_Hz=1.0 / step,
         peak_current_A=float(np.abs(drives).max()),
-        rms_current_A=float(np.sqrt(np.mean(drives**2))),
+        rms_current_A=root_mean_square(drives),
         port=redact(options.port or DEFAULT_PORT),
         output=options.output,
     )
