@@ -45,7 +45,9 @@ def starts(words: list[str], code: int, more: dict[str, str] | None = None, roun
     """Start the program and ``python -c pass`` in turns."""
     program = [sys.executable, "-m", "pulsetrainer", *words]
     empty = [sys.executable, "-c", "pass"]
-    environment = {**os.environ, **(more or {})}
+    # as after an installation: the modules are compiled, by the first start if by nobody else
+    installed = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {**installed, **(more or {})}
     _once(program, environment, code)
     ours, theirs = [], []
     for _ in range(rounds):

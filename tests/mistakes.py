@@ -49,6 +49,9 @@ def at_once() -> dict[str, Mistake]:
         "no such option": ("capture", "identification", "--speeed", "1"),
         "an option is missing": ("capture", "identification"),
         "a number is none": ("capture", "identification", "-o", "out.h5", "--levels", "many"),
+        "no such wire": ("capture", "identification", "-o", "out.h5", "--port", "bench:?wire=9"),
+        "no such emulator": ("play", "drive.h5", "-o", "out.h5", "--port", "qemu:?seed=1"),
+        "nothing to resume": ("capture", "identification", "-o", "out.h5", "--resume"),
         "no such signal": ("capture", "nothing", "-o", "out.h5"),
         "no such waveform": ("invert", "nothing", "--model", "model.h5", "-o", "out.h5"),
         "no such beat": ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--beat", "first"),
@@ -94,10 +97,8 @@ INSIDE = {
     "no extended inverse": Mistake(
         ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"), 2
     ),
+    "nothing left to resume": Mistake(("capture", "identification", "-o", "run.h5", "--resume"), 2),
     "no such bench parameter": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench:?crep=1"), 2
     ),
-    "no such wire": Mistake(("capture", "identification", "-o", "out.h5", "--port", "bench:?wire=9"), 2),
-    "no such emulator": Mistake(("play", "drive.h5", "-o", "out.h5", "--port", "qemu:?seed=1"), 2),
-    "nothing to resume": Mistake(("capture", "identification", "-o", "out.h5", "--resume"), 2),
 }

@@ -49,9 +49,12 @@ def capture(
     from pulsetrainer.flows import preflight
 
     preflight.signal_file(signal)
+    preflight.check_port(port)
     preflight.check_files(outputs=() if resume else (out,), force=force)
+    if resume:
+        preflight.check_resumable(out)
     from pulsetrainer.flows import capture as flow
-    from pulsetrainer.link import Limits
+    from pulsetrainer.link.device import Limits
 
     screen = Screen("capture", as_json=json)
     limits = Limits(limit_current, limit_force)

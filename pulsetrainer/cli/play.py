@@ -36,9 +36,10 @@ def play(
     """
     from pulsetrainer.flows import preflight
 
+    preflight.check_port(port)
     preflight.check_files(outputs=(out,), force=force, artefacts=(drive,))
     from pulsetrainer.flows import play as flow
-    from pulsetrainer.link import Limits
+    from pulsetrainer.link.device import Limits
 
     screen = Screen("play", as_json=json)
     options = flow.Options(drive, out, port, repeats, Limits(limit_current, limit_force), dry_run, force)

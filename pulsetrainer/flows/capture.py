@@ -19,12 +19,12 @@ from pulsetrainer.core.signals import Signal
 from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.flows import preflight, recording
 from pulsetrainer.flows.recording import Earlier, Tally, check_ended, conditioning_loop
-from pulsetrainer.link import DEFAULT_PORT, Limits, open_device, redact
 from pulsetrainer.link.codes import TICK_RATE_HZ
+from pulsetrainer.link.device import DEFAULT_PORT, Limits, open_device, redact
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
-    from pulsetrainer.link import Device
+    from pulsetrainer.link.device import Device
 
 
 @dataclass(frozen=True, slots=True)

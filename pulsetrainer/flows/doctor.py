@@ -21,11 +21,14 @@ from pulsetrainer.core import signals
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.errors import PulsetrainerError
-from pulsetrainer.link import DEFAULT_PORT, build, list_ports, open_device, redact
+from pulsetrainer.link import build
+from pulsetrainer.link.device import DEFAULT_PORT, open_device, redact
+from pulsetrainer.link.ports import list_ports
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
-    from pulsetrainer.link import Device, Recording
+    from pulsetrainer.link.device import Device
+    from pulsetrainer.link.recording import Recording
 
 State = Literal["ok", "warning", "problem"]
 

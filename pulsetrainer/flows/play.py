@@ -15,11 +15,12 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.flows.recording import check_ended
-from pulsetrainer.link import DEFAULT_PORT, Limits, open_device, redact
+from pulsetrainer.link.device import DEFAULT_PORT, Limits, open_device, redact
 
 if TYPE_CHECKING:
     from pulsetrainer.flows.context import Context
-    from pulsetrainer.link import Device, Recording
+    from pulsetrainer.link.device import Device
+    from pulsetrainer.link.recording import Recording
 
 _LOG = logging.getLogger(__name__)
 DRIVES = ("compensated", "scaled")

@@ -13,6 +13,7 @@ from pulsetrainer.artefacts.output import check_output
 from pulsetrainer.artefacts.source import check_artefact, check_file
 from pulsetrainer.artefacts.timing import check_timing
 from pulsetrainer.errors import UsageError
+from pulsetrainer.link.simulated import check_port
 from pulsetrainer.report.forms import FORMATS
 from pulsetrainer.resources import waveforms_dir
 
@@ -20,6 +21,8 @@ __all__ = [
     "check_beat",
     "check_files",
     "check_force_range",
+    "check_port",
+    "check_resumable",
     "check_timing",
     "comparison_form",
     "figure_form",
@@ -56,6 +59,21 @@ def check_files(
     for path in others:
         if path is not None:
             check_file(path)
+
+
+def check_resumable(path: Path) -> None:
+    """Refuse to go on with a recording into ``path`` of which nothing is there.
+
+    Raises
+    ------
+    UsageError
+        Neither the output nor what a killed program leaves beside it is there.
+    """
+    if not path.exists() and not any(path.parent.glob(f"{path.name}.partial*")):
+        raise UsageError(
+            f"there is nothing to resume: neither {path} nor {path.name}.partial is there",
+            hint="leave --resume out to record from the beginning",
+        )
 
 
 def signal_file(signal: str) -> Path | None:

@@ -27,10 +27,12 @@ from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError, Interrupted, UsageError
+from pulsetrainer.flows import preflight
 from pulsetrainer.link.codes import MAX_DECIMATION
 
 if TYPE_CHECKING:
-    from pulsetrainer.link import Block, Device
+    from pulsetrainer.link.device import Device
+    from pulsetrainer.link.recording import Block
 
 _LOG = logging.getLogger(__name__)
 CONDITIONING_SPEED_A_PER_S = 3.0
@@ -241,6 +243,7 @@ def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool
         What is there cannot be read, or is no recording of this signal.
     """
     output.check_output(path, force=True)
+    preflight.check_resumable(path)
     found = interrupted(path)
     source = found[0][0] if found else None
     if path.exists():
@@ -255,15 +258,11 @@ def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool
         if final is not None and (not found or final.input.size >= found[0][1]):
             source = path
     if source is None:
-        beside = sorted(entry.name for entry in path.parent.glob(f"{path.name}.partial*"))
-        if beside:
-            raise UsageError(
-                f"{beside[0]} is being written by another program, or cannot be read",
-                hint=f"wait for it, or look: pulsetrainer show {beside[0]}",
-            )
+        cut_off = f"{path.name}.partial"
+        beside = min((entry.name for entry in path.parent.glob(f"{cut_off}*")), default=cut_off)
         raise UsageError(
-            f"there is nothing to resume: neither {path} nor {path.name}.partial is there",
-            hint="leave --resume out to record from the beginning",
+            f"{beside} is being written by another program, or cannot be read",
+            hint=f"wait for it, or look: pulsetrainer show {beside}",
         )
     lease = Lease(source)
     run, header = store.read(source, Run), store.read_header(source)

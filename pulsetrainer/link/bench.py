@@ -5,84 +5,20 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
-import re
 import select
 import subprocess
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl
 
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.link.build import firmware_executable
-from pulsetrainer.link.simulated import GOOD_WIRE, Wire, wire_rate, wire_seed
+from pulsetrainer.link.simulated import BenchOptions, parse_bench
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-_SPEEDS = ("max", "real")
 _OWN = ("ideal", "speed", "break", "wire", "wire-seed")
 _START_S = 10.0
 _LEAVE_S = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class BenchOptions:
-    """What a ``bench:`` port asks for."""
-
-    ideal: bool = False
-    speed: str = "max"
-    settings: tuple[tuple[str, str], ...] = ()
-    breaks: tuple[str, ...] = ()
-    wire: Wire = GOOD_WIRE
-
-    def arguments(self) -> list[str]:
-        """Return the firmware process's command-line arguments."""
-        words = ["--speed", self.speed, *(["--ideal"] if self.ideal else [])]
-        for name, value in self.settings:
-            words += ["--set", f"{name}={value}"]
-        for what in self.breaks:
-            words += ["--break", what]
-        return words
-
-
-def parse_bench(port: str) -> BenchOptions:
-    """Return the options in ``bench:?ideal&creep=0.05&speed=real``; names and ranges are checked later.
-
-    Raises
-    ------
-    UsageError
-        if it is not of that form.
-    """
-    match = re.fullmatch(r"bench:(?://)?(?:\?(.*))?", port)
-    if match is None:
-        raise UsageError(
-            f"{port!r} is not a bench port",
-            hint='like this: "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
-        )
-    ideal, speed = False, "max"
-    rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
-    settings: list[tuple[str, str]] = []
-    breaks: list[str] = []
-    for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
-        if name == "ideal":
-            if value not in {"", "1", "0"}:
-                raise UsageError(
-                    f"bench parameter ideal takes no value, got {value!r}", hint='"bench:?ideal"'
-                )
-            ideal = value != "0"
-        elif name == "speed":
-            if value not in _SPEEDS:
-                raise UsageError(f"bench speed is max or real, not {value!r}", hint='"bench:?speed=real"')
-            speed = value
-        elif name == "break":
-            breaks.append(value)
-        elif name == "wire":
-            rate = wire_rate("bench", value)
-        elif name == "wire-seed":
-            seed = wire_seed("bench", value)
-        else:
-            settings.append((name, value))
-    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), Wire(rate, seed))
 
 
 def _known(executable: Path) -> tuple[dict[str, tuple[str, str, str, str]], list[str]]:

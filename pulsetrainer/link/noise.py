@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from pulsetrainer.link.transport import Transport
 
-MAX_RATE = 0.1
 KINDS = ("drop", "flip", "insert", "duplicate", "delay", "cut")
 _LONGEST_INSERT = 8
 _LONGEST_DUPLICATE = 160  # more than a whole frame: what repeats may be valid

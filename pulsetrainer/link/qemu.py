@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import re
 import secrets
 import select
 import shutil
@@ -13,18 +12,16 @@ import socket
 import subprocess
 import tempfile
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
-from urllib.parse import parse_qsl
 
-from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.errors import DeviceError
 from pulsetrainer.link.build import DEBIAN_PACKAGES, firmware_image
 from pulsetrainer.link.codes import TICK_RATE_HZ
-from pulsetrainer.link.simulated import GOOD_WIRE, Wire, parse_break, wire_rate, wire_seed
+from pulsetrainer.link.simulated import parse_qemu
 from pulsetrainer.link.transport import PortLostError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
 QEMU_PORT = "qemu:"
 # The line loses nothing but is slow, some 10 kB/s and less on a busy computer: a command repeated early
@@ -52,48 +49,13 @@ _REAL_TIME = "shift=5,align=on"
 _LEASH = '"$@" 3>&1 1>&2 </dev/null & exec 1>&-; read -r _; kill -9 $!; wait'
 
 
-@dataclass(frozen=True, slots=True)
-class QemuOptions:
-    """What a ``qemu:`` port asks for."""
-
-    breaks: tuple[tuple[int, float], ...] = ()  # what, at which second of the play
-    wire: Wire = GOOD_WIRE
-
-    def loads(self) -> list[str]:
-        """Return the emulator's arguments that put the breaks into the device's memory."""
-        words = []
-        for what, second in self.breaks:
-            tick = int(second * TICK_RATE_HZ) + 1
-            words += ["-device", f"loader,addr={_BREAKS_ADDRESS + 4 * what:#x},data={tick:#x},data-len=4"]
-        return words
-
-
-def parse_qemu(port: str) -> QemuOptions:
-    """Return the options in ``qemu:?break=force-high@1&wire=0.0001&wire-seed=3``.
-
-    Raises
-    ------
-    UsageError
-        if it is not of that form: the plant of the emulated device takes no parameters.
-    """
-    match = re.fullmatch(r"qemu:(?://)?(?:\?(.+))?", port)
-    if match is None:
-        raise UsageError(f"{port!r} is not a port", hint='"qemu:" alone, or "qemu:?break=reset@1"')
-    breaks: list[tuple[int, float]] = []
-    rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
-    for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
-        if name == "break":
-            breaks.append(parse_break(value))
-        elif name == "wire":
-            rate = wire_rate("qemu", value)
-        elif name == "wire-seed":
-            seed = wire_seed("qemu", value)
-        else:
-            raise UsageError(
-                f"the emulated device has no parameter {name!r}: its image is built once",
-                hint='it takes break, wire and wire-seed; for others the bench: "bench:?seed=3&creep=0.05"',
-            )
-    return QemuOptions(tuple(breaks), Wire(rate, seed))
+def _loads(breaks: Iterable[tuple[int, float]]) -> list[str]:
+    """Return the emulator's arguments that put the breaks into the device's memory."""
+    words = []
+    for what, second in breaks:
+        tick = int(second * TICK_RATE_HZ) + 1
+        words += ["-device", f"loader,addr={_BREAKS_ADDRESS + 4 * what:#x},data={tick:#x},data-len=4"]
+    return words
 
 
 class SocketTransport:
@@ -170,7 +132,7 @@ class Emulator:
         words += ["-chardev", "socket,id=wire,fd=3", "-serial", "chardev:wire"]
         seed = secrets.randbits(32)
         words += ["-device", f"loader,addr={_SEED_ADDRESS:#x},data={seed:#x},data-len=4"]
-        words += self.options.loads()
+        words += _loads(self.options.breaks)
         ours, theirs = socket.socketpair()
         # The emulator sends single bytes, each of which takes the room of a kilobyte in here.
         theirs.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_ROOM)

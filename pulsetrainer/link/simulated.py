@@ -1,13 +1,16 @@
-"""What can be wrong with a simulated device, by its port's text: parts that break, a bad wire."""
+"""What a simulated device is to be, by its port's text: its parameters, parts that break, a bad wire.
+
+Told before anything that is slow to load, so that a mistake in it is, too.
+"""
 
 from __future__ import annotations
 
 import difflib
 import re
 from dataclasses import dataclass
+from urllib.parse import parse_qsl
 
 from pulsetrainer.errors import UsageError
-from pulsetrainer.link.noise import MAX_RATE
 
 # In the order of the enum in firmware/plant/breaks.h; a test compares them with what the firmware lists.
 BREAKS = (
@@ -15,6 +18,8 @@ BREAKS = (
     "force-zero", "force-frozen", "tick-overrun", "reset", "hang",
 )  # fmt: skip
 LONGEST_S = 1e5
+MAX_RATE = 0.1  # of damaged bytes: beyond that no frame comes through
+_SPEEDS = ("max", "real")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,3 +75,113 @@ def parse_break(text: str) -> tuple[int, float]:
         f"a simulated device cannot break {text!r}" + (f"; did you mean {near[0]}?" if near else ""),
         hint=f"break=WHAT@SECONDS with WHAT one of {', '.join(BREAKS)}",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class BenchOptions:
+    """What a ``bench:`` port asks for."""
+
+    ideal: bool = False
+    speed: str = "max"
+    settings: tuple[tuple[str, str], ...] = ()
+    breaks: tuple[str, ...] = ()
+    wire: Wire = GOOD_WIRE
+
+    def arguments(self) -> list[str]:
+        """Return the firmware process's command-line arguments."""
+        words = ["--speed", self.speed, *(["--ideal"] if self.ideal else [])]
+        for name, value in self.settings:
+            words += ["--set", f"{name}={value}"]
+        for what in self.breaks:
+            words += ["--break", what]
+        return words
+
+
+def parse_bench(port: str) -> BenchOptions:
+    """Return the options in ``bench:?ideal&creep=0.05&speed=real``; names and ranges are checked later.
+
+    Raises
+    ------
+    UsageError
+        if it is not of that form.
+    """
+    match = re.fullmatch(r"bench:(?://)?(?:\?(.*))?", port)
+    if match is None:
+        raise UsageError(
+            f"{port!r} is not a bench port",
+            hint='like this: "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
+        )
+    ideal, speed = False, "max"
+    rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
+    settings: list[tuple[str, str]] = []
+    breaks: list[str] = []
+    for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
+        if name == "ideal":
+            if value not in {"", "1", "0"}:
+                raise UsageError(
+                    f"bench parameter ideal takes no value, got {value!r}", hint='"bench:?ideal"'
+                )
+            ideal = value != "0"
+        elif name == "speed":
+            if value not in _SPEEDS:
+                raise UsageError(f"bench speed is max or real, not {value!r}", hint='"bench:?speed=real"')
+            speed = value
+        elif name == "break":
+            breaks.append(value)
+        elif name == "wire":
+            rate = wire_rate("bench", value)
+        elif name == "wire-seed":
+            seed = wire_seed("bench", value)
+        else:
+            settings.append((name, value))
+    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), Wire(rate, seed))
+
+
+@dataclass(frozen=True, slots=True)
+class QemuOptions:
+    """What a ``qemu:`` port asks for."""
+
+    breaks: tuple[tuple[int, float], ...] = ()  # what, at which second of the play
+    wire: Wire = GOOD_WIRE
+
+
+def parse_qemu(port: str) -> QemuOptions:
+    """Return the options in ``qemu:?break=force-high@1&wire=0.0001&wire-seed=3``.
+
+    Raises
+    ------
+    UsageError
+        if it is not of that form: the plant of the emulated device takes no parameters.
+    """
+    match = re.fullmatch(r"qemu:(?://)?(?:\?(.+))?", port)
+    if match is None:
+        raise UsageError(f"{port!r} is not a port", hint='"qemu:" alone, or "qemu:?break=reset@1"')
+    breaks: list[tuple[int, float]] = []
+    rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
+    for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
+        if name == "break":
+            breaks.append(parse_break(value))
+        elif name == "wire":
+            rate = wire_rate("qemu", value)
+        elif name == "wire-seed":
+            seed = wire_seed("qemu", value)
+        else:
+            raise UsageError(
+                f"the emulated device has no parameter {name!r}: its image is built once",
+                hint='it takes break, wire and wire-seed; for others the bench: "bench:?seed=3&creep=0.05"',
+            )
+    return QemuOptions(tuple(breaks), Wire(rate, seed))
+
+
+def check_port(port: str | None) -> None:
+    """Refuse the text of a simulated device's port that makes no sense; others are tried when they open.
+
+    Raises
+    ------
+    UsageError
+        It is not of its form. Names and ranges of the plant's parameters are known to the firmware alone.
+    """
+    if port is not None and port.startswith("bench:"):
+        parse_bench(port)
+    if port is not None and port.startswith("qemu:"):
+        parse_qemu(port)

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from program import PROGRAM, pulsetrainer
 
-from pulsetrainer.link import open_device
 from pulsetrainer.link.build import firmware_executable
+from pulsetrainer.link.device import open_device
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the bench needs a pty")
 

@@ -13,7 +13,7 @@ from command_lines import READS_ONLY, WRITERS
 from mistakes import INSIDE, PREPARATION, at_once, lay_out
 from pulsetrainer.cli.app import app
 
-HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich")
+HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich", "pydantic")
 # each in a child of one interpreter that has loaded the parser and nothing else
 JOB = """
 import json, os, sys

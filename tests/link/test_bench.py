@@ -14,9 +14,10 @@ from pathlib import Path
 import pytest
 
 from pulsetrainer.errors import DeviceError, UsageError
-from pulsetrainer.link import build, open_device
-from pulsetrainer.link.bench import Bench, BenchOptions, parse_bench
-from pulsetrainer.link.simulated import BREAKS, Wire
+from pulsetrainer.link import build
+from pulsetrainer.link.bench import Bench
+from pulsetrainer.link.device import open_device
+from pulsetrainer.link.simulated import BREAKS, BenchOptions, Wire, parse_bench
 
 
 @pytest.mark.parametrize(
@@ -155,7 +156,7 @@ def _gone(pid: int, seconds: float = 10.0) -> bool:
 HOST = """
 import signal
 import numpy as np
-from pulsetrainer.link import open_device
+from pulsetrainer.link.device import open_device
 signal.signal(signal.SIGINT, signal.default_int_handler)  # tests run in the background have it ignored
 device = open_device("bench:?speed=real")
 def tell(block):

@@ -10,9 +10,11 @@ import pytest
 from link_wire import within
 
 from pulsetrainer.errors import ArgumentError, DeviceError, UsageError
-from pulsetrainer.link import Block, open_device, player, redact
+from pulsetrainer.link import player
 from pulsetrainer.link.codes import CURRENT_UNIT_A, PARAMETERS
+from pulsetrainer.link.device import open_device, redact
 from pulsetrainer.link.messages import GetParam
+from pulsetrainer.link.recording import Block
 
 
 def test_handshake_says_who_and_how_much(device):

@@ -12,8 +12,8 @@ import pytest
 
 from pulsetrainer.errors import ArgumentError
 from pulsetrainer.link import messages as m
-from pulsetrainer.link import open_device
 from pulsetrainer.link.codes import Fault, NakCode, State
+from pulsetrainer.link.device import open_device
 from pulsetrainer.link.frames import Frame, encode
 from pulsetrainer.link.session import RefusedError
 

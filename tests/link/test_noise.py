@@ -9,9 +9,9 @@ import pytest
 from link_wire import within
 
 from pulsetrainer.link import messages as m
-from pulsetrainer.link import open_device
 from pulsetrainer.link.bench import Bench
 from pulsetrainer.link.codes import PARAMETERS, Fault, State
+from pulsetrainer.link.device import open_device
 from pulsetrainer.link.noise import KINDS, NoisyLine, NoisyTransport
 from pulsetrainer.link.session import NoAnswerError, RefusedError, Session
 from pulsetrainer.link.transport import SerialTransport

@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 
 from pulsetrainer.errors import DeviceError
-from pulsetrainer.link import Block, list_ports, open_device, ports
 from pulsetrainer.link import messages as m
+from pulsetrainer.link import ports
 from pulsetrainer.link.codes import Fault, State
+from pulsetrainer.link.device import open_device
+from pulsetrainer.link.ports import list_ports
+from pulsetrainer.link.recording import Block
 from pulsetrainer.link.transport import SerialTransport
 
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from pulsetrainer.errors import DeviceError, UsageError
-from pulsetrainer.link import build, open_device
+from pulsetrainer.link import build
 from pulsetrainer.link.build import DEBIAN_PACKAGES
-from pulsetrainer.link.qemu import QemuOptions, parse_qemu
-from pulsetrainer.link.simulated import Wire
+from pulsetrainer.link.device import open_device
+from pulsetrainer.link.simulated import QemuOptions, Wire, parse_qemu
 
 pytestmark = pytest.mark.realtime
 RANGE_A = 1.5
@@ -269,7 +269,7 @@ def test_an_emulator_that_will_not_start_is_quoted(monkeypatch):
 
 HOST = """
 import sys
-from pulsetrainer.link import open_device
+from pulsetrainer.link.device import open_device
 device = open_device("qemu:")
 print(device._bench.pid, flush=True)
 device.play([0.5] * 60_000, 1000)
