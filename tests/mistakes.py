@@ -52,6 +52,19 @@ def at_once() -> dict[str, Mistake]:
         "no such wire": ("capture", "identification", "-o", "out.h5", "--port", "bench:?wire=9"),
         "no such emulator": ("play", "drive.h5", "-o", "out.h5", "--port", "qemu:?seed=1"),
         "nothing to resume": ("capture", "identification", "-o", "out.h5", "--resume"),
+        "a plane of one level": ("identify", "run.h5", "-o", "out.h5", "--levels", "1"),
+        "a signal of no levels": ("capture", "identification", "-o", "out.h5", "--levels", "0"),
+        "no repeats": ("capture", "identification", "-o", "out.h5", "--repeats", "0"),
+        "a speed of zero": ("capture", "identification", "-o", "out.h5", "--speed", "0"),
+        "samples below none": ("capture", "identification", "-o", "out.h5", "--rate", "-1"),
+        "no number of samples": ("capture", "identification", "-o", "out.h5", "--rate", "nan"),
+        "a current without end": ("capture", "identification", "-o", "out.h5", "--current-max", "inf"),
+        "a limit below none": ("play", "drive.h5", "-o", "out.h5", "--limit-force", "-1"),
+        "nothing played": ("play", "drive.h5", "-o", "out.h5", "--repeats", "0"),
+        "no periods": ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--periods", "0"),
+        "a drive that stands": ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--slew", "0"),
+        "a seed below zero": ("diagnose", "run.h5", "--model", "model.h5", "-o", "out.h5", "--seed", "-1"),
+        "another such seed": ("identify", "run.h5", "-o", "out.h5", "--seed", "-1"),
         "no such signal": ("capture", "nothing", "-o", "out.h5"),
         "no such waveform": ("invert", "nothing", "--model", "model.h5", "-o", "out.h5"),
         "no such beat": ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--beat", "first"),
@@ -93,6 +106,7 @@ PREPARATION = (
 )
 INSIDE = {
     "a run without a model": Mistake(("evaluate", "run.h5"), 2),
+    "a playback and a run": Mistake(("evaluate", "played.h5", "run.h5"), 2),
     "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),
     "no extended inverse": Mistake(
         ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"), 2

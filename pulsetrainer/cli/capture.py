@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, DryRun, Force, LimitCurrent, LimitForce, Out, Port
+from pulsetrainer.cli.options import AsJson, DryRun, Force, LimitCurrent, LimitForce, Out, Port, positive
 from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
@@ -22,17 +22,25 @@ def capture(
     out: Out,
     port: Port = None,
     levels: Annotated[
-        int, typer.Option(help="Levels whose cells the signal shall switch.", envvar=variable("levels"))
+        int,
+        typer.Option(min=2, help="Levels whose cells the signal shall switch.", envvar=variable("levels")),
     ] = 48,
     current_max: Annotated[
-        float, typer.Option(help="Top of the range, A.", envvar=variable("current_max_A"))
+        float, typer.Option(callback=positive, help="Top of the range, A.", envvar=variable("current_max_A"))
     ] = 1.5,
     speed: Annotated[
-        float, typer.Option(help="Speed of the identification signal, A/s.", envvar=variable("speed_A_per_s"))
+        float,
+        typer.Option(
+            callback=positive,
+            help="Speed of the identification signal, A/s.",
+            envvar=variable("speed_A_per_s"),
+        ),
     ] = 0.75,
-    rate: Annotated[float, typer.Option(help="Samples a second, Hz.", envvar=variable("rate_Hz"))] = 1000.0,
+    rate: Annotated[
+        float, typer.Option(callback=positive, help="Samples a second, Hz.", envvar=variable("rate_Hz"))
+    ] = 1000.0,
     condition: Annotated[bool, typer.Option(help="Go around the major loop once before recording.")] = True,
-    repeats: Annotated[int, typer.Option(help="How often the signal is played, without a pause.")] = 1,
+    repeats: Annotated[int, typer.Option(min=1, help="How often the signal is played, without a pause.")] = 1,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the recording into this output that was cut off.")
     ] = False,

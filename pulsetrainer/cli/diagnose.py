@@ -23,7 +23,7 @@ def diagnose(
     out: Out,
     html: Annotated[Path | None, typer.Option(help="Report to write.", show_default=False)] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Screen only: seconds, but no refit.")] = False,
-    seed: Annotated[int, typer.Option(help="Seed of the simulated null distribution.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated null distribution.")] = 0,
     force: Force = False,
     json: AsJson = False,
 ) -> None:

@@ -31,7 +31,7 @@ def identify(
     runs: Annotated[list[Path], typer.Argument(help="Runs to fit together.", metavar="RUN.h5...")],
     out: Out,
     levels: Annotated[
-        int, typer.Option(help="Levels of the Preisach plane.", envvar=variable("levels"))
+        int, typer.Option(min=2, help="Levels of the Preisach plane.", envvar=variable("levels"))
     ] = 48,
     operator: Annotated[
         Operator, typer.Option(help="continuous, or relay as in the paper.")
@@ -49,7 +49,7 @@ def identify(
         int,
         typer.Option(min=0, help="Refits to resampled blocks, for 90 % intervals; 200 take about a minute."),
     ] = 0,
-    seed: Annotated[int, typer.Option(help="Seed of the resampling.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the resampling.")] = 0,
     force: Force = False,
     json: AsJson = False,
 ) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, Force, Out
+from pulsetrainer.cli.options import AsJson, Force, Out, positive
 from pulsetrainer.cli.settings import variable
 
 
@@ -50,10 +50,13 @@ def invert(
         ),
     ] = None,
     periods: Annotated[
-        int, typer.Option(help="Periods to play; the first is not scored.", envvar=variable("periods"))
+        int, typer.Option(min=1, help="Periods to play; the first is not scored.", envvar=variable("periods"))
     ] = 4,
     slew: Annotated[
-        float, typer.Option(help="Fastest the drive may move, A/s.", envvar=variable("slew_A_per_s"))
+        float,
+        typer.Option(
+            callback=positive, help="Fastest the drive may move, A/s.", envvar=variable("slew_A_per_s")
+        ),
     ] = 30.0,
     force: Force = False,
     json: AsJson = False,

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from pulsetrainer.cli.settings import variable
+
+
+def positive(value: float | None) -> float | None:
+    """Refuse a number that is not above 0 and finite; None is no choice."""
+    if value is not None and not 0 < value < math.inf:
+        raise typer.BadParameter(f"{value:g} is not positive and finite.")
+    return value
+
 
 Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.", show_default=False)]
 Force = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
@@ -28,6 +37,7 @@ LimitCurrent = Annotated[
     float | None,
     typer.Option(
         "--limit-current",
+        callback=positive,
         help="Current that the device shall refuse to exceed, A; its own limit can only be lowered.",
         envvar=variable("limits.current_A"),
         show_default=False,
@@ -37,6 +47,7 @@ LimitForce = Annotated[
     float | None,
     typer.Option(
         "--limit-force",
+        callback=positive,
         help="Force above which the device shall switch off, N; its own limit can only be lowered.",
         envvar=variable("limits.force_N"),
         show_default=False,

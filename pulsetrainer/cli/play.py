@@ -20,7 +20,8 @@ def play(
     out: Out,
     port: Port = None,
     repeats: Annotated[
-        int, typer.Option(help="How often each of the two drives is played.", envvar=variable("repeats"))
+        int,
+        typer.Option(min=1, help="How often each of the two drives is played.", envvar=variable("repeats")),
     ] = 5,
     limit_current: LimitCurrent = None,
     limit_force: LimitForce = None,

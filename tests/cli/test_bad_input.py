@@ -133,11 +133,9 @@ def test_no_compiler_names_both_remedies(ready, tmp_path):
     [
         ("--rate", "1e-308", "the rate must divide the device's 10000 Hz, got 1e-308 Hz"),
         ("--rate", "1e308", "the rate must divide"),
-        ("--rate", "nan", "the rate must divide"),
         ("--speed", "1e-300", "would have 7.35e+304 samples"),
         ("--speed", "1e300", "from one sample to the next the signal would go 1e+297"),
         ("--current-max", "1e308", "would have inf samples"),
-        ("--current-max", "inf", "both finite"),
     ],
 )
 def test_numbers_no_device_can_follow_are_refused_before_anything_moves(run, option, value, said):
