@@ -185,7 +185,7 @@ class _Reader:
             for k, cell in enumerate(cells):
                 if k in dialect.text_columns or cell.lower() in MISSING:
                     continue
-                value = number(cell)
+                value = number(cell, day_first=dialect.day_first)
                 if value is None and k not in self.needed:
                     continue
                 if value is None:

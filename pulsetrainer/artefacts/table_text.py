@@ -12,11 +12,11 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pulsetrainer.artefacts import table_stamps as stamps
 from pulsetrainer.errors import DataError
 
 if TYPE_CHECKING:
@@ -25,12 +25,9 @@ if TYPE_CHECKING:
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: blanks
 _REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
 _SAMPLE_LINES = 200
+_LAST_BYTES = 4096
 _TABLE = 10  # rows of one kind make a table of what stands below a text
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
-_CLOCK = re.compile(r"(\d{1,2}):([0-5]\d):([0-5]\d(?:[.,]\d+)?)(?: ?([AaPp])[Mm])?")
-# the day comes first where points part it from the month; where slashes do, nobody can tell
-_GERMAN_STAMP = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4}),? (\d{1,2}):([0-5]\d)(:[0-5]\d(?:[.,]\d+)?)?")
-_STAMP = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 _FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
@@ -52,6 +49,7 @@ class Dialect:
     text_columns: frozenset[int]
     remarks: tuple[str, ...] = _REMARKS  # what a line that is no row begins with
     rate_Hz: float | None = None  # where the heading says a step
+    day_first: bool | None = None  # in dates with slashes
 
     def split(self, line: str) -> list[str]:
         """Return the cells of a line, without one that only a delimiter at the end makes."""
@@ -70,11 +68,12 @@ def split(line: str, delimiter: str | None) -> list[str]:
     return [cell.strip() for cell in line.split(delimiter)]
 
 
-def number(cell: str) -> float | None:
+def number(cell: str, *, day_first: bool | None = None) -> float | None:
     """Return the number in a cell, NaN where it says that the value is missing, None where it is text.
 
     A comma in a cell is a decimal sign: where commas separate, only quotes can hold one. A time of day is in
-    seconds since midnight, a time stamp in seconds since 1970.
+    seconds since midnight, a time stamp in seconds since 1970; ``day_first`` is the order of its date if
+    that has slashes.
     """
     try:
         # Python reads 1_000 as a number; no instrument writes it
@@ -84,24 +83,9 @@ def number(cell: str) -> float | None:
             return float(cell.replace(",", "."))
         if cell.lower() in MISSING:
             return np.nan
-        return float(re.sub("[dD]", "e", cell)) if _FORTRAN.fullmatch(cell) else _seconds(cell)
-
-
-def _seconds(cell: str) -> float | None:
-    """Return a time of day or a time stamp in seconds, None where it is neither."""
-    if found := _CLOCK.fullmatch(cell):
-        hour = int(found[1]) if found[4] is None else int(found[1]) % 12 + 12 * (found[4] in "Pp")
-        return 3600.0 * hour + 60.0 * int(found[2]) + float(found[3].replace(",", "."))
-    if found := _GERMAN_STAMP.fullmatch(cell):
-        day, month, year, hour_, minute, seconds = found.groups()
-        cell = f"{year}-{int(month):02}-{int(day):02} {int(hour_):02}:{minute}{seconds or ''}"
-    if not _STAMP.fullmatch(cell):
-        return None
-    try:
-        moment = datetime.fromisoformat(cell)
-    except ValueError:  # the 31st of February
-        return None
-    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+        if _FORTRAN.fullmatch(cell):
+            return float(re.sub("[dD]", "e", cell))
+        return stamps.seconds(cell, day_first=day_first)
 
 
 def detect(path: Path) -> Dialect:
@@ -254,7 +238,24 @@ def _with_header(
         lines[heads][0],
         frozenset(k for k, is_text in enumerate(text[heads][: len(first)]) if is_text),
         rate_Hz=rate,
+        day_first=stamps.day_first(_columns(rows[heads:], delimiter, _last_lines(path, encoding))),
     )
+
+
+def _columns(rows: list[list[str]], delimiter: str | None, last: list[str]) -> list[tuple[str, ...]]:
+    """Return the columns of the first rows and the last lines, as far as these are rows of the same kind."""
+    width = len(rows[0])
+    whole = [row for row in (*rows, *(split(line, delimiter) for line in last)) if len(row) == width]
+    return list(zip(*whole, strict=True))
+
+
+def _last_lines(path: Path, encoding: str) -> list[str]:
+    """Return the whole lines in the last few kilobytes of a file."""
+    with path.open("rb") as stream:
+        start = max(path.stat().st_size - _LAST_BYTES, 0)
+        stream.seek(start)
+        text = stream.read().decode("utf-16-le" if encoding == "utf-16" else "utf-8", "replace")
+    return [line for line in text.splitlines()[1 if start else 0 :] if line.strip()]
 
 
 def _cut_settings(rows: list[list[str]]) -> float | None:

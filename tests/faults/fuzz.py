@@ -48,29 +48,50 @@ def arguments(world: World, tries: int) -> Tally:
     commands = typer.main.get_command(app.app).commands  # every one there is: none can be forgotten
     names = world.rng.sample(list(commands), len(commands))
     tally.commands = sorted(names)
-    everything = Writer(
-        "all", (), (), tuple(f.name for f in world.ready.iterdir() if f.suffix in {".h5", ".csv"})
-    )
     for number in range(max(tries, len(names))):
         name = names[number % len(names)]
         good = next((w for w in (*WRITERS, *READS_ONLY) if w.words[0] == name), None)
-        words = _line(world.rng, name, commands[name].params, good)
-        with world.folder(everything) as folder:
-            done = children.run(folder, words, world.log)
-            tally.tries += 1
-            if done.seconds > _SLOW_S:
-                tally.slow.append(f"{done.seconds:.0f} s, code {done.code}: {' '.join(words)[:300]}")
-            if "--debug" in words:
-                done = children.Ended(
-                    words, done.code, done.out, _untraced(done.err), done.seconds, done.hung
-                )
-            if done.hung or not documented(done):
-                tally.judge(done, children.DOCUMENTED)
-            for path in folder.iterdir():
-                if path.name.endswith(".tmp") or (path.suffix == ".h5" and not ready.whole(path)):
-                    tally.half_written += 1
-                    tally.blame(f"{path.name!r} is half-written", done)
+        _try(world, tally, _line(world.rng, name, commands[name].params, good))
     return tally
+
+
+def values(world: World, tries: int) -> Tally:
+    """Give good command lines one more option: all that take a value, with every number, in any order."""
+    tally = Tally("fuzzed values")
+    commands = typer.main.get_command(app.app).commands
+    lines = [
+        (*one.line(force=False), parameter.opts[0], number)
+        for one in {line.words[0]: line for line in reversed(WRITERS)}.values()
+        for parameter in _valued(commands[one.words[0]].params)
+        for number in _NUMBERS
+    ]
+    tally.commands = sorted({line[0] for line in lines})
+    for words in world.rng.sample(lines, min(tries, len(lines))):
+        _try(world, tally, words)
+    return tally
+
+
+def _try(world: World, tally: Tally, words: tuple[str, ...]) -> None:
+    """Run a command line in a folder with an artefact of each kind, and count what is wrong with its end."""
+    names = tuple(path.name for path in world.ready.iterdir() if path.suffix in {".h5", ".csv"})
+    with world.folder(Writer("all", (), (), names)) as folder:
+        done = children.run(folder, words, world.log)
+        tally.tries += 1
+        if done.seconds > _SLOW_S:
+            tally.slow.append(f"{done.seconds:.0f} s, code {done.code}: {' '.join(words)[:300]}")
+        if "--debug" in words:
+            done = children.Ended(words, done.code, done.out, _untraced(done.err), done.seconds, done.hung)
+        if done.hung or not documented(done):
+            tally.judge(done, children.DOCUMENTED)
+        for path in folder.iterdir():
+            if path.name.endswith(".tmp") or (path.suffix == ".h5" and not ready.whole(path)):
+                tally.half_written += 1
+                tally.blame(f"{path.name!r} is half-written", done)
+
+
+def _valued(parameters: list[Any]) -> list[Any]:
+    """Return the options that take a value."""
+    return [p for p in parameters if p.opts[0].startswith("-") and not getattr(p, "is_flag", False)]
 
 
 def _untraced(err: str) -> str:
@@ -83,9 +104,9 @@ def _line(rng: random.Random, name: str, parameters: list[Any], good: Writer | N
     words = [name]
     if good is not None and rng.random() < 0.8:
         words = list(good.line(force=rng.random() < 0.5))
-        valued = [p for p in parameters if p.opts[0].startswith("-") and not getattr(p, "is_flag", False)]
+        valued = _valued(parameters)
         if valued and rng.random() < 0.7:  # all is well but for one value
-            return (*words, rng.choice(rng.choice(valued).opts), rng.choice(_NUMBERS).replace("\0", ""))
+            return (*words, rng.choice(rng.choice(valued).opts), rng.choice(_NUMBERS))
     for parameter in parameters:
         options = [o for o in (*parameter.opts, *parameter.secondary_opts) if o.startswith("-")]
         if rng.random() > (0.25 if options else 0.6):

@@ -93,6 +93,7 @@ def _rows(world: World, options: argparse.Namespace) -> Iterator[Tally]:
         ("together", lambda world: faults.together(world, share)),
         ("locked", lambda world: faults.locked(world, share)),
         ("fuzzed arguments", lambda world: fuzz.arguments(world, 2 * share)),
+        ("fuzzed values", lambda world: fuzz.values(world, 5 * share)),
         ("fuzzed tables", lambda world: fuzz.tables(world, share)),
         ("fuzzed artefacts", lambda world: fuzz.artefacts(world, share)),
     ]

@@ -214,6 +214,12 @@ def test_a_header_of_another_count_is_still_an_error(table):
         (("12:00:01", "12:00:02.25"), (43201, 43202.25)),
         (("2024-05-01T12:00:00", "2024-05-01 12:00:00.5"), (1714564800, 1714564800.5)),
         (("11:59:59 AM", "12:00:01 PM"), (43199, 43201)),
+        (("2024/05/01 12:00:00", "2024/5/1 12:00:00.5"), (1714564800, 1714564800.5)),
+        (("5/1/2024 11:59:59 AM", "5/1/2024 12:00:01 PM"), (1714564799, 1714564801)),
+        (("31/12/2024 23:59", "01/01/2025 00:01"), (1735689540, 1735689660)),
+        (("12/31/2024 23:59", "01/01/2025 00:01"), (1735689540, 1735689660)),
+        (("11/02/2024 23:59", "12/02/2024 00:01"), (1707695940, 1707696060)),
+        (("02/11/2024 23:59", "02/12/2024 00:01"), (1707695940, 1707696060)),
         (("01.05.2024 12:00:00", "1.5.2024 12:00:00,5"), (1714564800, 1714564800.5)),
         (("2024-05-01T14:00:00+02:00", "2024-05-01T12:00:00,5Z"), (1714564800, 1714564800.5)),
     ],
@@ -224,7 +230,19 @@ def test_times_of_day_and_time_stamps_are_seconds(table, cells, seconds):
     np.testing.assert_array_equal(read_run(path, **COLUMNS).time_s, seconds)
     read = table("when;u;y\n2024-02-30T12:00:00;1;2\n25;1;2\n")
     assert read.text_names == {"when"}
-    assert table("when;u;y\n05/01/2024 12:00;1;2\n25;1;2\n").text_names == {"when"}  # May, or January?
+    assert table("when;u;y\n25/25/2024 12:00;1;2\n25;1;2\n").text_names == {"when"}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+@pytest.mark.parametrize("days", ["11/02 12/02", "02/11 02/12"])
+def test_the_last_rows_tell_the_order_of_a_date(table, days, encoding):
+    """Both days may be either; midnight comes long after the first rows, and is a minute away."""
+    before, after = (f"{day}/2024" for day in days.split())
+    rows = [f"{before} 23:{k // 60:02}:{k % 60:02}" for k in range(3600)]
+    rows += [f"{after} 00:00:{k:02}" for k in range(60)]
+    text = "when;u;y\n" + "".join(f"{row};{k % 7};1\n" for k, row in enumerate(rows))
+    run = read_run(table(text.encode(encoding)).path, **COLUMNS)
+    np.testing.assert_array_equal(np.diff(run.time_s), np.ones(3659))
 
 
 def test_comments_are_those_above_the_first_row(table):

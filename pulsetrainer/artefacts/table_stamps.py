@@ -1,0 +1,84 @@
+"""Times of day and time stamps in the cells of a table, as seconds.
+
+ISO 8601, year first with slashes, day first with points. A date with slashes and the year last is the one of
+two countries: its order is told from the first and the last rows of the file, never from one cell.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from datetime import UTC, datetime
+
+_TIME = r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:[.,]\d+)?))?(?: ?([AaPp])[Mm])?"
+_CLOCK = re.compile(_TIME)
+_ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
+_YEAR_FIRST = re.compile(rf"(\d{{4}})[/-](\d{{1,2}})[/-](\d{{1,2}}),?[T ]{_TIME}")
+_POINTS = re.compile(rf"(\d{{1,2}})\.(\d{{1,2}})\.(\d{{4}}),? {_TIME}")
+_SLASHES = re.compile(rf"(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}),? {_TIME}")
+
+
+def seconds(cell: str, *, day_first: bool | None = None) -> float | None:
+    """Return a time of day in seconds since midnight, a stamp in seconds since 1970, None for other text.
+
+    ``day_first`` is the order of a date with slashes; None is any that exists.
+    """
+    if found := _CLOCK.fullmatch(cell):
+        return _of_day(found.groups()) if found[3] else None  # 12:34 may be minutes and seconds too
+    if _ISO.fullmatch(cell):
+        return _since_1970(cell)
+    if found := _YEAR_FIRST.fullmatch(cell):
+        return _stamp(found[1], found[2], found[3], found.groups()[3:])
+    if found := _POINTS.fullmatch(cell):
+        return _stamp(found[3], found[2], found[1], found.groups()[3:])
+    if found := _SLASHES.fullmatch(cell):
+        orders = (False, True) if day_first is None else (day_first,)
+        readings = [_stamp(found[3], *_month_and_day(found, order), found.groups()[3:]) for order in orders]
+        return next((reading for reading in readings if reading is not None), None)
+    return None
+
+
+def day_first(columns: Iterable[tuple[str, ...]]) -> bool | None:
+    """Return the order of the dates with slashes in columns of cells, None where there are none or both fit.
+
+    Of two orders that give a date in every row, the one is right whose rows span less time: a record goes
+    from one day to the next rather than from month to month.
+    """
+    for cells in columns:
+        dates = [cell for cell in cells if _SLASHES.fullmatch(cell)]
+        spans = {}
+        for order in (False, True):
+            read = [seconds(date, day_first=order) for date in dates]
+            times = [time for time in read if time is not None]
+            if dates and len(times) == len(dates):
+                spans[order] = max(times) - min(times)
+        if len(spans) == len(set(spans.values())) > 0:
+            return min(spans, key=spans.__getitem__)
+    return None
+
+
+def _month_and_day(found: re.Match[str], day_comes_first: bool) -> tuple[str, str]:
+    return (found[2], found[1]) if day_comes_first else (found[1], found[2])
+
+
+def _of_day(time: tuple[str | None, ...]) -> float | None:
+    """Return the seconds since midnight of hour, minute, second and the letter of a half of the day."""
+    hour, minute, second, half = time
+    count = int(hour or 0)
+    if half is not None:
+        count = count % 12 + 12 * (half in "Pp")
+    return 3600.0 * count + 60.0 * int(minute or 0) + float((second or "0").replace(",", "."))
+
+
+def _stamp(year: str, month: str, day: str, time: tuple[str | None, ...]) -> float | None:
+    midnight = _since_1970(f"{year}-{int(month):02}-{int(day):02}")
+    of_day = _of_day(time)
+    return None if midnight is None or of_day is None or of_day >= 86_401 else midnight + of_day
+
+
+def _since_1970(text: str) -> float | None:
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:  # the 31st of February
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
