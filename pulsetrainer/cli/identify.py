@@ -47,7 +47,9 @@ def identify(
     ] = None,
     bootstrap: Annotated[
         int,
-        typer.Option(min=0, help="Refits to resampled blocks, for 90 % intervals; 200 take about a minute."),
+        typer.Option(
+            min=0, max=10_000, help="Refits to resampled blocks, for 90 % intervals; 200 take about a minute."
+        ),
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the resampling.")] = 0,
     force: Force = False,

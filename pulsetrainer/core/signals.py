@@ -39,6 +39,20 @@ class Signal:
         return max(turning_points(self.value).size - 1, 0)
 
 
+def check_size(times: int, samples: int, most: int = MOST_SAMPLES) -> None:
+    """Refuse so many ``samples`` so many ``times`` where that is more than ``most``.
+
+    Raises
+    ------
+    ArgumentError
+        It is more.
+    """
+    if times * samples > most:
+        raise ArgumentError(
+            f"{str(times)[:20]} times {samples} samples are more than {most:.0e}", hint="fewer of them"
+        )
+
+
 def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
     """Samples of a path that visits ``points`` (k,) in turn at constant ``speed``, input units per second.
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray, ascending, finite_vector, positive
+from pulsetrainer.core.signals import check_size
 from pulsetrainer.errors import ArgumentError
 
 
@@ -53,7 +55,8 @@ def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float
     Raises
     ------
     ArgumentError
-        No periods, an empty range, or a rate that is not positive or leaves no sample.
+        No periods, an empty range, a rate that is not positive or leaves no sample, or more than
+        ``signals.MOST_SAMPLES``.
     """
     if periods < 1:
         raise ArgumentError(f"a pulse train needs at least 1 period, got {periods}", hint="12 suit a session")
@@ -63,6 +66,7 @@ def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float
     curve = scipy.interpolate.PchipInterpolator(
         np.append(t, shape.period_s), np.append(shape.normalised, shape.normalised[0])
     )
+    check_size(periods, math.ceil(shape.period_s * rate_Hz))
     count = round(periods * shape.period_s * rate_Hz)
     if count < 1:
         raise ArgumentError(

@@ -13,6 +13,7 @@ from pulsetrainer.artefacts import output, provenance, store
 from pulsetrainer.artefacts.kinds import DrivePlayback, Playback, Waveform
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.signals import check_size
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.flows.recording import check_ended
 from pulsetrainer.link.device import DEFAULT_PORT, Limits, open_device, redact
@@ -103,6 +104,7 @@ def _waveform(options: Options) -> Waveform:
     waveform = store.read(options.drive, Waveform)
     if options.repeats < 1:
         raise ArgumentError(f"repeats must be at least 1, got {options.repeats}", hint="5 is usual")
+    check_size(options.repeats, 2 * waveform.compensated.size)
     if waveform.input_unit != "A":
         raise DataError(
             f"{options.drive} drives in {waveform.input_unit}; the device takes a current in A",

@@ -147,6 +147,19 @@ def test_numbers_no_device_can_follow_are_refused_before_anything_moves(run, opt
         assert "try:" in shown.err
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("capture", "identification", "--repeats", "1000000"), "1000000 times 98001 samples"),
+        (("invert", "normal", "--model", "model.h5", "--periods", "1000000"), "1000000 times 800 samples"),
+        (("play", "drive.h5", "--repeats", "1000000"), "1000000 times [0-9]+ samples"),
+    ],
+)
+def test_more_than_memory_and_days_can_hold_is_refused_at_once(ready, words, said):
+    """The count of samples is told before they are made."""
+    refused(ready, [*words, "-o", "never.h5"], 3, said, "are more than")
+
+
 def test_usage_errors_are_exit_2_in_words(run):
     """A missing option, an unknown command, an unknown signal or waveform."""
     for words in (["identify", "run.h5"], ["frobnicate"], ["capture", "noise", "-o", "x.h5"]):
