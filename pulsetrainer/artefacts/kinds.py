@@ -330,6 +330,10 @@ class ModelEvaluation:
     shape_rms_percent: Annotated[
         float, Data("percent", "rms prediction error with the run's own offset, of the output span")
     ] = float("nan")
+    # what a user has who sets the zero first: nothing of the half that is scored was known
+    second_half_percent: Annotated[
+        float, Data("percent", "rms prediction error of the second half, with the zero of the first half")
+    ] = float("nan")
     start: str = "known"  # the state before the run: known, or which one was estimated
     outside_percent: Annotated[float, Data("percent", "samples outside the range of the model")] = 0.0
 

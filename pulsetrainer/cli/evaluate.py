@@ -96,7 +96,7 @@ def _payload(result: Result) -> dict[str, Any]:
     if evaluation.models:
         names = (
             "name", "rms", "rms_percent", "max_percent", "gain_percent",
-            "offset", "shape_rms_percent", "start", "outside_percent",
+            "offset", "shape_rms_percent", "second_half_percent", "start", "outside_percent",
         )  # fmt: skip
         payload["models"] = [{name: getattr(m, name) for name in names} for m in evaluation.models]
     return payload | {

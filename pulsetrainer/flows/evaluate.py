@@ -39,6 +39,9 @@ PUBLISHED: dict[str, dict[str, float]] = {
 }
 METRICS = ("mean_abs_error_percent", "max_abs_error_percent", "rms_error_percent", "hysteresis_percent",
            "current_tracking_max_percent")  # fmt: skip
+MODEL_METRICS = (
+    "rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent", "second_half_percent",
+)  # fmt: skip
 _TRACE_SAMPLES = 6000
 _BEYOND = 0.005  # of the model's range: an input further out than this was never identified
 
@@ -241,6 +244,7 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
                 max_percent=errors.max_percent,
                 offset=shift,
                 shape_rms_percent=own.rms_percent,
+                second_half_percent=_second_half(measured, predicted),
                 start=state,
                 outside_percent=100.0 * float(np.mean(outside)),
                 gain_percent=100.0 * (1.0 - errors.rms / found[0].rms) if found else 0.0,
@@ -251,6 +255,14 @@ def _of_run(path: Path, one: Run, models: Sequence[Path]) -> Evaluation:
             )
         )
     return Evaluation(models=tuple(found), model=model)
+
+
+def _second_half(measured: FloatArray, predicted: FloatArray) -> float:
+    """Rms error on the second half (n,), with the zero of the first, in percent of the span of all."""
+    half = measured.size // 2
+    error = measured - predicted
+    left = error[half:] - np.mean(error[:half])
+    return 100.0 * metrics.root_mean_square(left) / float(np.ptp(measured)) if half else float("nan")
 
 
 def _times(parts: Sequence[Run], known: Sequence[int], thin: slice) -> FloatArray | None:
@@ -308,7 +320,7 @@ def metrics_of(evaluation: Evaluation) -> dict[str, float]:
             for metric in METRICS:
                 named[f"{stem}.{drive}.{metric}"] = getattr(errors, metric)
     for model in evaluation.models:
-        for metric in ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent"):
+        for metric in MODEL_METRICS:
             named[f"{Path(model.name).stem}.{metric}"] = getattr(model, metric)
     return named
 
