@@ -53,6 +53,7 @@ def at_once() -> dict[str, Mistake]:
         "no such emulator": ("play", "drive.h5", "-o", "out.h5", "--port", "qemu:?seed=1"),
         "nothing to resume": ("capture", "identification", "-o", "out.h5", "--resume"),
         "a plane of one level": ("identify", "run.h5", "-o", "out.h5", "--levels", "1"),
+        "a plane of too many": ("identify", "run.h5", "-o", "out.h5", "--levels", "1000"),
         "a signal of no levels": ("capture", "identification", "-o", "out.h5", "--levels", "0"),
         "no repeats": ("capture", "identification", "-o", "out.h5", "--repeats", "0"),
         "a speed of zero": ("capture", "identification", "-o", "out.h5", "--speed", "0"),

@@ -27,11 +27,17 @@ class Method(StrEnum):
     alternating = "alternating"
 
 
+_MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
+
+
 def identify(
     runs: Annotated[list[Path], typer.Argument(help="Runs to fit together.", metavar="RUN.h5...")],
     out: Out,
     levels: Annotated[
-        int, typer.Option(min=2, help="Levels of the Preisach plane.", envvar=variable("levels"))
+        int,
+        typer.Option(
+            min=2, max=_MOST_LEVELS, help="Levels of the Preisach plane.", envvar=variable("levels")
+        ),
     ] = 48,
     operator: Annotated[
         Operator, typer.Option(help="continuous, or relay as in the paper.")
