@@ -114,7 +114,7 @@ def read_run(
     if rate_Hz is not None:
         time_s = np.arange(rows) / rate_Hz
     elif time_column is not None:
-        time_s = _time(table, time_column)
+        time_s = seconds(table, time_column)
     elif not no_time:
         time_s = _own_time(table, [table.index(name) for name in wanted], note)
     return Run(
@@ -176,7 +176,7 @@ def _own_time(table: Table, used: Collection[int], note: Note) -> FloatArray | N
             f"the samples counts (if it is seconds, give --time {name})"
         )
         return None
-    return _time(table, name)
+    return seconds(table, name)
 
 
 def _merely_counts(values: FloatArray) -> bool:
@@ -189,13 +189,19 @@ def _merely_counts(values: FloatArray) -> bool:
     )
 
 
-def _time(table: Table, name: str) -> FloatArray:
-    """Return a column as strictly increasing seconds."""
+def seconds(table: Table, name: str) -> FloatArray:
+    """Return a column as strictly increasing seconds (n,).
+
+    Raises
+    ------
+    DataError
+        Its unit is none of time, a value is not finite, or it does not increase: the line is named.
+    """
     unit = table.unit(name)
     if unit not in _SECONDS:
         raise DataError(
             f"{table.path} gives the time {name} in {unit!r}, which is not one of s, ms, us, min, h",
-            hint="name another --time column, or give --rate",
+            hint="give it in one of these; import also takes another --time column, or --rate",
         )
     time_s = table.check_finite(name)
     if _SECONDS[unit] != 1.0:
@@ -207,9 +213,9 @@ def _time(table: Table, name: str) -> FloatArray:
         raise DataError(
             f"the time in {table.path}, column {name}, does not increase at {table.place(row)}: "
             f"{time_s[row]:g} s after {time_s[row - 1]:g} s ({back.size} such rows)",
-            hint="drop the repeated rows, or give --rate instead"
+            hint="drop the repeated rows; import also takes --rate instead of the time"
             if same
-            else "name the --time column, sort the rows, or give --rate; import parts as files of their own",
+            else "sort the rows; import also takes another --time column, --rate, or parts as several files",
         )
     return time_s
 

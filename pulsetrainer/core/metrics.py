@@ -44,8 +44,9 @@ def tracking(target: ArrayLike, measured: ArrayLike, full: float) -> Tracking:
 
 
 def root_mean_square(values: FloatArray) -> float:
-    """Root of the mean of the squares of all ``values`` (...), in their unit."""
-    return float(np.sqrt(np.mean(values**2)))
+    """Root of the mean of the squares of all ``values`` (...), in their unit; infinite beyond 1e154."""
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.mean(values**2)))
 
 
 def loop_area(x: ArrayLike, y: ArrayLike) -> float:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pulsetrainer.artefacts import output, provenance, table
+from pulsetrainer.artefacts import output, provenance, table, table_run
 from pulsetrainer.artefacts.recorder import RunRecorder, interrupted
 from pulsetrainer.core import signals
 from pulsetrainer.core.course import Course
@@ -144,17 +144,12 @@ def _from_file(path: Path, rate_Hz: float) -> Signal:
             f"{path} has {len(columns.names)} column; a reference needs a time and a current",
             hint="write two columns: t_s,current_A",
         )
-    time, current = columns.column(columns.names[0]), columns.column(columns.names[1])
-    if not np.all(np.diff(time) > 0):
-        row = int(np.flatnonzero(np.diff(time) <= 0)[0]) + 1
-        raise DataError(
-            f"the time in {path} does not increase at row {row + 1}: {time[row]:g} after {time[row - 1]:g}",
-            hint="sort the rows by time and drop repeated ones",
-        )
-    lasts = (time[-1] - time[0]) * rate_Hz
+    time, current = table_run.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
+    seconds = float(time[-1]) - float(time[0])
+    lasts = seconds * rate_Hz
     if not lasts <= signals.MOST_SAMPLES:
         raise DataError(
-            f"{path} lasts {time[-1] - time[0]:g} s, {lasts:.3g} samples at {rate_Hz:g} Hz; "
+            f"{path} lasts {seconds:g} s, {lasts:.3g} samples at {rate_Hz:g} Hz; "
             f"{signals.MOST_SAMPLES} are the most",
             hint="give its time in s, a lower --rate, or a shorter signal with --repeats",
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from pulsetrainer.artefacts import output, provenance, store, table
+from pulsetrainer.artefacts import output, provenance, store, table, table_run
 from pulsetrainer.artefacts.kinds import Model, Waveform
 from pulsetrainer.core import inversion, signals
 from pulsetrainer.core.beats import find_beats
@@ -83,7 +83,7 @@ def read_shape(waveform: str) -> tuple[Shape, Path]:
             f"{path} has {len(columns.names)} column; a waveform needs a time and a value",
             hint="write two columns: t_s,p",
         )
-    time_s, value = columns.column(columns.names[0]), columns.column(columns.names[1])
+    time_s, value = table_run.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
     source = next((c.partition(":")[2].strip() for c in columns.comments if c.startswith("source:")), "")
     return Shape(path.stem, time_s, value, source or path.name), path
 

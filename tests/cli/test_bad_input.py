@@ -148,6 +148,33 @@ def test_numbers_no_device_can_follow_are_refused_before_anything_moves(run, opt
 
 
 @pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("0,0\n,0.5\n0.2,1\n", "nan in column t_s, line 3"),
+        ("0,0\n0.1,\n0.2,1\n", "nan in column {value}, line 3"),
+        ("0,0\n0.1,inf\n0.2,1\n", "inf in column {value}, line 3"),
+        ("0,0\n0.1,1\n0.1,0.5\n", "does not increase at line 4"),
+        ("nan,0\nnan,1\nnan,0.5\n", "no numbers in column t_s"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("words", "value"),
+    [(("capture", "x.csv", "--dry-run"), "current_A"), (("invert", "x.csv", "--model", "model.h5"), "p")],
+)
+def test_tables_of_signals_and_pulses_are_refused_by_line(ready, words, value, rows, said):
+    """Missing, infinite or repeated: whatever reads a time and a value names the line."""
+    (ready / "x.csv").write_text(f"t_s,{value}\n{rows}")
+    refused(ready, [*words, "-o", "never.h5"], 3, said.format(value=value))
+
+
+def test_a_signal_in_milliseconds_is_one(ready):
+    """The unit in the heading counts, as it does for import."""
+    (ready / "ms.csv").write_text("t_ms,current_A\n0,0\n500,1\n1000,0\n")
+    plan = pulsetrainer(ready, "capture", "ms.csv", "--dry-run", "--json", "-o", "never.h5").json
+    assert plan["samples"] == 1001
+
+
+@pytest.mark.parametrize(
     ("words", "said"),
     [
         (("capture", "identification", "--repeats", "1000000"), "1000000 times 98001 samples"),
