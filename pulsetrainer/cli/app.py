@@ -89,4 +89,5 @@ def main() -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     guard.end_like_ctrl_c()
     guard.speak_any_encoding()
+    guard.hush_libraries(sys.argv)
     sys.exit(guard.funnel(app, sys.argv[1:]))

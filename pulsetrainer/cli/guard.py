@@ -11,6 +11,7 @@ import shutil
 import signal
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
@@ -50,6 +51,12 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     with contextlib.suppress(OSError):  # nowhere to say it: the exit code still does
         report(problem, command=next((w for w in words if w[:1] != "-"), ""), as_json="--json" in words)
     return problem.exit_code
+
+
+def hush_libraries(argv: Sequence[str]) -> None:
+    """Keep what libraries warn of, such as an overflow, for those who asked for details."""
+    if not sys.warnoptions and not {"--verbose", "--debug"} & set(argv):
+        warnings.simplefilter("ignore")
 
 
 def end_like_ctrl_c() -> None:

@@ -39,7 +39,7 @@ class Signal:
         return max(turning_points(self.value).size - 1, 0)
 
 
-def check_size(times: int, samples: int, most: int = MOST_SAMPLES) -> None:
+def check_size(times: int, samples: float, most: int = MOST_SAMPLES) -> None:
     """Refuse so many ``samples`` so many ``times`` where that is more than ``most``.
 
     Raises
@@ -47,9 +47,9 @@ def check_size(times: int, samples: int, most: int = MOST_SAMPLES) -> None:
     ArgumentError
         It is more.
     """
-    if times * samples > most:
+    if times > most or not times * samples <= most:  # either may be beyond every float
         raise ArgumentError(
-            f"{str(times)[:20]} times {samples} samples are more than {most:.0e}", hint="fewer of them"
+            f"{str(times)[:20]} times {samples:.6g} samples are more than {most:.0e}", hint="fewer of them"
         )
 
 

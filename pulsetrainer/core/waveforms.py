@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +30,14 @@ class Shape:
                 f"{t.shape} of time and {value.shape} of value",
                 hint="mend the time column",
             )
-        if np.ptp(value) == 0:
+        with np.errstate(over="ignore"):
+            length, span = self.period_s, float(np.ptp(value))
+        if not np.isfinite([length, span]).all():
+            raise ArgumentError(
+                f"the waveform {self.name} is too long or too high for numbers: {length:g} s, {span:g}",
+                hint="give its time in s and values of any usual size",
+            )
+        if span == 0:
             raise ArgumentError(
                 f"the waveform {self.name} is constant at {value[0]:g}", hint="give a pulse that moves"
             )
@@ -62,11 +68,11 @@ def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float
         raise ArgumentError(f"a pulse train needs at least 1 period, got {periods}", hint="12 suit a session")
     ascending(low, high, what="the range of the pulse")
     positive(rate=rate_Hz)
+    check_size(periods, shape.period_s * rate_Hz)
     t = shape.time_s - shape.time_s[0]
     curve = scipy.interpolate.PchipInterpolator(
         np.append(t, shape.period_s), np.append(shape.normalised, shape.normalised[0])
     )
-    check_size(periods, math.ceil(shape.period_s * rate_Hz))
     count = round(periods * shape.period_s * rate_Hz)
     if count < 1:
         raise ArgumentError(

@@ -167,6 +167,25 @@ def test_tables_of_signals_and_pulses_are_refused_by_line(ready, words, value, r
     refused(ready, [*words, "-o", "never.h5"], 3, said.format(value=value))
 
 
+@pytest.mark.parametrize(
+    ("time", "top", "said"),
+    [("1e308", "1", "inf s, 2"), ("3", "1e308", "4 s, inf"), ("1e300", "1", "4 times 1e.303 samples")],
+)
+def test_pulses_beyond_all_numbers_are_refused_in_words(ready, time, top, said):
+    """Differences of finite numbers that are infinite, and a period that no memory holds."""
+    first = f"-{time}" if time == "1e308" else "0"
+    (ready / "x.csv").write_text(f"t_s,p\n{first},-{top}\n1,0\n2,{top}\n{time},0.5\n")
+    refused(ready, ["invert", "x.csv", "--model", "model.h5", "-o", "never.h5"], 3, said)
+
+
+def test_libraries_warn_those_who_asked_for_details(ready):
+    """A slope that overflows inside an interpolation is harmless: no line of source reaches a technician."""
+    (ready / "steep.csv").write_text("t_s,p\n0,0\n1,1e-308\n2,0.5\n3,1\n4,0.2\n")
+    words = ("invert", "steep.csv", "--model", "model.h5", "-o", "steep.h5", "--periods", "1", "--force")
+    assert "Warning" not in pulsetrainer(ready, *words).err
+    assert "RuntimeWarning" in pulsetrainer(ready, "--verbose", *words).err
+
+
 def test_a_signal_in_milliseconds_is_one(ready):
     """The unit in the heading counts, as it does for import."""
     (ready / "ms.csv").write_text("t_ms,current_A\n0,0\n500,1\n1000,0\n")
