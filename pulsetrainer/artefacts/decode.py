@@ -12,6 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from pulsetrainer.artefacts.kinds import beyond_all_quantities
 from pulsetrainer.artefacts.schema import TIME, FieldPlan, plan_of
 from pulsetrainer.errors import DataError
 
@@ -141,6 +142,8 @@ def _array(
     if plan.data is not None and plan.data.finite and not np.all(np.isfinite(values)):
         where_bad = ", ".join(str(k[0]) for k in np.nonzero(~np.isfinite(values)))
         raise origin.fault(where, f"holds a value that is not finite, the first at index {where_bad}")
+    if said := beyond_all_quantities(values):
+        raise origin.fault(where, said)
     return values
 
 
@@ -153,6 +156,8 @@ def _number(dataset: h5py.Dataset, plan: FieldPlan, origin: Origin) -> Any:
     value = dataset[()]
     if plan.data is not None and plan.data.finite and not np.isfinite(value):
         raise origin.fault(where, f"is {value}, expected a finite number")
+    if np.isfinite(value) and (said := beyond_all_quantities(np.asarray(value))):
+        raise origin.fault(where, said)
     return plan.type(value)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+from pulsetrainer.artefacts.kinds import beyond_all_quantities
 from pulsetrainer.artefacts.provenance import clean
 from pulsetrainer.artefacts.schema import TIME, FieldPlan, plan_of
 from pulsetrainer.errors import DataError
@@ -138,6 +139,8 @@ def _checked(plan: FieldPlan, array: np.ndarray[Any, Any]) -> np.ndarray[Any, An
         raise DataError(
             f"{plan.name!r} holds a value that is not finite and must not", hint="mend the data it came from"
         )
+    if said := beyond_all_quantities(array):
+        raise DataError(f"{plan.name!r} {said}", hint="mend the data it came from")
     return array
 
 
@@ -171,6 +174,8 @@ def _put_number(group: h5py.Group, plan: FieldPlan, value: Any, values: Mapping[
     number = np.asarray(plan.type(value))
     if plan.data is not None and plan.data.finite and not np.isfinite(number):
         raise DataError(f"{plan.name!r} is {value} and must be finite", hint="mend the data it came from")
+    if np.isfinite(number) and (said := beyond_all_quantities(number)):
+        raise DataError(f"{plan.name!r} {said}", hint="mend the data it came from")
     dataset = group.create_dataset(plan.path, data=number.astype(np.uint8) if plan.type is bool else number)
     _describe(dataset, plan, values)
     if plan.type is bool:

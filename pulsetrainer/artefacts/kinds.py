@@ -7,6 +7,7 @@ How a field is stored follows from its type and its ``Data`` annotation:
   dimension scale. ``units="@name"`` takes the text of the sibling field ``name`` (units come
   with the data: A and N here, A/m and T for somebody else's bench).
 - ``finite``: neither NaN nor infinity is written or read (what drives a device, what a model is).
+  Beyond ``LARGEST`` nothing is read, infinity included; NaN stands for what is missing.
 - ``path``: the dataset's name in the file where it is not the field's name.
 - ``str``, ``int``, ``float``, ``bool``: an attribute.
 - a dataclass: a group; a tuple of dataclasses: a group of numbered groups.
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 
 from pulsetrainer.errors import DataError
 
+LARGEST = 1e100  # no quantity in any unit is larger, and its squares and sums are numbers still
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
@@ -52,6 +54,14 @@ class Data:
         )
         for name, value in fields:
             object.__setattr__(self, name, value)
+
+
+def beyond_all_quantities(values: NDArray[Any]) -> str:
+    """Say which of the values (...) are beyond ``LARGEST``, nothing where none is; NaN is none of them."""
+    if values.dtype.kind != "f":
+        return ""
+    low, high = np.fmin.reduce(values, None, initial=0.0), np.fmax.reduce(values, None, initial=0.0)
+    return "" if max(-low, high) <= LARGEST else f"goes from {low:g} to {high:g}; the limit is {LARGEST:g}"
 
 
 def _check_equal_length(artefact: Any, names: tuple[str, ...]) -> None:
@@ -245,6 +255,10 @@ class Waveform:
     def __post_init__(self) -> None:
         _check_equal_length(self, ("time_s", "target", "compensated", "scaled", "predicted", "scored"))
         _check_time(self)
+        if self.time_s.size < 2:
+            raise DataError(
+                f"a waveform of {self.time_s.size} samples is none", hint="make it again: pulsetrainer invert"
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pulsetrainer.artefacts.kinds import FloatArray
+from pulsetrainer.artefacts.kinds import FloatArray, beyond_all_quantities
 from pulsetrainer.artefacts.output import replacing
 from pulsetrainer.artefacts.table_arrays import Columns, reader_of
 from pulsetrainer.artefacts.table_rows import parse
@@ -112,6 +112,8 @@ class Table:
                 f"({bad.size} of {values.size} rows are not finite)",
                 hint="remove those rows, or export the record again",
             )
+        if said := beyond_all_quantities(values):
+            raise DataError(f"{self.path}, column {name}, {said}", hint="mend or remove those rows")
         return values
 
     def index(self, name: str) -> int:

@@ -125,6 +125,11 @@ def _outside_of(error: Exception) -> PulsetrainerError | None:
             "there is not enough memory for this",
             hint="use fewer levels, or a shorter record",
         )
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        name = str(error.filename)
+        return DataError(
+            f"the name {name[:20]}... has {len(name)} characters: {error.strerror}", hint="shorten it"
+        )
     if isinstance(error, OSError) and error.filename is None and error.errno in _NOWHERE:
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left would fail again

@@ -186,6 +186,15 @@ def test_libraries_warn_those_who_asked_for_details(ready):
     assert "RuntimeWarning" in pulsetrainer(ready, "--verbose", *words).err
 
 
+@pytest.mark.parametrize("command", ["capture", "show", "invert", "identify"])
+def test_names_that_no_file_system_takes_are_refused_in_words(ready, command):
+    """Five thousand letters, with and without a suffix that promises a file."""
+    more = {"show": (), "invert": ("--model", "model.h5")}.get(command, ())
+    out = () if command == "show" else ("-o", "never.h5")
+    for name in ("x" * 5000, "x" * 5000 + ".csv"):
+        refused(ready, [command, name, *more, *out], 3, "x{20}", "too long")
+
+
 def test_a_signal_in_milliseconds_is_one(ready):
     """The unit in the heading counts, as it does for import."""
     (ready / "ms.csv").write_text("t_ms,current_A\n0,0\n500,1\n1000,0\n")

@@ -96,8 +96,9 @@ def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None, *, full:
     plans = plan_of(cls)
     own_time = any(plan.is_time_axis for plan in plans)
     level = draw(st.integers(1, 5))
+    least = 2 if cls is kinds.Waveform else 0
     lengths = {
-        TIME: inherited if inherited is not None and not own_time else draw(st.integers(0, 700)),
+        TIME: inherited if inherited is not None and not own_time else draw(st.integers(least, 700)),
         "level": level,
         "cell": level * (level - 1) // 2,
         "repeat": draw(st.integers(0, 3)),
@@ -118,15 +119,16 @@ def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None, *, full:
 
 def _values(plan: FieldPlan, lengths: dict[str, int], *, full: bool) -> st.SearchStrategy[Any]:
     """Return the strategy for one field."""
-    floats = (
-        st.floats(allow_nan=not plan.data.finite, allow_infinity=not plan.data.finite) if plan.data else None
-    )
+    quantities = st.floats(-kinds.LARGEST, kinds.LARGEST)
+    if plan.data is not None and not plan.data.finite:
+        quantities |= st.just(np.nan)
+    floats = quantities if plan.data is None or plan.data.finite else quantities | st.just(np.inf)
     if plan.is_time_axis:
         return st.integers(0, 2**32 - 1).map(
             lambda seed: np.cumsum(np.random.default_rng(seed).uniform(1e-4, 1, lengths[TIME]))
         )
     if plan.role == "array":
-        elements = st.booleans() if plan.type is np.bool_ else floats
+        elements = st.booleans() if plan.type is np.bool_ else quantities
         return hnp.arrays(plan.type, tuple(lengths[axis] for axis in plan.dims), elements=elements)
     if plan.role == "number":
         return {float: floats, int: ATTRIBUTES[int], bool: st.booleans()}[plan.type]

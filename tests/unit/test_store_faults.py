@@ -165,6 +165,7 @@ def test_edited_run(run_file, change, words):
     [
         (lambda f: f["weights"].__setitem__(2, np.nan), ["'/weights'", "not finite", "index 2"]),
         (lambda f: f["offset"].__setitem__((), np.inf), ["'/offset'", "finite"]),
+        (lambda f: f["weights"].__setitem__(2, -2e100), ["'/weights'", "goes from -2e+100 to", "1e+100"]),
         (_instead("offset", data=[1.0]), ["'/offset'", "(1,)"]),
         (_instead("levels", data=[0.0, 1]), ["1 levels has 1 cells"]),
         (_instead("covered", data=[0.0] * 6), ["whole numbers"]),
@@ -263,6 +264,7 @@ def test_locked_by_another_program(run_file):
         (lambda: examples.run(input=np.ones((50, 50))), ["'input'", "(50, 50)", "(time)"]),
         (lambda: kinds.Evaluation(waveforms=None), ["'waveforms'", "missing"]),
         (lambda: replace(examples.waveform(), scaled=np.full(20, np.nan)), ["'scaled'", "not finite"]),
+        (lambda: replace(examples.run(20), output=np.full(20, np.inf)), ["'output'", "to inf", "1e+100"]),
         (lambda: replace(examples.model(), offset=np.nan), ["'offset'", "finite"]),
         (
             lambda: replace(examples.model(), covered=np.ones(2, bool)),

@@ -245,6 +245,14 @@ def test_the_last_rows_tell_the_order_of_a_date(table, days, encoding):
     np.testing.assert_array_equal(np.diff(run.time_s), np.ones(3659))
 
 
+@pytest.mark.parametrize("cell", ["1e101", "-1e308"])
+def test_what_no_quantity_reaches_is_refused(table, cell):
+    """Its square is infinite: no figure and no fit would come of it."""
+    path = table(f"when,u,y\n0,1,2\n1,{cell},3\n2,1,2\n").path
+    with pytest.raises(DataError, match=r"t\.csv, column u, goes from .* the limit is 1e\+100"):
+        read_run(path, **COLUMNS)
+
+
 def test_comments_are_those_above_the_first_row(table):
     """A remark between the rows is no header, and no comment on the record."""
     read = table("# source: here\n0,1\n# a,b\n1,2\n")
