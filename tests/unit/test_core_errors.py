@@ -233,6 +233,15 @@ BAD = {
     ),
     "pulse of two lengths": (lambda: shape(time_s=np.arange(5.0)), ["value", "time", "(5,)", "(4,)"]),
     "pulse in standing time": (lambda: shape(time_s=np.array([0.0, 1.0, 1.0, 2.0])), ["increas", "time"]),
+    "pulse of infinite length": (
+        lambda: shape(time_s=np.array([-1e308, 0.0, 1.0, 1e308])),
+        ["too long", "inf s, 3"],
+    ),
+    "pulse of infinite height": (
+        lambda: shape(value=np.array([-1e308, 0.0, 1.0, 1e308])),
+        ["too high", "4 s, inf"],
+    ),
+    "more periods than memory": (lambda: train(periods=10**9), ["1000000000 times 400", "1e+08"]),
     "no periods": (lambda: train(periods=0), ["period", "0"]),
     "no range of force": (lambda: train(low=1.0), ["low < high", "1"]),
     "train at no rate": (lambda: train(rate_Hz=0.0), ["rate", "positive", "0"]),
