@@ -7,7 +7,7 @@ How a field is stored follows from its type and its ``Data`` annotation:
   dimension scale. ``units="@name"`` takes the text of the sibling field ``name`` (units come
   with the data: A and N here, A/m and T for somebody else's bench).
 - ``finite``: neither NaN nor infinity is written or read (what drives a device, what a model is).
-  Beyond ``LARGEST`` nothing is read, infinity included; NaN stands for what is missing.
+  In any array, and in numbers but for infinity, what is beyond ``LARGEST`` is refused too; NaN is missing.
 - ``path``: the dataset's name in the file where it is not the field's name.
 - ``str``, ``int``, ``float``, ``bool``: an attribute.
 - a dataclass: a group; a tuple of dataclasses: a group of numbered groups.

@@ -61,7 +61,7 @@ def _month_and_day(found: re.Match[str], day_comes_first: bool) -> tuple[str, st
     return (found[2], found[1]) if day_comes_first else (found[1], found[2])
 
 
-def _of_day(time: tuple[str | None, ...]) -> float | None:
+def _of_day(time: tuple[str | None, ...]) -> float:
     """Return the seconds since midnight of hour, minute, second and the letter of a half of the day."""
     hour, minute, second, half = time
     count = int(hour or 0)
@@ -73,7 +73,7 @@ def _of_day(time: tuple[str | None, ...]) -> float | None:
 def _stamp(year: str, month: str, day: str, time: tuple[str | None, ...]) -> float | None:
     midnight = _since_1970(f"{year}-{int(month):02}-{int(day):02}")
     of_day = _of_day(time)
-    return None if midnight is None or of_day is None or of_day >= 86_401 else midnight + of_day
+    return None if midnight is None or of_day >= 86_401 else midnight + of_day
 
 
 def _since_1970(text: str) -> float | None:

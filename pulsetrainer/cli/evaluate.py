@@ -94,10 +94,9 @@ def _payload(result: Result) -> dict[str, Any]:
             for w in evaluation.waveforms
         ]
     if evaluation.models:
-        names = (
-            "name", "rms", "rms_percent", "max_percent", "gain_percent",
-            "offset", "shape_rms_percent", "second_half_percent", "start", "outside_percent",
-        )  # fmt: skip
+        from pulsetrainer.flows.evaluate import MODEL_METRICS
+
+        names = ("name", *MODEL_METRICS, "start", "outside_percent")
         payload["models"] = [{name: getattr(m, name) for name in names} for m in evaluation.models]
     return payload | {
         "output": plain(result.output),

@@ -19,7 +19,7 @@ from pulsetrainer.errors import ArgumentError
 
 _LOW = 0.0  # where the input goes when the device is off
 _LONGEST_LEAD_S = 60.0  # a memory of many extremes is gone through faster
-MOST_SAMPLES = 1_000_000_000  # of one recording: eleven days at 1 kHz, a file of 30 GB
+MOST_RECORDED = 1_000_000_000  # of one recording: eleven days at 1 kHz, a file of 30 GB
 _BLOCK = 1 << 18  # samples traced at a time
 
 
@@ -33,7 +33,7 @@ class Course:
     def __post_init__(self) -> None:
         if self.repeats < 1:
             raise ArgumentError(f"repeats must be at least 1, got {self.repeats}", hint="--repeats 1")
-        check_size(self.repeats, self.signal.value.size, MOST_SAMPLES)
+        check_size(self.repeats, self.signal.value.size, MOST_RECORDED)
 
     @property
     def size(self) -> int:
