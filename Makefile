@@ -8,8 +8,8 @@ D      := build/demo
 
 FIRMWARE := $(shell find firmware -name '*.[ch]')
 CORE     := $(wildcard pulsetrainer/core/*.py)
-DIAGNOSE := $(wildcard pulsetrainer/diagnosis/*.py pulsetrainer/diagnosis/causes/*.py) pulsetrainer/flows/diagnose.py
-REPORT   := $(wildcard pulsetrainer/report/*.py pulsetrainer/report/templates/*) pulsetrainer/flows/evaluate.py
+DIAGNOSE := $(wildcard pulsetrainer/diagnosis/*.py pulsetrainer/diagnosis/causes/*.py) pulsetrainer/steps/diagnose.py
+REPORT   := $(wildcard pulsetrainer/report/*.py pulsetrainer/report/templates/*) pulsetrainer/steps/evaluate.py
 PULSES   := normal bifid
 METHODS  := paper continuous extended
 PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h5))
@@ -62,7 +62,7 @@ $(D)/unseen.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D
 	$(PT) capture identification --speed 6 --port '$(PORT)' -o $@ --force
 
 define PULSE_RULES
-$(D)/drive-$(1)-$(2).h5: $(D)/model-$(2).h5 waveforms/$(1).csv pulsetrainer/flows/invert.py
+$(D)/drive-$(1)-$(2).h5: $(D)/model-$(2).h5 waveforms/$(1).csv pulsetrainer/steps/invert.py
 	$(PT) invert $(1) --model $$< -o $$@ --force
 $(D)/played-$(1)-$(2).h5: $(D)/drive-$(1)-$(2).h5 $(FIRMWARE)
 	$(PT) play $$< --port '$(PORT)' -o $$@ --force

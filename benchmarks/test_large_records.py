@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from measuring import of_command
 
-from pulsetrainer.artefacts.kinds import Run
-from pulsetrainer.artefacts.store import read
+from pulsetrainer.artefacts import Run
+from pulsetrainer.files.store import read
 
 COLUMNS = ("--input", "current", "--output", "force")
 KEPT = 24  # bytes of a row: time, input, output

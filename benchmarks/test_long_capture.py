@@ -9,8 +9,8 @@ import sys
 import pytest
 from measuring import Cost, of_command
 
-from pulsetrainer.artefacts.kinds import Run
-from pulsetrainer.artefacts.store import read
+from pulsetrainer.artefacts import Run
+from pulsetrainer.files.store import read
 
 
 def _words(repeats) -> list[str]:

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from prandtl_ishlinskii import PrandtlIshlinskii
 
-from pulsetrainer.artefacts import store
-from pulsetrainer.artefacts.kinds import Model, Run
-from pulsetrainer.flows import evaluate, identify, import_
-from pulsetrainer.flows.context import Context
-from pulsetrainer.flows.modelling import known_from
+from pulsetrainer.artefacts import Model, Run
+from pulsetrainer.files import store
+from pulsetrainer.steps import evaluate, identify, import_
+from pulsetrainer.steps.context import Context
+from pulsetrainer.steps.modelling import known_from
 
 DATA = Path(__file__).resolve().parents[1] / "tests" / "data"
 CONTEXT = Context(argv=("benchmark",), now=lambda: datetime(2026, 1, 1, tzinfo=UTC))

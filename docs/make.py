@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from pulsetrainer import __version__
-from pulsetrainer.artefacts.kinds import KINDS
-from pulsetrainer.artefacts.schema import FieldPlan, plan_of
+from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.app import app
 from pulsetrainer.cli.settings import SETTINGS, VARIABLE
+from pulsetrainer.files.schema import FieldPlan, plan_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,7 +10,7 @@ enum breaks_what {
     BREAKS_FORCE_HIGH, BREAKS_FORCE_RAIL, BREAKS_FORCE_ZERO, BREAKS_FORCE_FROZEN,
     BREAKS_TICK_OVERRUN, BREAKS_RESET, BREAKS_HANG, BREAKS_COUNT
 };
-extern const char *const breaks_names[BREAKS_COUNT]; /* the same as BREAKS in pulsetrainer/link/simulated.py */
+extern const char *const breaks_names[BREAKS_COUNT]; /* the same as BREAKS in pulsetrainer/simulation/options.py */
 
 void breaks_at(enum breaks_what what, uint32_t tick_plus_one); /* 0: never */
 void breaks_play(bool running, uint32_t tick);                 /* where the play is; before the others, each tick */

@@ -1,1 +1,37 @@
-"""HDF5 kinds and store, provenance, recorder and tables; knows nothing of physics."""
+"""The nouns: one frozen dataclass a kind of artefact. They know no file."""
+
+from __future__ import annotations
+
+from pulsetrainer.artefacts.data import LARGEST, BoolArray, Data, FloatArray, beyond_all_quantities
+from pulsetrainer.artefacts.diagnosis import Cause, Diagnosis, Profile
+from pulsetrainer.artefacts.evaluation import DriveError, Evaluation, ModelEvaluation, WaveformEvaluation
+from pulsetrainer.artefacts.model import Extension, Fit, Model, Parameter
+from pulsetrainer.artefacts.playback import DrivePlayback, Playback
+from pulsetrainer.artefacts.run import Run
+from pulsetrainer.artefacts.waveform import Waveform
+
+__all__ = [
+    "KINDS",
+    "LARGEST",
+    "BoolArray",
+    "Cause",
+    "Data",
+    "Diagnosis",
+    "DriveError",
+    "DrivePlayback",
+    "Evaluation",
+    "Extension",
+    "Fit",
+    "FloatArray",
+    "Model",
+    "ModelEvaluation",
+    "Parameter",
+    "Playback",
+    "Profile",
+    "Run",
+    "Waveform",
+    "WaveformEvaluation",
+    "beyond_all_quantities",
+]
+
+KINDS: dict[str, type] = {k.kind: k for k in (Run, Model, Waveform, Playback, Evaluation, Diagnosis)}

@@ -11,7 +11,7 @@ from pulsetrainer.cli.options import AsJson, DryRun, Force, LimitCurrent, LimitF
 from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
-    from pulsetrainer.flows.capture import Plan
+    from pulsetrainer.steps.capture import Plan
 
 
 def capture(
@@ -54,15 +54,15 @@ def capture(
 
     Example: pulsetrainer capture identification -o run.h5
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.signal_file(signal)
     preflight.check_port(port)
     preflight.check_files(outputs=() if resume else (out,), force=force)
     if resume:
         preflight.check_resumable(out)
-    from pulsetrainer.flows import capture as flow
-    from pulsetrainer.link.device import Limits
+    from pulsetrainer.device.device import Limits
+    from pulsetrainer.steps import capture as flow
 
     screen = Screen("capture", as_json=json)
     limits = Limits(limit_current, limit_force)

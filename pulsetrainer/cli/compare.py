@@ -29,11 +29,11 @@ def compare(
 
     Example: pulsetrainer compare before.h5 after.h5 -o change.png
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.comparison_form(files, out)
     preflight.check_files(outputs=(out,), force=force, artefacts=files)
-    from pulsetrainer.flows import compare as flow
+    from pulsetrainer.steps import compare as flow
 
     screen = Screen("compare", as_json=json)
     with screen.working("comparing") as context:

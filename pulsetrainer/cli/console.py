@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from pulsetrainer.flows.context import Context, Progress
+from pulsetrainer.steps.context import Context, Progress
 
 _PIPE_WIDTH = 110
 

@@ -12,7 +12,7 @@ from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.options import AsJson, Force, Out
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts.kinds import Cause, Diagnosis, Parameter
+    from pulsetrainer.artefacts import Cause, Diagnosis, Parameter
 
 _SHOWN = 8
 
@@ -31,10 +31,10 @@ def diagnose(
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.check_files(outputs=(out, html), force=force, artefacts=(*runs, model))
-    from pulsetrainer.flows import diagnose as flow
+    from pulsetrainer.steps import diagnose as flow
 
     screen = Screen("diagnose", as_json=json)
     options = flow.Options(tuple(runs), model, out, html, quick, seed, force)
@@ -115,7 +115,7 @@ def _found(one: Cause) -> str:
 def words_of(p: Parameter) -> str:
     """Return a parameter with its unit and its interval."""
     interval = f" [{p.lower:.4g}, {p.upper:.4g}]" if math.isfinite(p.lower) else ""
-    from pulsetrainer.flows.show import shown
+    from pulsetrainer.steps.show import shown
 
     return " ".join(f"{p.name} {p.value:.4g} {shown(p.unit)}".split()) + interval
 

@@ -29,7 +29,7 @@ def doctor(
     Example: pulsetrainer doctor --port /dev/ttyUSB0
     """
     from pulsetrainer.errors import QualityError
-    from pulsetrainer.flows import doctor as flow
+    from pulsetrainer.steps import doctor as flow
 
     screen = Screen("doctor", as_json=json)
     named = context.parent.params.get("settings_file") if context.parent else None

@@ -11,8 +11,8 @@ from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.options import AsJson, Force
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts.kinds import DriveError, Evaluation
-    from pulsetrainer.flows.evaluate import Result
+    from pulsetrainer.artefacts import DriveError, Evaluation
+    from pulsetrainer.steps.evaluate import Result
 
 
 def evaluate(
@@ -36,11 +36,11 @@ def evaluate(
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.check_files(outputs=(out, html), force=force, artefacts=(*inputs, *model), others=(bounds,))
     from pulsetrainer.errors import QualityError
-    from pulsetrainer.flows import evaluate as flow
+    from pulsetrainer.steps import evaluate as flow
 
     screen = Screen("evaluate", as_json=json)
     options = flow.Options(tuple(inputs), tuple(model), out, html, bounds, force)
@@ -94,7 +94,7 @@ def _payload(result: Result) -> dict[str, Any]:
             for w in evaluation.waveforms
         ]
     if evaluation.models:
-        from pulsetrainer.flows.evaluate import MODEL_METRICS
+        from pulsetrainer.steps.evaluate import MODEL_METRICS
 
         names = ("name", *MODEL_METRICS, "start", "outside_percent")
         payload["models"] = [{name: getattr(m, name) for name in names} for m in evaluation.models]
@@ -107,7 +107,7 @@ def _payload(result: Result) -> dict[str, Any]:
 
 
 def _figures(errors: DriveError) -> dict[str, float]:
-    from pulsetrainer.flows.evaluate import METRICS
+    from pulsetrainer.steps.evaluate import METRICS
 
     return {name: getattr(errors, name) for name in METRICS}
 
@@ -142,7 +142,7 @@ def tables(screen: Screen, evaluation: Evaluation) -> None:
 
 def _pulses(screen: Screen, evaluation: Evaluation) -> None:
     """One table of all pulses where it fits the screen, else one for each pulse."""
-    from pulsetrainer.flows.evaluate import PUBLISHED, metrics_of
+    from pulsetrainer.steps.evaluate import PUBLISHED, metrics_of
 
     figures = metrics_of(evaluation)
     columns: dict[str, list[tuple[str, dict[str, float]]]] = {}  # by pulse: heading and figures

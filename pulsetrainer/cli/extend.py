@@ -23,10 +23,10 @@ def extend(
 
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.check_files(outputs=(out,), force=force, artefacts=(diagnosis, model))
-    from pulsetrainer.flows import extend as flow
+    from pulsetrainer.steps import extend as flow
 
     screen = Screen("extend", as_json=json)
     with screen.working("extending") as context:

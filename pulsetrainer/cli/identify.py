@@ -65,12 +65,12 @@ def identify(
 
     Example: pulsetrainer identify run.h5 -o model.h5
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.check_files(outputs=(out,), force=force, artefacts=runs)
     smooth = _smoothing(smoothing)
-    from pulsetrainer.flows import identify as flow
-    from pulsetrainer.flows.show import shown
+    from pulsetrainer.steps import identify as flow
+    from pulsetrainer.steps.show import shown
 
     screen = Screen("identify", as_json=json)
     options = flow.Options(

@@ -62,13 +62,13 @@ def import_(
 
     Example: pulsetrainer import scope.csv --input current_A --output force_N -o run.h5
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     outputs = preflight.import_groups(files, out)
     preflight.check_files(outputs=outputs, force=force, others=files)
     preflight.check_timing(time_column, rate, no_time=no_time, resampled=resample is not None)
     even_rate = _rate(resample)
-    from pulsetrainer.flows import import_ as flow
+    from pulsetrainer.steps import import_ as flow
 
     screen = Screen("import", as_json=json)
     options = flow.Options(

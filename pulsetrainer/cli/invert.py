@@ -67,13 +67,13 @@ def invert(
 
     Example: pulsetrainer invert normal --model model.h5 -o drive.h5
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.waveform_file(waveform)
     preflight.check_beat(beat)
     preflight.check_force_range(force_min, force_max)
     preflight.check_files(outputs=(out,), force=force, artefacts=(model,))
-    from pulsetrainer.flows import invert as flow
+    from pulsetrainer.steps import invert as flow
 
     screen = Screen("invert", as_json=json)
     options = flow.Options(

@@ -12,7 +12,7 @@ from pulsetrainer.cli.options import AsJson, DryRun, Force, LimitCurrent, LimitF
 from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
-    from pulsetrainer.flows.play import Plan
+    from pulsetrainer.steps.play import Plan
 
 
 def play(
@@ -35,12 +35,12 @@ def play(
 
     Example: pulsetrainer play drive.h5 -o played.h5
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.check_port(port)
     preflight.check_files(outputs=(out,), force=force, artefacts=(drive,))
-    from pulsetrainer.flows import play as flow
-    from pulsetrainer.link.device import Limits
+    from pulsetrainer.device.device import Limits
+    from pulsetrainer.steps import play as flow
 
     screen = Screen("play", as_json=json)
     options = flow.Options(drive, out, port, repeats, Limits(limit_current, limit_force), dry_run, force)

@@ -21,11 +21,11 @@ def plot(
 
     Example: pulsetrainer plot model.h5 -o model.png
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.figure_form(out, "a figure")
     preflight.check_files(outputs=(out,), force=force, artefacts=(file,))
-    from pulsetrainer.flows import plot as flow
+    from pulsetrainer.steps import plot as flow
 
     screen = Screen("plot", as_json=json)
     with screen.working(f"drawing {file.name}") as context:

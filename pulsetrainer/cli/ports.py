@@ -17,7 +17,7 @@ def ports(json: AsJson = False) -> None:
 
     Example: pulsetrainer ports
     """
-    from pulsetrainer.link.ports import list_ports
+    from pulsetrainer.device.ports import list_ports
 
     screen = Screen("ports", as_json=json)
     found = list_ports()

@@ -22,11 +22,11 @@ def show(
 
     Example: pulsetrainer show model.h5
     """
-    from pulsetrainer.flows import preflight
+    from pulsetrainer.steps import preflight
 
     preflight.check_files(artefacts=(file,))
-    from pulsetrainer.artefacts.kinds import Evaluation
-    from pulsetrainer.flows import show as flow
+    from pulsetrainer.artefacts import Evaluation
+    from pulsetrainer.steps import show as flow
 
     screen = Screen("show", as_json=json)
     with screen.working("reading") as context:

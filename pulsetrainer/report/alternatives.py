@@ -11,7 +11,7 @@ from pulsetrainer.report.style import pretty_unit
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from pulsetrainer.artefacts.kinds import Fit, Model, ModelEvaluation, WaveformEvaluation
+    from pulsetrainer.artefacts import Fit, Model, ModelEvaluation, WaveformEvaluation
 
 
 def _range(values: NDArray[np.float64], unit: str) -> str:

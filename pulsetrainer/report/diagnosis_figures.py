@@ -23,7 +23,7 @@ from pulsetrainer.report.style import (
 )
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts.kinds import Diagnosis, Profile
+    from pulsetrainer.artefacts import Diagnosis, Profile
 
 _MOST_BARS = 10
 _SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side

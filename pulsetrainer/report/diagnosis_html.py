@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from pulsetrainer.artefacts.kinds import Cause, Diagnosis
+    from pulsetrainer.artefacts import Cause, Diagnosis
 
 
 def render_diagnosis(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from pulsetrainer.artefacts.kinds import Diagnosis, Evaluation, Model, Playback, Run, Waveform
+from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Waveform
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import diagnosis_figures, panels
 from pulsetrainer.report.style import (
@@ -27,7 +27,7 @@ from pulsetrainer.report.style import (
 )
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts.kinds import Fit, ModelEvaluation, WaveformEvaluation
+    from pulsetrainer.artefacts import Fit, ModelEvaluation, WaveformEvaluation
 
 _ROW_IN = 4.4  # height of a figure of one column
 

@@ -13,7 +13,7 @@ from pulsetrainer.report import views
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pulsetrainer.artefacts.kinds import Evaluation
+    from pulsetrainer.artefacts import Evaluation
 
 
 def render_evaluation(

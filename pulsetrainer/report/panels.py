@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
     from numpy.typing import NDArray
 
-    from pulsetrainer.artefacts.kinds import (
+    from pulsetrainer.artefacts import (
         DrivePlayback,
         Fit,
         Model,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from pulsetrainer.artefacts.kinds import Model, ModelEvaluation, WaveformEvaluation
+    from pulsetrainer.artefacts import Model, ModelEvaluation, WaveformEvaluation
 
     Published = Mapping[str, Mapping[str, float]]
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pulsetrainer.core import signals
+from pulsetrainer.device.device import open_device
 from pulsetrainer.diagnosis.design import Measured
-from pulsetrainer.link.device import open_device
 
 RATE_HZ = 1000.0
 HIGH_A = 1.5

@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import hidden
 
 from pulsetrainer.core import signals
+from pulsetrainer.device.device import open_device
 from pulsetrainer.diagnosis import gates, residual
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.design import Measured
@@ -21,7 +22,6 @@ from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.screening import coloured, screen
 from pulsetrainer.diagnosis.selection import diagnose
-from pulsetrainer.link.device import open_device
 
 pytestmark = pytest.mark.timeout(600)
 TAU_S = 0.008

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from program import PROGRAM, pulsetrainer
 
-from pulsetrainer.link.build import firmware_executable
-from pulsetrainer.link.device import open_device
+from pulsetrainer.device.device import open_device
+from pulsetrainer.simulation.build import firmware_executable
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the bench needs a pty")
 

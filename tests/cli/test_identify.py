@@ -31,8 +31,8 @@ def record(run, tmp_path):
 
 def test_smoothing_is_chosen_reported_and_stored(run, record, tmp_path):
     """By itself; as asked; none for relays, as in the paper."""
-    from pulsetrainer.artefacts import store
-    from pulsetrainer.artefacts.kinds import Model
+    from pulsetrainer.artefacts import Model
+    from pulsetrainer.files import store
 
     record()
     base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force", "--json")
@@ -80,8 +80,8 @@ def test_the_missing_part_of_the_plane_is_named(run, record):
 
 def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path):
     """Stored beside weights and fit, around them, repeatable by seed, and wide enough to hold the truth."""
-    from pulsetrainer.artefacts import store
-    from pulsetrainer.artefacts.kinds import Model
+    from pulsetrainer.artefacts import Model
+    from pulsetrainer.files import store
 
     record()
     base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force", "--json")

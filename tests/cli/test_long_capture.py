@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from program import PROGRAM, pulsetrainer
 
-from pulsetrainer.artefacts.kinds import Run
-from pulsetrainer.artefacts.recorder import RunRecorder
-from pulsetrainer.artefacts.store import read, read_header, read_samples
+from pulsetrainer.artefacts import Run
 from pulsetrainer.core import signals
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.recorder import RunRecorder
+from pulsetrainer.files.store import read, read_header, read_samples
 
 SEED = 20260103
 IDENTIFICATION = ("capture", "identification", "--levels", "16", "--speed", "3", "--repeats", "40")

@@ -17,7 +17,7 @@ from program import PROGRAM
 from store_examples import header
 
 import pulsetrainer.cli
-from pulsetrainer.artefacts import store
+from pulsetrainer.files import store
 
 BIN = Path(sys.executable).parent
 COLOUR = re.compile(rb"\x1b\[(?:[0-9;]*;)?(?:3[0-8]|4[0-8]|9[0-7]|10[0-7])(?:;[0-9;]*)?m")

@@ -11,7 +11,7 @@ import pytest
 import report_examples
 from store_examples import header
 
-from pulsetrainer.artefacts import store
+from pulsetrainer.files import store
 
 TASKS = Path("/proc/self/task")
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1

@@ -17,8 +17,8 @@ import store_examples
 import typer
 from pages import PAGES, ROOT, anchors, blocks, links, tables, words
 
-from pulsetrainer.artefacts import store
 from pulsetrainer.cli.app import app
+from pulsetrainer.files import store
 from pulsetrainer.report.render import encode
 
 

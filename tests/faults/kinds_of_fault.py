@@ -19,7 +19,7 @@ import ready
 from children import DOCUMENTED, Child, Ended
 
 from command_lines import READS_ONLY, WRITERS, Writer
-from pulsetrainer.artefacts.seal import SEAL_LENGTH
+from pulsetrainer.files.seal import SEAL_LENGTH
 
 _SETTLE_S = 0.004  # the moments around a new file's appearance
 

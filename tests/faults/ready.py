@@ -9,9 +9,9 @@ import children
 import store_examples as examples
 
 from command_lines import EXCITATION, WRITERS
-from pulsetrainer.artefacts import store
-from pulsetrainer.artefacts.kinds import Model
+from pulsetrainer.artefacts import Model
 from pulsetrainer.errors import DataError
+from pulsetrainer.files import store
 
 
 def prepare(folder: Path) -> dict[str, float]:

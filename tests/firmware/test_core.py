@@ -12,8 +12,8 @@ import sys
 
 import pytest
 
-from pulsetrainer.link.build import find_compiler
 from pulsetrainer.resources import firmware_dir
+from pulsetrainer.simulation.build import find_compiler
 
 FIRMWARE = firmware_dir()
 CORE = sorted((FIRMWARE / "core").glob("*.c"))

@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 from test_core import compilers
 
-from pulsetrainer.link.build import find_compiler
 from pulsetrainer.resources import firmware_dir
+from pulsetrainer.simulation.build import find_compiler
 
 FIRMWARE = firmware_dir()
 SOURCES = [*sorted((FIRMWARE / "core").glob("*.c")), *sorted((FIRMWARE / "port" / "dspic33").glob("*.c"))]

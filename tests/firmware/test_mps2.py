@@ -11,8 +11,8 @@ import sys
 
 import pytest
 
-from pulsetrainer.link.build import DEBIAN_PACKAGES, find_compiler
 from pulsetrainer.resources import firmware_dir
+from pulsetrainer.simulation.build import DEBIAN_PACKAGES, find_compiler
 
 FIRMWARE = firmware_dir()
 INCLUDE = [f"-I{FIRMWARE / folder}" for folder in ("core", "hal", "plant")]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from worlds import pasts, planes, state_after, weights
 
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.flows.modelling import first_extreme, known_from, start_of
+from pulsetrainer.steps.modelling import first_extreme, known_from, start_of
 
 STEPS = 20  # inputs lie on so many steps of the range: one that is near an end is at it
 

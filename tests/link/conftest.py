@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from link_wire import Wire
 
-from pulsetrainer.link.device import open_device
+from pulsetrainer.device.device import open_device
 
 if TYPE_CHECKING:
     from pathlib import Path

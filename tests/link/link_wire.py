@@ -7,12 +7,12 @@ import zlib
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from pulsetrainer.link import codes
-from pulsetrainer.link import messages as m
-from pulsetrainer.link.bench import Bench
-from pulsetrainer.link.qemu import QEMU_TIMEOUTS_S, Emulator
-from pulsetrainer.link.session import TIMEOUTS_S, Session
-from pulsetrainer.link.transport import SerialTransport, Transport
+from pulsetrainer.device import codes
+from pulsetrainer.device import messages as m
+from pulsetrainer.device.session import TIMEOUTS_S, Session
+from pulsetrainer.device.transport import SerialTransport, Transport
+from pulsetrainer.simulation.bench import Bench
+from pulsetrainer.simulation.emulator import QEMU_TIMEOUTS_S, Emulator
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
+from pulsetrainer.device.device import open_device
 from pulsetrainer.errors import DeviceError, UsageError
-from pulsetrainer.link import build
-from pulsetrainer.link.bench import Bench
-from pulsetrainer.link.device import open_device
-from pulsetrainer.link.simulated import BREAKS, BenchOptions, Wire, parse_bench
+from pulsetrainer.simulation import build
+from pulsetrainer.simulation.bench import Bench
+from pulsetrainer.simulation.options import BREAKS, BenchOptions, Wire, parse_bench
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def _gone(pid: int, seconds: float = 10.0) -> bool:
 HOST = """
 import signal
 import numpy as np
-from pulsetrainer.link.device import open_device
+from pulsetrainer.device.device import open_device
 signal.signal(signal.SIGINT, signal.default_int_handler)  # tests run in the background have it ignored
 device = open_device("bench:?speed=real")
 def tell(block):

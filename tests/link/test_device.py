@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from link_wire import within
 
+from pulsetrainer.device import player
+from pulsetrainer.device.codes import CURRENT_UNIT_A, PARAMETERS
+from pulsetrainer.device.device import open_device, redact
+from pulsetrainer.device.messages import GetParam
+from pulsetrainer.device.recording import Block
 from pulsetrainer.errors import ArgumentError, DeviceError, UsageError
-from pulsetrainer.link import player
-from pulsetrainer.link.codes import CURRENT_UNIT_A, PARAMETERS
-from pulsetrainer.link.device import open_device, redact
-from pulsetrainer.link.messages import GetParam
-from pulsetrainer.link.recording import Block
 
 
 def test_handshake_says_who_and_how_much(device):

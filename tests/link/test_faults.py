@@ -10,12 +10,12 @@ import zlib
 import numpy as np
 import pytest
 
+from pulsetrainer.device import messages as m
+from pulsetrainer.device.codes import Fault, NakCode, State
+from pulsetrainer.device.device import open_device
+from pulsetrainer.device.frames import Frame, encode
+from pulsetrainer.device.session import RefusedError
 from pulsetrainer.errors import ArgumentError
-from pulsetrainer.link import messages as m
-from pulsetrainer.link.codes import Fault, NakCode, State
-from pulsetrainer.link.device import open_device
-from pulsetrainer.link.frames import Frame, encode
-from pulsetrainer.link.session import RefusedError
 
 HALF_AMP = np.full(3000, 0.5)
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pulsetrainer.link.frames import Frame, FrameReader, decode, encode
+from pulsetrainer.device.frames import Frame, FrameReader, decode, encode
 
 BYTES = st.integers(0, 255)
 FRAMES = st.builds(Frame, BYTES, BYTES, st.binary(max_size=128))

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pulsetrainer.link import messages as m
-from pulsetrainer.link.build import find_compiler
-from pulsetrainer.link.header import c_header
+from pulsetrainer.device import messages as m
+from pulsetrainer.device.header import c_header
 from pulsetrainer.resources import firmware_dir
+from pulsetrainer.simulation.build import find_compiler
 
 RANGES = {
     "B": (0, 0xFF),

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from link_wire import within
 
-from pulsetrainer.link import messages as m
-from pulsetrainer.link.bench import Bench
-from pulsetrainer.link.codes import PARAMETERS, Fault, State
-from pulsetrainer.link.device import open_device
-from pulsetrainer.link.noise import KINDS, NoisyLine, NoisyTransport
-from pulsetrainer.link.session import NoAnswerError, RefusedError, Session
-from pulsetrainer.link.transport import SerialTransport
+from pulsetrainer.device import messages as m
+from pulsetrainer.device.codes import PARAMETERS, Fault, State
+from pulsetrainer.device.device import open_device
+from pulsetrainer.device.session import NoAnswerError, RefusedError, Session
+from pulsetrainer.device.transport import SerialTransport
+from pulsetrainer.simulation.bad_wire import KINDS, NoisyLine, NoisyTransport
+from pulsetrainer.simulation.bench import Bench
 
 RATE = 1e-4  # one bad byte in ten thousand
 

@@ -11,14 +11,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pulsetrainer.device import messages as m
+from pulsetrainer.device import ports
+from pulsetrainer.device.codes import Fault, State
+from pulsetrainer.device.device import open_device
+from pulsetrainer.device.ports import list_ports
+from pulsetrainer.device.recording import Block
+from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import DeviceError
-from pulsetrainer.link import messages as m
-from pulsetrainer.link import ports
-from pulsetrainer.link.codes import Fault, State
-from pulsetrainer.link.device import open_device
-from pulsetrainer.link.ports import list_ports
-from pulsetrainer.link.recording import Block
-from pulsetrainer.link.transport import SerialTransport
 
 
 def _computer(monkeypatch, *found):

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from pulsetrainer.link import codes
-from pulsetrainer.link import messages as m
-from pulsetrainer.link.header import _upper
-from pulsetrainer.link.session import TIMEOUTS_S
-from pulsetrainer.link.transport import BAUD
+from pulsetrainer.device import codes
+from pulsetrainer.device import messages as m
+from pulsetrainer.device.header import _upper
+from pulsetrainer.device.session import TIMEOUTS_S
+from pulsetrainer.device.transport import BAUD
 from pulsetrainer.resources import firmware_dir
 
 TEXT = (firmware_dir() / "PROTOCOL.md").read_text(encoding="utf-8")

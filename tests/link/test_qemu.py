@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pulsetrainer.device.device import open_device
 from pulsetrainer.errors import DeviceError, UsageError
-from pulsetrainer.link import build
-from pulsetrainer.link.build import DEBIAN_PACKAGES
-from pulsetrainer.link.device import open_device
-from pulsetrainer.link.simulated import QemuOptions, Wire, parse_qemu
+from pulsetrainer.simulation import build
+from pulsetrainer.simulation.build import DEBIAN_PACKAGES
+from pulsetrainer.simulation.options import QemuOptions, Wire, parse_qemu
 
 pytestmark = pytest.mark.realtime
 RANGE_A = 1.5
@@ -262,14 +262,14 @@ def test_an_emulator_that_dies_leaves_what_was_recorded():
 @group
 def test_an_emulator_that_will_not_start_is_quoted(monkeypatch):
     """What the emulator complained about reaches the user."""
-    monkeypatch.setattr("pulsetrainer.link.qemu._REAL_TIME", "shift=nonsense")
+    monkeypatch.setattr("pulsetrainer.simulation.emulator._REAL_TIME", "shift=nonsense")
     with pytest.raises(DeviceError, match="shift"):
         open_device("qemu:")
 
 
 HOST = """
 import sys
-from pulsetrainer.link.device import open_device
+from pulsetrainer.device.device import open_device
 device = open_device("qemu:")
 print(device._bench.pid, flush=True)
 device.play([0.5] * 60_000, 1000)

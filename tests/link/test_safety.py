@@ -12,10 +12,10 @@ import time
 import numpy as np
 import pytest
 
-from pulsetrainer.link import messages as m
-from pulsetrainer.link.build import DEBIAN_PACKAGES
-from pulsetrainer.link.codes import FLAG_LAST, PARAMETERS, Fault, NakCode, ResetCause, State
-from pulsetrainer.link.session import RefusedError
+from pulsetrainer.device import messages as m
+from pulsetrainer.device.codes import FLAG_LAST, PARAMETERS, Fault, NakCode, ResetCause, State
+from pulsetrainer.device.session import RefusedError
+from pulsetrainer.simulation.build import DEBIAN_PACKAGES
 
 QEMU = pytest.param(
     "qemu:",

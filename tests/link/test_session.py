@@ -10,13 +10,13 @@ import tty
 import numpy as np
 import pytest
 
+from pulsetrainer.device import messages as m
+from pulsetrainer.device.codes import MAGIC, Fault, State
+from pulsetrainer.device.frames import Frame, encode
+from pulsetrainer.device.session import NoAnswerError, Session
+from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import DeviceError
-from pulsetrainer.link import messages as m
-from pulsetrainer.link.build import firmware_executable
-from pulsetrainer.link.codes import MAGIC, Fault, State
-from pulsetrainer.link.frames import Frame, encode
-from pulsetrainer.link.session import NoAnswerError, Session
-from pulsetrainer.link.transport import SerialTransport
+from pulsetrainer.simulation.build import firmware_executable
 
 
 def test_greeting_gets_through_garbage(wire):
@@ -190,7 +190,7 @@ def stranger():
 @pytest.fixture
 def impatient(monkeypatch):
     """Give up greeting early: these tests wait for exactly that."""
-    monkeypatch.setattr("pulsetrainer.link.session._HELLO_S", 0.5)
+    monkeypatch.setattr("pulsetrainer.device.session._HELLO_S", 0.5)
 
 
 @pytest.mark.usefixtures("impatient")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pulsetrainer.artefacts.kinds import (
+from pulsetrainer.artefacts import (
     DriveError,
     DrivePlayback,
     Evaluation,

@@ -10,9 +10,9 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pulsetrainer.artefacts import kinds
-from pulsetrainer.artefacts.provenance import Device, Header, make_header
-from pulsetrainer.artefacts.schema import TIME, FieldPlan, plan_of
+from pulsetrainer import artefacts as kinds
+from pulsetrainer.files.provenance import Device, Header, make_header
+from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 # what a text attribute holds: any Unicode but NUL and lone surrogates, which are escaped on writing

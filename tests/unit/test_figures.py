@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from matplotlib import rcParams
 from matplotlib.collections import PolyCollection, QuadMesh
 
-from pulsetrainer.artefacts.kinds import Evaluation, Run
+from pulsetrainer.artefacts import Evaluation, Run
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.report import figures
 from pulsetrainer.report.render import encode, inline_svg

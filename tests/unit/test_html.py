@@ -13,7 +13,7 @@ from itertools import pairwise
 import pytest
 import report_examples as examples
 
-from pulsetrainer.artefacts.kinds import Evaluation
+from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.report.html import render_evaluation
 
 PUBLISHED = {

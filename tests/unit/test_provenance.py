@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pulsetrainer.artefacts.provenance import (
+from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.files.provenance import (
     Device,
     Header,
     Provenance,
@@ -22,7 +23,6 @@ from pulsetrainer.artefacts.provenance import (
     redact,
     sha256_of,
 )
-from pulsetrainer.errors import ArgumentError, DataError
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 SECRETS = ["creep", "0.05", "ideal", "speed"]

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 import store_examples as examples
 
-from pulsetrainer.artefacts import recorder as recorder_module
-from pulsetrainer.artefacts.growing import lookup3
-from pulsetrainer.artefacts.kinds import Run
-from pulsetrainer.artefacts.provenance import Header
-from pulsetrainer.artefacts.recorder import RunRecorder
-from pulsetrainer.artefacts.store import read, read_header, write
+from pulsetrainer.artefacts import Run
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
+from pulsetrainer.files import recorder as recorder_module
+from pulsetrainer.files.growing import lookup3
+from pulsetrainer.files.provenance import Header
+from pulsetrainer.files.recorder import RunRecorder
+from pulsetrainer.files.store import read, read_header, write
 
 SEED = 20260102
 

@@ -16,11 +16,11 @@ import xarray
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pulsetrainer.artefacts import kinds
-from pulsetrainer.artefacts.kinds import KINDS, Data, FloatArray
-from pulsetrainer.artefacts.schema import plan_of
-from pulsetrainer.artefacts.store import read, read_any, read_header, read_one_of, write
+from pulsetrainer import artefacts as kinds
+from pulsetrainer.artefacts import KINDS, Data, FloatArray
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.schema import plan_of
+from pulsetrainer.files.store import read, read_any, read_header, read_one_of, write
 
 ANY_KIND = pytest.mark.parametrize("kind", sorted(KINDS))
 

@@ -18,11 +18,12 @@ import numpy as np
 import pytest
 import store_examples as examples
 
-from pulsetrainer.artefacts import kinds, output, store
-from pulsetrainer.artefacts.kinds import KINDS
-from pulsetrainer.artefacts.seal import SEAL_LENGTH
-from pulsetrainer.artefacts.store import check_output, read, read_any, read_header, write
+from pulsetrainer import artefacts as kinds
+from pulsetrainer.artefacts import KINDS
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files import output, store
+from pulsetrainer.files.seal import SEAL_LENGTH
+from pulsetrainer.files.store import check_output, read, read_any, read_header, write
 
 SEED = 20260102
 
@@ -385,7 +386,7 @@ def test_permissions_are_those_of_any_new_file(tmp_path):
 _WRITER = """
 import resource, sys
 import store_examples as examples
-from pulsetrainer.artefacts.store import write
+from pulsetrainer.files.store import write
 from pulsetrainer.errors import DataError
 
 path, limit = sys.argv[1:]

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pulsetrainer.artefacts.table import read_table, write_table
-from pulsetrainer.artefacts.table_rows import PIECE, parse
-from pulsetrainer.artefacts.table_run import read_run
-from pulsetrainer.artefacts.table_text import detect
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
+from pulsetrainer.files.table import read_table, write_table
+from pulsetrainer.files.table_rows import PIECE, parse
+from pulsetrainer.files.table_run import read_run
+from pulsetrainer.files.table_text import detect
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 COLUMNS = {"input_column": "u", "output_column": "y"}

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
 
-from pulsetrainer.artefacts.table import read_table
-from pulsetrainer.artefacts.table_run import read_run
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.table import read_table
+from pulsetrainer.files.table_run import read_run
 
 N = 500
 T = np.arange(N) / 250.0

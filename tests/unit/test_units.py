@@ -5,8 +5,8 @@ from __future__ import annotations
 import pint
 import pytest
 
-from pulsetrainer.artefacts.units import check_unit, is_unit
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.units import check_unit, is_unit
 
 SI = ["A", "mA", "N", "kN", "A/m", "T", "mT", "nm", "V", "Pa", "bar", "mbar", "N*m", "m/s", "m/s^2", "nA*m^2"]
 SI += ["1/s", "Hz", "deg", "rad", "K", "ms", "kg", "J/kg", "rad/s", "ohm", "eV", "N·m", "m/s²", "s^-1"]

@@ -1,0 +1,68 @@
+"""A diagnosis: what a model gets wrong on some runs, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from pulsetrainer.artefacts.data import Data, FloatArray
+from pulsetrainer.artefacts.model import Model, Parameter
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """What a diagnosis says about one cause."""
+
+    cause: str
+    found: bool
+    p_value: float  # over the whole library; 0 for what is read off the raw data
+    explains_percent: float  # of the reducible part of the baseline's squared error
+    held_out_gain_percent: float  # of the reducible part; NaN where it was not measured
+    parameters: tuple[Parameter, ...] = ()
+    confounded_with: tuple[str, ...] = ()
+    text: str = ""  # in words
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """The rms residual against one quantity, before and after the extension (k groups)."""
+
+    name: str  # "rate" | "level" | "direction" | "time" | "frequency"
+    unit: str
+    at: Annotated[FloatArray, Data("@unit", "middle of the group", "group")]  # (k,)
+    before: Annotated[FloatArray, Data("@output_unit", "rms residual of the static refit", "group")]  # (k,)
+    after: Annotated[FloatArray, Data("@output_unit", "rms residual of the extended refit", "group")]  # (k,)
+    output_unit: str = "N"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What a model gets wrong on some runs, why, and the model extended by the causes found."""
+
+    kind: ClassVar[str] = "diagnosis"
+
+    verdict: str  # a cause's id, "none" or "unknown"
+    quick: bool  # screened only: figures are those of linearised scores
+    rms: Annotated[float, Data("@output_unit", "rms error of the model as it was given")]
+    rms_percent: Annotated[float, Data("percent", "rms error of the model as it was given, of the span")]
+    noise_percent: Annotated[float, Data("percent", "white noise of single samples, rms, of the span")]
+    static_percent: Annotated[
+        float, Data("percent", "rms residual of averages, weights refitted, of the span")
+    ]
+    extended_percent: Annotated[float, Data("percent", "rms residual of averages, extended, of the span")]
+    floor_percent: Annotated[
+        float, Data("percent", "rms residual of averages when nothing is wrong, of the span")
+    ]
+    causes: tuple[Cause, ...]
+    evidence: tuple[str, ...]
+    next_experiment: str
+    profiles: tuple[Profile, ...]
+    # the runs one after another, thinned for the figures (m averages)
+    time_s: Annotated[FloatArray, Data("s", "time, runs one after another", "time", path="time")]
+    input: Annotated[FloatArray, Data("@input_unit", "input", "time")]
+    output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
+    before: Annotated[FloatArray, Data("@output_unit", "static refit", "time")]
+    after: Annotated[FloatArray, Data("@output_unit", "extended refit", "time")]
+    extended: Model | None = None  # weights refitted together with the causes found
+    input_unit: str = "A"
+    output_unit: str = "N"

@@ -1,0 +1,82 @@
+"""An evaluation: the errors of played waveforms, or of models on a run they were not fitted to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from pulsetrainer.artefacts.data import Data, FloatArray
+from pulsetrainer.artefacts.model import Model
+
+
+@dataclass(frozen=True, slots=True)
+class DriveError:
+    """Errors of one drive, in percent of the full applied force, over all scored samples of all repeats."""
+
+    mean_abs_error_percent: Annotated[float, Data("percent", "mean absolute error, of full force")]
+    max_abs_error_percent: Annotated[float, Data("percent", "largest absolute error, of full force")]
+    rms_error_percent: Annotated[float, Data("percent", "rms error, of full force")]
+    hysteresis_percent: Annotated[
+        float, Data("percent", "loop area of force against target, of full force squared, per beat")
+    ]
+    current_tracking_max_percent: Annotated[
+        float, Data("percent", "largest current tracking error, of the range")
+    ]
+    output: Annotated[
+        FloatArray, Data("@output_unit", "mean measured output over the repeats", "time")
+    ]  # (n,)
+    output_unit: str = "N"
+
+
+@dataclass(frozen=True, slots=True)
+class WaveformEvaluation:
+    """The figures of one played waveform."""
+
+    name: str
+    inversion: str
+    repeats: int
+    time_s: Annotated[FloatArray, Data("s", "time", "time", path="time")]  # (n,) scored samples only
+    target: Annotated[FloatArray, Data("@output_unit", "target", "time")]  # (n,)
+    scaled: DriveError
+    compensated: DriveError
+    mean_error_reduction_percent: Annotated[float, Data("percent", "reduction of the mean absolute error")]
+    full_force: Annotated[float, Data("@output_unit", "full applied force")]
+    noise_percent: Annotated[float, Data("percent", "spread between repeats, of full force")]
+    output_unit: str = "N"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelEvaluation:
+    """The prediction error of one model on a held-out run."""
+
+    name: str
+    rms: Annotated[float, Data("@output_unit", "rms prediction error")]
+    rms_percent: Annotated[float, Data("percent", "rms prediction error, of the output span")]
+    max_percent: Annotated[float, Data("percent", "largest prediction error, of the output span")]
+    gain_percent: Annotated[float, Data("percent", "reduction of the rms against the first model")]
+    time_s: Annotated[FloatArray | None, Data("s", "time", "time", path="time")]  # thinned for the figures
+    output: Annotated[FloatArray, Data("@output_unit", "measured output", "time")]
+    predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
+    output_unit: str = "N"
+    # how far the measured output lies above the predicted one, and what is left when that is taken out
+    offset: Annotated[float, Data("@output_unit", "offset of the run against the model")] = float("nan")
+    shape_rms_percent: Annotated[
+        float, Data("percent", "rms prediction error with the run's own offset, of the output span")
+    ] = float("nan")
+    # what a user has who sets the zero first: nothing of the half that is scored was known
+    second_half_percent: Annotated[
+        float, Data("percent", "rms prediction error of the second half, with the zero of the first half")
+    ] = float("nan")
+    start: str = "known"  # the state before the run: known, or which one was estimated
+    outside_percent: Annotated[float, Data("percent", "samples outside the range of the model")] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """An error report: of played waveforms, or of models on a held-out run."""
+
+    kind: ClassVar[str] = "evaluation"
+
+    waveforms: tuple[WaveformEvaluation, ...] = ()
+    models: tuple[ModelEvaluation, ...] = ()
+    model: Model | None = None  # the model behind the first waveform, for the figures

@@ -1,0 +1,38 @@
+"""A playback: what the device measured while it played a waveform."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar
+
+from pulsetrainer.artefacts.data import Data, FloatArray
+from pulsetrainer.artefacts.waveform import Waveform
+
+
+@dataclass(frozen=True, slots=True)
+class DrivePlayback:
+    """What the device measured while it played one drive, repeat by repeat; NaN where a block was lost."""
+
+    reference: Annotated[FloatArray, Data("@input_unit", "reference as played", "repeat", "time")]  # (r, n)
+    input: Annotated[FloatArray, Data("@input_unit", "measured input", "repeat", "time")]  # (r, n)
+    output: Annotated[FloatArray, Data("@output_unit", "measured output", "repeat", "time")]  # (r, n)
+    input_unit: str = "A"
+    output_unit: str = "N"
+
+
+@dataclass(frozen=True, slots=True)
+class Playback:
+    """A waveform and what the device measured for each of its drives."""
+
+    kind: ClassVar[str] = "playback"
+
+    time_s: Annotated[FloatArray, Data("s", "time", "time", path="time")]  # (n,)
+    waveform: Waveform
+    compensated: DrivePlayback
+    scaled: DrivePlayback
+    input_range: Annotated[
+        float, Data("@input_unit", "full range of the drive current")
+    ]  # for tracking in percent
+    input_unit: str = "A"
+    complete: bool = True
+    dropped_samples: int = 0

@@ -1,0 +1,288 @@
+"""One play: upload by credit, start, keep the buffer filled and the device convinced that we live.
+
+Runs in a thread of its own, so that a slow disk under the telemetry never starves a device that
+switches off after 200 ms of silence. The thread vouches for the whole program, though: when nobody
+takes its data for some seconds it stops the device itself.
+"""
+
+from __future__ import annotations
+
+import threading
+import zlib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.device import codes
+from pulsetrainer.device import messages as m
+from pulsetrainer.device.session import NoAnswerError, RefusedError, Session
+from pulsetrainer.device.transport import PortLostError
+from pulsetrainer.errors import DeviceError, PulsetrainerError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+_BEATS = 5  # in the time that the device is patient, by the wall clock and by its own
+_DRAIN_S = 0.3  # for telemetry on its way after the end
+_RAMP_S = 1.0
+_TAKER_S = 10.0  # nobody took the telemetry for so long: the program hangs
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a play ended."""
+
+    produced: int  # samples the device made, -1: it could not be asked
+    played_to_end: bool
+    fault: str
+    remedy: str = ""  # what to do about the fault, where something better than finding its cause is known
+
+
+NOTHING = m.Telemetry(0, 0, 0, 0, 0, b"")  # in the place of a block that nobody needs any more
+
+# Faults whose cause is not in the device.
+_REMEDY = {
+    codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
+    codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
+    codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",
+    codes.Fault.ON_TIME: "play it in several pieces",
+    codes.Fault.WAVE_CRC: "check the cable, then run the command again",
+}
+
+
+class Player:
+    """Plays one reference [100 uA, int16]; ``received`` grows by wire blocks until ``ended`` is set."""
+
+    def __init__(
+        self,
+        session: Session,
+        reference: NDArray[np.int16],
+        ticks_per_sample: int,
+        decimation: int,
+        *,
+        hello: m.HelloReply,
+        monotonic: Callable[[], float],
+        piece_s: float = np.inf,
+    ) -> None:
+        self._session = session
+        self._samples = reference
+        self._wire = reference.astype("<i2").tobytes()
+        self._ticks_per_sample = ticks_per_sample
+        self.decimation = decimation
+        self._hello = hello
+        self._monotonic = monotonic
+        self._piece_s = piece_s
+        self._short = m.WaveData.MAX_ITEMS  # samples a frame while the buffer is well filled
+        self._sent = 0
+        self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
+        self._play_session = -1
+        self._tick = 0  # latest known tick of the device
+        self._recorded_tick = -1  # of the last sample received
+        self._tick_at_send = 0
+        self._last_block = False
+        # A plain list: appending is atomic, and a Ctrl-C in the reader's thread can lose nothing of it.
+        self.received: list[m.Telemetry] = []
+        self.samples = 0  # received so far
+        self.ended = threading.Event()
+        self._stop = threading.Event()
+        self._stop_reason = ""
+        self._stop_remedy = ""
+        self.taken_at_s = monotonic()
+        self.outcome: Outcome | None = None
+        self.error: BaseException | None = None
+
+    @property
+    def last_tick(self) -> int:
+        """Tick of the last sample received; -1 before the first."""
+        return self._recorded_tick
+
+    def forget(self, start: int, stop: int) -> None:
+        """Let go of the samples of these blocks: a long play must not fill the memory."""
+        for number in range(start, stop):
+            self.received[number] = NOTHING
+
+    def stop(self, reason: str) -> None:
+        """Ask for the output to be stopped at once; the first reason counts."""
+        self._stop_reason = self._stop_reason or reason
+        self._stop.set()
+
+    def run(self) -> None:
+        """Play; leaves ``outcome`` or ``error``."""
+        self._session.on_telemetry = self._take
+        try:
+            self.outcome = self._play()
+        except BaseException as error:  # noqa: BLE001 - carried over to the caller's thread
+            self.error = error
+        finally:
+            self._session.on_telemetry = lambda _: None
+            self.ended.set()
+
+    def _take(self, block: m.Telemetry) -> None:
+        if block.session != self._play_session:
+            return  # stale bytes of an earlier play
+        last_tick = block.first_tick + (block.count - 1) * self.decimation
+        if block.count:
+            if block.first_tick <= self._recorded_tick or block.first_tick % self.decimation:
+                return  # a wire that repeats itself
+            if last_tick > (len(self._samples) - 1) * self._ticks_per_sample:
+                return  # no such sample was asked for: damage that happens to fit the checksum
+            self._recorded_tick = last_tick
+            self._tick = max(self._tick, last_tick)
+        self._last_block = self._last_block or bool(block.flags & codes.FLAG_LAST)
+        self.received.append(block)
+        self.samples += block.count
+
+    def _request(self, command: m.Message) -> m.Ack:
+        self._tick_at_send = self._tick
+        reply = self._session.request(command)
+        if not isinstance(reply, m.Ack):
+            raise DeviceError(
+                f"the device answered {type(command).__name__} with {type(reply).__name__}",
+                hint="flash the firmware that came with this program",
+            )
+        self._ack = reply
+        if reply.session == self._play_session:
+            self._tick = max(self._tick, reply.tick)
+        return reply
+
+    def _status(self) -> m.StatusReply:
+        reply = self._session.request(m.Status())
+        if not isinstance(reply, m.StatusReply):
+            raise DeviceError(
+                "the device answered Status with something else", hint="flash the firmware again"
+            )
+        return reply
+
+    # --- the steps of a play ---------------------------------------------------------------------
+
+    def _upload(self) -> None:
+        n = len(self._samples)
+        self._request(m.Stop())  # whatever an earlier program left half done
+        deadline = self._monotonic() + _RAMP_S
+        while self._ack.state == codes.State.RAMPING and self._monotonic() < deadline:
+            self._session.receive()
+            self._request(m.Stop())
+        if self._ack.fault:
+            self._request(m.ClearFault())
+        self._request(m.Stream(self.decimation))
+        self._request(m.WaveBegin(n, self._ticks_per_sample, zlib.crc32(self._wire)))
+        while self._sent < n and self._send_chunk(self._ack.credit):
+            pass
+        self._request(m.WaveCommit(self._sent, zlib.crc32(self._wire[: 2 * self._sent])))
+
+    def _send_chunk(self, credit: int) -> bool:
+        """Send the next samples if the device has room for a whole frame of them."""
+        most = self._short if credit < self._hello.wave_buffer // 2 else m.WaveData.MAX_ITEMS
+        count = min(most, len(self._samples) - self._sent)
+        if count == 0 or credit < count:
+            return False
+        at = self._sent
+        self._request(m.WaveData(at, count, self._wire[2 * at : 2 * (at + count)]))
+        self._sent = at + count
+        return True
+
+    def _credit(self) -> int:
+        """Room in the device's buffer by what telemetry says it has played; never more than there is."""
+        played = self._tick // self._ticks_per_sample
+        return max(
+            self._ack.credit, min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + played)
+        )
+
+    def _beat_due(self) -> bool:
+        beat_s = self._hello.heartbeat_ms / 1000 / _BEATS
+        if self._monotonic() - self._session.sent_at_s >= beat_s:
+            return True
+        return self._tick - self._tick_at_send >= beat_s * self._hello.tick_rate_Hz
+
+    def _stream(self) -> None:
+        """Keep the buffer full until the play ends, whoever ends it."""
+        in_piece = self._piece_s * self._hello.tick_rate_Hz / self._ticks_per_sample
+        self._short = int(min(m.WaveData.MAX_ITEMS, max(1, in_piece)))
+        while self._ack.state == codes.State.RUNNING and not self._last_block:
+            if self._monotonic() - self.taken_at_s > _TAKER_S:
+                self._stop_remedy = "the disk is too slow: write elsewhere, close other programs"
+                self.stop(f"the program did not take its data for {_TAKER_S:g} s")
+            if self._stop.is_set():
+                self._request(m.Stop())
+                return
+            if self._send_chunk(self._credit()):
+                continue
+            if self._beat_due():
+                self._request(m.Heartbeat())
+            else:
+                self._session.receive()
+
+    def _finish(self) -> m.StatusReply:
+        """Wait for the ramp to end and for the telemetry on its way."""
+        deadline = self._monotonic() + _RAMP_S
+        status = self._status()
+        while status.state in {codes.State.RUNNING, codes.State.RAMPING} and self._monotonic() < deadline:
+            self._session.receive()
+            status = self._status()
+        deadline = self._monotonic() + _DRAIN_S
+        while not self._last_block and self._monotonic() < deadline:
+            self._session.receive()
+        return status
+
+    def _play(self) -> Outcome:
+        self._upload()
+        if self._stop.is_set():
+            self._request(m.Stop())
+            return Outcome(0, played_to_end=False, fault=self._stop_reason)
+        try:
+            try:
+                self._request(m.Arm(self._hello.boot_nonce))
+                # Telemetry may overtake a lost reply to START: know its session beforehand.
+                self._play_session = (self._ack.session + 1) & 0xFF
+                self._request(m.Start())
+                self._stream()
+            except RefusedError as refused:
+                # The device left the state we thought it in; its status says why.
+                return self._judge(self._finish(), refused.message)
+            return self._judge(self._finish(), "")
+        except (PortLostError, NoAnswerError) as error:
+            return Outcome(-1, played_to_end=False, fault=error.message, remedy=error.hint)
+        finally:
+            self._leave()
+
+    def _leave(self) -> None:
+        """Disarm, whatever happened; a device that cannot be reached does it by itself."""
+        try:
+            self._session.request(m.Stop())
+        except PulsetrainerError:
+            return
+
+    def _judge(self, status: m.StatusReply, refused: str) -> Outcome:
+        if status.boot_nonce != self._hello.boot_nonce:
+            cause = codes.ResetCause(status.reset_cause).name.lower().replace("_", " ")
+            return Outcome(
+                -1,
+                played_to_end=False,
+                fault=f"the device restarted in mid-play (cause: {cause})",
+                remedy="check its power supply and cable; nothing was started again",
+            )
+        last_tick = (len(self._samples) - 1) * self._ticks_per_sample
+        fault = describe_fault(status, self._hello.tick_rate_Hz) or self._stop_reason
+        to_end = status.tick > last_tick and not fault
+        if not fault and not to_end:
+            fault = refused or "the device ended the play early"
+        # Refused before it started: the numbers in the status are those of an earlier play.
+        produced = status.produced if status.session == self._play_session else 0
+        known = {int(f): text for f, text in _REMEDY.items()}
+        return Outcome(produced, to_end, fault, known.get(status.fault, self._stop_remedy))
+
+
+def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:
+    """Return the latched fault with its snapshot, empty if there is none."""
+    if not status.fault:
+        return ""
+    text = codes.FAULT_TEXT.get(codes.Fault(status.fault)) if status.fault <= max(codes.Fault) else None
+    return (
+        f"{text or f'fault {status.fault}'} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
+        f"reference {status.fault_reference * codes.CURRENT_UNIT_A:.4f} A, "
+        f"current {status.fault_current * codes.CURRENT_UNIT_A:.4f} A, "
+        f"force {status.fault_force * codes.FORCE_UNIT_N:.3f} N)"
+    )

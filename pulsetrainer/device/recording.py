@@ -1,0 +1,68 @@
+"""What comes back from a device: telemetry samples, and the whole of a play."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pulsetrainer.device.codes import CURRENT_UNIT_A, FORCE_UNIT_N
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pulsetrainer.device.messages import Telemetry
+
+FloatArray = NDArray[np.float64]
+Int64Array = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Telemetry samples in order, of one or many wire blocks: tick of the play, A, A, N; shapes (n,)."""
+
+    tick: Int64Array
+    reference_A: FloatArray
+    current_A: FloatArray
+    force_N: FloatArray
+
+    @classmethod
+    def from_wire(cls, messages: Sequence[Telemetry], decimation: int) -> Block:
+        """Return the samples of ``messages``, ``decimation`` ticks apart within each."""
+        samples = np.frombuffer(b"".join(m.items for m in messages), dtype="<i2").reshape(-1, 3)
+        starts = np.array([m.first_tick for m in messages], dtype=np.int64)
+        counts = np.array([m.count for m in messages], dtype=np.int64)
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        scaled = samples * (CURRENT_UNIT_A, CURRENT_UNIT_A, FORCE_UNIT_N)
+        return cls(
+            tick=np.repeat(starts, counts) + decimation * within,
+            reference_A=scaled[:, 0].copy(),
+            current_A=scaled[:, 1].copy(),
+            force_N=scaled[:, 2].copy(),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """All that a play brought back; lost samples are counted, never filled.
+
+    The arrays are empty where the play was asked not to keep what it handed over.
+    """
+
+    tick: Int64Array
+    reference_A: FloatArray
+    current_A: FloatArray
+    force_N: FloatArray
+    tick_rate_Hz: float
+    dropped_samples: int
+    complete: bool  # the reference was played to its end
+    fault: str  # why not: the device's first cause, or "interrupted"; empty when complete
+    samples: int  # received, also where they were not kept
+    remedy: str = ""  # what to do about it, where that is known
+
+    @property
+    def time_s(self) -> FloatArray:
+        """Time since the first sample of the reference, s."""
+        return self.tick / self.tick_rate_Hz

@@ -1,0 +1,213 @@
+"""Commands and replies: stop-and-wait with sequence numbers, beside a stream of telemetry."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pulsetrainer.device.codes import (
+    FAULT_TEXT,
+    FIRMWARE_MAJOR,
+    FIRMWARE_MINOR,
+    FIRMWARE_PATCH,
+    MAGIC,
+    NAK_TEXT,
+    PROTOCOL_MAJOR,
+    PROTOCOL_MINOR,
+    Fault,
+    NakCode,
+)
+from pulsetrainer.device.frames import Frame, FrameReader, encode
+from pulsetrainer.device.messages import (
+    BY_TYPE,
+    COMMANDS,
+    Hello,
+    HelloReply,
+    Message,
+    Nak,
+    Telemetry,
+    answers,
+)
+from pulsetrainer.errors import DeviceError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pulsetrainer.device.transport import Transport
+
+# Five quick tries; the last wait is long because a busy computer may just have been away.
+TIMEOUTS_S = (0.05, 0.05, 0.05, 0.05, 0.05, 0.5)
+_HELLO_S = 3.0
+_HELLO_TRY_S = 0.2
+_NAMES = {c.TYPE: c.__name__ for c in COMMANDS}
+
+
+class NoAnswerError(DeviceError):
+    """The device did not answer a command."""
+
+
+class RefusedError(DeviceError):
+    """The device answered no."""
+
+    def __init__(self, port: str, nak: Nak) -> None:
+        self.nak = nak
+        codes = {int(c) for c in NakCode}
+        why = NAK_TEXT[NakCode(nak.code)] if nak.code in codes else f"code {nak.code}"
+        faults = {int(f) for f in Fault}
+        fault = FAULT_TEXT[Fault(nak.fault)] if nak.fault in faults else f"fault {nak.fault}"
+        super().__init__(
+            f"the device on {port} refused {_NAMES.get(nak.command, hex(nak.command))}: {why}"
+            + (f" (latched fault: {fault})" if fault else ""),
+            hint="run the command again; if it is refused again, restart the device",
+        )
+
+
+class Session:
+    """One command at a time; telemetry goes to ``on_telemetry`` whenever it comes."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        port: str,
+        *,
+        monotonic: Callable[[], float],
+        timeouts_s: tuple[float, ...] = TIMEOUTS_S,
+    ) -> None:
+        self._transport = transport
+        self._port = port
+        self._monotonic = monotonic
+        self._timeouts_s = timeouts_s
+        self._reader = FrameReader()
+        # Not always from the same number: a late reply to an earlier program must not fit.
+        self._seq = int(monotonic() * 1000) & 0xFF
+        self._replies: list[Frame] = []
+        self._heard = 0
+        self.on_telemetry: Callable[[Telemetry], None] = lambda _: None
+        self.sent_at_s = 0.0
+        self.rejected = 0
+
+    @property
+    def damaged(self) -> int:
+        """Number of frames that arrived damaged and were thrown away."""
+        return self._reader.damaged + self.rejected
+
+    def receive(self) -> None:
+        """Take in what has arrived, waiting a few milliseconds for it."""
+        data = self._transport.read()
+        self._heard += len(data)
+        for frame in self._reader.feed(data):
+            if frame.type == Telemetry.TYPE:
+                try:
+                    block = Telemetry.parse(frame.payload)
+                except ValueError:
+                    self.rejected += 1
+                    continue
+                self.on_telemetry(block)
+            else:
+                self._replies.append(frame)
+
+    def _send(self, command: Message, seq: int) -> None:
+        self._transport.write(encode(Frame(command.TYPE, seq, command.pack())))
+        self.sent_at_s = self._monotonic()
+
+    def _reply(self, command: Message, timeout_s: float) -> Message | None:
+        """Return the reply to ``command``, just sent; replies to anything earlier are stale and dropped."""
+        deadline = self._monotonic() + timeout_s
+        while True:
+            while self._replies:
+                frame = self._replies.pop(0)
+                kind = BY_TYPE.get(frame.type)
+                if frame.seq != self._seq or kind is None:
+                    continue
+                try:
+                    reply = kind.parse(frame.payload)
+                except ValueError:
+                    self.rejected += 1
+                    continue
+                if answers(reply, command):  # else it is 256 commands old, or damage that fits the checksum
+                    return reply
+                self.rejected += 1
+            if self._monotonic() >= deadline:
+                return None
+            self.receive()
+
+    def request(self, command: Message) -> Message:
+        """Return the reply to ``command``; commands are idempotent, so a lost one is simply sent again.
+
+        Raises
+        ------
+        NoAnswerError
+            if none of the tries was answered.
+        RefusedError
+            if the device said no.
+        """
+        self._seq = (self._seq + 1) & 0xFF
+        for timeout_s in self._timeouts_s:
+            self._send(command, self._seq)
+            reply = self._reply(command, timeout_s)
+            if isinstance(reply, Nak):
+                raise RefusedError(self._port, reply)
+            if reply is not None:
+                return reply
+        raise NoAnswerError(
+            f"the device on {self._port} did not answer {type(command).__name__} "
+            f"({len(self._timeouts_s)} tries, {sum(self._timeouts_s):g} s)",
+            hint="its output goes off by itself; check cable and power, then open it again",
+        )
+
+    def hello(self) -> HelloReply:
+        """Find out who is there, from whatever state and noise the line is in.
+
+        Raises
+        ------
+        DeviceError
+            if nobody answers, somebody else does, or the protocol's major version differs.
+        """
+        self._transport.discard()
+        self._reader.clear()
+        deadline = self._monotonic() + _HELLO_S
+        command = Hello(MAGIC, PROTOCOL_MAJOR, PROTOCOL_MINOR)
+        while self._monotonic() < deadline:
+            self._seq = (self._seq + 1) & 0xFF
+            self._send(command, self._seq)
+            reply = self._reply(command, _HELLO_TRY_S)
+            if isinstance(reply, HelloReply) and reply.magic == MAGIC:
+                self._check_version(reply)
+                return reply
+        if self._heard:
+            raise DeviceError(
+                f"what answers on {self._port} is not a pulsetrainer device "
+                f"({self._heard} bytes, none of them a greeting)",
+                hint="check the port with `pulsetrainer ports`; flash the firmware if this is the device",
+            )
+        raise NoAnswerError(
+            f"nobody answers on {self._port}",
+            hint="check that the device has power and that this is its port: `pulsetrainer ports`",
+        )
+
+    def _check_version(self, reply: HelloReply) -> None:
+        firmware = (reply.firmware_major, reply.firmware_minor, reply.firmware_patch)
+        name = f"the device on {self._port} (firmware {_dotted(firmware)})"
+        theirs: tuple[int, ...] = (reply.major, reply.minor)
+        ours: tuple[int, ...] = (PROTOCOL_MAJOR, PROTOCOL_MINOR)
+        if reply.major != PROTOCOL_MAJOR:
+            said = f"speaks protocol {_dotted(theirs)}, this program {_dotted(ours)}"
+        else:
+            theirs, ours = firmware, (FIRMWARE_MAJOR, FIRMWARE_MINOR, FIRMWARE_PATCH)
+            if _generation(theirs) == _generation(ours):
+                return
+            said = f"is of another generation than this program's firmware {_dotted(ours)}"
+        older = "device" if theirs < ours else "program"
+        remedy = {
+            "device": "flash the firmware that came with this program (make -C firmware)",
+            "program": "update this program: pip install --upgrade pulsetrainer",
+        }[older]
+        raise DeviceError(f"{name} {said}: the {older} is older", hint=remedy)
+
+
+def _dotted(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))
+
+
+def _generation(version: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the part of a firmware version that must agree: below 1.0.0 that is also the minor one."""
+    return version[:1] if version[0] else version[:2]

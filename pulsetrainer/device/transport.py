@@ -1,0 +1,97 @@
+"""Bytes to and from a port, through pyserial: a real port, ``socket://`` or the bench's pty."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import serial
+
+from pulsetrainer.device.ports import cannot_open
+from pulsetrainer.errors import DeviceError
+
+BAUD = 921_600  # U1BRG = 18 on the real device: 0.04 % off
+_SLICE_S = 0.01  # longest single wait; short enough for every deadline of the session
+
+
+class PortLostError(DeviceError):
+    """The port went away while it was open."""
+
+
+class Transport(Protocol):
+    """What the session needs of a port."""
+
+    def read(self) -> bytes:
+        """Return what has arrived, waiting a few milliseconds for the first byte."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send all of ``data``."""
+        ...
+
+    def discard(self) -> None:
+        """Forget what has arrived."""
+        ...
+
+    def close(self) -> None:
+        """Give the port back."""
+        ...
+
+
+class SerialTransport:
+    """A port opened by pyserial, for this program alone; ``name`` is what messages call it."""
+
+    def __init__(self, port: str, name: str = "") -> None:
+        self._port = name or port
+        try:
+            self._serial: Any = serial.serial_for_url(port, do_not_open=True)
+            self._serial.baudrate = BAUD
+            self._serial.timeout = _SLICE_S
+            self._serial.write_timeout = 2.0
+            if "://" not in port:
+                self._serial.exclusive = True
+                # Set before opening, else some bridges pulse the line and reset the board.
+                self._serial.dtr = True
+                self._serial.rts = False
+            self._serial.open()
+        except (serial.SerialException, OSError) as error:
+            raise cannot_open(port, error) from error
+        except ValueError as error:
+            raise DeviceError(
+                f"{port!r} is not a port: {error}",
+                hint="a port is bench:, qemu:, /dev/ttyUSB0, COM3 or socket://host:port",
+            ) from error
+
+    def _lost(self, error: Exception) -> PortLostError:
+        return PortLostError(
+            f"the port {self._port} is gone: {error}",
+            hint="the device switches its output off by itself; check cable and power, then open it again",
+        )
+
+    def read(self) -> bytes:
+        """Return what has arrived, waiting at most 10 ms for the first byte."""
+        try:
+            first: bytes = self._serial.read(1)
+            if not first:
+                return b""
+            return first + bytes(self._serial.read(self._serial.in_waiting))
+        except (serial.SerialException, OSError, TypeError) as error:
+            # TypeError: pyserial's read on a port that another thread has just closed
+            raise self._lost(error) from error
+
+    def write(self, data: bytes) -> None:
+        """Send all of ``data``."""
+        try:
+            self._serial.write(data)
+        except (serial.SerialException, OSError, TypeError) as error:
+            raise self._lost(error) from error
+
+    def discard(self) -> None:
+        """Forget what has arrived."""
+        try:
+            self._serial.reset_input_buffer()
+        except (serial.SerialException, OSError) as error:
+            raise self._lost(error) from error
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._serial.close()

@@ -1,0 +1,210 @@
+"""An artefact dataclass into an HDF5 group: datasets with units, named axes, checksums.
+
+Nothing here knows what a field means: ``schema.plan_of`` says what it becomes. Axes are HDF5
+dimension scales, so that h5py, xarray and netCDF readers see them by name.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from pulsetrainer.artefacts import beyond_all_quantities
+from pulsetrainer.errors import DataError
+from pulsetrainer.files.provenance import clean
+from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+INDEX_AXIS = "sample"  # the axis of records without time: a dataset "time" always is a time in seconds
+_CHUNK = 16384
+_GROWING_CHUNK = 4096  # some seconds of a capture: little is left empty in the last one
+_COMPRESS_ABOVE_BYTES = 4096
+_WRITE_AGAIN = "write the artefact again with the command that makes it"
+
+Axes = dict[str, h5py.Dataset]
+
+
+def values_of(artefact: Any) -> dict[str, Any]:
+    """Return the fields of an artefact by name."""
+    cls: type = type(artefact)
+    return {plan.name: getattr(artefact, plan.name) for plan in plan_of(cls)}
+
+
+def encode(
+    group: h5py.Group,
+    cls: type,
+    values: Mapping[str, Any],
+    *,
+    inherited: Axes | None = None,
+    growing: bool = False,
+) -> None:
+    """Write the fields of a dataclass into a group.
+
+    Parameters
+    ----------
+    group
+        An empty group, or the root of a file.
+    cls
+        The dataclass.
+    values
+        Its fields by name.
+    inherited
+        The axis ``time`` of the group above, used where the dataclass has none of its own.
+    growing
+        Lay out the arrays of one axis so that they can be appended to.
+
+    Raises
+    ------
+    DataError
+        A value does not fit its annotation.
+    """
+    plans = plan_of(cls)
+    axes: Axes = dict(inherited or {})
+    if any(plan.is_time_axis for plan in plans):
+        axes.pop(TIME, None)
+    # the scale first, for the others are attached to it
+    for plan in sorted(plans, key=lambda plan: not plan.is_time_axis):
+        if values[plan.name] is not None:
+            _put(group, plan, values, axes, growing=growing)
+        elif not plan.optional:
+            raise DataError(f"{plan.name!r} is missing and must be there", hint=_WRITE_AGAIN)
+
+
+def _put(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes, *, growing: bool) -> None:
+    """Write one field of any role."""
+    value = values[plan.name]
+    if plan.role == "array":
+        _put_array(group, plan, values, axes, growing=growing)
+    elif plan.role == "number":
+        _put_number(group, plan, value, values)
+    elif plan.role == "attribute":
+        group.attrs[plan.path] = _attribute(plan, value)
+    elif plan.role == "list":
+        _put_list(group, plan, value)
+    elif plan.role == "group":
+        encode(group.create_group(plan.path), plan.type, values_of(value), inherited=_time_of(axes))
+    else:
+        numbered = group.create_group(plan.path)
+        for k, item in enumerate(value):
+            encode(numbered.create_group(f"{k:04d}"), plan.type, values_of(item), inherited=_time_of(axes))
+
+
+def _time_of(axes: Axes) -> Axes:
+    return {TIME: axes[TIME]} if TIME in axes else {}
+
+
+def _put_array(
+    group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes, *, growing: bool
+) -> None:
+    """Write one array and attach its axes."""
+    array = _checked(plan, np.asarray(values[plan.name]))
+    is_bool = plan.type is np.bool_
+    dataset = group.create_dataset(
+        plan.path,
+        data=array.astype(np.uint8 if is_bool else plan.type, copy=False),
+        **_storage(array, growing=growing),
+    )
+    _describe(dataset, plan, values)
+    if is_bool:
+        dataset.attrs["dtype"] = "bool"  # xarray's own sign for a boolean in an integer
+    if plan.is_time_axis:
+        dataset.make_scale(TIME)
+        axes[TIME] = dataset
+        return
+    for k, axis in enumerate(plan.dims):
+        scale = _scale(group, axes, axis, array.shape[k])
+        if scale.shape[0] != array.shape[k]:
+            raise DataError(
+                f"{plan.name!r} has {array.shape[k]} values along {axis}, expected {scale.shape[0]}",
+                hint=_WRITE_AGAIN,
+            )
+        dataset.dims[k].attach_scale(scale)
+        dataset.dims[k].label = scale.name.rsplit("/", 1)[-1]
+
+
+def _checked(plan: FieldPlan, array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return the array if its axes and values are what the annotation says."""
+    if array.ndim != len(plan.dims):
+        raise DataError(
+            f"{plan.name!r} has the shape {array.shape}, expected the axes ({', '.join(plan.dims)})",
+            hint=_WRITE_AGAIN,
+        )
+    if array.dtype.kind not in "biuf":
+        raise DataError(f"{plan.name!r} holds {array.dtype}, expected numbers", hint=_WRITE_AGAIN)
+    if plan.data is not None and plan.data.finite and not np.all(np.isfinite(array)):
+        raise DataError(
+            f"{plan.name!r} holds a value that is not finite and must not", hint="mend the data it came from"
+        )
+    if said := beyond_all_quantities(array):
+        raise DataError(f"{plan.name!r} {said}", hint="mend the data it came from")
+    return array
+
+
+def _storage(array: np.ndarray[Any, Any], *, growing: bool = False) -> dict[str, Any]:
+    """Return how an array lies in the file."""
+    if growing and array.ndim == 1:
+        # no filter: a chunk rewritten at every flush must keep its size and place
+        return {"chunks": (_GROWING_CHUNK,), "maxshape": (None,)}
+    if array.nbytes <= _COMPRESS_ABOVE_BYTES:
+        return {}
+    chunks = (*(1 for _ in array.shape[:-1]), min(array.shape[-1], _CHUNK))
+    # level 1: noise does not get smaller at higher levels, only slower
+    return {"chunks": chunks, "shuffle": True, "compression": "gzip", "compression_opts": 1}
+
+
+def _scale(group: h5py.Group, axes: Axes, axis: str, length: int) -> h5py.Dataset:
+    """Return the scale of an axis; one that is not known yet becomes a plain index."""
+    if axis not in axes:
+        name = INDEX_AXIS if axis == TIME else axis
+        index = np.arange(length)
+        scale = group.create_dataset(name, data=index, **_storage(index))
+        scale.attrs["units"] = "1"
+        scale.attrs["quantity"] = f"index of {name}"
+        scale.make_scale(name)
+        axes[axis] = scale
+    return axes[axis]
+
+
+def _put_number(group: h5py.Group, plan: FieldPlan, value: Any, values: Mapping[str, Any]) -> None:
+    """Write one number with its units."""
+    number = np.asarray(plan.type(value))
+    if plan.data is not None and plan.data.finite and not np.isfinite(number):
+        raise DataError(f"{plan.name!r} is {value} and must be finite", hint="mend the data it came from")
+    if np.isfinite(number) and (said := beyond_all_quantities(number)):
+        raise DataError(f"{plan.name!r} {said}", hint="mend the data it came from")
+    dataset = group.create_dataset(plan.path, data=number.astype(np.uint8) if plan.type is bool else number)
+    _describe(dataset, plan, values)
+    if plan.type is bool:
+        dataset.attrs["dtype"] = "bool"
+
+
+def _describe(dataset: h5py.Dataset, plan: FieldPlan, values: Mapping[str, Any]) -> None:
+    """Write units and quantity, taken from a sibling field where the annotation says ``@name``."""
+    if plan.data is None:
+        return
+    for name in ("units", "quantity"):
+        text = getattr(plan.data, name)
+        dataset.attrs[name] = clean(values[text[1:]] if text.startswith("@") else text)
+
+
+def _attribute(plan: FieldPlan, value: Any) -> Any:
+    """Return the value as an HDF5 attribute takes it."""
+    if plan.type is str:
+        return clean(value)
+    if plan.type is bool:
+        return np.uint8(bool(value))
+    return np.int64(value) if plan.type is int else np.float64(value)
+
+
+def _put_list(group: h5py.Group, plan: FieldPlan, value: Any) -> None:
+    """Write a tuple of texts or numbers as one attribute."""
+    items = [_attribute(plan, item) for item in value]
+    if plan.type is str:
+        items_array = np.array(items, dtype=object)
+        group.attrs.create(plan.path, items_array, shape=(len(items),), dtype=h5py.string_dtype())
+    else:
+        group.attrs.create(plan.path, np.array(items, dtype=plan.type), shape=(len(items),))

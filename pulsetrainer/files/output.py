@@ -1,0 +1,171 @@
+"""Files appear whole or not at all: a temporary name in the same folder, fsync, then a rename."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import secrets
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.lease import Lease, sweep
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
+
+
+def check_output(path: Path | str, force: bool = False) -> None:
+    """Refuse an output that cannot be written, BEFORE the work that would be lost.
+
+    Raises
+    ------
+    UsageError
+        The file exists and ``force`` is not set, or its folder is missing or not writable.
+    """
+    path = Path(path)
+    try:
+        _check_target(path, path.parent, force=force)
+    except OSError as error:  # a name too long, a folder that must not be looked into
+        raise UsageError(
+            f"the output {path} cannot be written: {error.strerror or error}", hint="name another output"
+        ) from error
+
+
+def _check_target(path: Path, folder: Path, *, force: bool) -> None:
+    if path.is_dir():
+        raise UsageError(
+            f"the output {path} is a folder", hint=f"name a file in it, such as {path / 'out.h5'}"
+        )
+    if path.exists() and not path.is_file():
+        raise UsageError(f"the output {path} is not an ordinary file", hint="name a file on disk")
+    if not folder.exists():
+        raise UsageError(
+            f"the folder {folder} of the output {path.name} does not exist",
+            hint=f"make it: mkdir -p {shlex.quote(str(folder))}",
+        )
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is a file, so {path} cannot be written", hint="name another output")
+    if path.exists() and not force:
+        raise _exists(path)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise UsageError(
+            f"the folder {folder} of the output {path.name} is not writable",
+            hint="write to another folder, or mend the permissions",
+        )
+
+
+def _exists(path: Path) -> UsageError:
+    return UsageError(
+        f"the output {path} exists already", hint="give --force to replace it, or name another file"
+    )
+
+
+@contextlib.contextmanager
+def replacing(path: Path | str, *, force: bool) -> Iterator[Path]:
+    """Give a new, empty temporary file, which becomes ``path`` when the block ends well.
+
+    Whatever goes wrong, the temporary file is removed and a file that was at ``path`` is untouched. A process
+    that is killed leaves its temporary file; the next one that writes the same output removes it.
+
+    Raises
+    ------
+    UsageError
+        See ``check_output``; also when another process wrote ``path`` meanwhile and ``force`` is not set.
+    DataError
+        The disk is full or failed.
+    """
+    check_output(path, force)
+    target = Path(path).resolve()  # through a symbolic link, not over it
+    for leftover in _leftovers(target):
+        sweep(leftover)
+    temporary: Path | None = None
+    lease: Lease | None = None
+    try:
+        temporary, lease = _claim(target)
+        yield temporary
+        publish(temporary, target, force=force)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    finally:
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+        if lease is not None:
+            lease.end()
+
+
+def _claim(target: Path) -> tuple[Path, Lease]:
+    """Make a temporary file that no other process uses, with a lease on it.
+
+    Between its making and the lease another process may have swept it away; then it is made again.
+    """
+    while True:
+        temporary = target.with_name(f".{_stem(target)}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
+        temporary.open("xb").close()
+        with contextlib.suppress(FileNotFoundError):
+            lease = Lease(temporary)
+            if lease.is_on(temporary):
+                return temporary, lease
+            lease.end()
+
+
+def _stem(target: Path) -> str:
+    return os.fsdecode(os.fsencode(target.name)[:_LONGEST_STEM])
+
+
+def _leftovers(target: Path) -> list[Path]:
+    """Return the temporary files of this output that other processes made, whether they live or not."""
+    pattern = re.compile(rf"\.{re.escape(_stem(target))}\.\d+-[0-9a-f]{{8}}\.tmp")
+    with contextlib.suppress(OSError):
+        return [entry for entry in target.parent.iterdir() if pattern.fullmatch(entry.name)]
+    return []
+
+
+def publish(temporary: Path, target: Path, *, force: bool) -> None:
+    """Give a finished file its final name, at once and for good.
+
+    Raises
+    ------
+    UsageError
+        Another process wrote ``target`` meanwhile and ``force`` is not set.
+    OSError
+        The disk failed.
+    """
+    _sync(temporary)
+    if force:
+        temporary.replace(target)
+    else:
+        try:
+            os.link(temporary, target)  # unlike a rename, fails where the name is taken
+            temporary.unlink()
+        except FileExistsError:
+            raise _exists(target) from None
+        except OSError:  # a file system without hard links
+            if target.exists():
+                raise _exists(target) from None
+            temporary.replace(target)
+    with contextlib.suppress(OSError):  # a folder cannot be synced everywhere; the file already is
+        _sync(target.parent)
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def cannot_write(path: Path | str, error: Exception) -> DataError:
+    """Return the error for a file that could not be written, with the system's reason in it."""
+    text = str(error)
+    in_hdf5 = re.search(r"error message = '([^']*)'", text)  # HDF5 wraps it in its own account
+    reason = in_hdf5[1] if in_hdf5 else getattr(error, "strerror", None) or text
+    full = any(sign in text for sign in ("No space left", "quota", "File too large"))
+    hint = "free some space, or write to another disk" if full else "check the disk and its permissions"
+    return DataError(f"{path} could not be written: {reason}", hint=hint)

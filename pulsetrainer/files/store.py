@@ -1,0 +1,258 @@
+"""Artefacts on disk: any kind into HDF5 and back, whole or not at all.
+
+The file format: root attributes ``kind``, ``format_version``, ``title``, ``created``, ``history``,
+``provenance`` (JSON), ``samples`` where the kind has a time axis; then the kind's fields as ``kinds`` says.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import h5py
+import numpy as np
+
+from pulsetrainer import __version__
+from pulsetrainer.artefacts import KINDS
+from pulsetrainer.errors import DataError
+from pulsetrainer.files.decode import Origin, decode, text_of
+from pulsetrainer.files.encode import encode, values_of
+from pulsetrainer.files.growing import GrowingFile, is_growing
+from pulsetrainer.files.output import check_output, replacing
+from pulsetrainer.files.provenance import Header, Provenance, clean
+from pulsetrainer.files.schema import TIME, kind_of, plan_of
+from pulsetrainer.files.seal import append_seal, check_seal
+from pulsetrainer.files.sheltered import Sheltered
+from pulsetrainer.files.source import RESTORE, check_artefact
+from pulsetrainer.files.steps import maker, next_step, with_article
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+__all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "read_samples", "write"]
+
+FORMAT_VERSION = 1
+# from 1.10 on a file can be read while it grows, and HDF5 keeps checksums of most of its own structures
+LIBVER = ("v110", "v110")
+_HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
+
+K = TypeVar("K")
+
+
+def write(path: Path | str, artefact: Any, header: Header, *, force: bool = False) -> None:
+    """Write an artefact under its final name, or leave everything as it was.
+
+    Raises
+    ------
+    UsageError
+        See ``check_output``.
+    DataError
+        The artefact does not fit its own annotations, or the disk is full or failed.
+    """
+    cls: type = type(artefact)
+    values = values_of(artefact)
+    with replacing(path, force=force) as temporary:
+        try:
+            with Sheltered(temporary) as stream:
+                try:
+                    with h5py.File(stream, "w", libver=LIBVER) as file:
+                        write_root(file, cls, header, samples=_samples(cls, values))
+                        encode(file, cls, values)
+                finally:
+                    stream.check()  # also where HDF5 missed what had been dropped
+        except DataError as error:
+            raise DataError(f"{path} was not written: {error.message}", hint=error.hint) from error
+        append_seal(temporary)
+
+
+def _samples(cls: type, values: Mapping[str, Any]) -> int | None:
+    """Return the length of the root's time axis; None where the kind has none."""
+    for plan in plan_of(cls):
+        if plan.dims[-1:] == (TIME,) and np.ndim(values[plan.name]):
+            return int(np.shape(values[plan.name])[-1])
+    return None
+
+
+def write_root(file: h5py.File, cls: type, header: Header, *, samples: int | None) -> None:
+    """Write the attributes that every kind has."""
+    texts = {
+        "kind": kind_of(cls),
+        "title": clean(header.title),
+        "created": clean(header.created),
+        "history": "\n".join(clean(line) for line in header.history),
+        "provenance": header.provenance.to_json(),  # cleaned item by item when it was built
+    }
+    for name, text in texts.items():
+        file.attrs[name] = text
+    file.attrs["format_version"] = np.int64(FORMAT_VERSION)
+    if samples is not None:
+        file.attrs["samples"] = np.int64(samples)
+
+
+def read(path: Path | str, kind: type[K]) -> K:
+    """Read an artefact that must be of this kind.
+
+    Raises
+    ------
+    DataError
+        The file is absent, unreadable, damaged, of another kind, or of a newer format.
+    """
+    artefact: K = read_one_of(path, kind)
+    return artefact
+
+
+def read_one_of(path: Path | str, *kinds: type) -> Any:
+    """Read an artefact of any of these kinds.
+
+    Raises
+    ------
+    DataError
+        As ``read``.
+    """
+    with _opened(path) as file:
+        got = _kind(file, path)
+        expected = [kind_of(kind) for kind in kinds]
+        if got not in expected:
+            raise DataError(
+                f"{path}: expected {with_article(expected)}, got {with_article([got])}",
+                hint=next_step(expected, got, str(path)),
+            )
+        return _decode(file, path, got)
+
+
+def read_any(path: Path | str) -> Any:
+    """Read an artefact of whatever kind it is.
+
+    Raises
+    ------
+    DataError
+        The file is absent, unreadable, damaged, not an artefact, or of a newer format.
+    """
+    with _opened(path) as file:
+        return _decode(file, path, _kind(file, path))
+
+
+def read_header(path: Path | str) -> Header:
+    """Read what an artefact says about itself.
+
+    Raises
+    ------
+    DataError
+        As ``read_any``.
+    """
+    with _opened(path) as file:
+        _kind(file, path)
+        history = _root_text(file, path, "history")
+        try:
+            provenance = Provenance.from_json(_root_text(file, path, "provenance"))
+        except DataError as error:
+            raise DataError(f"{path}: {error.message}", hint=error.hint) from error
+        return Header(
+            title=_root_text(file, path, "title"),
+            created=_root_text(file, path, "created"),
+            history=tuple(history.split("\n")) if history else (),
+            provenance=provenance,
+        )
+
+
+def read_samples(path: Path | str) -> int:
+    """Read how many samples an artefact has along its time axis; 0 where it has none.
+
+    Raises
+    ------
+    DataError
+        As ``read_any``.
+    """
+    with _opened(path) as file:
+        _kind(file, path)
+        return _trusted(file, path) or 0
+
+
+def _trusted(file: h5py.File, path: Path | str) -> int | None:
+    """Return the sample count at the root; None where the kind has no time axis."""
+    samples = file.attrs.get("samples")
+    if samples is None:
+        return None
+    if np.ndim(samples) or not np.issubdtype(type(samples), np.integer) or samples < 0:
+        raise DataError(f"{path}: the attribute 'samples' is {samples!r}, expected a count", hint=RESTORE)
+    return int(samples)
+
+
+def _decode(file: h5py.File, path: Path | str, kind: str) -> Any:
+    origin = Origin(str(path), kind, maker(kind))
+    return decode(file, KINDS[kind], origin, samples=_trusted(file, path))
+
+
+def _kind(file: h5py.File, path: Path | str) -> str:
+    """Return the kind of an opened file that this version can read."""
+    if not isinstance(file.attrs.get("kind"), str | bytes) or "format_version" not in file.attrs:
+        raise DataError(
+            f"{path} is an HDF5 file, but not one of pulsetrainer's: "
+            "it lacks the attributes kind and format_version",
+            hint="a record of another program comes in as a table: pulsetrainer import FILE.csv -o run.h5",
+        )
+    kind, version = text_of(file.attrs["kind"]), file.attrs["format_version"]
+    if not np.issubdtype(type(version), np.integer):
+        raise DataError(
+            f"{path}: the attribute 'format_version' is {version!r}, expected a whole number", hint=RESTORE
+        )
+    if version > FORMAT_VERSION:
+        raise DataError(
+            f"{path} has format version {version}, but pulsetrainer {__version__} "
+            f"reads up to version {FORMAT_VERSION}",
+            hint="update with `pip install --upgrade pulsetrainer`, or make the file again with this version",
+        )
+    if kind not in KINDS:
+        raise DataError(
+            f"{path}: unknown kind {kind!r}, expected one of {', '.join(KINDS)}",
+            hint="update with `pip install --upgrade pulsetrainer`, or check where the file comes from",
+        )
+    return kind
+
+
+def _root_text(file: h5py.File, path: Path | str, name: str) -> str:
+    value = file.attrs.get(name)
+    if not isinstance(value, str | bytes):
+        raise DataError(f"{path}: the attribute {name!r} is missing or not a text", hint=RESTORE)
+    return text_of(value)
+
+
+@contextlib.contextmanager
+def _opened(path: Path | str) -> Iterator[h5py.File]:
+    """Open a file for reading; whatever HDF5 finds wrong with it is a DataError."""
+    path = Path(path)
+    check_artefact(path)
+    check_seal(path)
+    try:
+        with _open(path) as file:
+            yield file
+    except _HDF5_ERRORS as error:
+        raise _damaged(path, error) from error
+
+
+@contextlib.contextmanager
+def _open(path: Path) -> Iterator[h5py.File]:
+    """Open a file that is whole, or a capture that still grows or was killed."""
+    with path.open("rb") as stream:
+        growing = is_growing(stream.read(64))
+    if growing:
+        with contextlib.closing(GrowingFile(path)) as shown, h5py.File(shown, "r") as file:
+            yield file
+        return
+    with h5py.File(path, "r", locking="best-effort") as file:
+        yield file
+
+
+def _damaged(path: Path, error: Exception) -> DataError:
+    text = str(error)
+    if "truncated file" in text:
+        return DataError(
+            f"{path} is truncated: only {path.stat().st_size} bytes of it are there", hint=RESTORE
+        )
+    if "lock file" in text:
+        return DataError(
+            f"{path} is locked by another program", hint="close the program that has it open and try again"
+        )
+    reason = text.strip("'\"").split("\n")[0]
+    return DataError(f"{path} is damaged and cannot be read: {reason}", hint=RESTORE)

@@ -1,0 +1,280 @@
+"""Tables from any bench: text of any dialect, .npz, .mat, .wav.
+
+What a text is taken for is decided in ``table_text``, by explicit rules, and its rows are read by
+``table_rows``; what is no text is read by ``table_arrays``. Units are what a header says: ``current_A``,
+``Force (N)``, ``time [ms]``, ``Kraft / N``, or a line of units below it.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import io
+import re
+from bisect import bisect_right
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.artefacts import FloatArray, beyond_all_quantities
+from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.files.output import replacing
+from pulsetrainer.files.table_arrays import Columns, reader_of
+from pulsetrainer.files.table_rows import parse
+from pulsetrainer.files.table_text import Dialect, detect
+from pulsetrainer.files.units import symbol_of
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*$")
+_DIVIDED = re.compile(r"^(?P<name>.*\S)\s+/\s+(?P<unit>\S+)\s*$")
+_SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,6})$")
+# a suffix is a unit only if it is one: "coil_current" is a name
+_UNIT_NAMES = """
+    s ms us µs min h A mA uA kA V mV kV N mN kN Nm mNm T mT m mm um µm nm Pa kPa MPa bar mbar mmHg
+    deg rad C °C degC K Hz kHz W g kg A/m kA/m m/s mm/s rad/s N/A % percent
+"""
+_UNITS = frozenset(_UNIT_NAMES.split())
+_WRITTEN_ROWS = 1 << 14
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Columns of numbers, their names and units as the header has them, and the comments above them."""
+
+    path: Path
+    names: tuple[str, ...]
+    columns: Mapping[str, FloatArray]  # those that were kept, each (rows,); NaN where there is text
+    units: Mapping[str, str]  # by name, where the header says one
+    comments: tuple[str, ...]
+    text_names: frozenset[str] = frozenset()  # columns of text
+    # (row, line) wherever their distance changes; empty where the file has no lines
+    shifts: Sequence[tuple[int, int]] = ((0, 1),)
+    rate_Hz: float | None = None  # where the file itself says one
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return next((column.size for column in self.columns.values()), 0)
+
+    def column(self, name: str) -> FloatArray:
+        """Return a column (rows,) by its name, or by the name without its unit, whatever the case.
+
+        Raises
+        ------
+        DataError
+            There is no such column, or it holds text.
+        """
+        return self.columns[self.names[self.index(name)]]
+
+    def unit(self, name: str) -> str:
+        """Return the unit of a column, empty where the header says none.
+
+        Raises
+        ------
+        DataError
+            There is no such column, or it holds text.
+        """
+        return self.units.get(self.names[self.index(name)], "")
+
+    def place(self, row: int) -> str:
+        """Say where a row is: the line of a text, the row of anything else."""
+        return f"line {self.line_of(row)}" if self.shifts else f"row {row + 1}"
+
+    def line_of(self, row: int) -> int:
+        """Return the line of the file that holds a row."""
+        first_row, line = self.shifts[bisect_right(self.shifts, row, key=lambda shift: shift[0]) - 1]
+        return line + row - first_row
+
+    def check_finite(self, name: str) -> FloatArray:
+        """Return a column in which every value is finite.
+
+        Raises
+        ------
+        DataError
+            A value is NaN, infinite or missing: line and column are named.
+        """
+        values = self.column(name)
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size == values.size:
+            raise DataError(
+                f"{self.path} has no numbers in column {name}: all {values.size} rows are NaN or empty",
+                hint=f"name another column; it has {', '.join(self.names)}",
+            )
+        if bad.size:
+            raise DataError(
+                f"{self.path} has {values[bad[0]]} in column {name}, {self.place(int(bad[0]))} "
+                f"({bad.size} of {values.size} rows are not finite)",
+                hint="remove those rows, or export the record again",
+            )
+        if said := beyond_all_quantities(values):
+            raise DataError(f"{self.path}, column {name}, {said}", hint="mend or remove those rows")
+        return values
+
+    def index(self, name: str) -> int:
+        """Return the place of a column of numbers.
+
+        Raises
+        ------
+        DataError
+            There is no such column (the nearest names are offered), or it holds text.
+        """
+        bare = [split_unit(own)[0].lower() for own in self.names]
+        if name in self.names:
+            k = self.names.index(name)
+        elif bare.count(name.lower()) == 1:
+            k = bare.index(name.lower())
+        else:
+            near = difflib.get_close_matches(name, self.names, n=3, cutoff=0.3) or list(self.names)[:8]
+            raise DataError(
+                f"{self.path} has no column {name!r}; it has {', '.join(self.names)}",
+                hint=f"did you mean {' or '.join(repr(n) for n in near)}?",
+            )
+        if self.names[k] in self.text_names:
+            raise DataError(
+                f"{self.path} has text, not numbers, in column {self.names[k]}, as in {self.place(0)}",
+                hint="name another column; times may be numbers, 12:34:56.7, 2024-05-01T12:34:56 or "
+                "01.05.2024 12:34:56",
+            )
+        return k
+
+
+def split_unit(heading: str) -> tuple[str, str]:
+    """Return name and unit of a column heading; no unit where it says none."""
+    for pattern in (_BRACKETED, _DIVIDED):
+        if (found := pattern.match(heading)) and found["name"]:
+            return found["name"].strip(), found["unit"].strip()
+    suffixed = _SUFFIXED.match(heading)
+    if suffixed and suffixed["unit"] in _UNITS:
+        return suffixed["name"], suffixed["unit"]
+    return heading, ""
+
+
+def numbered(names: Sequence[str]) -> tuple[str, ...]:
+    """Return headings with a number behind the name wherever several columns have one heading.
+
+    ``t, Volt (V), Volt (V)`` become ``t, Volt#1 (V), Volt#2 (V)``.
+    """
+    found: list[str] = []
+    for k, name in enumerate(names):
+        if names.count(name) > 1:
+            bare = split_unit(name)[0]
+            found.append(f"{bare}#{names[: k + 1].count(name)}{name.removeprefix(bare)}")
+        else:
+            found.append(name)
+    return tuple(found)
+
+
+def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None = None) -> Table:
+    """Read a table of numbers, a text of any size piece by piece.
+
+    Parameters
+    ----------
+    keep
+        Gets the table without its numbers and returns the places of the columns that are to stay in memory;
+        all by default.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read, is empty or no table, or holds text in a column of numbers or two
+        decimal signs (line and column are named).
+    """
+    path = Path(path)
+    try:
+        reader = reader_of(path)
+        if reader is not None:
+            return _only(_of_arrays(path, reader(path)), keep)
+        dialect = detect(path)
+        dialect = replace(dialect, names=numbered(dialect.names))
+        table = _head(path, dialect)
+        kept = sorted(set(keep(table))) if keep else list(range(len(table.names)))
+        rows = parse(path, dialect, kept)
+    except OSError as error:
+        raise DataError(
+            f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
+        ) from error
+    except UnicodeError as error:
+        raise DataError(f"{path} is not a text file: {error}", hint="export the record as CSV") from error
+    except (csv.Error, ValueError, IndexError) as error:  # quotes that do not close, cells without end
+        raise DataError(
+            f"{path} is no table of numbers: {error}", hint="export it as CSV with one column a quantity"
+        ) from error
+    columns = {table.names[k]: column for k, column in zip(kept, rows.columns, strict=True)}
+    return replace(table, columns=columns, shifts=rows.shifts)
+
+
+def _head(path: Path, dialect: Dialect) -> Table:
+    """Return the table of a text without its numbers."""
+    return Table(
+        path,
+        dialect.names,
+        {},
+        _units(dialect),
+        dialect.comments,
+        frozenset(dialect.names[k] for k in dialect.text_columns),
+        ((0, dialect.first_line),),
+        dialect.rate_Hz,
+    )
+
+
+def _only(table: Table, keep: Callable[[Table], Collection[int]] | None) -> Table:
+    """Return a table with no other columns than these."""
+    if keep is None:
+        return table
+    return replace(
+        table, columns={name: table.columns[name] for name in (table.names[k] for k in keep(table))}
+    )
+
+
+def _of_arrays(path: Path, columns: Columns) -> Table:
+    """Return the table of a file that is no text."""
+    names = tuple(columns.values)
+    units = {name: columns.units.get(name) or split_unit(name)[1] for name in names}
+    named = {name: unit for name, unit in units.items() if unit}
+    return Table(path, names, columns.values, named, (), shifts=(), rate_Hz=columns.rate_Hz)
+
+
+def _units(dialect: Dialect) -> dict[str, str]:
+    """Return the unit of each column that has one, in its heading or in the line below."""
+    pairs = zip(dialect.names, dialect.units, strict=True)
+    units = {name: symbol_of(split_unit(name)[1] or below) for name, below in pairs}
+    return {name: unit for name, unit in units.items() if unit}
+
+
+def write_table(
+    path: Path | str, columns: Mapping[str, ArrayLike], *, comments: Sequence[str] = (), force: bool = False
+) -> None:
+    """Write columns as CSV: a header of their names, numbers that read back to the last bit.
+
+    Raises
+    ------
+    UsageError
+        The file exists and ``force`` is not set, or its folder is missing or not writable.
+    DataError
+        The disk is full or failed.
+    ArgumentError
+        The columns differ in length.
+    """
+    arrays = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in columns.values()]
+    if len({array.shape for array in arrays}) != 1 or arrays[0].ndim != 1:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(columns, arrays, strict=True))
+        raise ArgumentError(
+            f"a table needs columns of one length: {shapes}", hint="this is a bug in the caller"
+        )
+    header = io.StringIO()
+    csv.writer(header, lineterminator="\n").writerow(columns)
+    with (
+        replacing(path, force=force) as temporary,
+        temporary.open("w", encoding="utf-8", newline="\n") as out,
+    ):
+        out.writelines(f"# {line}\n" for comment in comments for line in comment.splitlines())
+        out.write(header.getvalue())
+        rows = zip(*(map(repr, array.tolist()) for array in arrays), strict=True)
+        while block := list(islice(rows, _WRITTEN_ROWS)):
+            out.write("".join(f"{','.join(row)}\n" for row in block))

@@ -1,0 +1,195 @@
+"""Records that are no text: numpy's .npz and .npy, MATLAB's .mat of any version, .wav.
+
+Every vector in the file is a column under its own name; a matrix gives one column for each of its shorter
+side. What is nested (a MATLAB structure, an HDF5 group) has its path for a name: ``run.force``. The time
+is a column named so, or the rate in the file.
+"""
+
+from __future__ import annotations
+
+import struct
+import warnings
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pulsetrainer.artefacts import FloatArray
+from pulsetrainer.errors import DataError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+RATE_NAMES = frozenset(["fs", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "f_s"])
+STEP_NAMES = frozenset(["dt", "dt_s", "ts", "tinterval", "sample_time"])
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_WIDEST = 64  # columns that one matrix may give
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """The vectors of a file, all of the length that most of them share, and its rate."""
+
+    values: Mapping[str, FloatArray]  # each (n,)
+    rate_Hz: float | None
+    units: Mapping[str, str]
+
+
+def reader_of(path: Path) -> Callable[[Path], Columns] | None:
+    """Return what reads a file of this name, or None for text."""
+    readers = {".npz": _read_npz, ".npy": _read_npy, ".mat": _read_mat, ".wav": _read_wav}
+    return readers.get(path.suffix.lower())
+
+
+def _read_npz(path: Path) -> Columns:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return _columns(path, {name: file[name] for name in file.files if not _holds_objects(file, name)})
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError) as error:
+        raise _unreadable(path, "an .npz archive of numbers", error) from error
+
+
+def _holds_objects(file: Any, name: str) -> bool:
+    """Whether a member is no array of numbers but Python's own, which is never loaded: it could run code."""
+    try:
+        with file.zip.open(f"{name}.npy") as member:
+            version = np.lib.format.read_magic(member)
+            read = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            return bool(read(member)[2].hasobject)
+    except KeyError:
+        return False
+
+
+def _read_npy(path: Path) -> Columns:
+    try:
+        array = np.load(path, allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise _unreadable(path, "a .npy array of numbers", error) from error
+    if array.dtype.names:
+        return _columns(path, {name: array[name] for name in array.dtype.names})
+    return _columns(path, {"column": array})
+
+
+def _read_mat(path: Path) -> Columns:
+    with path.open("rb") as stream:
+        head = stream.read(520)
+    # version 7.3 is HDF5 behind a block of 512 bytes of text
+    if head[512:520] == _HDF5 or head[:8] == _HDF5:
+        return _read_mat_73(path)
+    # half a second that text files need not wait for
+    from scipy.io import loadmat  # noqa: PLC0415
+    from scipy.io.matlab import MatReadError  # noqa: PLC0415
+
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=True)
+    except (
+        MatReadError,
+        ValueError,
+        TypeError,
+        NotImplementedError,
+        KeyError,
+        IndexError,
+        zlib.error,
+    ) as error:
+        raise _unreadable(path, "a MATLAB file", error) from error
+    found: dict[str, Any] = {}
+    for name, value in content.items():
+        if not name.startswith("__"):
+            _flatten(name, value, found)
+    return _columns(path, found)
+
+
+def _flatten(name: str, value: Any, found: dict[str, Any]) -> None:
+    """Put the fields of a structure under their paths."""
+    array = np.asarray(value)
+    if array.dtype.names is None:
+        found[name] = array
+        return
+    if array.size == 1:
+        for key in array.dtype.names:
+            _flatten(f"{name}.{key}", array[key].item() if array[key].dtype == object else array[key], found)
+
+
+def _read_mat_73(path: Path) -> Columns:
+    import h5py  # noqa: PLC0415
+
+    found: dict[str, Any] = {}
+    units: dict[str, str] = {}
+
+    def visit(name: str, node: Any) -> None:
+        is_text = isinstance(node, h5py.Dataset) and node.attrs.get("MATLAB_class") == b"char"
+        if isinstance(node, h5py.Dataset) and not name.startswith("#") and not is_text:
+            dotted = name.replace("/", ".")
+            found[dotted] = np.asarray(node[()]).T  # MATLAB counts columns first
+            if "units" in node.attrs:
+                units[dotted] = str(np.asarray(node.attrs["units"]).item())
+
+    try:
+        with h5py.File(path) as file:
+            file.visititems(visit)
+    except (OSError, ValueError, TypeError) as error:
+        raise _unreadable(path, "a MATLAB 7.3 file", error) from error
+    return _columns(path, found, units)
+
+
+def _read_wav(path: Path) -> Columns:
+    from scipy.io import wavfile  # noqa: PLC0415
+
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", category=wavfile.WavFileWarning)
+            warnings.filterwarnings("error", message="Reached EOF", category=wavfile.WavFileWarning)
+            rate, samples = wavfile.read(path)
+    except (ValueError, EOFError, struct.error, wavfile.WavFileWarning) as error:
+        raise _unreadable(path, "a whole .wav file", error) from error
+    channels = samples.reshape(samples.shape[0], -1)
+    # integers count steps of the converter: 1 is full scale, as in every sound program
+    full = float(np.iinfo(samples.dtype).max) + 1.0 if np.issubdtype(samples.dtype, np.integer) else 1.0
+    zero = 128.0 if samples.dtype == np.uint8 else 0.0
+    full = 128.0 if samples.dtype == np.uint8 else full
+    values = {f"channel{k + 1}": (channels[:, k] - zero) / full for k in range(channels.shape[1])}
+    return Columns(values, float(rate), {})
+
+
+def _columns(path: Path, arrays: Mapping[str, Any], units: Mapping[str, str] | None = None) -> Columns:
+    """Return the vectors of the length that most have, and the rate if a number says it."""
+    vectors: dict[str, FloatArray] = {}
+    rate = None
+    for name, value in arrays.items():
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiub":
+            continue
+        array = np.squeeze(array)
+        word = name.rpartition(".")[2].lower()
+        if array.ndim == 0:
+            number = float(array)
+            if number > 0 and word in RATE_NAMES:
+                rate = number
+            elif number > 0 and word in STEP_NAMES:
+                rate = 1.0 / number
+        elif array.ndim == 1:
+            vectors[name] = np.asarray(array, dtype=np.float64)
+        elif array.ndim == 2 and min(array.shape) <= _WIDEST:
+            tall = array if array.shape[0] >= array.shape[1] else array.T
+            for k in range(tall.shape[1]):
+                vectors[f"{name}{k + 1}"] = np.asarray(tall[:, k], dtype=np.float64)
+    sizes = [vector.size for vector in vectors.values()]
+    if not sizes:
+        listed = ", ".join(arrays) or "nothing"
+        raise DataError(
+            f"{path} holds no vector of numbers; it has {listed}", hint="save the columns as vectors"
+        )
+    # the record's columns are the longest vectors; shorter ones are settings
+    longest = max(sizes)
+    return Columns({name: v for name, v in vectors.items() if v.size == longest}, rate, units or {})
+
+
+def _unreadable(path: Path, kind: str, error: Exception) -> DataError:
+    return DataError(f"{path} is not {kind} that can be read: {error}", hint="save it again, or export CSV")

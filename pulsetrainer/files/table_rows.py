@@ -1,0 +1,219 @@
+"""The rows of a text table, piece by piece: only the columns that are kept stay in memory.
+
+Numpy parses a piece at once. Only where that fails are its comments and blank lines taken out, and only where
+that fails too are its cells looked at one by one, to fill what is missing or to name the one to blame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.errors import DataError
+from pulsetrainer.files.table_text import MISSING, Dialect, number, readable
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from pulsetrainer.artefacts import FloatArray
+
+PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
+_SPARE = 1.02  # of the room that the first piece lets expect; what is never written to takes no memory
+_GROWTH = 1.125
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """The kept columns of a text, and where in the file their rows are."""
+
+    columns: tuple[FloatArray, ...]  # each (n,)
+    shifts: tuple[tuple[int, int], ...]  # (row, line) wherever comments or blank lines change the distance
+
+
+def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece: int = PIECE) -> Rows:
+    """Return the columns whose numbers are in ``keep``, in that order; all by default. Text becomes NaN.
+
+    Text in other columns, a remark for instance, is passed over. A ``piece`` has so many characters, and the
+    rest of its last line.
+
+    Raises
+    ------
+    DataError
+        A row is too short or too long, a cell in a kept column of numbers is text, or the decimal sign
+        changes: line and column are named.
+    OSError
+        The file cannot be read.
+    """
+    places = list(range(len(dialect.names)) if keep is None else keep)
+    reader = _Reader(path, dialect, frozenset(places))
+    kept = _Kept(places)
+    with path.open(encoding=dialect.encoding, errors="surrogateescape", newline=None) as stream:
+        for _ in range(dialect.first_line - 1):
+            stream.readline()
+        size = path.stat().st_size
+        while text := stream.read(piece) + stream.readline():
+            values = reader.read(text)
+            # a character is a byte, or, in UTF-16, two of them
+            kept.append(values, expected=len(values) * size / len(text))
+    return Rows(kept.finished(), tuple(reader.shifts))
+
+
+class _Kept:
+    """Columns that grow in place: never a second copy of them."""
+
+    def __init__(self, places: list[int]) -> None:
+        self._places = places
+        self._columns = [np.empty(0) for _ in places]
+        self._rows = 0
+
+    def append(self, values: FloatArray, *, expected: float) -> None:
+        """Append the rows (n, columns of the file); ``expected``: how many there may be in the end."""
+        end = self._rows + len(values)
+        if self._columns and end > self._columns[0].size:
+            if self._rows == 0:
+                self._columns = [np.empty(max(end, int(_SPARE * expected))) for _ in self._places]
+            else:
+                for column in self._columns:
+                    column.resize(int(_GROWTH * end), refcheck=False)
+        for column, place in zip(self._columns, self._places, strict=True):
+            column[self._rows : end] = values[:, place]
+        self._rows = end
+
+    def finished(self) -> tuple[FloatArray, ...]:
+        """Return the columns, and give back the room that was not needed."""
+        for column in self._columns:
+            column.resize(self._rows, refcheck=False)
+        return tuple(self._columns)
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Pieces of text into numbers; knows the line it is at and the decimal signs it has seen."""
+
+    path: Path
+    dialect: Dialect
+    needed: frozenset[int]  # columns that must hold numbers
+    shifts: list[tuple[int, int]] = field(default_factory=list)
+    line: int = 0  # of the next piece
+    row: int = 0
+    point: str = ""  # where the first decimal point was, and the first decimal comma
+    comma: str = ""
+
+    def __post_init__(self) -> None:
+        self.line = self.dialect.first_line
+
+    def read(self, text: str) -> FloatArray:
+        """Return the rows (n, columns) of the next piece.
+
+        Raises
+        ------
+        DataError
+            See ``parse``.
+        """
+        found = text.removesuffix("\n").split("\n")
+        values = self._at_once(found, range(self.line, self.line + len(found)))
+        if values is not None:
+            self._note_shift(self.line, self.row)
+        else:
+            rows, places = self._without_remarks(found)
+            values = self._at_once(rows, places)
+            if values is None:
+                values = self._cell_by_cell(rows, places)
+        self.line += len(found)
+        self.row += len(values)
+        return values
+
+    def _at_once(self, lines: Sequence[str], places: Sequence[int]) -> FloatArray | None:
+        """Return what numpy makes of the lines, if that is beyond doubt: each is a row of as many numbers."""
+        dialect = self.dialect
+        rows = lines
+        if dialect.delimiter and all(line.endswith(dialect.delimiter) for line in lines):
+            rows = [line[:-1] for line in lines]
+        if dialect.text_columns or not any(line.strip() for line in rows):
+            return None
+        if dialect.decimal_comma and dialect.delimiter == ",":  # in quotes
+            return None
+        if dialect.decimal_comma:
+            if any("." in line for line in rows):
+                return None
+            rows = [line.replace(",", ".") for line in rows]
+        try:
+            values: FloatArray = np.loadtxt(
+                rows, delimiter=dialect.delimiter, comments=None, quotechar='"', ndmin=2
+            )
+        except ValueError:
+            return None
+        if values.shape != (len(lines), len(dialect.names)):
+            return None
+        if not (self.comma if dialect.decimal_comma else self.point):
+            sign = "," if dialect.decimal_comma else "."
+            k = next((k for k, line in enumerate(lines) if sign in line), None)
+            if k is not None:
+                self._look_for_signs(places[k], dialect.split(lines[k]))
+        return values
+
+    def _without_remarks(self, found: Sequence[str]) -> tuple[list[str], list[int]]:
+        """Return the rows without comments and blank lines, and their lines; note where these jump."""
+        rows: list[str] = []
+        places: list[int] = []
+        for count, line in enumerate(found, self.line):
+            if line and not line.isspace() and not line.lstrip().startswith(self.dialect.remarks):
+                self._note_shift(count, self.row + len(rows))
+                rows.append(line)
+                places.append(count)
+        return rows, places
+
+    def _note_shift(self, line: int, row: int) -> None:
+        if not self.shifts or line - row != self.shifts[-1][1] - self.shifts[-1][0]:
+            self.shifts.append((row, line))
+
+    def _cell_by_cell(self, lines: Sequence[str], places: Sequence[int]) -> FloatArray:
+        """Look at every cell; NaN for what is missing, and for text in a column of text."""
+        dialect = self.dialect
+        values = np.full((len(lines), len(dialect.names)), np.nan)
+        for row, (count, line) in enumerate(zip(places, lines, strict=True)):
+            cells = dialect.split(line)
+            if len(cells) != len(dialect.names):
+                raise DataError(
+                    f"{self.path} has {len(cells)} columns in line {count}, expected {len(dialect.names)}: "
+                    f"{', '.join(dialect.names)}",
+                    hint="mend or remove that line, or export the record again",
+                )
+            for k, cell in enumerate(cells):
+                if k in dialect.text_columns or cell.lower() in MISSING:
+                    continue
+                value = number(cell, day_first=dialect.day_first)
+                if value is None and k not in self.needed:
+                    continue
+                if value is None:
+                    raise DataError(
+                        f"{self.path} has {self._place(cell, k, count)}: not a number",
+                        hint="mend or remove that line",
+                    )
+                values[row, k] = value
+            self._look_for_signs(count, cells)
+        if self.comma and not dialect.decimal_comma:
+            self.dialect = replace(dialect, decimal_comma=True)
+        return values
+
+    def _look_for_signs(self, line: int, cells: Sequence[str]) -> None:
+        """Note the first decimal point and the first decimal comma; raise DataError where there are both."""
+        for k, cell in enumerate(cells):
+            # a remark has no decimal sign, a time of day one of its own
+            if k in self.dialect.text_columns or ":" in cell:
+                continue
+            if not self.point and "." in cell and number(cell) is not None:
+                self.point = self._place(cell, k, line)
+            if not self.comma and "," in cell and number(cell) is not None:
+                self.comma = self._place(cell, k, line)
+        if self.point and self.comma:
+            raise DataError(
+                f"{self.path} mixes decimal signs: {self.point}, but {self.comma}",
+                hint="export it with one decimal sign",
+            )
+
+    def _place(self, cell: str, column: int, line: int) -> str:
+        return f"{readable(cell)!r} in column {self.dialect.names[column]}, line {line}"

@@ -1,0 +1,303 @@
+"""How a text file is a table: its delimiter, decimal sign, header and comments.
+
+Every rule is explicit: the delimiter is the one that makes most cells numbers; a comma is a decimal sign
+only where something else separates; the first line is a header if it has text where the next one has a
+number; a column that starts with text is a column of text; what an instrument writes about itself above the
+table is a comment. Times of day and ISO 8601 time stamps are numbers: seconds. The rows themselves are read
+by ``table_rows``.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.errors import DataError
+from pulsetrainer.files import table_stamps as stamps
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_DELIMITERS = ("\t", ";", ",", "|", None)  # None: blanks
+_REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
+_SAMPLE_LINES = 200
+_LAST_BYTES = 4096
+_TABLE = 10  # rows of one kind make a table of what stands below a text
+_STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
+_FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
+_COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
+_UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """What makes a table of a text file."""
+
+    encoding: str
+    delimiter: str | None
+    decimal_comma: bool
+    names: tuple[str, ...]
+    units: tuple[str, ...]  # of a second header line; empty texts where there is none
+    comments: tuple[str, ...]  # above the first row
+    first_line: int  # of the first row
+    text_columns: frozenset[int]
+    remarks: tuple[str, ...] = _REMARKS  # what a line that is no row begins with
+    rate_Hz: float | None = None  # where the heading says a step
+    day_first: bool | None = None  # in dates with slashes
+
+    def split(self, line: str) -> list[str]:
+        """Return the cells of a line, without one that only a delimiter at the end makes."""
+        cells = split(line, self.delimiter)
+        if len(cells) == len(self.names) + 1 and not cells[-1]:
+            cells.pop()
+        return cells
+
+
+def split(line: str, delimiter: str | None) -> list[str]:
+    """Return the cells of a line, stripped."""
+    if delimiter is None:
+        return line.split()
+    if '"' in line:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def number(cell: str, *, day_first: bool | None = None) -> float | None:
+    """Return the number in a cell, NaN where it says that the value is missing, None where it is text.
+
+    A comma in a cell is a decimal sign: where commas separate, only quotes can hold one. A time of day is in
+    seconds since midnight, a time stamp in seconds since 1970; ``day_first`` is the order of its date if
+    that has slashes.
+    """
+    try:
+        # Python reads 1_000 as a number; no instrument writes it
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        if _COMMA_DECIMAL.fullmatch(cell):
+            return float(cell.replace(",", "."))
+        if cell.lower() in MISSING:
+            return np.nan
+        if _FORTRAN.fullmatch(cell):
+            return float(re.sub("[dD]", "e", cell))
+        return stamps.seconds(cell, day_first=day_first)
+
+
+def detect(path: Path) -> Dialect:
+    """Return how a file is to be read.
+
+    Raises
+    ------
+    DataError
+        It is no text, or no table.
+    OSError
+        It cannot be read.
+    """
+    encoding = _encoding(path)
+    comments: list[tuple[int, str]] = []
+    lines: list[tuple[int, str]] = []
+    declared: str | None = None
+    with path.open(encoding=encoding, errors="surrogateescape", newline=None) as stream:
+        for count, line in enumerate(stream, 1):
+            text = line.strip()
+            if count == 1 and (found := _SIGNED_DELIMITER.fullmatch(text)):
+                declared = found[1]
+            elif text.startswith(_REMARKS):
+                if len(lines) <= 2:
+                    comments.append((count, _remark(text)))
+            elif text:
+                lines.append((count, readable(line.strip("\r\n"))))
+            if len(lines) == _SAMPLE_LINES:
+                break
+    if not lines:
+        raise DataError(f"{path} is empty", hint="export the record again")
+    delimiter = declared or _delimiter([line for _, line in lines])
+    remarks = _REMARKS if delimiter == ";" else (*_REMARKS, ";")
+    comments += [(count, _remark(line)) for count, line in lines if line.startswith(remarks)]
+    lines = [(count, line) for count, line in lines if not line.startswith(remarks)]
+    if not lines:
+        raise DataError(f"{path} is empty", hint="export the record again")
+    above = _above([split(line, delimiter) for _, line in lines])
+    comments += [(count, line.strip()) for count, line in lines[:above]]
+    dialect = _with_header(path, encoding, delimiter, lines[above:], sorted(comments))
+    return replace(dialect, remarks=remarks)
+
+
+def _remark(line: str) -> str:
+    return readable(line.strip().lstrip("#%/; "))
+
+
+def _encoding(path: Path) -> str:
+    with path.open("rb") as stream:
+        start = stream.read(4096)
+    if start.startswith(_UTF16_MARKS):
+        return "utf-16"
+    if b"\0" in start:
+        ours = start.startswith(b"\x89HDF")
+        raise DataError(
+            f"{path} is not a text file",
+            hint="it is HDF5: see `pulsetrainer show`" if ours else "export the record as CSV",
+        )
+    return "utf-8-sig"
+
+
+def readable(line: str) -> str:
+    """Return a line in which bytes that are not UTF-8 are read as Western Windows letters."""
+    if line.isascii():
+        return line
+    raw = line.encode("utf-8", "surrogateescape")
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", "replace")
+
+
+def _delimiter(lines: list[str]) -> str | None:
+    """Return the delimiter that makes the largest share of cells numbers, the first of equals."""
+    # the first line may be a header, and more may stand above it
+    body = lines[len(lines) // 2 :] if len(lines) > 2 * _TABLE else lines[1:] or lines
+
+    def share(delimiter: str | None) -> float:
+        rows = [split(line, delimiter) for line in body]
+        if max(map(len, rows)) < 2:
+            return -1.0
+        cells = [cell for row in rows for cell in row if cell]
+        return float(np.mean([number(cell) is not None for cell in cells])) if cells else 0.0
+
+    shares = [share(delimiter) for delimiter in _DELIMITERS]
+    return "," if max(shares) < 0 else _DELIMITERS[int(np.argmax(shares))]
+
+
+def _above(rows: list[list[str]]) -> int:
+    """Return how many lines stand above the table and its headings: what an instrument says about itself.
+
+    The table is the rows at the end of the sample that are of one kind, ten or more. Rows of numbers above,
+    or headings of another count, are in error, and 0 is returned.
+    """
+    kinds = [[number(cell) is None for cell in row] for row in rows]
+    width = len(rows[-1])
+    start = len(rows)
+    while (
+        start
+        and len(rows[start - 1]) == width
+        and not any(here and not last for here, last in zip(kinds[start - 1], kinds[-1], strict=True))
+    ):
+        start -= 1
+    if len(rows) - start < _TABLE or not all(any(kind) for kind in kinds[:start]):
+        return 0
+    named = width - (not rows[-1][-1])  # a delimiter at the end makes no column
+    head = start
+    while head > max(start - 2, 0) and len(kinds[head - 1]) >= named and all(kinds[head - 1][:named]):
+        head -= 1
+    misfit = 0 < head == start and len(kinds[head - 1]) > 1 and all(kinds[head - 1])
+    return 0 if misfit else head
+
+
+def _with_header(
+    path: Path,
+    encoding: str,
+    delimiter: str | None,
+    lines: list[tuple[int, str]],
+    commented: list[tuple[int, str]],
+) -> Dialect:
+    """Return the dialect, with what the lines above the first row say."""
+    rows = [split(line, delimiter) for _, line in lines]
+    decimal_comma = any(_COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row)
+    rate = _cut_settings(rows)
+    text = [[number(cell) is None for cell in row] for row in rows]
+    heads = _heading_lines(text)
+    if heads == len(rows):
+        raise DataError(f"{path} is empty below its header", hint="export the record again")
+    first = rows[heads]
+    comments = tuple(comment for count, comment in commented if count < lines[heads][0])
+    names = rows[0] if heads else _commented_names(comments, delimiter, len(first))
+    names, first = _without_end(names, first)
+    if len(names) != len(first):
+        raise DataError(
+            f"{path} has {len(names)} column names, but {len(first)} columns in line {lines[heads][0]}",
+            hint="mend the header; decimal commas need another delimiter, such as a semicolon",
+        )
+    if all(text[heads][: len(first)]):
+        raise DataError(
+            f"{path} has no column of numbers: line {lines[heads][0]} is {lines[heads][1][:60]!r}",
+            hint="export the record as CSV, one column a quantity",
+        )
+    units = [cell.strip("()[] ") for cell in rows[1]] if heads == 2 else []
+    return Dialect(
+        encoding,
+        delimiter,
+        decimal_comma,
+        tuple(name or f"column{k + 1}" for k, name in enumerate(names)),
+        tuple(units) if len(units) == len(names) else ("",) * len(names),
+        comments,
+        lines[heads][0],
+        frozenset(k for k, is_text in enumerate(text[heads][: len(first)]) if is_text),
+        rate_Hz=rate,
+        day_first=stamps.day_first(_columns(rows[heads:], delimiter, _last_lines(path, encoding))),
+    )
+
+
+def _columns(rows: list[list[str]], delimiter: str | None, last: list[str]) -> list[tuple[str, ...]]:
+    """Return the columns of the first rows and the last lines, as far as these are rows of the same kind."""
+    width = len(rows[0])
+    whole = [row for row in (*rows, *(split(line, delimiter) for line in last)) if len(row) == width]
+    return list(zip(*whole, strict=True))
+
+
+def _last_lines(path: Path, encoding: str) -> list[str]:
+    """Return the whole lines in the last few kilobytes of a file."""
+    with path.open("rb") as stream:
+        start = max(path.stat().st_size - _LAST_BYTES, 0)
+        stream.seek(start)
+        text = stream.read().decode("utf-16-le" if encoding == "utf-16" else "utf-8", "replace")
+    return [line for line in text.splitlines()[1 if start else 0 :] if line.strip()]
+
+
+def _cut_settings(rows: list[list[str]]) -> float | None:
+    """Take from the headings what is beside the columns, in place; return the rate if a step is there.
+
+    Some oscilloscopes write ``X,CH1,Start,Increment`` over ``Sequence,Volt,0.0,1e-3`` over rows ``0,1.5``.
+    """
+    if len(rows) < 3:
+        return None
+    names, units, first = rows[:3]
+    width = len(first) - (not first[-1])
+    beside = [number(cell) for cell in units[width:] if cell]
+    if not beside or None in beside or not all(number(cell) is None for cell in units[:width]):
+        return None
+    step = next(
+        (value for name, value in zip(names[width:], beside, strict=False) if name.lower() in _STEPS), None
+    )
+    rows[:2] = [names[:width], units[:width]]
+    return 1.0 / step if step else None
+
+
+def _heading_lines(text: list[list[bool]]) -> int:
+    """Return how many lines stand above the first row: names, and units below; ``text``: cell is text."""
+    second = text[1] if len(text) > 1 else []
+    if not (all(text[0]) or any(a and not b for a, b in zip(text[0], second, strict=False))):
+        return 0
+    return 2 if len(text) > 2 and all(second) and not all(text[2]) else 1
+
+
+def _without_end(names: list[str], first: list[str]) -> tuple[list[str], list[str]]:
+    """Return header and first row without the column that only a delimiter at the end of a line makes."""
+    if not names[-1] and (not first[-1] or len(names) == len(first) + 1):
+        names = names[:-1]
+    if not first[-1] and len(first) == len(names) + 1:
+        first = first[:-1]
+    return names, first
+
+
+def _commented_names(comments: tuple[str, ...], delimiter: str | None, count: int) -> list[str]:
+    """Return names from the last comment, if it is a header (numpy writes it so), or numbers."""
+    if comments:
+        cells = split(comments[-1], delimiter)
+        if len(cells) == count and all(number(cell) is None for cell in cells):
+            return cells
+    return [f"column{k + 1}" for k in range(count)]

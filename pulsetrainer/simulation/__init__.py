@@ -1,0 +1,1 @@
+"""What only pretends to be a device: the bench, the emulator, the bad wire."""

@@ -1,0 +1,119 @@
+"""The virtual bench: the real firmware with a simulated solenoid, as a process on a pty."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import os
+import select
+import subprocess
+from typing import TYPE_CHECKING
+
+from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.simulation.build import firmware_executable
+from pulsetrainer.simulation.options import BenchOptions, parse_bench
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_OWN = ("ideal", "speed", "break", "wire", "wire-seed")
+_START_S = 10.0
+_LEAVE_S = 2.0
+
+
+def _known(executable: Path) -> tuple[dict[str, tuple[str, str, str, str]], list[str]]:
+    """Return the plant's parameters (name: unit, low, high, meaning) and what can be broken."""
+    text = subprocess.run([str(executable), "--list"], capture_output=True, text=True, check=True).stdout
+    table, _, breaks = text.partition("\n\n")
+    rows = [line.split("\t") for line in table.splitlines()]
+    return {name: (unit, low, high, meaning) for name, unit, low, high, meaning in rows}, breaks.split()
+
+
+def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageError:
+    """Return the usage error behind the firmware process's complaint."""
+    parameters, breaks = _known(executable)
+    for name, value in options.settings:
+        if name not in parameters:
+            near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.5)
+            return UsageError(
+                f"the bench has no parameter {name!r}",
+                hint=f"did you mean {' or '.join(near)}?"
+                if near
+                else f"there are: {', '.join([*_OWN, *parameters])}",
+            )
+        unit, low, high, meaning = parameters[name]
+        if f"{name}={value}" in complaint:
+            return UsageError(
+                f"bench parameter {name}={value} is outside its range: {low}..{high} {unit}",
+                hint=f"{name}: {meaning}",
+            )
+    for what in options.breaks:
+        if what.partition("@")[0] not in breaks or what in complaint:
+            return UsageError(
+                f"the bench cannot break {what!r}",
+                hint=f"break=WHAT@SECONDS with WHAT one of {', '.join(breaks)}",
+            )
+    return UsageError(f"the bench refused its parameters: {complaint}", hint='start with "bench:" alone')
+
+
+class Bench:
+    """A running firmware process; ``path`` is its pty."""
+
+    def __init__(self, port: str, executable: Path | None = None) -> None:
+        if os.name != "posix":
+            raise DeviceError(
+                "the virtual bench needs a pseudo-terminal, which this system does not have",
+                hint="use Linux, macOS or WSL for bench:, or a real device with --port COM3",
+            )
+        self.options = options = parse_bench(port)
+        executable = executable or firmware_executable()
+        # A session of its own: Ctrl-C in the terminal must reach the host program only, which then stops
+        # the device in order. The pipe on standard input is the leash: it closes however we end.
+        self._process = subprocess.Popen(
+            [str(executable), "--leash", *options.arguments()],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+        try:
+            self.path = self._first_line()
+        except BaseException:
+            self.close()
+            raise
+        if not self.path:
+            complaint = self._complaint()
+            self.close()
+            if self._process.returncode == 2:
+                raise _explain(executable, options, complaint)
+            raise DeviceError(
+                f"the bench did not start: {complaint}", hint="is /dev/ptmx there and permitted?"
+            )
+
+    @property
+    def pid(self) -> int:
+        """Process id of the firmware process."""
+        return self._process.pid
+
+    def _first_line(self) -> str:
+        assert self._process.stdout is not None
+        ready, _, _ = select.select([self._process.stdout], [], [], _START_S)
+        return self._process.stdout.readline().decode().strip() if ready else ""
+
+    def _complaint(self) -> str:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            _, err = self._process.communicate(timeout=_LEAVE_S)
+            return err.decode(errors="replace").strip()
+        return f"no answer within {_START_S:g} s"
+
+    def close(self) -> None:
+        """End the firmware process."""
+        process = self._process
+        for pipe in (process.stdin, process.stdout, process.stderr):
+            if pipe is not None:
+                pipe.close()
+        try:
+            process.wait(timeout=_LEAVE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()

@@ -1,0 +1,296 @@
+"""Doctor: what stands in the way of a capture on this computer and on this device, each with its fix."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import scipy  # its parts load when they are first used
+
+from pulsetrainer import __version__
+from pulsetrainer.core import signals
+from pulsetrainer.device.device import DEFAULT_PORT, open_device, redact
+from pulsetrainer.device.ports import list_ports
+from pulsetrainer.diagnosis import gates
+from pulsetrainer.diagnosis.design import Measured
+from pulsetrainer.errors import PulsetrainerError
+from pulsetrainer.simulation import build
+
+if TYPE_CHECKING:
+    from pulsetrainer.device.device import Device
+    from pulsetrainer.device.recording import Recording
+    from pulsetrainer.steps.context import Context
+
+State = Literal["ok", "warning", "problem"]
+
+_ROOM_MB = 500.0  # an hour at 1 kHz takes about 150
+_NOISE_SHARE = 0.01  # of the range; more, and small loops drown
+_TRACKING_SHARE = 0.02
+_LOOP_A = 0.75  # top of the short capture: half the range, 3 s of it
+_LOOP_A_PER_S = 0.75
+_REST_S = 0.5
+_RATE_HZ = 1000.0
+_GRID_S = 1.0 / _RATE_HZ
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Which device, and whether its coil may be driven."""
+
+    port: str | None = None
+    capture: bool = True
+    settings: str = ""  # what is in force, in words
+    folder: Path = Path()
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at."""
+
+    name: str
+    state: State
+    found: str
+    fix: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """All findings, in the order in which they were looked at."""
+
+    findings: tuple[Finding, ...]
+
+    @property
+    def problems(self) -> int:
+        """Findings that stand in the way."""
+        return sum(one.state == "problem" for one in self.findings)
+
+
+def run(options: Options, context: Context) -> Result:
+    """Look at versions, compiler, emulator, folder, ports, and the device with a short capture."""
+    looks: list[Callable[[], Iterator[Finding]]] = [
+        _versions,
+        _compiler,
+        _emulator,
+        lambda: _folder(options.folder),
+        lambda: iter([Finding("settings", "ok", options.settings or "none: defaults")]),
+        _ports,
+        lambda: _device(options),
+    ]
+    found: list[Finding] = []
+    for number, look in enumerate(looks):
+        found += look()
+        context.progress((number + 1) / len(looks))
+    return Result(tuple(found))
+
+
+# --- this computer ------------------------------------------------------------------------------------
+
+
+def _versions() -> Iterator[Finding]:
+    own = f"pulsetrainer {__version__}, Python {platform.python_version()}"
+    names, old = [], []
+    for requirement in importlib.metadata.requires("pulsetrainer") or []:
+        match = re.match(r"([A-Za-z0-9_.-]+)\s*>=\s*([0-9.]+)", requirement)
+        if match is None or "extra ==" in requirement:
+            continue
+        name, least = match.groups()
+        version = importlib.metadata.version(name)
+        names.append(f"{name} {version}")
+        if _numbers(version) < _numbers(least):
+            old.append(f"{name}>={least}")
+    if old:
+        yield Finding("versions", "problem", own, f"python -m pip install --upgrade {' '.join(old)}")
+    else:
+        yield Finding("versions", "ok", f"{own}; {', '.join(names)}")
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    return tuple(int(n) for n in re.findall(r"\d+", version)[:3])
+
+
+def _compiler() -> Iterator[Finding]:
+    try:
+        words = build.find_compiler()
+    except PulsetrainerError as error:
+        yield Finding("compiler", "problem", error.message, error.hint)
+    else:
+        yield Finding("compiler", "ok", f"{shutil.which(words[0]) or ' '.join(words)}, for the virtual bench")
+
+
+def _emulator() -> Iterator[Finding]:
+    missing = [p for p in ("qemu-system-arm", "arm-none-eabi-gcc") if not shutil.which(p)]
+    if missing:
+        yield Finding(
+            "emulator",
+            "warning",
+            f"{' and '.join(missing)} not found; only --port qemu: needs it",
+            f"sudo apt install {build.DEBIAN_PACKAGES}",
+        )
+    else:
+        yield Finding("emulator", "ok", str(shutil.which("qemu-system-arm")))
+
+
+def _folder(folder: Path) -> Iterator[Finding]:
+    """Tell whether artefacts can be written here: permission and room."""
+    where = folder.resolve()
+    try:
+        with tempfile.NamedTemporaryFile(dir=where, prefix=".pulsetrainer-doctor-") as probe:
+            probe.write(b"\0" * 4096)
+            probe.flush()
+            os.fsync(probe.fileno())
+    except OSError as error:
+        yield Finding(
+            "folder",
+            "problem",
+            f"{where} cannot be written: {error.strerror or error}",
+            "work in a folder of your own, or make room",
+        )
+        return
+    free_MB = shutil.disk_usage(where).free / 1e6
+    yield Finding(
+        "folder",
+        "ok" if free_MB > _ROOM_MB else "warning",
+        f"{where} can be written, {free_MB:.0f} MB free",
+        "" if free_MB > _ROOM_MB else "make room: an hour of capture takes 150 MB",
+    )
+
+
+def _ports() -> Iterator[Finding]:
+    fixes = {
+        "no permission": "sudo usermod -aG dialout $USER, then log in again",
+        "busy": "close the other program (a terminal, a second pulsetrainer)",
+        "absent": "check the cable",
+    }
+    ports = list_ports()
+    if not ports:
+        yield Finding("ports", "ok", "no serial port; without a device --port bench: is there")
+    for port in ports:
+        state: State = "ok" if port.status == "free" else "problem" if port.is_device else "warning"
+        kind = "the trainer" if port.is_device else port.description or "unknown"
+        yield Finding(
+            f"port {port.device}",
+            state,
+            f"{port.status}, {kind} {port.vid_pid}".strip(),
+            fixes.get(port.status, ""),
+        )
+
+
+# --- the device -----------------------------------------------------------------------------------------
+
+
+def _device(options: Options) -> Iterator[Finding]:
+    port = redact(options.port or DEFAULT_PORT)
+    try:
+        with open_device(options.port) as device:
+            yield from _identity(device, port)
+            if options.capture:
+                yield from _short_capture(device)
+    except PulsetrainerError as error:
+        yield Finding("device", "problem", error.message, error.hint)
+
+
+def _identity(device: Device, port: str) -> Iterator[Finding]:
+    info = device.info
+    yield Finding(
+        "device",
+        "ok",
+        f"{port} {info.serial}, firmware {info.firmware}, protocol {info.protocol}, "
+        f"limits {info.current_limit_A:g} A and {info.force_limit_N:g} N",
+    )
+    if info.latched_fault:
+        yield Finding(
+            "last fault", "warning", info.latched_fault, "remove its cause; the next play clears it"
+        )
+
+
+def _short_capture(device: Device) -> Iterator[Finding]:
+    """Rest, go up to half the range, hold, come back, rest; look at noise, rails, tracking and losses."""
+    top = min(_LOOP_A, device.info.current_limit_A)
+    rest = np.zeros(round(_REST_S * _RATE_HZ))
+    up = signals.through(np.asarray([0.0, top]), _LOOP_A_PER_S, _RATE_HZ)
+    reference = np.concatenate((rest, up, rest + top, up[::-1], rest))
+    held = slice(rest.size + up.size + rest.size // 5, rest.size + up.size + rest.size)
+    recording = device.play(reference, _RATE_HZ, decimation=round(device.info.tick_rate_Hz / _RATE_HZ))
+    if recording.fault:
+        yield Finding("short capture", "problem", f"it ended early: {recording.fault}", recording.remedy)
+        return
+    yield _lost(recording, reference.size)
+    yield from _noise(recording, held, device.info.current_limit_A)
+    yield from _rails(recording, top)
+
+
+def _lost(recording: Recording, expected: int) -> Finding:
+    if recording.dropped_samples:
+        return Finding(
+            "link",
+            "warning",
+            f"{recording.dropped_samples} of {expected} samples were lost on the wire",
+            "use a shorter or shielded cable, another USB port, no hub",
+        )
+    return Finding("link", "ok", f"{recording.tick.size} samples, none lost")
+
+
+def _noise(recording: Recording, held: slice, range_A: float) -> Iterator[Finding]:
+    """Noise while the current is held, against the range of the current and the span of the force."""
+    span = float(np.ptp(recording.force_N))
+    for name, values, full, unit, fix in (
+        ("current noise", recording.current_A, range_A, "A", "check the shunt's wiring and its ground"),
+        (
+            "force noise",
+            recording.force_N,
+            span,
+            "N",
+            "keep the sensor's cable off the coil; check its screws",
+        ),
+    ):
+        still = values[held]
+        sigma = float(np.std(scipy.signal.detrend(still)))  # creep is a slope on so short a hold
+        share = sigma / full if full > 0 else 0.0
+        words = f"{1e3 * sigma:.2g} m{unit} rms, {100 * share:.2g} % of {full:.3g} {unit}"
+        if sigma == 0.0:
+            yield Finding(
+                name, "warning", f"none at all: {still[0]:.4g} {unit} in every sample", "is the sensor alive?"
+            )
+        elif share > _NOISE_SHARE:
+            yield Finding(name, "warning", words, fix)
+        else:
+            yield Finding(name, "ok", words)
+
+
+def _rails(recording: Recording, top: float) -> Iterator[Finding]:
+    """Saturation, tracking and what else the raw data show by themselves."""
+    measured = Measured(
+        _GRID_S,
+        recording.current_A,
+        recording.force_N,
+        np.ones(recording.force_N.size),
+        recording.reference_A,
+    )
+    fired = {one.cause: one for one in gates.check(measured, 0.0, top) if one.cause != "out-of-range"}
+    cut = fired.pop("saturation", None)
+    if cut is None:
+        yield Finding("saturation", "ok", f"none up to {top:g} A and {recording.force_N.max():.3g} N")
+    else:
+        yield Finding("saturation", "problem", cut.text, "lower the gain of the force amplifier")
+    worst = float(np.abs(recording.current_A - recording.reference_A).max()) / top
+    if worst > _TRACKING_SHARE:
+        yield Finding(
+            "current tracking",
+            "warning",
+            f"{100 * worst:.2g} % of the range at worst",
+            "check supply voltage and coil resistance; set the gains of the loop anew",
+        )
+    else:
+        yield Finding("current tracking", "ok", f"{100 * worst:.2g} % of the range at worst")
+    fired.pop("current-tracking", None)
+    for cause, one in fired.items():
+        yield Finding(f"force: {cause}", "warning", one.text, "pulsetrainer diagnose tells more")

@@ -1,0 +1,327 @@
+"""Recording: play a course on the device, part by part, into a file that grows; or go on with one cut off.
+
+Only the part that is being played is held in memory. The device stays on for some minutes at most, so a
+long course is played in parts; each begins with the major loop (not recorded) and with the extremes that the
+memory held where the part before ended (recorded). Every part is therefore a record of its own that begins
+with a known memory, and the run says where each begins: ``Run.seam``.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pulsetrainer.artefacts import Run
+from pulsetrainer.core import signals
+from pulsetrainer.core.course import Course
+from pulsetrainer.core.coverage import coverage
+from pulsetrainer.core.memory import turning_points
+from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.device.codes import MAX_DECIMATION
+from pulsetrainer.errors import ArgumentError, DataError, DeviceError, Interrupted, UsageError
+from pulsetrainer.files import output, store
+from pulsetrainer.files.lease import Lease, is_abandoned
+from pulsetrainer.files.provenance import Header
+from pulsetrainer.files.recorder import RunRecorder, interrupted
+from pulsetrainer.steps import preflight
+
+if TYPE_CHECKING:
+    from pulsetrainer.device.device import Device
+    from pulsetrainer.device.recording import Block
+
+_LOG = logging.getLogger(__name__)
+CONDITIONING_SPEED_A_PER_S = 3.0
+CONDITIONING_REST_S = 0.2
+PAUSE_S = 1.0  # between two parts, on the time axis; how long it was in truth nobody knows after a crash
+_MATCH_A = 1.5e-4  # the device tells the reference in steps of 0.1 mA
+_MOST_TURNS = 20_000  # of the reference, kept until the part ends
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """An interrupted recording and where in its course it stopped."""
+
+    path: Path
+    run: Run
+    header: Header
+    at: int  # samples of the course that were played
+    lease: Lease  # so that nobody else goes on with it meanwhile
+
+
+class Tally:
+    """What there is to say about a recording, kept up to date without keeping the recording."""
+
+    def __init__(self, plane: Plane | None) -> None:
+        self._plane = plane
+        self._covered = np.zeros(1 if plane is None else plane.n_q, dtype=bool)
+        self._turns = np.zeros(0)
+        self.current_A = (np.inf, -np.inf)
+        self.force_N = (np.inf, -np.inf)
+
+    def add(self, reference_A: FloatArray, current_A: FloatArray, force_N: FloatArray) -> None:
+        """Take samples in, arrays (n,)."""
+        self.current_A = _wider(self.current_A, current_A)
+        self.force_N = _wider(self.force_N, force_N)
+        path = np.concatenate((self._turns, reference_A))
+        self._turns = path[np.append(0, turning_points(path))]
+        if self._turns.size > _MOST_TURNS:
+            self.end_part()
+
+    def end_part(self) -> None:
+        """Count the cells that were switched since the part began."""
+        if self._plane is not None and self._turns.size:
+            self._covered |= coverage(self._plane, [self._turns])
+        self._turns = np.zeros(0)
+
+    @property
+    def coverage_percent(self) -> float:
+        """Cells switched on and off."""
+        return 100.0 * float(self._covered.mean())
+
+
+def _wider(known: tuple[float, float], values: FloatArray) -> tuple[float, float]:
+    if values.size == 0:
+        return known
+    return min(known[0], float(np.nanmin(values))), max(known[1], float(np.nanmax(values)))
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a recording ended."""
+
+    complete: bool
+    fault: str
+    remedy: str
+    parts: int
+
+
+def record(
+    course: Course,
+    device: Device,
+    recorder: RunRecorder,
+    tally: Tally,
+    *,
+    at: int,
+    condition_first: bool,
+    progress: Callable[[float], None],
+) -> Ending:
+    """Play a course from sample ``at`` to its end, or until the device or the user stops it.
+
+    Raises
+    ------
+    ArgumentError
+        The device cannot play the course.
+    DataError
+        The disk is full or failed.
+    DeviceError, Interrupted
+        The device could not be conditioned; what was recorded before is kept.
+    """
+    info, rate_Hz = device.info, course.signal.rate_Hz
+    decimation = decimation_for(info.tick_rate_Hz, rate_Hz)
+    longest = int(device.longest_play_s * rate_Hz) + 1
+    high, parts, step = float(course.signal.value.max()), 0, info.tick_rate_Hz
+    while at < course.size:
+        if condition_first:
+            kept = f"; the {recorder.samples} samples recorded before were kept" if recorder.samples else ""
+            _LOG.info("conditioning: once around the major loop")
+            condition(device, high, rate_Hz, kept)
+        lead = course.lead_in(at, speed=CONDITIONING_SPEED_A_PER_S, rest_s=CONDITIONING_REST_S)
+        if lead.size >= longest:
+            raise ArgumentError(
+                f"bringing the memory back takes {lead.size / rate_Hz:g} s, the device stays on for "
+                f"{info.on_time_limit_s:g} s",
+                hint="raise the device's on-time limit",
+            )
+        end = course.part_end(at, longest - lead.size)
+        begun_s = recorder.end_s + PAUSE_S if recorder.samples else 0.0
+        if recorder.samples:
+            recorder.begin_part()
+
+        def keep(block: Block, begun_s: float = begun_s, done: int = at, lead: int = lead.size) -> None:
+            recorder.append(begun_s + block.tick / step, block.reference_A, block.current_A, block.force_N)
+            tally.add(block.reference_A, block.current_A, block.force_N)
+            played = int(block.tick[-1]) // decimation + 1 - lead
+            progress((done + max(played, 0)) / course.size)
+
+        _LOG.info("playing samples %d to %d of %d at %g Hz", at, end, course.size, rate_Hz)
+        before = recorder.samples
+        played = device.play(
+            np.concatenate((lead, course.values(at, end))) if lead.size else course.values(at, end),
+            rate_Hz,
+            decimation=decimation,
+            on_block=keep,
+            keep=False,
+        )
+        tally.end_part()
+        parts += 1
+        # a Ctrl-C in the middle of writing costs what was being written: it is counted, not passed over
+        recorder.dropped_samples += played.dropped_samples + played.samples - (recorder.samples - before)
+        if played.fault or not played.complete:
+            return Ending(complete=False, fault=played.fault, remedy=played.remedy, parts=parts)
+        at = end
+    return Ending(complete=True, fault="", remedy="", parts=parts)
+
+
+def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:
+    """Ticks of the device from one sample to the next.
+
+    Raises
+    ------
+    ArgumentError
+        The rate does not divide the device's, or is too low for it.
+    """
+    slowest = tick_rate_Hz / MAX_DECIMATION
+    decimation = round(tick_rate_Hz / rate_Hz) if rate_Hz >= slowest else 0
+    if decimation < 1 or not np.isclose(decimation * rate_Hz, tick_rate_Hz):
+        raise ArgumentError(
+            f"the rate must divide the device's {tick_rate_Hz:g} Hz, got {rate_Hz:g} Hz",
+            hint="use 1000, 2000 or 5000 Hz",
+        )
+    return decimation
+
+
+def condition(device: Device, high_A: float, rate_Hz: float, kept: str = "") -> None:
+    """Take the actuator once around its major loop, so that what came before is forgotten.
+
+    Raises
+    ------
+    DeviceError, Interrupted
+        The loop could not be completed.
+    """
+    loop = conditioning_loop(high_A, rate_Hz)
+    if loop.size == 0:
+        return
+    recording = device.play(loop, rate_Hz)
+    check_ended(recording.fault, "conditioning", kept, recording.remedy)
+
+
+def conditioning_loop(high_A: float, rate_Hz: float) -> FloatArray:
+    """Samples (n,) of the major loop that comes first; none for a signal that stays at zero."""
+    if high_A <= 0:
+        return np.zeros(0)
+    return signals.conditioning(
+        0.0, high_A, speed=CONDITIONING_SPEED_A_PER_S, rate_Hz=rate_Hz, rest_s=CONDITIONING_REST_S
+    )
+
+
+def check_ended(fault: str, what: str, kept: str, remedy: str) -> None:
+    """Raise what a play that did not reach its end has to say.
+
+    Raises
+    ------
+    DeviceError, Interrupted
+        ``fault`` is not empty.
+    """
+    if fault == "interrupted":
+        raise Interrupted(f"stopped by you during {what}; the output was switched off first{kept}")
+    if fault:
+        raise DeviceError(
+            f"the device stopped during {what}: {fault}{kept}",
+            hint=remedy or "remove the cause; the next command clears the fault",
+        )
+
+
+# --- going on with an interrupted recording -------------------------------------------------------------
+
+
+def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool) -> Earlier:
+    """Find the recording into ``path`` that was interrupted, and where in its course it stopped.
+
+    That is the longest of the files that killed programs left beside it, or ``path`` itself if it is not
+    complete.
+
+    Raises
+    ------
+    UsageError
+        There is nothing to go on with, it is being written, or it was recorded with other options.
+    DataError
+        What is there cannot be read, or is no recording of this signal.
+    """
+    output.check_output(path, force=True)
+    preflight.check_resumable(path)
+    found = interrupted(path)
+    source = found[0][0] if found else None
+    if path.exists():
+        final = _unfinished(path, must_read=source is None)
+        if final is None and source is not None and not force:
+            raise UsageError(
+                f"{source} can be continued, but {path} exists already",
+                hint="give --force too to replace it when the recording has ended",
+            )
+        if final is None and source is None:
+            raise UsageError(f"there is nothing to resume: {path} is complete", hint="leave --resume out")
+        if final is not None and (not found or final.input.size >= found[0][1]):
+            source = path
+    if source is None:
+        cut_off = f"{path.name}.partial"
+        beside = min((entry.name for entry in path.parent.glob(f"{cut_off}*")), default=cut_off)
+        raise UsageError(
+            f"{beside} is being written by another program, or cannot be read",
+            hint=f"wait for it, or look: pulsetrainer show {beside}",
+        )
+    lease = Lease(source)
+    run, header = store.read(source, Run), store.read_header(source)
+    _check_same(source, header.provenance.parameters, asked)
+    return Earlier(source, run, header, _played(source, run, course), lease)
+
+
+def _unfinished(path: Path, *, must_read: bool) -> Run | None:
+    """Read a recording that a fault or Ctrl-C ended early; None for what will have to make room."""
+    try:
+        run = store.read(path, Run)
+    except DataError:
+        if must_read:
+            raise
+        return None
+    if run.complete:
+        return None
+    if not is_abandoned(path):
+        raise UsageError(f"{path} is being continued by another program", hint="wait for it")
+    return run
+
+
+def _check_same(source: Path, before: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+    """Raise UsageError where the recording was begun with other options."""
+    differ = [
+        f"{name} was {before[name]}, now it is {value}"
+        for name, value in asked.items()
+        if name in before and before[name] != value
+    ]
+    if differ:
+        raise UsageError(
+            f"{source} was recorded with other options: {'; '.join(differ)}",
+            hint="resume with the same options, or leave --resume out and name another output",
+        )
+
+
+def _played(source: Path, run: Run, course: Course) -> int:
+    """Return how many samples of the course are in a recording: as far as its reference follows it.
+
+    What follows the course no more is the way down after a fault.
+    """
+    if run.time_s is None or run.reference is None:
+        raise DataError(f"{source} has no time or no reference", hint="resume what `capture` recorded")
+    at, begun_s, rate_Hz = 0, 0.0, course.signal.rate_Hz
+    for number, part in enumerate(run.parts()):
+        assert part.time_s is not None
+        assert part.reference is not None
+        lead = course.lead_in(at, speed=CONDITIONING_SPEED_A_PER_S, rest_s=CONDITIONING_REST_S)
+        index = np.rint((part.time_s - begun_s) * rate_Hz).astype(np.int64)
+        last = min(int(index[-1]) + 1, lead.size + course.size - at)
+        expected = np.concatenate((lead, course.values(at, at + max(last - lead.size, 0))))
+        inside = index < expected.size
+        off = np.flatnonzero(np.abs(part.reference[inside] - expected[index[inside]]) > _MATCH_A)
+        reached = int(index[off[0]]) if off.size else min(int(index[-1]) + 1, expected.size)
+        if number == 0 and reached == 0:
+            raise DataError(
+                f"the reference in {source} is not that of this signal",
+                hint="resume with the signal and options that it was recorded with: pulsetrainer show FILE",
+            )
+        at += max(reached - lead.size, 0)
+        begun_s = float(part.time_s[-1]) + PAUSE_S
+    return at
