@@ -10,31 +10,21 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-import numpy as np
-
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.player import Player, describe_fault
 from pulsetrainer.device.ports import find_device_port
-from pulsetrainer.device.recording import Block, FloatArray, Recording
-from pulsetrainer.device.session import TIMEOUTS_S, Session
-from pulsetrainer.device.transport import SerialTransport, Transport
+from pulsetrainer.device.reference import ticks_per_sample, to_wire
+from pulsetrainer.device.schemes import OpenPort, find_opener, redact
+from pulsetrainer.device.session import Session
+from pulsetrainer.device.trace import Block, Trace
+from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
-from pulsetrainer.simulation.bad_wire import NoisyTransport
-from pulsetrainer.simulation.bench import Bench
-from pulsetrainer.simulation.emulator import (
-    QEMU_BAD_WIRE_TIMEOUTS_S,
-    QEMU_PIECE_S,
-    QEMU_PORT,
-    QEMU_TIMEOUTS_S,
-    Emulator,
-)
-from pulsetrainer.simulation.options import Wire
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
 _LOG = logging.getLogger(__name__)
 PORT_VARIABLE = "PULSETRAINER_PORT"
@@ -94,18 +84,13 @@ class Device:
 
     def __init__(
         self,
-        session: Session,
-        transport: Transport,
-        bench: Bench | Emulator | None,
+        port: OpenPort,
         *,
-        monotonic: Callable[[], float],
-        sleep: Callable[[float], None],
-        piece_s: float = np.inf,
+        monotonic: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self._piece_s = piece_s  # of the reference in one frame while it plays
-        self._session = session
-        self._transport = transport
-        self._bench = bench
+        self._port = port
+        self._session = Session(port.transport, port.name, monotonic=monotonic, timeouts_s=port.timeouts_s)
         self._monotonic = monotonic
         self._sleep = sleep
         self._player: Player | None = None
@@ -128,9 +113,7 @@ class Device:
             with contextlib.suppress(PulsetrainerError):
                 self.stop()
         finally:
-            self._transport.close()
-            if self._bench is not None:
-                self._bench.close()
+            self._port.close()
 
     @property
     def longest_play_s(self) -> float:
@@ -204,12 +187,12 @@ class Device:
         on_block: Callable[[Block], None] | None = None,
         keep: bool = True,
         should_stop: Callable[[], bool] | None = None,
-    ) -> Recording:
+    ) -> Trace:
         """Play a coil current and return what the device measured meanwhile.
 
         The reference, shape (n,) in A at ``rate_Hz``, is interpolated linearly to the device's tick; its
         first sample is tick 0. Telemetry is one sample every ``decimation`` ticks. ``on_block`` gets it
-        in pieces as it comes; without ``keep`` that is all there is of it: the recording that is returned
+        in pieces as it comes; without ``keep`` that is all there is of it: the trace that is returned
         has counts only, and memory stays flat. Ctrl-C, ``should_stop`` or a fault of the device stop the
         output first; what was recorded until then is returned with ``complete=False``. The device ends
         disarmed.
@@ -221,8 +204,15 @@ class Device:
         DeviceError
             if the device cannot be talked to before it starts.
         """
-        ticks_per_sample = self._ticks_per_sample(rate_Hz)
-        wire = self._checked(reference_A, ticks_per_sample)
+        step = ticks_per_sample(rate_Hz, self.info.tick_rate_Hz)
+        wire = to_wire(reference_A, limit_A=self.info.current_limit_A)
+        seconds = (wire.size - 1) * step / self.info.tick_rate_Hz
+        if seconds > self.longest_play_s:
+            raise ArgumentError(
+                f"the reference is {seconds:g} s long; the device stays on for at most "
+                f"{self.info.on_time_limit_s:g} s",
+                hint="play it in several pieces",
+            )
         if not 1 <= decimation <= codes.MAX_DECIMATION:
             raise ArgumentError(
                 f"decimation {decimation} is outside 1..{codes.MAX_DECIMATION}",
@@ -231,11 +221,11 @@ class Device:
         player = Player(
             self._session,
             wire,
-            ticks_per_sample,
+            step,
             decimation,
             hello=self._hello,
             monotonic=self._monotonic,
-            piece_s=self._piece_s,
+            piece_s=self._port.piece_s,
         )
         self._player = player
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
@@ -253,7 +243,7 @@ class Device:
             self._player = None
         if player.error is not None:
             raise player.error
-        return self._recording(player, interrupted)
+        return self._trace(player, interrupted)
 
     def _follow(
         self,
@@ -286,7 +276,7 @@ class Device:
                 player.stop(_INTERRUPTED)
         return interrupted
 
-    def _recording(self, player: Player, interrupted: bool) -> Recording:
+    def _trace(self, player: Player, interrupted: bool) -> Trace:
         outcome = player.outcome
         block = Block.from_wire(player.received, player.decimation)
         assert outcome is not None
@@ -295,7 +285,7 @@ class Device:
             dropped = outcome.produced - received
         else:  # the device is gone: what is missing between the samples that came
             dropped = player.last_tick // player.decimation + 1 - received if received else 0
-        return Recording(
+        return Trace(
             tick=block.tick,
             reference_A=block.reference_A,
             current_A=block.current_A,
@@ -308,59 +298,6 @@ class Device:
             samples=received,
             remedy=outcome.remedy,
         )
-
-    def _ticks_per_sample(self, rate_Hz: float) -> int:
-        if not (np.isfinite(rate_Hz) and rate_Hz > 0):
-            raise ArgumentError(f"a sample rate of {rate_Hz} Hz is not possible", hint="1000 Hz is usual")
-        exact = self.info.tick_rate_Hz / rate_Hz
-        ticks = round(exact)
-        if ticks < 1 or ticks > codes.MAX_TICKS_PER_SAMPLE or abs(exact - ticks) > 1e-9 * exact:
-            nearest = self.info.tick_rate_Hz / min(max(ticks, 1), codes.MAX_TICKS_PER_SAMPLE)
-            raise ArgumentError(
-                f"the reference's rate of {rate_Hz:g} Hz does not divide the device's "
-                f"{self.info.tick_rate_Hz:g} Hz",
-                hint=f"resample it to {nearest:g} Hz",
-            )
-        return ticks
-
-    def _checked(self, reference_A: ArrayLike, ticks_per_sample: int) -> NDArray[np.int16]:
-        """Return the reference in wire units if the device may play it."""
-        reference: FloatArray = np.asarray(reference_A, dtype=np.float64)
-        if reference.ndim != 1 or reference.size == 0:
-            raise ArgumentError(
-                f"a reference is a row of samples, got an array of shape {reference.shape}",
-                hint="one current in A per sample",
-            )
-        bad = np.flatnonzero(~np.isfinite(reference))
-        if bad.size:
-            raise ArgumentError(f"sample {bad[0]} of the reference is not a number", hint="mend the waveform")
-        # Half a wire unit of tolerance: rounding must not refuse a waveform that uses the whole range.
-        limit, half = self.info.current_limit_A, codes.CURRENT_UNIT_A / 2
-        out = np.flatnonzero((reference < -half) | (reference > limit + half))
-        if out.size:
-            raise ArgumentError(
-                f"sample {out[0]} of the reference is {reference[out[0]]:g} A; "
-                f"the device plays 0..{limit:g} A ({out.size} of {reference.size} samples are outside)",
-                hint="scale the waveform into the range",
-            )
-        seconds = (reference.size - 1) * ticks_per_sample / self.info.tick_rate_Hz
-        if seconds > self.longest_play_s:
-            raise ArgumentError(
-                f"the reference is {seconds:g} s long; the device stays on for at most "
-                f"{self.info.on_time_limit_s:g} s",
-                hint="play it in several pieces",
-            )
-        return np.rint(reference / codes.CURRENT_UNIT_A).astype(np.int16)
-
-
-def redact(port: str) -> str:
-    """Return the port without a bench's parameters, which must never reach an artefact."""
-    return DEFAULT_PORT if port.startswith("bench:") else port
-
-
-def _through(wire: Wire, transport: Transport, monotonic: Callable[[], float]) -> Transport:
-    """Return the transport as it is at the other end of a wire that may be bad."""
-    return NoisyTransport(transport, wire.rate, wire.seed, monotonic=monotonic) if wire.rate else transport
 
 
 def open_device(
@@ -381,38 +318,24 @@ def open_device(
     DeviceError
         if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
     """
-    port = port or os.environ.get(PORT_VARIABLE) or DEFAULT_PORT
-    machine: Bench | Emulator | None = None
-    transport: Transport | None = None
+    opened = _open_port(port or os.environ.get(PORT_VARIABLE) or DEFAULT_PORT, monotonic)
     try:
-        name = port
-        timeouts_s: tuple[float, ...] = TIMEOUTS_S
-        if port.startswith("bench:"):
-            machine = bench = Bench(port)
-            name = DEFAULT_PORT
-            transport = SerialTransport(bench.path, name)
-            transport = _through(bench.options.wire, transport, monotonic)
-        elif port.startswith("qemu:"):
-            machine = emulator = Emulator(port)
-            name = QEMU_PORT
-            transport = _through(emulator.options.wire, emulator.transport, monotonic)
-            timeouts_s = QEMU_BAD_WIRE_TIMEOUTS_S if emulator.options.wire.rate else QEMU_TIMEOUTS_S
-        else:
-            name = find_device_port() if port == "auto" else port
-            transport = SerialTransport(name)
-        session = Session(transport, name, monotonic=monotonic, timeouts_s=timeouts_s)
-        piece_s = QEMU_PIECE_S if isinstance(machine, Emulator) else np.inf
-        device = Device(session, transport, machine, monotonic=monotonic, sleep=sleep, piece_s=piece_s)
+        device = Device(opened, monotonic=monotonic, sleep=sleep)
         _LOG.info(
             "%s: %s, firmware %s, protocol %s, limits %g A and %g N",
-            *(redact(port), device.info.serial, device.info.firmware, device.info.protocol),
+            *(opened.name, device.info.serial, device.info.firmware, device.info.protocol),
             *(device.info.current_limit_A, device.info.force_limit_N),
         )
         device.lower(limits or Limits())
         return device  # noqa: TRY300 - what fails up to here closes the port
     except BaseException:
-        if transport is not None:
-            transport.close()
-        if machine is not None:
-            machine.close()
+        opened.close()
         raise
+
+
+def _open_port(port: str, monotonic: Callable[[], float]) -> OpenPort:
+    opener = find_opener(port)
+    if opener is not None:
+        return opener(port, monotonic)
+    name = find_device_port() if port == "auto" else port
+    return OpenPort(SerialTransport(name), redact(name))

@@ -27,6 +27,7 @@ from pulsetrainer.device.messages import (
     Telemetry,
     answers,
 )
+from pulsetrainer.device.schemes import TIMEOUTS_S
 from pulsetrainer.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
     from pulsetrainer.device.transport import Transport
 
-# Five quick tries; the last wait is long because a busy computer may just have been away.
-TIMEOUTS_S = (0.05, 0.05, 0.05, 0.05, 0.05, 0.5)
 _HELLO_S = 3.0
 _HELLO_TRY_S = 0.2
 _NAMES = {c.TYPE: c.__name__ for c in COMMANDS}

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from pulsetrainer.device.transport import Transport
+    from pulsetrainer.simulation.options import Wire
 
 KINDS = ("drop", "flip", "insert", "duplicate", "delay", "cut")
 _LONGEST_INSERT = 8
@@ -136,3 +137,8 @@ class NoisyTransport:
     def close(self) -> None:
         """Give the port back; what is still on the wire is lost."""
         self._inner.close()
+
+
+def through(wire: Wire, transport: Transport, monotonic: Callable[[], float]) -> Transport:
+    """Return the transport as it is at the other end of a wire that may be bad."""
+    return NoisyTransport(transport, wire.rate, wire.seed, monotonic=monotonic) if wire.rate else transport

@@ -9,13 +9,18 @@ import select
 import subprocess
 from typing import TYPE_CHECKING
 
+from pulsetrainer.device.schemes import OpenPort
+from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.simulation.bad_wire import through
 from pulsetrainer.simulation.build import firmware_executable
 from pulsetrainer.simulation.options import BenchOptions, parse_bench
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
+BENCH_PORT = "bench:"
 _OWN = ("ideal", "speed", "break", "wire", "wire-seed")
 _START_S = 10.0
 _LEAVE_S = 2.0
@@ -117,3 +122,23 @@ class Bench:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+
+
+def open_bench(port: str, monotonic: Callable[[], float], executable: Path | None = None) -> OpenPort:
+    """Start a bench and open its line.
+
+    Raises
+    ------
+    UsageError
+        if the port's text makes no sense.
+    DeviceError
+        if the firmware cannot be compiled or started.
+    """
+    bench = Bench(port, executable)
+    try:
+        transport = SerialTransport(bench.path, BENCH_PORT)
+    except BaseException:
+        bench.close()
+        raise
+    wired = through(bench.options.wire, transport, monotonic)
+    return OpenPort(wired, BENCH_PORT, starts_cold=True, machine=bench)

@@ -15,8 +15,10 @@ import time
 from typing import TYPE_CHECKING
 
 from pulsetrainer.device.codes import TICK_RATE_HZ
+from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.errors import DeviceError
+from pulsetrainer.simulation.bad_wire import through
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES, firmware_image
 from pulsetrainer.simulation.options import parse_qemu
 
@@ -178,3 +180,25 @@ class Emulator:
                 os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
         self._said.close()
+
+
+def open_emulator(port: str, monotonic: Callable[[], float]) -> OpenPort:
+    """Start an emulator; its line is slow, which the port says.
+
+    Raises
+    ------
+    UsageError
+        if the port's text makes no sense.
+    DeviceError
+        if there is no emulator, or no compiler for its image.
+    """
+    emulator = Emulator(port)
+    wire = emulator.options.wire
+    return OpenPort(
+        through(wire, emulator.transport, monotonic),
+        QEMU_PORT,
+        timeouts_s=QEMU_BAD_WIRE_TIMEOUTS_S if wire.rate else QEMU_TIMEOUTS_S,
+        piece_s=QEMU_PIECE_S,
+        starts_cold=True,
+        machine=emulator,
+    )

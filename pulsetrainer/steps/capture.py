@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.core import signals
 from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
@@ -15,7 +16,8 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.signals import Signal
 from pulsetrainer.device.codes import TICK_RATE_HZ
-from pulsetrainer.device.device import DEFAULT_PORT, Limits, open_device, redact
+from pulsetrainer.device.device import DEFAULT_PORT, Limits, open_device
+from pulsetrainer.device.schemes import redact
 from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.files import output, provenance, table, table_run
 from pulsetrainer.files.recorder import RunRecorder, interrupted

@@ -18,8 +18,9 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer import __version__
 from pulsetrainer.core import signals
-from pulsetrainer.device.device import DEFAULT_PORT, open_device, redact
+from pulsetrainer.device.device import DEFAULT_PORT, open_device
 from pulsetrainer.device.ports import list_ports
+from pulsetrainer.device.schemes import redact
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.errors import PulsetrainerError
@@ -27,7 +28,7 @@ from pulsetrainer.simulation import build
 
 if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
-    from pulsetrainer.device.recording import Recording
+    from pulsetrainer.device.trace import Trace
     from pulsetrainer.steps.context import Context
 
 State = Literal["ok", "warning", "problem"]
@@ -228,7 +229,7 @@ def _short_capture(device: Device) -> Iterator[Finding]:
     yield from _rails(recording, top)
 
 
-def _lost(recording: Recording, expected: int) -> Finding:
+def _lost(recording: Trace, expected: int) -> Finding:
     if recording.dropped_samples:
         return Finding(
             "link",
@@ -239,7 +240,7 @@ def _lost(recording: Recording, expected: int) -> Finding:
     return Finding("link", "ok", f"{recording.tick.size} samples, none lost")
 
 
-def _noise(recording: Recording, held: slice, range_A: float) -> Iterator[Finding]:
+def _noise(recording: Trace, held: slice, range_A: float) -> Iterator[Finding]:
     """Noise while the current is held, against the range of the current and the span of the force."""
     span = float(np.ptp(recording.force_N))
     for name, values, full, unit, fix in (
@@ -266,7 +267,7 @@ def _noise(recording: Recording, held: slice, range_A: float) -> Iterator[Findin
             yield Finding(name, "ok", words)
 
 
-def _rails(recording: Recording, top: float) -> Iterator[Finding]:
+def _rails(recording: Trace, top: float) -> Iterator[Finding]:
     """Saturation, tracking and what else the raw data show by themselves."""
     measured = Measured(
         _GRID_S,

@@ -9,18 +9,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.artefacts import DrivePlayback, Playback, Waveform
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.signals import check_size
-from pulsetrainer.device.device import DEFAULT_PORT, Limits, open_device, redact
+from pulsetrainer.device.device import DEFAULT_PORT, Limits, open_device
+from pulsetrainer.device.schemes import redact
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files import output, provenance, store
 from pulsetrainer.steps.recording import check_ended
 
 if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
-    from pulsetrainer.device.recording import Recording
+    from pulsetrainer.device.trace import Trace
     from pulsetrainer.steps.context import Context
 
 _LOG = logging.getLogger(__name__)
@@ -192,7 +194,7 @@ def _play(
     ), (fault, remedy)
 
 
-def _on_grid(recording: Recording, samples: int, decimation: int) -> FloatArray:
+def _on_grid(recording: Trace, samples: int, decimation: int) -> FloatArray:
     """Lay a recording (3, n) on the waveform's samples by its ticks; NaN where a block was lost."""
     grid = np.full((3, samples), np.nan)
     place = recording.tick // decimation

@@ -32,7 +32,7 @@ from pulsetrainer.steps import preflight
 
 if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
-    from pulsetrainer.device.recording import Block
+    from pulsetrainer.device.trace import Block
 
 _LOG = logging.getLogger(__name__)
 CONDITIONING_SPEED_A_PER_S = 3.0

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.core import signals
 from pulsetrainer.device.device import open_device
 from pulsetrainer.diagnosis.design import Measured

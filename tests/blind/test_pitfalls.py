@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import hidden
 
+import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.core import signals
 from pulsetrainer.device.device import open_device
 from pulsetrainer.diagnosis import gates, residual

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from link_wire import Wire
 
+import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.device.device import open_device
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.session import TIMEOUTS_S, Session
+from pulsetrainer.device.schemes import TIMEOUTS_S
+from pulsetrainer.device.session import Session
 from pulsetrainer.device.transport import SerialTransport, Transport
 from pulsetrainer.simulation.bench import Bench
 from pulsetrainer.simulation.emulator import QEMU_TIMEOUTS_S, Emulator

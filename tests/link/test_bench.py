@@ -156,11 +156,12 @@ def _gone(pid: int, seconds: float = 10.0) -> bool:
 HOST = """
 import signal
 import numpy as np
+import pulsetrainer.simulation
 from pulsetrainer.device.device import open_device
 signal.signal(signal.SIGINT, signal.default_int_handler)  # tests run in the background have it ignored
 device = open_device("bench:?speed=real")
 def tell(block):
-    print(device._bench.pid, block.tick[-1], flush=True)
+    print(device._port.machine.pid, block.tick[-1], flush=True)
 recording = device.play(np.full(60_000, 0.5), 1000, on_block=tell)
 device.close()
 print("END", recording.complete, recording.fault, len(recording.tick), recording.dropped_samples, flush=True)
@@ -209,7 +210,7 @@ def test_ctrl_c_in_the_terminal_stops_the_device_in_order(host):
 def test_an_idle_bench_costs_nothing():
     """An open, disarmed bench sleeps."""
     with open_device("bench:") as device:
-        stat = Path(f"/proc/{device._bench.pid}/stat")
+        stat = Path(f"/proc/{device._port.machine.pid}/stat")
 
         def ticks() -> int:
             fields = stat.read_text(encoding="utf-8").rpartition(")")[2].split()

@@ -11,9 +11,10 @@ from link_wire import within
 
 from pulsetrainer.device import player
 from pulsetrainer.device.codes import CURRENT_UNIT_A, PARAMETERS
-from pulsetrainer.device.device import open_device, redact
+from pulsetrainer.device.device import open_device
 from pulsetrainer.device.messages import GetParam
-from pulsetrainer.device.recording import Block
+from pulsetrainer.device.schemes import redact
+from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DeviceError, UsageError
 
 
@@ -230,7 +231,7 @@ def test_closing_always_disarms(pulse):
     """Leaving the context ends the firmware process."""
     with open_device("bench:") as device:
         device.play(pulse, 1000)
-        bench = device._bench
+        bench = device._port.machine
     assert bench._process.returncode == 0
 
 

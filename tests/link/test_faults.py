@@ -187,7 +187,7 @@ def test_a_port_that_vanishes_keeps_what_came():
 
         def kill(block):
             if block.tick[-1] > 3000:
-                os.kill(device._bench.pid, signal.SIGKILL)
+                os.kill(device._port.machine.pid, signal.SIGKILL)
 
         recording = device.play(np.full(20_000, 0.5), 1000, on_block=kill)
     assert not recording.complete
@@ -234,7 +234,7 @@ def test_a_host_that_does_not_read_loses_counted_samples(wire):
 def test_lost_blocks_are_counted_not_filled(pulse):
     """Damage on the way to the host costs whole blocks; the record has a gap of just that size."""
     with open_device("bench:") as device:
-        intact, hurt = device._transport.read, [0]
+        intact, hurt = device._port.transport.read, [0]
 
         def damage():
             data = bytearray(intact())
@@ -243,9 +243,9 @@ def test_lost_blocks_are_counted_not_filled(pulse):
                 hurt[0] += 1
             return bytes(data)
 
-        device._transport.read = damage
+        device._port.transport.read = damage
         recording = device.play(np.tile(pulse, 10), 1000)
-        device._transport.read = intact
+        device._port.transport.read = intact
     assert hurt[0] > 0
     assert recording.complete
     assert recording.dropped_samples > 0

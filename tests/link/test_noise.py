@@ -77,7 +77,7 @@ def test_a_minute_of_telemetry_through_a_bad_wire(clean, seed, capsys):
     """No sample that is not bit for bit that of the good wire; every lost one counted; played to its end."""
     with within(60), open_device(f"bench:?seed=3&wire={RATE}&wire-seed={seed}") as device:
         recording = device.play(_reference(), 1000)
-        wire = device._transport
+        wire = device._port.transport
         assert device._session.damaged > 0
     assert isinstance(wire, NoisyTransport)
     with capsys.disabled():
@@ -178,7 +178,7 @@ def test_nothing_is_accepted_that_was_not_sent():
 def test_a_wire_too_bad_to_play_on_is_told_and_soon():
     """One bad byte in thirty: the play ends with a reason instead of hanging, or it was completed."""
     with within(30), open_device("bench:?wire=0.0001&wire-seed=1") as device:
-        for line in (device._transport.to_device, device._transport.to_host):
+        for line in (device._port.transport.to_device, device._port.transport.to_host):
             line._rate, line._until_next = 1 / 30, 1
         said = ""
         try:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import errno
 import socket
+import subprocess
+import sys
 import threading
 from types import SimpleNamespace
 
@@ -16,7 +18,8 @@ from pulsetrainer.device import ports
 from pulsetrainer.device.codes import Fault, State
 from pulsetrainer.device.device import open_device
 from pulsetrainer.device.ports import list_ports
-from pulsetrainer.device.recording import Block
+from pulsetrainer.device.schemes import OpenPort, find_opener
+from pulsetrainer.device.trace import Block
 from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import DeviceError
 
@@ -166,3 +169,51 @@ def test_a_cable_pulled_in_mid_play(carrier):
     assert Fault(status.fault) == Fault.HEARTBEAT
     assert status.fault_tick - recording.tick[-1] < 2000 + 1500  # 200 ms after the last command, not later
     assert one.ask(m.Heartbeat()).state == State.FAULT
+
+
+def test_a_kind_of_port_announces_itself():
+    """The device opens no simulation of its own: a scheme that nobody announced is a usage error."""
+    script = (
+        "from pulsetrainer.device.device import open_device\n"
+        "from pulsetrainer.errors import UsageError\n"
+        "try:\n    open_device('bench:')\nexcept UsageError:\n    print('unknown')\n"
+        "import pulsetrainer.simulation\n"
+        "with open_device('bench:') as device:\n    print(device.info.serial)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["unknown", "BENCH-0"]
+
+
+def test_announcing_simulations_loads_nothing():
+    """Whoever imports the simulations pays for them only when one is opened."""
+    script = (
+        "import sys, pulsetrainer.simulation\n"
+        "print(*{'numpy', 'serial', 'subprocess', 'cobs'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+@pytest.mark.parametrize(
+    "port", ["bench", "/dev/ttyUSB0", "COM3", "socket://127.0.0.1:9", "/dev/by-path/usb-0:1"]
+)
+def test_what_names_no_scheme_is_a_serial_port(port):
+    """Colons in paths and in the addresses of sockets are no schemes."""
+    assert find_opener(port) is None
+
+
+def test_an_opened_port_closes_what_runs_behind_it():
+    """Also when giving the line back fails."""
+    ended = []
+
+    class Line:
+        def close(self) -> None:
+            raise OSError("gone")
+
+    class Machine:
+        def close(self) -> None:
+            ended.append(1)
+
+    with pytest.raises(OSError, match="gone"):
+        OpenPort(Line(), "x:", machine=Machine()).close()
+    assert ended == [1]

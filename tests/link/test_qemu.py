@@ -245,7 +245,7 @@ def test_a_bad_wire_costs_counted_samples_only(seed, tell):
 def test_an_emulator_that_dies_leaves_what_was_recorded():
     """Killed in mid-play: the recording is kept, incomplete, and says why."""
     with open_device("qemu:") as device:
-        session = device._bench.pid
+        session = device._port.machine.pid
 
         def kill(block):
             if block.tick[-1] > 2000:
@@ -269,9 +269,10 @@ def test_an_emulator_that_will_not_start_is_quoted(monkeypatch):
 
 HOST = """
 import sys
+import pulsetrainer.simulation
 from pulsetrainer.device.device import open_device
 device = open_device("qemu:")
-print(device._bench.pid, flush=True)
+print(device._port.machine.pid, flush=True)
 device.play([0.5] * 60_000, 1000)
 """
 
@@ -284,7 +285,7 @@ def test_no_emulator_is_left_behind(how):
     """However the host program ends, its emulator ends too."""
     if how == "close":
         with open_device("qemu:") as device:
-            session = device._bench.pid
+            session = device._port.machine.pid
             assert any("qemu" in name for name in emulators(session))
     else:
         host = subprocess.Popen([sys.executable, "-c", HOST], stdout=subprocess.PIPE, text=True)

@@ -45,7 +45,7 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class Trace:
     """All that a play brought back; lost samples are counted, never filled.
 
     The arrays are empty where the play was asked not to keep what it handed over.

@@ -1,0 +1,86 @@
+"""Kinds of ports: what kind a port's text names, and who opens it.
+
+A serial port is opened here. Every other kind announces itself with ``register`` under its scheme, the word
+before the colon, so that this package knows transports and not what pretends to be a device.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from pulsetrainer.errors import UsageError
+
+if TYPE_CHECKING:
+    from pulsetrainer.device.transport import Transport
+
+# Five quick tries; the last wait is long because a busy computer may just have been away.
+TIMEOUTS_S = (0.05, 0.05, 0.05, 0.05, 0.05, 0.5)
+
+Clock = Callable[[], float]
+
+
+class Machine(Protocol):
+    """What runs behind a port and has to be ended with it."""
+
+    def close(self) -> None:
+        """End it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class OpenPort:
+    """A port that is open, and how a device behind it has to be talked to."""
+
+    transport: Transport
+    name: str  # in messages and files: without whatever parameters opened it
+    timeouts_s: tuple[float, ...] = TIMEOUTS_S  # patience for each try of a command
+    piece_s: float = math.inf  # of the reference in one frame while it plays
+    starts_cold: bool = False  # nothing can have heated its coil before it was opened
+    machine: Machine | None = None
+
+    def close(self) -> None:
+        """Give the port back and end what runs behind it."""
+        try:
+            self.transport.close()
+        finally:
+            if self.machine is not None:
+                self.machine.close()
+
+
+Opener = Callable[[str, Clock], OpenPort]
+_OPENERS: dict[str, Opener] = {}
+
+
+def register(scheme: str, opener: Opener) -> None:
+    """Let ``opener`` open every port whose text begins with ``scheme`` and a colon."""
+    _OPENERS[scheme] = opener
+
+
+def find_opener(port: str) -> Opener | None:
+    """Return who opens a port of this text; None for a serial port, and for ``socket://`` and its like.
+
+    Raises
+    ------
+    UsageError
+        if nobody has announced its scheme.
+    """
+    match = re.match(r"([a-z][a-z0-9+-]*):(//)?", port)
+    if match is None:
+        return None
+    scheme, slashes = match.groups()
+    if scheme not in _OPENERS and not slashes:
+        raise UsageError(
+            f"{port!r} is of no known kind of port",
+            hint=f"a port is {''.join(f'{known}:, ' for known in _OPENERS)}/dev/ttyUSB0, COM3 or "
+            "socket://host:port",
+        )
+    return _OPENERS.get(scheme)
+
+
+def redact(port: str) -> str:
+    """Return the port without its parameters, which must never reach a file: they may hold what is hidden."""
+    return port.partition("?")[0]
