@@ -42,35 +42,35 @@ $(D):
 	mkdir -p $@
 
 $(D)/run.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
-	$(PT) capture identification --port '$(PORT)' -o $@ --force
+	$(PT) capture identification --port '$(PORT)' -o $@ --overwrite
 
 # the paper: relays, closest match, spline; ours: continuous reading, exact inverse
 $(D)/model-paper.h5: $(D)/run.h5 $(CORE)
-	$(PT) identify $< --operator relay -o $@ --force
+	$(PT) identify $< --operator relay -o $@ --overwrite
 $(D)/model-continuous.h5: $(D)/run.h5 $(CORE)
-	$(PT) identify $< --operator continuous -o $@ --force
+	$(PT) identify $< --operator continuous -o $@ --overwrite
 
 # the second act: the same device, not told what it hides, on a signal that tells causes apart
 $(D)/diagnostic.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
-	$(PT) capture diagnostic --port '$(PORT)' -o $@ --force
+	$(PT) capture diagnostic --port '$(PORT)' -o $@ --overwrite
 $(D)/diagnosis.h5 $(D)/diagnosis.html &: $(D)/diagnostic.h5 $(D)/model-continuous.h5 $(DIAGNOSE)
-	$(PT) diagnose $< --model $(D)/model-continuous.h5 -o $(D)/diagnosis.h5 --html $(D)/diagnosis.html --force
+	$(PT) diagnose $< --model $(D)/model-continuous.h5 -o $(D)/diagnosis.h5 --html $(D)/diagnosis.html --overwrite
 $(D)/model-extended.h5: $(D)/diagnosis.h5 $(D)/model-continuous.h5
-	$(PT) extend $< --model $(D)/model-continuous.h5 -o $@ --force
+	$(PT) extend $< --model $(D)/model-continuous.h5 -o $@ --overwrite
 # a run that neither model was fitted to, at the rate of a pulse
 $(D)/unseen.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
-	$(PT) capture identification --speed 6 --port '$(PORT)' -o $@ --force
+	$(PT) capture identification --speed 6 --port '$(PORT)' -o $@ --overwrite
 
 define PULSE_RULES
 $(D)/drive-$(1)-$(2).h5: $(D)/model-$(2).h5 waveforms/$(1).csv pulsetrainer/steps/invert.py
-	$(PT) invert $(1) --model $$< -o $$@ --force
+	$(PT) invert $(1) --model $$< -o $$@ --overwrite
 $(D)/played-$(1)-$(2).h5: $(D)/drive-$(1)-$(2).h5 $(FIRMWARE)
-	$(PT) play $$< --port '$(PORT)' -o $$@ --force
+	$(PT) play $$< --port '$(PORT)' -o $$@ --overwrite
 endef
 $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(eval $(call PULSE_RULES,$(p),$(m)))))
 
 $(D)/evaluation.h5 $(D)/report.html &: $(PLAYED) $(REPORT)
-	$(PT) evaluate $(PLAYED) -o $(D)/evaluation.h5 --html $(D)/report.html --force > /dev/null
+	$(PT) evaluate $(PLAYED) -o $(D)/evaluation.h5 --html $(D)/report.html --overwrite > /dev/null
 
 bounds: $(D)/report.html tests/regression/bounds.toml  ## hold the demo's figures against their bounds
 	$(PT) evaluate $(PLAYED) --bounds tests/regression/bounds.toml

@@ -32,7 +32,7 @@ COMMANDS = """\
 {mark}
 
 `pulsetrainer COMMAND --help` says the same on the screen. Results go to stdout, progress and notes to stderr; bars show
-only on a terminal, colours nowhere when `NO_COLOR` is set. No command replaces a file without `--force`.
+only on a terminal, colours nowhere when `NO_COLOR` is set. No command replaces a file without `--overwrite`.
 
 With `--json` a command writes one object to stdout: `{{"schema": 1, "command": ..., ...}}`, and for an error
 `"error": {{"kind", "message", "hint"}}`.

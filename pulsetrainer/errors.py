@@ -7,6 +7,9 @@ an error into an exit.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 
 class PulsetrainerError(Exception):
     """Base of the family: a message for a person, a hint, an exit code, a stable kind for scripts."""
@@ -34,11 +37,49 @@ class UsageError(PulsetrainerError):
     kind = "usage"
 
 
+class ExistsError(UsageError):
+    """The output is there already, and nobody said that it may be overwritten."""
+
+    def __init__(self, path: Path | str) -> None:
+        super().__init__(f"the output {path} already exists", hint="allow overwriting, or name another file")
+        self.path = Path(path)
+
+
 class DataError(PulsetrainerError):
     """A file, an artefact or the numbers in it cannot be used."""
 
     exit_code = 3
     kind = "data"
+
+
+class WrongKindError(DataError):
+    """A file holds another kind of artefact than is wanted here."""
+
+    def __init__(self, path: Path | str, expected: Sequence[str], found: str) -> None:
+        wanted = " or ".join(map(_with_article, expected))
+        super().__init__(
+            f"{path}: expected {wanted}, got {_with_article(found)}", hint=f"give {wanted} instead"
+        )
+        self.path = Path(path)
+        self.expected = tuple(expected)
+        self.found = found
+
+
+class DamagedFileError(DataError):
+    """A file of ours that cannot be read; ``artefact`` is its kind, empty where nobody can tell."""
+
+    def __init__(self, message: str, *, path: Path | str, artefact: str = "") -> None:
+        super().__init__(message, hint="restore it from a copy, or make it again")
+        self.path = Path(path)
+        self.artefact = artefact
+
+
+class NotAnArtefactError(DataError):
+    """A file that this program did not write."""
+
+    def __init__(self, message: str, *, path: Path | str) -> None:
+        super().__init__(message, hint="give an HDF5 file that pulsetrainer wrote")
+        self.path = Path(path)
 
 
 class ArgumentError(DataError, ValueError):
@@ -66,3 +107,7 @@ class Interrupted(PulsetrainerError):  # noqa: N818 - the user's wish, not a fau
 
     exit_code = 130
     kind = "interrupted"
+
+
+def _with_article(kind: str) -> str:
+    return f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}"

@@ -17,7 +17,7 @@ class Writer:
     def line(self, *, force: bool, folder: str = "") -> tuple[str, ...]:
         """Return the whole command line, its outputs in ``folder``."""
         options = [word for option, name in self.outputs for word in (option, f"{folder}{name}")]
-        return (*self.words, *options, *(["--force"] if force else []))
+        return (*self.words, *options, *(["--overwrite"] if force else []))
 
 
 def _h5(name: str = "out.h5") -> tuple[tuple[str, str], ...]:

@@ -17,6 +17,7 @@ from types import FrameType
 from typing import Any
 
 from pulsetrainer.cli.console import folded
+from pulsetrainer.cli.next_step import next_step
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
 
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -28,7 +29,8 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     debug = "--debug" in argv
     if "--verbose" in argv:
         _be_verbose()
-    words = [word for word in argv if word not in ("--debug", "--verbose")]
+    # --force is what --overwrite was called in 0.1
+    words = [{"--force": "--overwrite"}.get(w, w) for w in argv if w not in ("--debug", "--verbose")]
     problem: PulsetrainerError
     try:
         code = program(args=words, standalone_mode=False, prog_name="pulsetrainer")
@@ -97,15 +99,16 @@ def _trace(debug: bool) -> None:
 
 def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
     """Write a problem to stderr for a person, and with ``as_json`` to stdout for a script."""
+    hint = next_step(problem)
     if as_json:
-        error = {"kind": problem.kind, "message": problem.message, "hint": problem.hint}
+        error = {"kind": problem.kind, "message": problem.message, "hint": hint}
         sys.stdout.write(json.dumps({"schema": 1, "command": command, "error": error}) + "\n")
     width = shutil.get_terminal_size().columns if sys.stderr.isatty() else None
     sys.stderr.write(folded("error: ", problem.message, width, indent=2) + "\n")
     for note in getattr(problem, "__notes__", ()):
         sys.stderr.write(folded("note: ", str(note), width, indent=2) + "\n")
-    if problem.hint:  # not folded: a command in it is copied in one piece
-        sys.stderr.write(f"  try: {problem.hint}\n")
+    if hint:  # not folded: a command in it is copied in one piece
+        sys.stderr.write(f"  try: {hint}\n")
 
 
 def _usage_of(error: Exception) -> UsageError | None:

@@ -19,7 +19,8 @@ def positive(value: float | None) -> float | None:
 
 
 Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.", show_default=False)]
-Force = Annotated[bool, typer.Option("--force", help="Replace an existing output.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing output.")]
+Force = Overwrite
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 Port = Annotated[
     str | None,

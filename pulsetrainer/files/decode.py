@@ -13,10 +13,9 @@ import h5py
 import numpy as np
 
 from pulsetrainer.artefacts import beyond_all_quantities
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DamagedFileError, DataError
 from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
 
-_MISSING_HINT = "the file was damaged or edited: restore it from a copy, or make it again with `{command}`"
 _DEFLATE_RATIO = 1100  # deflate packs at most 1032 to 1
 _ALLOWANCE_BYTES = 1 << 20
 
@@ -27,13 +26,11 @@ class Origin:
 
     file: str
     kind: str
-    command: str  # the command that makes such a file
 
-    def fault(self, where: str, what: str) -> DataError:
+    def fault(self, where: str, what: str) -> DamagedFileError:
         """Return the error about one dataset, group or attribute."""
-        return DataError(
-            f"{self.file}: {where} of this {self.kind} {what}",
-            hint=_MISSING_HINT.format(command=self.command),
+        return DamagedFileError(
+            f"{self.file}: {where} of this {self.kind} {what}", path=self.file, artefact=self.kind
         )
 
 

@@ -12,7 +12,7 @@ import io
 import struct
 from typing import TYPE_CHECKING
 
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DamagedFileError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,10 +49,7 @@ class GrowingFile(io.RawIOBase):
         if damaged or truncated:
             self._stream.close()
             what = "truncated" if truncated else "damaged: its superblock is not as it was written"
-            raise DataError(
-                f"{path} is {what}",
-                hint="restore it from a copy, or record the run again",
-            )
+            raise DamagedFileError(f"{path} is {what}", path=path, artefact="run")
         fields[4], fields[7] = 0, _END
         self._start = _SUPERBLOCK.pack(*fields, 0)[:-4]
         self._start += struct.pack("<I", lookup3(self._start))

@@ -20,11 +20,11 @@ import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.errors import ArgumentError, DataError, PulsetrainerError
+from pulsetrainer.files.atomic_write import cannot_write, check_output, publish
+from pulsetrainer.files.checksum import append_seal
 from pulsetrainer.files.encode import encode
-from pulsetrainer.files.lease import Lease, is_abandoned, sweep
-from pulsetrainer.files.output import cannot_write, check_output, publish
+from pulsetrainer.files.file_lock import Lease, is_abandoned, sweep
 from pulsetrainer.files.schema import plan_of
-from pulsetrainer.files.seal import append_seal
 from pulsetrainer.files.store import LIBVER, read, read_samples, write_root
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class RunRecorder:
         The final name.
     header
         What the artefact says about itself.
-    force
+    overwrite
         Replace an existing file.
     input_unit, output_unit, input_quantity, output_quantity, signal
         As in ``Run``.
@@ -74,7 +74,7 @@ class RunRecorder:
         path: Path | str,
         header: Header,
         *,
-        force: bool = False,
+        overwrite: bool = False,
         input_unit: str = "A",
         output_unit: str = "N",
         input_quantity: str = "current",
@@ -82,9 +82,9 @@ class RunRecorder:
         signal: str = "",
         in_parts: bool = False,
     ) -> None:
-        check_output(path, force)
+        check_output(path, overwrite)
         self._final = Path(path)
-        self._force = force
+        self._overwrite = overwrite
         self._samples = 0
         self._last_time = -np.inf
         self._finished = False
@@ -272,11 +272,12 @@ class RunRecorder:
                 )
             with contextlib.suppress(OSError):  # without a seal the file is only less guarded
                 append_seal(self.partial)
-            publish(self.partial, self._final.resolve(), force=self._force)
+            publish(self.partial, self._final.resolve(), overwrite=self._overwrite)
         except (OSError, RuntimeError) as error:
             raise self._kept(cannot_write(self._final, error)) from error
         except PulsetrainerError as error:
-            raise self._kept(error) from error
+            self._kept(error)
+            raise
         finally:
             self._end_lease()
         for path in self._superseded:
@@ -293,7 +294,9 @@ class RunRecorder:
         """Return the error with the place where the samples are."""
         if not self.partial.exists():
             return error
-        return type(error)(f"{error.message}; the recording is kept in {self.partial}", hint=error.hint)
+        error.message = f"{error.message}; the recording is kept in {self.partial}"
+        error.args = (error.message,)
+        return error
 
     def __enter__(self) -> Self:
         return self

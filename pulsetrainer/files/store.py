@@ -15,17 +15,16 @@ import numpy as np
 
 from pulsetrainer import __version__
 from pulsetrainer.artefacts import KINDS
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, WrongKindError
+from pulsetrainer.files.atomic_write import check_output, replacing
+from pulsetrainer.files.checksum import append_seal, check_seal
 from pulsetrainer.files.decode import Origin, decode, text_of
 from pulsetrainer.files.encode import encode, values_of
 from pulsetrainer.files.growing import GrowingFile, is_growing
-from pulsetrainer.files.output import check_output, replacing
+from pulsetrainer.files.input_file import check_artefact
 from pulsetrainer.files.provenance import Header, Provenance, clean
 from pulsetrainer.files.schema import TIME, kind_of, plan_of
-from pulsetrainer.files.seal import append_seal, check_seal
 from pulsetrainer.files.sheltered import Sheltered
-from pulsetrainer.files.source import RESTORE, check_artefact
-from pulsetrainer.files.steps import maker, next_step, with_article
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -40,7 +39,7 @@ _HDF5_ERRORS = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryEr
 K = TypeVar("K")
 
 
-def write(path: Path | str, artefact: Any, header: Header, *, force: bool = False) -> None:
+def write(path: Path | str, artefact: Any, header: Header, *, overwrite: bool = False) -> None:
     """Write an artefact under its final name, or leave everything as it was.
 
     Raises
@@ -52,7 +51,7 @@ def write(path: Path | str, artefact: Any, header: Header, *, force: bool = Fals
     """
     cls: type = type(artefact)
     values = values_of(artefact)
-    with replacing(path, force=force) as temporary:
+    with replacing(path, overwrite=overwrite) as temporary:
         try:
             with Sheltered(temporary) as stream:
                 try:
@@ -114,10 +113,7 @@ def read_one_of(path: Path | str, *kinds: type) -> Any:
         got = _kind(file, path)
         expected = [kind_of(kind) for kind in kinds]
         if got not in expected:
-            raise DataError(
-                f"{path}: expected {with_article(expected)}, got {with_article([got])}",
-                hint=next_step(expected, got, str(path)),
-            )
+            raise WrongKindError(path, expected, got)
         return _decode(file, path, got)
 
 
@@ -175,27 +171,25 @@ def _trusted(file: h5py.File, path: Path | str) -> int | None:
     if samples is None:
         return None
     if np.ndim(samples) or not np.issubdtype(type(samples), np.integer) or samples < 0:
-        raise DataError(f"{path}: the attribute 'samples' is {samples!r}, expected a count", hint=RESTORE)
+        raise DamagedFileError(f"{path}: the attribute 'samples' is {samples!r}, expected a count", path=path)
     return int(samples)
 
 
 def _decode(file: h5py.File, path: Path | str, kind: str) -> Any:
-    origin = Origin(str(path), kind, maker(kind))
-    return decode(file, KINDS[kind], origin, samples=_trusted(file, path))
+    return decode(file, KINDS[kind], Origin(str(path), kind), samples=_trusted(file, path))
 
 
 def _kind(file: h5py.File, path: Path | str) -> str:
     """Return the kind of an opened file that this version can read."""
     if not isinstance(file.attrs.get("kind"), str | bytes) or "format_version" not in file.attrs:
-        raise DataError(
-            f"{path} is an HDF5 file, but not one of pulsetrainer's: "
-            "it lacks the attributes kind and format_version",
-            hint="a record of another program comes in as a table: pulsetrainer import FILE.csv -o run.h5",
+        raise NotAnArtefactError(
+            f"{path} is an HDF5 file from another program: it has no attributes kind and format_version",
+            path=path,
         )
     kind, version = text_of(file.attrs["kind"]), file.attrs["format_version"]
     if not np.issubdtype(type(version), np.integer):
-        raise DataError(
-            f"{path}: the attribute 'format_version' is {version!r}, expected a whole number", hint=RESTORE
+        raise DamagedFileError(
+            f"{path}: the attribute 'format_version' is {version!r}, expected a whole number", path=path
         )
     if version > FORMAT_VERSION:
         raise DataError(
@@ -214,7 +208,7 @@ def _kind(file: h5py.File, path: Path | str) -> str:
 def _root_text(file: h5py.File, path: Path | str, name: str) -> str:
     value = file.attrs.get(name)
     if not isinstance(value, str | bytes):
-        raise DataError(f"{path}: the attribute {name!r} is missing or not a text", hint=RESTORE)
+        raise DamagedFileError(f"{path}: the attribute {name!r} is missing or not a text", path=path)
     return text_of(value)
 
 
@@ -247,12 +241,12 @@ def _open(path: Path) -> Iterator[h5py.File]:
 def _damaged(path: Path, error: Exception) -> DataError:
     text = str(error)
     if "truncated file" in text:
-        return DataError(
-            f"{path} is truncated: only {path.stat().st_size} bytes of it are there", hint=RESTORE
+        return DamagedFileError(
+            f"{path} is truncated: only its first {path.stat().st_size} bytes are there", path=path
         )
     if "lock file" in text:
         return DataError(
             f"{path} is locked by another program", hint="close the program that has it open and try again"
         )
     reason = text.strip("'\"").split("\n")[0]
-    return DataError(f"{path} is damaged and cannot be read: {reason}", hint=RESTORE)
+    return DamagedFileError(f"{path} is damaged and cannot be read: {reason}", path=path)

@@ -1,7 +1,7 @@
 """Tables from any bench: text of any dialect, .npz, .mat, .wav.
 
-What a text is taken for is decided in ``table_text``, by explicit rules, and its rows are read by
-``table_rows``; what is no text is read by ``table_arrays``. Units are what a header says: ``current_A``,
+What a text is taken for is decided in ``csv_dialect``, by explicit rules, and its rows are read by
+``csv_rows``; what is no text is read by ``array_files``. Units are what a header says: ``current_A``,
 ``Force (N)``, ``time [ms]``, ``Kraft / N``, or a line of units below it.
 """
 
@@ -22,10 +22,10 @@ import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, beyond_all_quantities
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.files.output import replacing
-from pulsetrainer.files.table_arrays import Columns, reader_of
-from pulsetrainer.files.table_rows import parse
-from pulsetrainer.files.table_text import Dialect, detect
+from pulsetrainer.files.array_files import Columns, reader_of
+from pulsetrainer.files.atomic_write import replacing
+from pulsetrainer.files.csv_dialect import Dialect, detect
+from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.units import symbol_of
 
 if TYPE_CHECKING:
@@ -248,14 +248,18 @@ def _units(dialect: Dialect) -> dict[str, str]:
 
 
 def write_table(
-    path: Path | str, columns: Mapping[str, ArrayLike], *, comments: Sequence[str] = (), force: bool = False
+    path: Path | str,
+    columns: Mapping[str, ArrayLike],
+    *,
+    comments: Sequence[str] = (),
+    overwrite: bool = False,
 ) -> None:
     """Write columns as CSV: a header of their names, numbers that read back to the last bit.
 
     Raises
     ------
     UsageError
-        The file exists and ``force`` is not set, or its folder is missing or not writable.
+        The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
     DataError
         The disk is full or failed.
     ArgumentError
@@ -270,7 +274,7 @@ def write_table(
     header = io.StringIO()
     csv.writer(header, lineterminator="\n").writerow(columns)
     with (
-        replacing(path, force=force) as temporary,
+        replacing(path, overwrite=overwrite) as temporary,
         temporary.open("w", encoding="utf-8", newline="\n") as out,
     ):
         out.writelines(f"# {line}\n" for comment in comments for line in comment.splitlines())

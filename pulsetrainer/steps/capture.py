@@ -19,7 +19,7 @@ from pulsetrainer.device.codes import TICK_RATE_HZ
 from pulsetrainer.device.device import DEFAULT_PORT, Limits, open_device
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.errors import DataError, DeviceError
-from pulsetrainer.files import output, provenance, table, table_run
+from pulsetrainer.files import atomic_write, provenance, run_from_table, table
 from pulsetrainer.files.recorder import RunRecorder, interrupted
 from pulsetrainer.steps import preflight, recording
 from pulsetrainer.steps.recording import Earlier, Tally, check_ended, conditioning_loop
@@ -93,7 +93,7 @@ def plan(options: Options) -> Plan:
     UsageError, DataError
         As ``reference``; also when the output exists.
     """
-    output.check_output(options.output, options.force)
+    atomic_write.check_output(options.output, options.force)
     signal = reference(options)
     course = Course(signal, options.repeats)
     top = float(signal.value.max())
@@ -146,7 +146,7 @@ def _from_file(path: Path, rate_Hz: float) -> Signal:
             f"{path} has {len(columns.names)} column; a reference needs a time and a current",
             hint="write two columns: t_s,current_A",
         )
-    time, current = table_run.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
+    time, current = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
     seconds = float(time[-1]) - float(time[0])
     lasts = seconds * rate_Hz
     if not lasts <= signals.MOST_SAMPLES:
@@ -173,7 +173,7 @@ def run(options: Options, context: Context) -> Result:
         Ctrl-C: the output was stopped first, then what was recorded was kept.
     """
     if not options.resume:
-        output.check_output(options.output, options.force)
+        atomic_write.check_output(options.output, options.force)
     course = Course(reference(options), options.repeats)
     earlier = None
     if options.resume:
@@ -231,7 +231,7 @@ def _record(
         options.output,
         header,
         signal=signal.name,
-        force=options.force or (earlier is not None and earlier.path == options.output),
+        overwrite=options.force or (earlier is not None and earlier.path == options.output),
         in_parts=earlier is not None or course.duration_s > device.longest_play_s,
     ) as recorder:
         if earlier is not None:

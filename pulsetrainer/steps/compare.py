@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import output, store
+from pulsetrainer.files import atomic_write, store
 from pulsetrainer.steps import preflight
 from pulsetrainer.steps.evaluate import metrics_of
 
@@ -151,7 +151,7 @@ def _write(options: Options, form: str, sources: tuple[Source, ...], metrics: tu
         labels = labels_of(options.files)
         picture = comparison_figure.draw(labels, {m.name: m.values for m in metrics})
         content = render.encode(picture, form)
-    with output.replacing(options.output, force=options.force) as temporary:
+    with atomic_write.replacing(options.output, overwrite=options.force) as temporary:
         temporary.write_bytes(content)
 
 

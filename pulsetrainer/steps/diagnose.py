@@ -21,7 +21,7 @@ from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.selection import diagnose
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files import output, provenance, store
+from pulsetrainer.files import atomic_write, provenance, store
 from pulsetrainer.steps import given_model
 from pulsetrainer.steps.modelling import known_from, parts_of, predict, step_of
 
@@ -72,7 +72,7 @@ def run(options: Options, context: Context) -> Result:
     begun = time.perf_counter()
     for path in (options.output, options.html):
         if path is not None:
-            output.check_output(path, options.force)
+            atomic_write.check_output(path, options.force)
     if not options.runs:
         raise UsageError("diagnose needs at least one run", hint="pulsetrainer capture diagnostic -o run.h5")
     model = store.read(options.model, Model)
@@ -102,7 +102,7 @@ def run(options: Options, context: Context) -> Result:
         ancestors=[store.read_header(path) for path in (*options.runs, options.model)],
         libraries=provenance.library_versions(),
     )
-    store.write(options.output, diagnosis, header, force=options.force)
+    store.write(options.output, diagnosis, header, overwrite=options.force)
     if options.html is not None:
         from pulsetrainer.report.diagnosis_html import render_diagnosis
 
@@ -113,7 +113,7 @@ def run(options: Options, context: Context) -> Result:
             provenance_json=header.provenance.to_json(),
             history=header.history,
         )
-        with output.replacing(options.html, force=options.force) as temporary:
+        with atomic_write.replacing(options.html, overwrite=options.force) as temporary:
             temporary.write_text(page, encoding="utf-8")
     context.progress(1.0)
     return Result(options.output, options.html, diagnosis, time.perf_counter() - begun)

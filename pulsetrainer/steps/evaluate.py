@@ -24,7 +24,7 @@ from pulsetrainer.core import metrics
 from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import DataError, QualityError, UsageError
-from pulsetrainer.files import output, provenance, store
+from pulsetrainer.files import atomic_write, provenance, store
 from pulsetrainer.steps.modelling import known_from, operator_of, parts_of, predict, step_of
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def run(options: Options, context: Context) -> Result:
     """
     for path in (options.output, options.html):
         if path is not None:
-            output.check_output(path, options.force)
+            atomic_write.check_output(path, options.force)
     bounds = read_bounds(options.bounds) if options.bounds else {}
     artefacts = [store.read_one_of(path, Playback, Run) for path in options.inputs]
     context.progress(0.2)
@@ -115,7 +115,7 @@ def run(options: Options, context: Context) -> Result:
     context.progress(0.6)
     header = _header(options, evaluation, context)
     if options.output is not None:
-        store.write(options.output, evaluation, header, force=options.force)
+        store.write(options.output, evaluation, header, overwrite=options.force)
     if options.html is not None:
         from pulsetrainer.report import html  # draws: half a second that nobody else has to wait
 
@@ -127,7 +127,7 @@ def run(options: Options, context: Context) -> Result:
             published=PUBLISHED,
             history=header.history,
         )
-        with output.replacing(options.html, force=options.force) as temporary:
+        with atomic_write.replacing(options.html, overwrite=options.force) as temporary:
             temporary.write_text(page, encoding="utf-8")
     context.progress(1.0)
     breaches, checked = _check_bounds(evaluation, bounds)

@@ -10,7 +10,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Extension, Model
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import output, provenance, store
+from pulsetrainer.files import atomic_write, provenance, store
 
 if TYPE_CHECKING:
     from pulsetrainer.steps.context import Context
@@ -47,7 +47,7 @@ def run(options: Options, context: Context) -> Result:
     DataError
         The diagnosis found nothing that extends a model, or is of another model.
     """
-    output.check_output(options.output, options.force)
+    atomic_write.check_output(options.output, options.force)
     diagnosis = store.read(options.diagnosis, Diagnosis)
     model = store.read(options.model, Model)
     extended = diagnosis.extended
@@ -79,7 +79,7 @@ def run(options: Options, context: Context) -> Result:
         ancestors=[store.read_header(path) for path in (options.diagnosis, options.model)],
         libraries=provenance.library_versions(),
     )
-    store.write(options.output, extended, header, force=options.force)
+    store.write(options.output, extended, header, overwrite=options.force)
     context.progress(1.0)
     return Result(
         options.output,

@@ -24,7 +24,7 @@ from pulsetrainer.core.levels import plane_for
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import output, provenance, store
+from pulsetrainer.files import atomic_write, provenance, store
 from pulsetrainer.steps.modelling import known_from, parts_of, record_of, step_of
 from pulsetrainer.steps.show import shown as shown_unit
 
@@ -91,7 +91,7 @@ def run(options: Options, context: Context) -> Result:
     ConvergenceError
         The fit did not settle.
     """
-    output.check_output(options.output, options.force)
+    atomic_write.check_output(options.output, options.force)
     begun = time.perf_counter()
     runs = [store.read(path, Run) for path in options.runs]
     _check_units(options.runs, runs)
@@ -135,7 +135,7 @@ def run(options: Options, context: Context) -> Result:
         ancestors=[store.read_header(path) for path in options.runs],
         libraries=provenance.library_versions(),
     )
-    store.write(options.output, model, header, force=options.force)
+    store.write(options.output, model, header, overwrite=options.force)
     context.progress(1.0)
     assert model.fit is not None
     return Result(

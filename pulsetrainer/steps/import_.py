@@ -14,7 +14,7 @@ from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.equations import Record
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
-from pulsetrainer.files import provenance, store, table_run
+from pulsetrainer.files import provenance, run_from_table, store
 from pulsetrainer.steps import preflight
 from pulsetrainer.steps.show import run_facts
 
@@ -120,17 +120,17 @@ def run(options: Options, context: Context) -> Result:
 def _read_group(files: Sequence[Path], options: Options, context: Context) -> tuple[Report, Run]:
     """Return what the files of one run hold, and the run that is kept: no other copy stays in memory."""
     parts = [_read(path, options, context) for path in files]
-    whole = parts[0] if len(parts) == 1 else table_run.joined(parts, context.note)
+    whole = parts[0] if len(parts) == 1 else run_from_table.joined(parts, context.note)
     report = report_of(whole, files, resampled=options.resample is not None)
     if options.resample is None:
         return report, whole
     del whole
-    evened = [table_run.resampled(part, options.resample or None) for part in parts]
-    return report, evened[0] if len(evened) == 1 else table_run.joined(evened)
+    evened = [run_from_table.resampled(part, options.resample or None) for part in parts]
+    return report, evened[0] if len(evened) == 1 else run_from_table.joined(evened)
 
 
 def _read(path: Path, options: Options, context: Context) -> Run:
-    return table_run.read_run(
+    return run_from_table.read_run(
         path,
         input_column=options.input_column,
         output_column=options.output_column,
@@ -153,13 +153,13 @@ def _store(target: Path, files: Sequence[Path], whole: Run, options: Options, co
         inputs=provenance.digests(files),
         libraries=provenance.library_versions(),
     )
-    store.write(target, whole, header, force=options.force)
+    store.write(target, whole, header, overwrite=options.force)
 
 
 def report_of(whole: Run, files: Sequence[Path], *, resampled: bool = False) -> Report:
     """Return what a run holds, in numbers."""
     timed = whole.time_s is not None
-    steps = table_run.steps_of(whole.time_s) if whole.time_s is not None else None
+    steps = run_from_table.steps_of(whole.time_s) if whole.time_s is not None else None
     low, high = float(whole.input.min()), float(whole.input.max())
     every = -(-whole.input.size // _LOOKED_AT)
     u, y = whole.input[::every], whole.output[::every]

@@ -14,7 +14,7 @@ from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.waveforms import Shape, train
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files import output, provenance, store, table, table_run
+from pulsetrainer.files import atomic_write, provenance, run_from_table, store, table
 from pulsetrainer.steps import preflight
 from pulsetrainer.steps.modelling import extended_of, operator_of, predict
 
@@ -83,7 +83,7 @@ def read_shape(waveform: str) -> tuple[Shape, Path]:
             f"{path} has {len(columns.names)} column; a waveform needs a time and a value",
             hint="write two columns: t_s,p",
         )
-    time_s, value = table_run.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
+    time_s, value = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
     source = next((c.partition(":")[2].strip() for c in columns.comments if c.startswith("source:")), "")
     return Shape(path.stem, time_s, value, source or path.name), path
 
@@ -113,7 +113,7 @@ def run(options: Options, context: Context) -> Result:
     DataError
         The model or the waveform cannot be used, or the force range is beyond the model's reach.
     """
-    output.check_output(options.output, options.force)
+    atomic_write.check_output(options.output, options.force)
     preflight.check_beat(options.beat)
     model = store.read(options.model, Model)
     shape, path = read_shape(options.waveform)
@@ -149,7 +149,7 @@ def run(options: Options, context: Context) -> Result:
         ancestors=[store.read_header(options.model)],
         libraries=provenance.library_versions(),
     )
-    store.write(options.output, waveform, header, force=options.force)
+    store.write(options.output, waveform, header, overwrite=options.force)
     context.progress(1.0)
     if waveform.clipped_samples:
         context.note(f"{waveform.clipped_samples} samples of the target were out of reach and were clipped")

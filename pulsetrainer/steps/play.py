@@ -17,7 +17,7 @@ from pulsetrainer.core.signals import check_size
 from pulsetrainer.device.device import DEFAULT_PORT, Limits, open_device
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.files import output, provenance, store
+from pulsetrainer.files import atomic_write, provenance, store
 from pulsetrainer.steps.recording import check_ended
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def plan(options: Options) -> Plan:
 
 def _waveform(options: Options) -> Waveform:
     """Return the drive to be played, or say why it cannot be."""
-    output.check_output(options.output, options.force)
+    atomic_write.check_output(options.output, options.force)
     waveform = store.read(options.drive, Waveform)
     if options.repeats < 1:
         raise ArgumentError(f"repeats must be at least 1, got {options.repeats}", hint="5 is usual")
@@ -145,7 +145,7 @@ def run(options: Options, context: Context) -> Result:
     )
     played = playback.compensated.output.shape[0]
     if played:
-        store.write(options.output, playback, header, force=options.force)
+        store.write(options.output, playback, header, overwrite=options.force)
     kept = f"; {played} of {options.repeats} repeats were kept in {options.output}" if played else ""
     check_ended(fault, "the playback", kept, remedy)
     return Result(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import output, store
+from pulsetrainer.files import atomic_write, store
 from pulsetrainer.steps import preflight
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def run(options: Options, context: Context) -> Result:
         The file cannot be read, is not an artefact, or holds values that no axis can show.
     """
     form = preflight.figure_form(options.output, "a figure")
-    output.check_output(options.output, options.force)
+    atomic_write.check_output(options.output, options.force)
     artefact = store.read_any(options.file)
     from pulsetrainer.report import figures, render  # draws: half a second that an error need not wait for
 
@@ -54,7 +54,7 @@ def run(options: Options, context: Context) -> Result:
             f"{options.file} cannot be drawn: {error}",
             hint=f"look at its values: pulsetrainer show {options.file}",
         ) from error
-    with output.replacing(options.output, force=options.force) as temporary:
+    with atomic_write.replacing(options.output, overwrite=options.force) as temporary:
         temporary.write_bytes(picture)
     context.progress(1.0)
     return Result(options.output, artefact.kind)

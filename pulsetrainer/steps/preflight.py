@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from pulsetrainer.errors import UsageError
-from pulsetrainer.files.output import check_output
-from pulsetrainer.files.source import check_artefact, check_file
+from pulsetrainer.files.atomic_write import check_output
+from pulsetrainer.files.input_file import check_artefact, check_file
 from pulsetrainer.files.timing import check_timing
 from pulsetrainer.report.forms import FORMATS
 from pulsetrainer.resources import waveforms_dir

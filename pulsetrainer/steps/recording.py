@@ -24,8 +24,8 @@ from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.device.codes import MAX_DECIMATION
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError, Interrupted, UsageError
-from pulsetrainer.files import output, store
-from pulsetrainer.files.lease import Lease, is_abandoned
+from pulsetrainer.files import atomic_write, store
+from pulsetrainer.files.file_lock import Lease, is_abandoned
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.recorder import RunRecorder, interrupted
 from pulsetrainer.steps import preflight
@@ -242,7 +242,7 @@ def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool
     DataError
         What is there cannot be read, or is no recording of this signal.
     """
-    output.check_output(path, force=True)
+    atomic_write.check_output(path, overwrite=True)
     preflight.check_resumable(path)
     found = interrupted(path)
     source = found[0][0] if found else None

@@ -12,7 +12,7 @@ import numpy as np
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Parameter, Playback, Run, Waveform
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.files import store, table_run
+from pulsetrainer.files import run_from_table, store
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.steps.evaluate import metrics_of
 
@@ -90,7 +90,7 @@ def _span(values: FloatArray, unit: str) -> str:
 
 def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
     """Return the main figures of a run; its ``reversals`` are counted unless they are given."""
-    steps = table_run.steps_of(run.time_s) if run.time_s is not None and run.time_s.size > 1 else None
+    steps = run_from_table.steps_of(run.time_s) if run.time_s is not None and run.time_s.size > 1 else None
     if reversals is None:
         turns = turning_points(run.input if run.reference is None else run.reference)
         reversals = max(turns.size - 1, 0)

@@ -61,14 +61,16 @@ def test_the_wrong_kind_of_file_names_both_kinds_and_the_next_step(ready, words,
 
 
 def test_an_existing_output_is_refused_and_kept(ready):
-    """Without --force nothing is replaced; with it, it is."""
+    """Without --overwrite nothing is replaced; with it, it is."""
     before = (ready / "model.h5").read_bytes()
-    refused(ready, ["identify", "run.h5", "-o", "model.h5"], 2, "model.h5 exists", "--force")
+    refused(ready, ["identify", "run.h5", "-o", "model.h5"], 2, "model.h5 already exists", "--overwrite")
     refused(ready, ["capture", "identification", "-o", "model.h5"], 2, "model.h5 exists")
     refused(ready, ["play", "drive.h5", "-o", "model.h5"], 2, "model.h5 exists")
     refused(ready, ["plot", "run.h5", "-o", "model.h5"], 2)
     assert (ready / "model.h5").read_bytes() == before
-    assert pulsetrainer(ready, "identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force").code == 0
+    assert (
+        pulsetrainer(ready, "identify", "run.h5", "--levels", "12", "-o", "model.h5", "--overwrite").code == 0
+    )
 
 
 @pytest.mark.parametrize(
@@ -185,7 +187,7 @@ def test_pulses_beyond_all_numbers_are_refused_in_words(ready, time, top, said):
 def test_libraries_warn_those_who_asked_for_details(ready):
     """A slope that overflows inside an interpolation is harmless: no line of source reaches a technician."""
     (ready / "steep.csv").write_text("t_s,p\n0,0\n1,1e-308\n2,0.5\n3,1\n4,0.2\n")
-    words = ("invert", "steep.csv", "--model", "model.h5", "-o", "steep.h5", "--periods", "1", "--force")
+    words = ("invert", "steep.csv", "--model", "model.h5", "-o", "steep.h5", "--periods", "1", "--overwrite")
     assert "Warning" not in pulsetrainer(ready, *words).err
     assert "RuntimeWarning" in pulsetrainer(ready, "--verbose", *words).err
 

@@ -70,7 +70,7 @@ def test_show_and_plot_take_every_kind(as_built):
 
 def test_a_pipe_gets_no_bar_and_a_terminal_does(tmp_path):
     """Progress is for people: nothing of it in a pipe, a moving bar on a terminal, none with --json."""
-    words = ["capture", "identification", "--speed", "3", "--force", "-o", "run.h5"]
+    words = ["capture", "identification", "--speed", "3", "--overwrite", "-o", "run.h5"]
     done = pulsetrainer(tmp_path, *words)
     assert done.err == ""
     assert "\x1b" not in done.out

@@ -54,7 +54,9 @@ def bench(tmp_path_factory):
 
 
 def _diagnose(folder, *runs, model="model.h5", out="diagnosis.h5", more=()):
-    return pulsetrainer(folder, "diagnose", *runs, "--model", model, "-o", out, "--force", "--json", *more)
+    return pulsetrainer(
+        folder, "diagnose", *runs, "--model", model, "-o", out, "--overwrite", "--json", *more
+    )
 
 
 def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):

@@ -22,7 +22,17 @@ def record(run, tmp_path):
         table = np.column_stack((t, measured, y + rng.normal(0.0, 0.01, ROWS)))
         np.savetxt(tmp_path / "run.csv", table, delimiter=",", header="t_s,u,y", comments="")
         done = run(
-            "import", "run.csv", "--time", "t_s", "--input", "u", "--output", "y", "-o", "run.h5", "--force"
+            "import",
+            "run.csv",
+            "--time",
+            "t_s",
+            "--input",
+            "u",
+            "--output",
+            "y",
+            "-o",
+            "run.h5",
+            "--overwrite",
         )
         assert done.code == 0, done.err
 
@@ -35,7 +45,7 @@ def test_smoothing_is_chosen_reported_and_stored(run, record, tmp_path):
     from pulsetrainer.files import store
 
     record()
-    base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force", "--json")
+    base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--overwrite", "--json")
     chosen = run(*base).json["smoothing"]
     assert 0 <= chosen <= 0.3
     assert run(*base, "--smoothing", "auto").json["smoothing"] == chosen
@@ -64,7 +74,7 @@ def test_false_reversals_are_counted(run, record):
     assert done.json["false_reversals"] > 500
     assert "false reversals" in done.err
     record()
-    done = run("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force", "--json")
+    done = run("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--overwrite", "--json")
     assert done.json["false_reversals"] == 0
     assert "false reversals" not in done.err
 
@@ -84,7 +94,7 @@ def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path)
     from pulsetrainer.files import store
 
     record()
-    base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--force", "--json")
+    base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--overwrite", "--json")
     assert run(*base).json["output_uncertainty"] is None
     first = run(*base, "--bootstrap", "60", "--seed", "5").json["output_uncertainty"]
     assert 1e-4 < first < 0.01  # noise of 0.01 on 4000 samples, 78 cells

@@ -142,7 +142,7 @@ def test_what_cannot_be_resumed_says_why(tmp_path):
     assert noted.code == 0, noted
     assert "run.h5.partial holds" in noted.err
     assert "--resume" in noted.err
-    refused(("--speed", "0.75"), "run.h5 exists already", "--force")
+    refused(("--speed", "0.75"), "run.h5 already exists", "--overwrite")
     (tmp_path / "run.h5.partial").unlink()
     refused((), "nothing to resume: run.h5 is complete", "leave --resume out")
     (tmp_path / "run.h5").unlink()
@@ -191,7 +191,7 @@ def test_memory_does_not_grow_with_the_length(tmp_path):
     """Half an hour takes no more memory than a quarter of one: the most that is held is one part."""
 
     def peak_MB(repeats: int) -> float:
-        words = ["capture", "diagnostic", "--repeats", str(repeats), "--force", "-o", "run.h5"]
+        words = ["capture", "diagnostic", "--repeats", str(repeats), "--overwrite", "-o", "run.h5"]
         # a small process in between: a child is charged with the memory of who starts it
         done = subprocess.run(
             [sys.executable, "-c", _PEAK, *PROGRAM, *words],

@@ -22,14 +22,14 @@ def folder(tmp_path_factory) -> Path:
 
 
 def _identified(folder: Path, name: str):
-    done = pulsetrainer(folder, "identify", f"{name}.h5", "-o", f"{name}-model.h5", "--force", "--json")
+    done = pulsetrainer(folder, "identify", f"{name}.h5", "-o", f"{name}-model.h5", "--overwrite", "--json")
     assert done.code == 0, done
     return done
 
 
 def _diagnosed(folder: Path, name: str, model: str):
     words = ["diagnose", f"{name}.h5", "--model", f"{model}-model.h5", "-o", f"{name}-diagnosis.h5"]
-    done = pulsetrainer(folder, *words, "--force", "--json")
+    done = pulsetrainer(folder, *words, "--overwrite", "--json")
     assert done.code == 0, done
     return done.json
 
@@ -85,12 +85,12 @@ def test_speed_is_predicted_and_torque_is_another_condition(folder):
 def test_records_shifted_against_each_other_are_fitted_with_an_offset_each(folder):
     """Two records of one condition whose zeros differ by 0.6 degrees; two of one record keep one offset."""
     words = ["davinci_f0p1_torque10.h5", "davinci_f0p3_torque10.h5"]
-    done = pulsetrainer(folder, "identify", *words, "-o", "both.h5", "--force", "--json")
+    done = pulsetrainer(folder, "identify", *words, "-o", "both.h5", "--overwrite", "--json")
     assert done.json["fit_rms_percent"] <= 0.3
     assert np.ptp(done.json["offsets"]) == pytest.approx(0.6, abs=0.05)
     assert "shifted against each other" in done.err
     words = ["davinci_f0p3_torque10.h5", "davinci_f0p3_torque10.h5"]
-    done = pulsetrainer(folder, "identify", *words, "-o", "twice.h5", "--force", "--json")
+    done = pulsetrainer(folder, "identify", *words, "-o", "twice.h5", "--overwrite", "--json")
     assert done.json["offsets"] == [0.0, 0.0]
 
 

@@ -52,7 +52,7 @@ def test_bash_completes_commands_and_options(tmp_path):
     assert completed(tmp_path, "pulsetrainer id") == ["identify"]
     assert {"capture", "compare"} <= set(completed(tmp_path, "pulsetrainer c"))
     assert "--operator" in completed(tmp_path, "pulsetrainer identify --op")
-    assert {"--out", "--force", "--json"} <= set(completed(tmp_path, "pulsetrainer capture --"))
+    assert {"--out", "--overwrite", "--json"} <= set(completed(tmp_path, "pulsetrainer capture --"))
 
 
 def on_terminal(folder: Path, *words: str, **more: str) -> bytes:
@@ -84,7 +84,7 @@ def recorded(tmp_path):
 
 def test_no_color_is_honoured(recorded):
     """The progress bar is coloured on a terminal, and plain there when NO_COLOR is set."""
-    fitting = ("identify", "run.h5", "--levels", "6", "--force", "-o", "model.h5")
+    fitting = ("identify", "run.h5", "--levels", "6", "--overwrite", "-o", "model.h5")
     assert COLOUR.search(on_terminal(recorded, *fitting))
     plain = on_terminal(recorded, *fitting, NO_COLOR="1")
     assert not COLOUR.search(plain)

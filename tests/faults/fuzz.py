@@ -35,6 +35,7 @@ _MAIN_OPTIONS = (
     "--version",
     "--help",
     "--json",
+    "--overwrite",
     "--force",
     "--nonsense",
     "-x",

@@ -19,7 +19,7 @@ import ready
 from children import DOCUMENTED, Child, Ended
 
 from command_lines import READS_ONLY, WRITERS, Writer
-from pulsetrainer.files.seal import SEAL_LENGTH
+from pulsetrainer.files.checksum import SEAL_LENGTH
 
 _SETTLE_S = 0.004  # the moments around a new file's appearance
 
@@ -168,7 +168,7 @@ def _go_on(world: World, writer: Writer, folder: Path, tally: Tally) -> None:
     if not dead and not recordings:
         return
     if writer.name == "capture (long)" and recordings:
-        done = children.run(folder, (*writer.line(force=False), "--resume", "--force"), world.log)
+        done = children.run(folder, (*writer.line(force=False), "--resume", "--overwrite"), world.log)
         if done.code in (2, 3) and not any(".partial" in path.name for path in folder.iterdir()):
             # killed before the first sample: nothing to go on with
             done = children.run(folder, writer.line(force=True), world.log)
@@ -340,7 +340,7 @@ def _damaged(world: World, tries: int, fault: str, damage: Callable[[bytes, rand
 
 
 def together(world: World, tries: int) -> Tally:
-    """Two processes write one output at the same time: the first wins, with --force the last one."""
+    """Two processes write one output at the same time: the first wins, with --overwrite the last one."""
     tally = Tally("two processes, one output")
     writers = world.order(WRITERS)
     for number in range(tries):

@@ -46,7 +46,9 @@ def _surely(folder: Path, words: tuple[str, ...], log: Path) -> children.Ended:
     done = children.run(folder, words, log)
     for _ in range(5):
         if done.code == 4 and "too busy" in done.err:
-            done = children.run(folder, (*words, *(["--force"] if "--force" not in words else [])), log)
+            done = children.run(
+                folder, (*words, *(["--overwrite"] if "--overwrite" not in words else [])), log
+            )
     assert done.code == 0, done
     return done
 

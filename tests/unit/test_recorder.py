@@ -14,7 +14,7 @@ import pytest
 import store_examples as examples
 
 from pulsetrainer.artefacts import Run
-from pulsetrainer.errors import ArgumentError, DataError, UsageError
+from pulsetrainer.errors import ArgumentError, DataError, ExistsError, UsageError
 from pulsetrainer.files import recorder as recorder_module
 from pulsetrainer.files.growing import lookup3
 from pulsetrainer.files.provenance import Header
@@ -110,11 +110,11 @@ def test_nothing_recorded_leaves_nothing(tmp_path):
 def test_an_existing_output_is_refused_at_once(tmp_path):
     """Before the device moves: an existing file without force, a folder that is not there."""
     (tmp_path / "a.h5").write_text("old")
-    with pytest.raises(UsageError, match="exists already"):
+    with pytest.raises(ExistsError):
         RunRecorder(tmp_path / "a.h5", examples.header())
     with pytest.raises(UsageError, match="does not exist"):
         RunRecorder(tmp_path / "no" / "a.h5", examples.header())
-    with RunRecorder(tmp_path / "a.h5", examples.header(), force=True) as recorder:
+    with RunRecorder(tmp_path / "a.h5", examples.header(), overwrite=True) as recorder:
         _record(recorder, examples.run(5))
         assert (tmp_path / "a.h5").read_text() == "old"
     assert len(read(tmp_path / "a.h5", Run).input) == 5

@@ -20,9 +20,10 @@ import store_examples as examples
 
 from pulsetrainer import artefacts as kinds
 from pulsetrainer.artefacts import KINDS
-from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files import output, store
-from pulsetrainer.files.seal import SEAL_LENGTH
+from pulsetrainer.cli.next_step import next_step
+from pulsetrainer.errors import DataError, ExistsError, NotAnArtefactError, UsageError, WrongKindError
+from pulsetrainer.files import atomic_write, store
+from pulsetrainer.files.checksum import SEAL_LENGTH
 from pulsetrainer.files.store import check_output, read, read_any, read_header, write
 
 SEED = 20260102
@@ -60,17 +61,20 @@ def test_wrong_kind_names_both_and_the_next_command(expected, got, tmp_path):
     """For every pair of kinds the message says what was expected, what came, and what to run."""
     path = tmp_path / "my file.h5"
     write(path, examples.EXAMPLES[got](), examples.header())
-    error = _refused(path, KINDS[expected], f"expected a{'n' * (expected[0] == 'e')} {expected}, got a")
-    assert "pulsetrainer " in error.hint or "give the" in error.hint
-    if str(path) in error.hint:
-        assert f"'{path}'" in error.hint  # a shell can take it
+    error = _refused(path, KINDS[expected])
+    assert isinstance(error, WrongKindError)
+    assert (error.path, error.expected, error.found) == (path, (expected,), got)
+    hint = next_step(error)
+    assert "pulsetrainer " in hint or "give the" in hint
+    if str(path) in hint:
+        assert f"'{path}'" in hint  # a shell can take it
 
 
 def test_a_run_where_a_model_is_wanted(run_file):
     """The case that happens every day, word for word."""
     error = _refused(run_file, kinds.Model)
     assert error.message == f"{run_file}: expected a model, got a run"
-    assert error.hint == f"run `pulsetrainer identify {run_file} -o model.h5`"
+    assert next_step(error) == f"run `pulsetrainer identify {run_file} -o model.h5`"
 
 
 def test_absent(run_file):
@@ -97,14 +101,16 @@ def test_not_hdf5(tmp_path):
         (tmp_path / name).write_text(content)
         _refused(tmp_path / name, kinds.Run, word)
     (tmp_path / "t.csv").write_text("t,u,y\n1,2,3\n")
-    assert "pulsetrainer import" in _refused(tmp_path / "t.csv", kinds.Run, "is not an HDF5 file").hint
+    error = _refused(tmp_path / "t.csv", kinds.Run)
+    assert isinstance(error, NotAnArtefactError)
+    assert "pulsetrainer import" in next_step(error)
 
 
 def test_hdf5_of_another_program(tmp_path):
     """An HDF5 file that is not ours says so."""
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["x"] = 1
-    _refused(tmp_path / "a.h5", kinds.Run, "not one of pulsetrainer's")
+    assert isinstance(_refused(tmp_path / "a.h5", kinds.Run), NotAnArtefactError)
 
 
 def test_newer_format_names_both_versions(run_file):
@@ -152,7 +158,7 @@ def _attribute(name, value):
         (_attribute("samples", 99), ["50 values along time", "expected 99"]),
         (_attribute("format_version", "x"), ["'format_version'"]),
         (_attribute("kind", "moon"), ["unknown kind 'moon'"]),
-        (_attribute("kind", 3), ["not one of pulsetrainer's"]),
+        (_attribute("kind", 3), ["from another program"]),
     ],
 )
 def test_edited_run(run_file, change, words):
@@ -281,20 +287,21 @@ def test_artefacts_that_do_not_fit_are_not_written(artefact, words, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_existing_output_needs_force(run_file):
-    """An existing file is refused before and while writing, unless force is set."""
+def test_existing_output_is_not_overwritten_unasked(run_file):
+    """An existing file is refused before and while writing, unless overwriting is allowed."""
     before = run_file.read_bytes()
     for attempt in (
         lambda: check_output(run_file),
         lambda: write(run_file, examples.model(), examples.header()),
     ):
-        with pytest.raises(UsageError, match="exists already") as caught:
+        with pytest.raises(ExistsError) as caught:
             attempt()
         assert caught.value.exit_code == 2
-        assert "--force" in caught.value.hint
+        assert caught.value.path == run_file
+        assert "--overwrite" in next_step(caught.value)
     assert run_file.read_bytes() == before
-    check_output(run_file, force=True)
-    write(run_file, examples.model(), examples.header(), force=True)
+    check_output(run_file, overwrite=True)
+    write(run_file, examples.model(), examples.header(), overwrite=True)
     assert examples.equal(read_any(run_file), examples.model())
 
 
@@ -309,7 +316,7 @@ def test_outputs_that_cannot_be(tmp_path, monkeypatch):
         (tmp_path / ("x" * 300), "cannot be written"),
     ]:
         with pytest.raises(UsageError, match=words) as caught:
-            check_output(path, force=True)
+            check_output(path, overwrite=True)
         assert caught.value.hint
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
     with pytest.raises(UsageError, match="not writable"):
@@ -327,9 +334,9 @@ def test_an_exception_in_the_middle_changes_nothing(run_file, error, step, monke
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr({"encode": store, "publish": output}[step], step, fail)
+    monkeypatch.setattr({"encode": store, "publish": atomic_write}[step], step, fail)
     with pytest.raises(DataError if isinstance(error, OSError) else type(error)):
-        write(run_file, examples.model(), examples.header(), force=True)
+        write(run_file, examples.model(), examples.header(), overwrite=True)
     assert [entry.name for entry in run_file.parent.iterdir()] == ["run.h5"]
     assert run_file.read_bytes() == before
 
@@ -338,11 +345,11 @@ def test_a_file_that_came_meanwhile_is_not_overwritten(tmp_path):
     """Two processes, one output, no force: the first wins, the second says so."""
 
     def second():
-        with output.replacing(tmp_path / "a.h5", force=False) as mine:
+        with atomic_write.replacing(tmp_path / "a.h5", overwrite=False) as mine:
             mine.write_text("second")
             (tmp_path / "a.h5").write_text("first")
 
-    with pytest.raises(UsageError, match="exists already"):
+    with pytest.raises(ExistsError):
         second()
     assert [(entry.name, entry.read_text()) for entry in tmp_path.iterdir()] == [("a.h5", "first")]
 
@@ -358,11 +365,11 @@ def test_without_hard_links(tmp_path, monkeypatch):
     assert examples.equal(read_any(tmp_path / "a.h5"), examples.run())
 
     def second():
-        with output.replacing(tmp_path / "b.h5", force=False) as mine:
+        with atomic_write.replacing(tmp_path / "b.h5", overwrite=False) as mine:
             mine.touch()
             (tmp_path / "b.h5").write_text("first")
 
-    with pytest.raises(UsageError, match="exists already"):
+    with pytest.raises(ExistsError):
         second()
     assert (tmp_path / "b.h5").read_text() == "first"
 
@@ -392,7 +399,7 @@ from pulsetrainer.errors import DataError
 path, limit = sys.argv[1:]
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(limit), -1))
 try:
-    write(path, examples.run(20_000), examples.header(), force=True)
+    write(path, examples.run(20_000), examples.header(), overwrite=True)
 except DataError as error:
     sys.exit(f"{error.message} | {error.hint}")
 """
@@ -424,7 +431,7 @@ def test_killed_at_random_moments(tmp_path):
     path = tmp_path / "a.h5"
     begun = time.perf_counter()
     for artefact in whole:  # how long one round takes on this machine, now
-        write(path, artefact, examples.header(), force=True)
+        write(path, artefact, examples.header(), overwrite=True)
     one_round = time.perf_counter() - begun
     kinds_seen = set()
     for _ in range(30):
@@ -432,7 +439,7 @@ def test_killed_at_random_moments(tmp_path):
         if child == 0:
             while True:
                 for artefact in whole:
-                    write(path, artefact, examples.header(), force=True)
+                    write(path, artefact, examples.header(), overwrite=True)
         time.sleep(rng.uniform(0.0, 3.0) * one_round)
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)

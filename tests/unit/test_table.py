@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pulsetrainer.errors import ArgumentError, DataError, UsageError
+from pulsetrainer.errors import ArgumentError, DataError, ExistsError, UsageError
+from pulsetrainer.files.csv_dialect import detect
+from pulsetrainer.files.csv_rows import PIECE, parse
+from pulsetrainer.files.run_from_table import read_run
 from pulsetrainer.files.table import read_table, write_table
-from pulsetrainer.files.table_rows import PIECE, parse
-from pulsetrainer.files.table_run import read_run
-from pulsetrainer.files.table_text import detect
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 COLUMNS = {"input_column": "u", "output_column": "y"}
@@ -101,9 +101,9 @@ def test_write_and_read(tmp_path):
         np.testing.assert_array_equal(read.column(name), values)
     assert read.units == {"t_s": "s", "current (A)": "A"}
     assert read.comments == ("source: here",)
-    with pytest.raises(UsageError, match="exists already"):
+    with pytest.raises(ExistsError):
         write_table(tmp_path / "t.csv", columns)
-    write_table(tmp_path / "t.csv", {"a": [1.0], "b": [2.0]}, force=True)
+    write_table(tmp_path / "t.csv", {"a": [1.0], "b": [2.0]}, overwrite=True)
     with pytest.raises(ArgumentError, match="one length"):
         write_table(tmp_path / "x.csv", {"a": [1.0], "b": [2.0, 3.0]})
     assert not (tmp_path / "x.csv").exists()

@@ -8,8 +8,8 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.run_from_table import read_run
 from pulsetrainer.files.table import read_table
-from pulsetrainer.files.table_run import read_run
 
 N = 500
 T = np.arange(N) / 250.0

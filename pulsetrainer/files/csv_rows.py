@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.table_text import MISSING, Dialect, number, readable
+from pulsetrainer.files.csv_dialect import MISSING, Dialect, number, readable
 
 if TYPE_CHECKING:
     from pathlib import Path

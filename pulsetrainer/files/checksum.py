@@ -11,7 +11,7 @@ import re
 import zlib
 from pathlib import Path
 
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DamagedFileError, DataError
 
 _FORMAT = b"\npulsetrainer crc32 %08x\n"
 _PATTERN = re.compile(rb"\npulsetrainer crc32 ([0-9a-f]{8})\n")
@@ -56,10 +56,7 @@ def check_seal(path: Path) -> None:
             return
     except OSError as error:
         raise DataError(f"{path} cannot be read: {error.strerror or error}", hint="check the disk") from error
-    raise DataError(
-        f"{path} is damaged: its checksum is not the one it was written with",
-        hint="restore it from a copy, or make it again",
-    )
+    raise DamagedFileError(f"{path} is damaged: its checksum is not the one it was written with", path=path)
 
 
 def _crc(path: Path, length: int) -> int:

@@ -4,7 +4,7 @@ Every rule is explicit: the delimiter is the one that makes most cells numbers; 
 only where something else separates; the first line is a header if it has text where the next one has a
 number; a column that starts with text is a column of text; what an instrument writes about itself above the
 table is a comment. Times of day and ISO 8601 time stamps are numbers: seconds. The rows themselves are read
-by ``table_rows``.
+by ``csv_rows``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import table_stamps as stamps
+from pulsetrainer.files import time_stamps as stamps
 
 if TYPE_CHECKING:
     from pathlib import Path

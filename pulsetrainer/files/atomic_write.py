@@ -10,8 +10,8 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.lease import Lease, sweep
+from pulsetrainer.errors import DataError, ExistsError, UsageError
+from pulsetrainer.files.file_lock import Lease, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,24 +19,24 @@ if TYPE_CHECKING:
 _LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
 
 
-def check_output(path: Path | str, force: bool = False) -> None:
+def check_output(path: Path | str, overwrite: bool = False) -> None:
     """Refuse an output that cannot be written, BEFORE the work that would be lost.
 
     Raises
     ------
     UsageError
-        The file exists and ``force`` is not set, or its folder is missing or not writable.
+        The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
     """
     path = Path(path)
     try:
-        _check_target(path, path.parent, force=force)
+        _check_target(path, path.parent, overwrite=overwrite)
     except OSError as error:  # a name too long, a folder that must not be looked into
         raise UsageError(
             f"the output {path} cannot be written: {error.strerror or error}", hint="name another output"
         ) from error
 
 
-def _check_target(path: Path, folder: Path, *, force: bool) -> None:
+def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
     if path.is_dir():
         raise UsageError(
             f"the output {path} is a folder", hint=f"name a file in it, such as {path / 'out.h5'}"
@@ -50,23 +50,17 @@ def _check_target(path: Path, folder: Path, *, force: bool) -> None:
         )
     if not folder.is_dir():
         raise UsageError(f"{folder} is a file, so {path} cannot be written", hint="name another output")
-    if path.exists() and not force:
-        raise _exists(path)
+    if path.exists() and not overwrite:
+        raise ExistsError(path)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(
             f"the folder {folder} of the output {path.name} is not writable",
-            hint="write to another folder, or mend the permissions",
+            hint="write to another folder, or change its permissions",
         )
 
 
-def _exists(path: Path) -> UsageError:
-    return UsageError(
-        f"the output {path} exists already", hint="give --force to replace it, or name another file"
-    )
-
-
 @contextlib.contextmanager
-def replacing(path: Path | str, *, force: bool) -> Iterator[Path]:
+def replacing(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     """Give a new, empty temporary file, which becomes ``path`` when the block ends well.
 
     Whatever goes wrong, the temporary file is removed and a file that was at ``path`` is untouched. A process
@@ -75,11 +69,11 @@ def replacing(path: Path | str, *, force: bool) -> Iterator[Path]:
     Raises
     ------
     UsageError
-        See ``check_output``; also when another process wrote ``path`` meanwhile and ``force`` is not set.
+        See ``check_output``; also when another process wrote ``path`` meanwhile and ``overwrite`` is not set.
     DataError
         The disk is full or failed.
     """
-    check_output(path, force)
+    check_output(path, overwrite)
     target = Path(path).resolve()  # through a symbolic link, not over it
     for leftover in _leftovers(target):
         sweep(leftover)
@@ -88,7 +82,7 @@ def replacing(path: Path | str, *, force: bool) -> Iterator[Path]:
     try:
         temporary, lease = _claim(target)
         yield temporary
-        publish(temporary, target, force=force)
+        publish(temporary, target, overwrite=overwrite)
     except OSError as error:
         raise cannot_write(path, error) from error
     finally:
@@ -126,28 +120,28 @@ def _leftovers(target: Path) -> list[Path]:
     return []
 
 
-def publish(temporary: Path, target: Path, *, force: bool) -> None:
+def publish(temporary: Path, target: Path, *, overwrite: bool) -> None:
     """Give a finished file its final name, at once and for good.
 
     Raises
     ------
     UsageError
-        Another process wrote ``target`` meanwhile and ``force`` is not set.
+        Another process wrote ``target`` meanwhile and ``overwrite`` is not set.
     OSError
         The disk failed.
     """
     _sync(temporary)
-    if force:
+    if overwrite:
         temporary.replace(target)
     else:
         try:
             os.link(temporary, target)  # unlike a rename, fails where the name is taken
             temporary.unlink()
         except FileExistsError:
-            raise _exists(target) from None
+            raise ExistsError(target) from None
         except OSError:  # a file system without hard links
             if target.exists():
-                raise _exists(target) from None
+                raise ExistsError(target) from None
             temporary.replace(target)
     with contextlib.suppress(OSError):  # a folder cannot be synced everywhere; the file already is
         _sync(target.parent)

@@ -1,12 +1,22 @@
-"""Which command makes which kind of artefact, and what to run when the wrong kind was given."""
+"""What to do next about an error: the library says what is wrong, this names the command or the option."""
 
 from __future__ import annotations
 
 import shlex
 from typing import TYPE_CHECKING
 
+from pulsetrainer.errors import (
+    DamagedFileError,
+    ExistsError,
+    NotAnArtefactError,
+    PulsetrainerError,
+    WrongKindError,
+)
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from pathlib import Path
+
+_TABLES = (".csv", ".tsv", ".txt", ".dat")
 
 _MAKES = {
     "run": "pulsetrainer capture identification -o run.h5",
@@ -40,19 +50,34 @@ _NEXT = {
 }
 
 
-def maker(kind: str) -> str:
-    """Return the command that makes an artefact of this kind."""
-    return _MAKES.get(kind, "pulsetrainer --help")
+def next_step(problem: PulsetrainerError) -> str:
+    """Return what to do about an error: a command or an option where there is one, else its own hint."""
+    if isinstance(problem, ExistsError):
+        return "give --overwrite to replace it, or name another file"
+    if isinstance(problem, WrongKindError):
+        return _after_wrong_kind(problem)
+    if isinstance(problem, DamagedFileError):
+        how = (
+            f"with `{_MAKES[problem.artefact]}`"
+            if problem.artefact in _MAKES
+            else "(see pulsetrainer --help)"
+        )
+        return f"restore it from a copy, or make it again {how}"
+    if isinstance(problem, NotAnArtefactError):
+        return _after_foreign_file(problem.path)
+    return problem.hint
 
 
-def next_step(expected: Sequence[str], got: str, file: str) -> str:
-    """Return what to do when a file of kind ``got`` was given where ``expected`` was wanted."""
-    for kind in expected:
-        if (kind, got) in _NEXT:
-            return _NEXT[kind, got].format(file=shlex.quote(file))
-    return f"run `{maker(expected[0])}`"
+def _after_wrong_kind(problem: WrongKindError) -> str:
+    for kind in problem.expected:
+        if (kind, problem.found) in _NEXT:
+            return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))
+    return f"run `{_MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"
 
 
-def with_article(kinds: Sequence[str]) -> str:
-    """Return ``a run``, ``an evaluation``, ``a playback or a run``."""
-    return " or ".join(f"{'an' if kind[:1] in 'aeiou' else 'a'} {kind}" for kind in kinds)
+def _after_foreign_file(path: Path) -> str:
+    if path.suffix.lower() in _TABLES:
+        return f"import the table first: pulsetrainer import {shlex.quote(str(path))} -o run.h5"
+    return (
+        "give a file that pulsetrainer wrote; a recording from elsewhere comes in with `pulsetrainer import`"
+    )

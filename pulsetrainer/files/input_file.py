@@ -8,11 +8,9 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError
 
-RESTORE = "restore it from a copy, or make it again: pulsetrainer --help lists the commands"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-_TABLES = (".csv", ".tsv", ".txt", ".dat")
 
 
 def check_file(path: Path | str) -> None:
@@ -37,11 +35,9 @@ def check_artefact(path: Path | str) -> None:
     path = Path(path)
     start = _first_bytes(path)
     if not start:
-        raise DataError(f"{path} is empty", hint=RESTORE)
+        raise DamagedFileError(f"{path} is empty", path=path)
     if start != _HDF5:
-        table = path.suffix.lower() in _TABLES
-        hint = f"read the table in first: pulsetrainer import {path} -o run.h5" if table else RESTORE
-        raise DataError(f"{path} is not an HDF5 file", hint=hint)
+        raise NotAnArtefactError(f"{path} is not an HDF5 file", path=path)
 
 
 def _first_bytes(path: Path) -> bytes:
