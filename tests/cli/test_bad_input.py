@@ -64,8 +64,8 @@ def test_an_existing_output_is_refused_and_kept(ready):
     """Without --overwrite nothing is replaced; with it, it is."""
     before = (ready / "model.h5").read_bytes()
     refused(ready, ["identify", "run.h5", "-o", "model.h5"], 2, "model.h5 already exists", "--overwrite")
-    refused(ready, ["capture", "identification", "-o", "model.h5"], 2, "model.h5 exists")
-    refused(ready, ["play", "drive.h5", "-o", "model.h5"], 2, "model.h5 exists")
+    refused(ready, ["capture", "identification", "-o", "model.h5"], 2, "model.h5 already exists")
+    refused(ready, ["play", "drive.h5", "-o", "model.h5"], 2, "model.h5 already exists")
     refused(ready, ["plot", "run.h5", "-o", "model.h5"], 2)
     assert (ready / "model.h5").read_bytes() == before
     assert (
