@@ -85,10 +85,10 @@ def find_device_port() -> str:
     )
 
 
-def cannot_open(port: str, error: OSError) -> DeviceError:
+def cannot_open(port: str, error: Exception) -> DeviceError:
     """Return what to tell about a port that would not open: absent, busy or not permitted."""
     # pyserial drops the number of what stopped it; the exception it came from still has it.
-    number = error.errno or next(iter(getattr(error.__context__, "args", ())), None)
+    number = getattr(error, "errno", None) or next(iter(getattr(error.__context__, "args", error.args)), None)
     text = str(error)
     if "://" in port:
         return DeviceError(

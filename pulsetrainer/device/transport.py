@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any, Protocol
 
 import serial
@@ -38,7 +39,12 @@ class Transport(Protocol):
 
 
 class SerialTransport:
-    """A port opened by pyserial, for this program alone; ``name`` is what messages call it."""
+    """A port opened by pyserial, for this program alone; ``name`` is what messages call it.
+
+    Beneath pyserial lie the drivers and libraries of three operating systems, which raise ``OSError``,
+    ``termios.error``, ``struct.error``, ``TypeError`` and more on a port that has gone. Whatever it is, to
+    the caller the port is gone.
+    """
 
     def __init__(self, port: str, name: str = "") -> None:
         self._port = name or port
@@ -53,17 +59,17 @@ class SerialTransport:
                 self._serial.dtr = True
                 self._serial.rts = False
             self._serial.open()
-        except (serial.SerialException, OSError) as error:
-            raise cannot_open(port, error) from error
-        except ValueError as error:
+        except (ValueError, LookupError) as error:  # pyserial's way to say that the text makes no sense
             raise DeviceError(
                 f"{port!r} is not a port: {error}",
                 hint="a port is bench:, qemu:, /dev/ttyUSB0, COM3 or socket://host:port",
             ) from error
+        except Exception as error:
+            raise cannot_open(port, error) from error
 
     def _lost(self, error: Exception) -> PortLostError:
         return PortLostError(
-            f"the port {self._port} is gone: {error}",
+            f"the port {self._port} is gone: {error or type(error).__name__}",
             hint="the device switches its output off by itself; check cable and power, then open it again",
         )
 
@@ -74,24 +80,24 @@ class SerialTransport:
             if not first:
                 return b""
             return first + bytes(self._serial.read(self._serial.in_waiting))
-        except (serial.SerialException, OSError, TypeError) as error:
-            # TypeError: pyserial's read on a port that another thread has just closed
+        except Exception as error:
             raise self._lost(error) from error
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
         try:
             self._serial.write(data)
-        except (serial.SerialException, OSError, TypeError) as error:
+        except Exception as error:
             raise self._lost(error) from error
 
     def discard(self) -> None:
         """Forget what has arrived."""
         try:
             self._serial.reset_input_buffer()
-        except (serial.SerialException, OSError) as error:
+        except Exception as error:
             raise self._lost(error) from error
 
     def close(self) -> None:
-        """Give the port back."""
-        self._serial.close()
+        """Give the port back; one that has gone needs nothing more."""
+        with contextlib.suppress(Exception):
+            self._serial.close()
