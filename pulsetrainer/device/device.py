@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Self
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.player import Player, describe_fault
+from pulsetrainer.device.player import Player
 from pulsetrainer.device.ports import find_device_port
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
 from pulsetrainer.device.schemes import OpenPort, find_opener, redact
 from pulsetrainer.device.session import Session
 from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.transport import SerialTransport
+from pulsetrainer.device.wording import describe_fault, reset_text, serial_text
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ class DeviceInfo:
     def from_wire(cls, hello: m.HelloReply, latched_fault: str) -> DeviceInfo:
         """Return what a greeting says."""
         return cls(
-            serial=hello.serial.rstrip(b"\0").decode("ascii", errors="replace"),
+            serial=serial_text(hello.serial),
             firmware=f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}",
             protocol=f"{hello.major}.{hello.minor}",
             build=f"{hello.build_hash:08x}",
@@ -66,7 +67,7 @@ class DeviceInfo:
             on_time_limit_s=float(hello.on_time_s),
             heartbeat_s=hello.heartbeat_ms / 1_000,
             wave_buffer_samples=hello.wave_buffer,
-            reset_cause=codes.ResetCause(hello.reset_cause).name.lower(),
+            reset_cause=reset_text(hello.reset_cause),
             latched_fault=latched_fault,
         )
 
@@ -94,10 +95,12 @@ class Device:
         self._monotonic = monotonic
         self._sleep = sleep
         self._player: Player | None = None
+        self._turn = threading.Lock()  # held by whoever talks to the device, and to change who plays
         self._greet()
 
     def _greet(self) -> None:
-        self._hello = self._session.hello()
+        with self._turn:
+            self._hello = self._session.hello()
         latched = describe_fault(self._status(), self._hello.tick_rate_Hz)
         self.info = DeviceInfo.from_wire(self._hello, latched)
 
@@ -112,6 +115,9 @@ class Device:
         try:
             with contextlib.suppress(PulsetrainerError):
                 self.stop()
+            playing = self._player
+            if playing is not None:  # in another thread, which is just stopping the device
+                playing.ended.wait()
         finally:
             self._port.close()
 
@@ -121,14 +127,29 @@ class Device:
         return self.info.on_time_limit_s - _RAMP_S
 
     def stop(self) -> None:
-        """Ramp the current to zero and disarm; from another thread it ends a play."""
-        if self._player is not None:
-            self._player.stop(_STOPPED)
-        else:
-            self._session.request(m.Stop())
+        """Ramp the current to zero and disarm; any thread may ask, at any time.
+
+        While a play goes on in another thread this returns at once, and STOP is the next that the device
+        hears; the play then ends as ``stopped``. It is the only method that may be called meanwhile.
+        """
+        with self._turn:
+            if self._player is not None:
+                self._player.stop(_STOPPED)
+            else:
+                self._session.request(m.Stop())
+
+    def _ask(self, command: m.Message) -> m.Message:
+        """Ask while nothing is played: one thread talks to the device at a time."""
+        with self._turn:
+            if self._player is not None:
+                raise DeviceError(
+                    f"the device is playing; {type(command).__name__} has to wait",
+                    hint="wait for the play to end, or stop() it",
+                )
+            return self._session.request(command)
 
     def _status(self) -> m.StatusReply:
-        reply = self._session.request(m.Status())
+        reply = self._ask(m.Status())
         if not isinstance(reply, m.StatusReply):
             raise DeviceError(
                 "the device answered Status with something else", hint="flash the firmware again"
@@ -149,7 +170,7 @@ class Device:
                 f"{name}={value} is outside {row.minimum}..{row.maximum} {row.unit}",
                 hint="a limit can only be lowered below the one compiled into the firmware",
             )
-        reply = self._session.request(m.SetParam(row.id, value))
+        reply = self._ask(m.SetParam(row.id, value))
         if not isinstance(reply, m.ParamReply) or reply.value != value:
             raise DeviceError(f"the device did not take {name}={value}", hint="flash the firmware again")
         self._greet()  # the limits in force have changed
@@ -227,11 +248,16 @@ class Device:
             monotonic=self._monotonic,
             piece_s=self._port.piece_s,
         )
-        self._player = player
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
-        thread.start()
+        with self._turn:
+            if self._player is not None:
+                raise DeviceError(
+                    "the device is playing already", hint="wait for the play to end, or stop() it"
+                )
+            self._player = player
         interrupted = False
         try:
+            thread.start()
             interrupted = self._follow(player, on_block, should_stop, keep=keep)
         finally:
             player.stop(_STOPPED)
@@ -240,7 +266,8 @@ class Device:
                     thread.join()
                 except KeyboardInterrupt:
                     interrupted = True
-            self._player = None
+            with self._turn:
+                self._player = None
         if player.error is not None:
             raise player.error
         return self._trace(player, interrupted)

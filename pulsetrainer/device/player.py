@@ -7,6 +7,7 @@ takes its data for some seconds it stops the device itself.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import zlib
 from dataclasses import dataclass
@@ -16,8 +17,9 @@ import numpy as np
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.session import NoAnswerError, RefusedError, Session
+from pulsetrainer.device.session import AbandonedError, NoAnswerError, RefusedError, Session
 from pulsetrainer.device.transport import PortLostError
+from pulsetrainer.device.wording import describe_fault, remedy_of, reset_text, state_text
 from pulsetrainer.errors import DeviceError, PulsetrainerError
 
 if TYPE_CHECKING:
@@ -42,15 +44,6 @@ class Outcome:
 
 
 NOTHING = m.Telemetry(0, 0, 0, 0, 0, b"")  # in the place of a block that nobody needs any more
-
-# Faults whose cause is not in the device.
-_REMEDY = {
-    codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
-    codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
-    codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",
-    codes.Fault.ON_TIME: "play it in several pieces",
-    codes.Fault.WAVE_CRC: "check the cable, then run the command again",
-}
 
 
 class Player:
@@ -136,8 +129,10 @@ class Player:
         self.samples += block.count
 
     def _request(self, command: m.Message) -> m.Ack:
+        """Ask; once the play is to be stopped nothing but STOP is still waited for."""
         self._tick_at_send = self._tick
-        reply = self._session.request(command)
+        urgent = isinstance(command, m.Stop)
+        reply = self._session.request(command, None if urgent else self._stop.is_set)
         if not isinstance(reply, m.Ack):
             raise DeviceError(
                 f"the device answered {type(command).__name__} with {type(reply).__name__}",
@@ -206,7 +201,6 @@ class Player:
                 self._stop_remedy = "the disk is too slow: write elsewhere, close other programs"
                 self.stop(f"the program did not take its data for {_TAKER_S:g} s")
             if self._stop.is_set():
-                self._request(m.Stop())
                 return
             if self._send_chunk(self._credit()):
                 continue
@@ -216,7 +210,8 @@ class Player:
                 self._session.receive()
 
     def _finish(self) -> m.StatusReply:
-        """Wait for the ramp to end and for the telemetry on its way."""
+        """Stop, whatever the device is thought to be doing; then wait for the ramp and the last telemetry."""
+        self._request(m.Stop())
         deadline = self._monotonic() + _RAMP_S
         status = self._status()
         while status.state in {codes.State.RUNNING, codes.State.RAMPING} and self._monotonic() < deadline:
@@ -228,61 +223,51 @@ class Player:
         return status
 
     def _play(self) -> Outcome:
-        self._upload()
-        if self._stop.is_set():
-            self._request(m.Stop())
-            return Outcome(0, played_to_end=False, fault=self._stop_reason)
+        refused = ""
         try:
             try:
-                self._request(m.Arm(self._hello.boot_nonce))
+                self._upload()
                 # Telemetry may overtake a lost reply to START: know its session beforehand.
                 self._play_session = (self._ack.session + 1) & 0xFF
+                self._request(m.Arm(self._hello.boot_nonce))
                 self._request(m.Start())
                 self._stream()
-            except RefusedError as refused:
-                # The device left the state we thought it in; its status says why.
-                return self._judge(self._finish(), refused.message)
-            return self._judge(self._finish(), "")
+            except AbandonedError:  # it is to be stopped
+                if self._play_session < 0:
+                    return Outcome(0, played_to_end=False, fault=self._stop_reason)
+            except RefusedError as error:
+                if self._play_session < 0:
+                    raise
+                refused = error.message  # it left the state we thought it in; its status will say why
+            return self._judge(self._finish(), refused)
         except (PortLostError, NoAnswerError) as error:
+            if self._play_session < 0:
+                raise
             return Outcome(-1, played_to_end=False, fault=error.message, remedy=error.hint)
         finally:
             self._leave()
 
     def _leave(self) -> None:
         """Disarm, whatever happened; a device that cannot be reached does it by itself."""
-        try:
+        with contextlib.suppress(PulsetrainerError):
             self._session.request(m.Stop())
-        except PulsetrainerError:
-            return
 
     def _judge(self, status: m.StatusReply, refused: str) -> Outcome:
         if status.boot_nonce != self._hello.boot_nonce:
-            cause = codes.ResetCause(status.reset_cause).name.lower().replace("_", " ")
             return Outcome(
                 -1,
                 played_to_end=False,
-                fault=f"the device restarted in mid-play (cause: {cause})",
+                fault=f"the device restarted in mid-play (cause: {reset_text(status.reset_cause)})",
                 remedy="check its power supply and cable; nothing was started again",
             )
         last_tick = (len(self._samples) - 1) * self._ticks_per_sample
         fault = describe_fault(status, self._hello.tick_rate_Hz) or self._stop_reason
-        to_end = status.tick > last_tick and not fault
+        if not fault and status.state != codes.State.IDLE:
+            fault = f"the device did not come to rest after the play (state: {state_text(status.state)})"
+        # Refused before it started: the numbers in the status are those of an earlier play.
+        started = status.session == self._play_session
+        to_end = started and status.tick > last_tick and not fault
         if not fault and not to_end:
             fault = refused or "the device ended the play early"
-        # Refused before it started: the numbers in the status are those of an earlier play.
-        produced = status.produced if status.session == self._play_session else 0
-        known = {int(f): text for f, text in _REMEDY.items()}
-        return Outcome(produced, to_end, fault, known.get(status.fault, self._stop_remedy))
-
-
-def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:
-    """Return the latched fault with its snapshot, empty if there is none."""
-    if not status.fault:
-        return ""
-    text = codes.FAULT_TEXT.get(codes.Fault(status.fault)) if status.fault <= max(codes.Fault) else None
-    return (
-        f"{text or f'fault {status.fault}'} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
-        f"reference {status.fault_reference * codes.CURRENT_UNIT_A:.4f} A, "
-        f"current {status.fault_current * codes.CURRENT_UNIT_A:.4f} A, "
-        f"force {status.fault_force * codes.FORCE_UNIT_N:.3f} N)"
-    )
+        produced = status.produced if started else 0
+        return Outcome(produced, to_end, fault, remedy_of(status.fault) or self._stop_remedy)

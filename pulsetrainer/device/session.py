@@ -5,16 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pulsetrainer.device.codes import (
-    FAULT_TEXT,
     FIRMWARE_MAJOR,
     FIRMWARE_MINOR,
     FIRMWARE_PATCH,
     MAGIC,
-    NAK_TEXT,
     PROTOCOL_MAJOR,
     PROTOCOL_MINOR,
-    Fault,
-    NakCode,
 )
 from pulsetrainer.device.frames import Frame, FrameReader, encode
 from pulsetrainer.device.messages import (
@@ -28,6 +24,7 @@ from pulsetrainer.device.messages import (
     answers,
 )
 from pulsetrainer.device.schemes import TIMEOUTS_S
+from pulsetrainer.device.wording import fault_text, refusal_text
 from pulsetrainer.errors import DeviceError
 
 if TYPE_CHECKING:
@@ -44,18 +41,19 @@ class NoAnswerError(DeviceError):
     """The device did not answer a command."""
 
 
+class AbandonedError(DeviceError):
+    """The caller no longer waits for the answer to a command: something is more urgent."""
+
+
 class RefusedError(DeviceError):
     """The device answered no."""
 
     def __init__(self, port: str, nak: Nak) -> None:
         self.nak = nak
-        codes = {int(c) for c in NakCode}
-        why = NAK_TEXT[NakCode(nak.code)] if nak.code in codes else f"code {nak.code}"
-        faults = {int(f) for f in Fault}
-        fault = FAULT_TEXT[Fault(nak.fault)] if nak.fault in faults else f"fault {nak.fault}"
+        fault = fault_text(nak.fault)
         super().__init__(
-            f"the device on {port} refused {_NAMES.get(nak.command, hex(nak.command))}: {why}"
-            + (f" (latched fault: {fault})" if fault else ""),
+            f"the device on {port} refused {_NAMES.get(nak.command, hex(nak.command))}: "
+            f"{refusal_text(nak.code)}" + (f" (latched fault: {fault})" if fault else ""),
             hint="run the command again; if it is refused again, restart the device",
         )
 
@@ -108,7 +106,9 @@ class Session:
         self._transport.write(encode(Frame(command.TYPE, seq, command.pack())))
         self.sent_at_s = self._monotonic()
 
-    def _reply(self, command: Message, timeout_s: float) -> Message | None:
+    def _reply(
+        self, command: Message, timeout_s: float, abandon: Callable[[], bool] | None = None
+    ) -> Message | None:
         """Return the reply to ``command``, just sent; replies to anything earlier are stale and dropped."""
         deadline = self._monotonic() + timeout_s
         while True:
@@ -125,15 +125,19 @@ class Session:
                 if answers(reply, command):  # else it is 256 commands old, or damage that fits the checksum
                     return reply
                 self.rejected += 1
+            if abandon is not None and abandon():
+                raise AbandonedError(f"{type(command).__name__} was not waited for")
             if self._monotonic() >= deadline:
                 return None
             self.receive()
 
-    def request(self, command: Message) -> Message:
+    def request(self, command: Message, abandon: Callable[[], bool] | None = None) -> Message:
         """Return the reply to ``command``; commands are idempotent, so a lost one is simply sent again.
 
         Raises
         ------
+        AbandonedError
+            as soon as ``abandon`` says so; the device may have done what was asked.
         NoAnswerError
             if none of the tries was answered.
         RefusedError
@@ -142,7 +146,7 @@ class Session:
         self._seq = (self._seq + 1) & 0xFF
         for timeout_s in self._timeouts_s:
             self._send(command, self._seq)
-            reply = self._reply(command, timeout_s)
+            reply = self._reply(command, timeout_s, abandon)
             if isinstance(reply, Nak):
                 raise RefusedError(self._port, reply)
             if reply is not None:
@@ -171,6 +175,7 @@ class Session:
             reply = self._reply(command, _HELLO_TRY_S)
             if isinstance(reply, HelloReply) and reply.magic == MAGIC:
                 self._check_version(reply)
+                self._check_sense(reply)
                 return reply
         if self._heard:
             raise DeviceError(
@@ -182,6 +187,22 @@ class Session:
             f"nobody answers on {self._port}",
             hint="check that the device has power and that this is its port: `pulsetrainer ports`",
         )
+
+    def _check_sense(self, reply: HelloReply) -> None:
+        for name in (
+            "tick_rate_Hz",
+            "wave_buffer",
+            "heartbeat_ms",
+            "current_limit",
+            "force_trip",
+            "on_time_s",
+        ):
+            if getattr(reply, name) <= 0:
+                raise DeviceError(
+                    f"the device on {self._port} says {name} = {getattr(reply, name)} in its greeting; "
+                    "that must be above 0",
+                    hint="flash the firmware that came with this program (make -C firmware)",
+                )
 
     def _check_version(self, reply: HelloReply) -> None:
         firmware = (reply.firmware_major, reply.firmware_minor, reply.firmware_patch)

@@ -1,0 +1,69 @@
+"""What the numbers that a device tells mean, in words; also those that this program does not know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import IntEnum
+
+from pulsetrainer.device import codes
+from pulsetrainer.device import messages as m
+
+# What to do about a fault whose cause is not in the device.
+_REMEDY: dict[int, str] = {
+    codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
+    codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
+    codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",
+    codes.Fault.ON_TIME: "play it in several pieces",
+    codes.Fault.WAVE_CRC: "check the cable, then run the command again",
+}
+
+
+def _told(number: int, known: Mapping[int, str], kind: str) -> str:
+    return known.get(number, f"{kind} {number}, which this program does not know")
+
+
+def fault_text(number: int) -> str:
+    """Return a fault in words; empty for none."""
+    return _told(number, {int(fault): text for fault, text in codes.FAULT_TEXT.items()}, "fault")
+
+
+def refusal_text(number: int) -> str:
+    """Return why a command was refused."""
+    return _told(number, {int(code): text for code, text in codes.NAK_TEXT.items()}, "refusal")
+
+
+def _names(numbers: type[IntEnum]) -> dict[int, str]:
+    return {int(one): one.name.lower().replace("_", " ") for one in numbers}
+
+
+def reset_text(number: int) -> str:
+    """Return why the device last started."""
+    return _told(number, _names(codes.ResetCause), "cause")
+
+
+def state_text(number: int) -> str:
+    """Return what the device is doing."""
+    return _told(number, _names(codes.State), "state")
+
+
+def remedy_of(fault: int) -> str:
+    """Return what to do about a fault, empty where nothing better than finding its cause is known."""
+    return _REMEDY.get(fault, "")
+
+
+def serial_text(serial: bytes) -> str:
+    """Return a serial number that can be shown and stored, whatever bytes came."""
+    text = serial.rstrip(b"\0").decode("ascii", errors="replace")
+    return "".join(letter if letter.isprintable() else "\N{REPLACEMENT CHARACTER}" for letter in text)
+
+
+def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:
+    """Return the latched fault with its snapshot, empty if there is none."""
+    if not status.fault:
+        return ""
+    return (
+        f"{fault_text(status.fault)} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
+        f"reference {status.fault_reference * codes.CURRENT_UNIT_A:.4f} A, "
+        f"current {status.fault_current * codes.CURRENT_UNIT_A:.4f} A, "
+        f"force {status.fault_force * codes.FORCE_UNIT_N:.3f} N)"
+    )
