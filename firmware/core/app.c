@@ -38,11 +38,21 @@ static void apply_params(void)
     app.pid.feed_offset = app.param[PT_PARAM_FEED_OFFSET];
 }
 
+static void default_params(void)
+{
+    for (uint8_t id = 0; id < PT_PARAM_COUNT; id++)
+        app.param[id] = param_table[id][1];
+}
+
 void app_init(void)
 {
     hal_pwm_kill();
     app.state = PT_STATE_IDLE;
     app.fault = PT_FAULT_NONE;
+    app.worst = PT_FAULT_NONE;
+    app.beat = 0;
+    app.current = 0;
+    app.force = 0;
     app.snapshot = (struct app_snapshot){0};
     app.tick = 0;
     app.session = 0;
@@ -53,11 +63,10 @@ void app_init(void)
     app.reference = 0;
     app.duty = 0;
     app.reply_valid = false;
-    for (uint8_t id = 0; id < PT_PARAM_COUNT; id++)
-        app.param[id] = param_table[id][1];
+    default_params();
     wave_reset(&app.wave);
     pid_reset(&app.pid);
-    safety_init(&app.safety);
+    safety_init(&app.safety, hal_kept(), hal_reset_cause() == PT_RESET_POWER);
     telemetry_init(&app.telemetry);
     frame_decoder_init(&app.decoder);
     apply_params();
@@ -76,8 +85,19 @@ static void output_off(void)
     app.wave.committed = false;
 }
 
+static uint8_t gravity(uint8_t fault)
+{
+    if (fault == PT_FAULT_NONE)
+        return 0;
+    if (fault == PT_FAULT_OUTPUT_NOT_OFF)
+        return 3;
+    return safety_is_soft(fault) ? 1 : 2;
+}
+
 static void latch(uint8_t fault, int16_t current, int16_t force)
 {
+    if (gravity(fault) > gravity(app.worst))
+        app.worst = fault;
     if (app.fault != PT_FAULT_NONE)
         return;
     app.fault = fault;
@@ -157,12 +177,15 @@ static void control(void)
     in.reference = app.reference;
     in.current = units_current(adc.current);
     in.force = units_force(adc.force);
+    app.current = in.current;
+    app.force = in.force;
     in.current_counts = adc.current;
     in.force_counts = adc.force;
     in.duty = app.duty;
     in.full = HAL_PWM_PERIOD;
     in.driving = driving;
     in.armed = driving || app.state == PT_STATE_ARMED;
+    in.awaited = was_running || app.state == PT_STATE_ARMED;
 
     if (was_running) {
         struct telemetry_sample s = {app.tick, asked, in.current, in.force};
@@ -224,7 +247,8 @@ uint8_t app_wave_begin(uint32_t total, uint16_t ticks_per_sample, uint32_t crc)
     if (total == 0 || ticks_per_sample == 0 || ticks_per_sample > PT_MAX_TICKS_PER_SAMPLE)
         return PT_NAK_CODE_RANGE;
     /* Too long for the on-time limit: refuse now, not in mid-play. */
-    if (total - 1u > (app.safety.on_ticks_limit - APP_RAMP_TICKS) / ticks_per_sample)
+    uint32_t on_ticks = (uint32_t)app.param[PT_PARAM_ON_TIME] * PT_TICK_RATE_HZ;
+    if (total - 1u > (on_ticks - APP_RAMP_TICKS) / ticks_per_sample)
         return PT_NAK_CODE_RANGE;
     wave_begin(&app.wave, total, ticks_per_sample, crc);
     return 0;
@@ -249,6 +273,7 @@ uint8_t app_wave_data(uint32_t offset, const uint8_t *samples, uint8_t count)
     wave_append(w, samples, count);
     hal_critical_enter();
     wave_publish(w, count);
+    safety_alive(&app.safety);
     hal_critical_exit();
     return 0;
 }
@@ -281,6 +306,7 @@ uint8_t app_arm(uint32_t nonce)
     if (!app.wave.committed)
         return PT_NAK_CODE_STATE;
     hal_critical_enter();
+    apply_params();
     safety_begin(&app.safety);
     pid_reset(&app.pid);
     app.state = PT_STATE_ARMED;
@@ -299,6 +325,7 @@ uint8_t app_start(void)
     app.tick = 0;
     wave_start(&app.wave);
     telemetry_begin(&app.telemetry, app.session);
+    safety_alive(&app.safety);
     app.state = PT_STATE_RUNNING;
     hal_critical_exit();
     return 0;
@@ -320,17 +347,57 @@ uint8_t app_stop(void)
     return 0;
 }
 
-uint8_t app_clear_fault(void)
+uint8_t app_clear_fault(uint8_t fault, uint8_t worst)
 {
-    if (app.state == PT_STATE_RAMPING)
-        return PT_NAK_CODE_STATE;
+    uint8_t refused = 0;
     hal_critical_enter();
-    if (app.state == PT_STATE_FAULT)
-        app.state = PT_STATE_IDLE;
-    app.fault = PT_FAULT_NONE;
-    app.snapshot = (struct app_snapshot){0};
+    if (app.fault == PT_FAULT_NONE) {
+        refused = 0; /* it is cleared already */
+    } else if (app.state == PT_STATE_RAMPING) {
+        refused = PT_NAK_CODE_STATE;
+    } else if (fault != app.fault || worst != app.worst) {
+        refused = PT_NAK_CODE_FAULT; /* not what the host has seen */
+    } else {
+        if (app.state == PT_STATE_FAULT)
+            app.state = PT_STATE_IDLE;
+        app.fault = PT_FAULT_NONE;
+        app.worst = PT_FAULT_NONE;
+        app.snapshot = (struct app_snapshot){0};
+    }
     hal_critical_exit();
-    return 0;
+    return refused;
+}
+
+/* A wire that is stuck repeats what it heard: only what cannot be a repetition is a sign of life. */
+void app_beat(uint32_t counter)
+{
+    if (counter <= app.beat)
+        return;
+    app.beat = counter;
+    safety_alive(&app.safety);
+}
+
+uint8_t app_coil_heat(uint16_t per_mille)
+{
+    if (app.state != PT_STATE_IDLE && app.state != PT_STATE_FAULT)
+        return PT_NAK_CODE_STATE;
+    if (per_mille > HEAT_MOST_PER_MILLE)
+        return PT_NAK_CODE_RANGE;
+    hal_critical_enter();
+    bool taken = heat_tell(&app.safety.heat, per_mille);
+    hal_critical_exit();
+    return taken ? 0u : PT_NAK_CODE_RANGE;
+}
+
+/* A new host: nothing that an earlier one left running goes on, nothing that it set holds. */
+void app_greet(bool same_major)
+{
+    (void)app_stop();
+    hal_critical_enter();
+    app.greeted = same_major;
+    app.beat = 0;
+    default_params();
+    hal_critical_exit();
 }
 
 uint8_t app_stream(uint16_t decimation)
@@ -353,7 +420,6 @@ uint8_t app_set_param(uint8_t id, int32_t value)
         return PT_NAK_CODE_RANGE;
     hal_critical_enter();
     app.param[id] = value;
-    apply_params();
     /* A reference checked against the old limit must not be played under the new one. */
     app.wave.begun = false;
     app.wave.committed = false;

@@ -27,6 +27,10 @@ struct app_snapshot {
 struct app {
     volatile uint8_t state;   /* PT_STATE_... */
     volatile uint8_t fault;   /* the first cause, latched until CLEAR_FAULT */
+    volatile uint8_t worst;   /* the gravest since then */
+    uint32_t beat;            /* the largest heartbeat counter since the greeting */
+    int16_t current;          /* as just read */
+    int16_t force;
     struct app_snapshot snapshot;
     volatile uint32_t tick;   /* of the session */
     uint8_t session;
@@ -65,7 +69,10 @@ uint8_t app_wave_commit(uint32_t count, uint32_t crc);
 uint8_t app_arm(uint32_t nonce);
 uint8_t app_start(void);
 uint8_t app_stop(void);
-uint8_t app_clear_fault(void);
+uint8_t app_clear_fault(uint8_t fault, uint8_t worst);
+void app_beat(uint32_t counter);
+uint8_t app_coil_heat(uint16_t per_mille);
+void app_greet(bool same_major);
 uint8_t app_stream(uint16_t decimation);
 uint8_t app_set_param(uint8_t id, int32_t value);
 

@@ -90,6 +90,13 @@ static void reply_status(void)
     put_i16(p + PT_STATUS_REPLY_FAULT_FORCE, app.snapshot.force);
     put_u16(p + PT_STATUS_REPLY_FAULT_DUTY, app.snapshot.duty);
     p[PT_STATUS_REPLY_FAULT_STATE] = app.snapshot.state;
+    p[PT_STATUS_REPLY_WORST] = app.worst;
+    p[PT_STATUS_REPLY_FLAGS] =
+        (uint8_t)((app.worst == PT_FAULT_OUTPUT_NOT_OFF ? PT_STATUS_OUTPUT_NOT_OFF : 0u) |
+                  (heat_is_assumed(&app.safety.heat) ? PT_STATUS_HEAT_ASSUMED : 0u));
+    put_i16(p + PT_STATUS_REPLY_CURRENT, app.current);
+    put_i16(p + PT_STATUS_REPLY_FORCE, app.force);
+    put_u16(p + PT_STATUS_REPLY_HEAT, heat_per_mille(&app.safety.heat));
     hal_critical_exit();
     p[PT_STATUS_REPLY_RESET_CAUSE] = hal_reset_cause();
     put_u32(p + PT_STATUS_REPLY_BOOT_NONCE, app.nonce);
@@ -133,10 +140,8 @@ static uint8_t hello(const uint8_t *p)
 {
     if (get_u32(p + PT_HELLO_MAGIC) != PT_MAGIC)
         return PT_NAK_CODE_VERSION;
-    /* A new host: nothing that an earlier one left running goes on. */
-    (void)app_stop();
     /* Another major version still gets its answer, so that it can name both sides. */
-    app.greeted = p[PT_HELLO_MAJOR] == PT_PROTOCOL_MAJOR;
+    app_greet(p[PT_HELLO_MAJOR] == PT_PROTOCOL_MAJOR);
     reply_hello();
     return 0;
 }
@@ -189,12 +194,18 @@ static uint8_t execute(const struct frame *f)
         refused = app_stop();
         break;
     case PT_CLEAR_FAULT:
-        refused = app_clear_fault();
+        refused = app_clear_fault(p[PT_CLEAR_FAULT_FAULT], p[PT_CLEAR_FAULT_WORST]);
+        break;
+    case PT_COIL_HEAT:
+        refused = app_coil_heat(get_u16(p + PT_COIL_HEAT_HEAT));
+        break;
+    case PT_HEARTBEAT:
+        app_beat(get_u32(p + PT_HEARTBEAT_COUNTER));
         break;
     case PT_STREAM:
         refused = app_stream(get_u16(p + PT_STREAM_DECIMATION));
         break;
-    default: /* HEARTBEAT: being heard is all it asks */
+    default: /* check_length() knows no other */
         break;
     }
     if (!refused)
@@ -206,8 +217,6 @@ void proto_handle(const struct frame *f)
 {
     uint8_t refused = check_length(f);
     uint16_t crc = frame_crc16(f->payload, f->length);
-    if (!refused)
-        safety_alive(&app.safety);
     bool again = app.reply_valid && f->type == app.reply_to_type && f->seq == app.reply_to_seq &&
                  crc == app.reply_to_crc && f->type != PT_HELLO;
     if (!again) {

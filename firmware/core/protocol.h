@@ -7,7 +7,7 @@
 
 
 #ifndef PT_PROTOCOL_MAJOR
-#define PT_PROTOCOL_MAJOR 1u
+#define PT_PROTOCOL_MAJOR 2u
 #endif
 #ifndef PT_PROTOCOL_MINOR
 #define PT_PROTOCOL_MINOR 0u
@@ -16,7 +16,7 @@
 #define PT_FIRMWARE_MAJOR 0u
 #endif
 #ifndef PT_FIRMWARE_MINOR
-#define PT_FIRMWARE_MINOR 1u
+#define PT_FIRMWARE_MINOR 2u
 #endif
 #ifndef PT_FIRMWARE_PATCH
 #define PT_FIRMWARE_PATCH 0u
@@ -31,6 +31,8 @@
 #define PT_HEARTBEAT_MAX_MS 200u
 #define PT_FLAG_LAST 1u
 #define PT_FLAG_SLEW 2u
+#define PT_STATUS_OUTPUT_NOT_OFF 1u
+#define PT_STATUS_HEAT_ASSUMED 2u
 
 /* what the device is doing */
 #define PT_STATE_IDLE 0u
@@ -56,6 +58,13 @@
 #define PT_FAULT_TICK_OVERRUN 13u
 #define PT_FAULT_WAVE_CRC 14u
 #define PT_FAULT_STRAY_CURRENT 15u
+#define PT_FAULT_CURRENT_IMPLAUSIBLE 16u
+#define PT_FAULT_FORCE_IMPLAUSIBLE 17u
+#define PT_FAULT_FORCE_ZERO 18u
+#define PT_FAULT_COMPARATOR 19u
+#define PT_FAULT_OUTPUT_NOT_OFF 20u
+#define PT_FAULT_TICK_LOST 21u
+#define PT_FAULT_CONVERTER 22u
 
 /* why a command was refused */
 #define PT_NAK_CODE_UNKNOWN 1u
@@ -76,6 +85,7 @@
 #define PT_RESET_WATCHDOG 2u
 #define PT_RESET_BROWN_OUT 3u
 #define PT_RESET_SOFTWARE 4u
+#define PT_RESET_CLOCK 5u
 
 /* parameters: X(NAME, id, minimum, default, absolute maximum) */
 #define PT_PARAMETERS(X) \
@@ -115,7 +125,8 @@
 #define PT_STATUS_LEN 0u
 
 #define PT_HEARTBEAT 0x03u
-#define PT_HEARTBEAT_LEN 0u
+#define PT_HEARTBEAT_COUNTER 0u
+#define PT_HEARTBEAT_LEN 4u
 
 #define PT_GET_PARAM 0x04u
 #define PT_GET_PARAM_ID 0u
@@ -155,11 +166,17 @@
 #define PT_STOP_LEN 0u
 
 #define PT_CLEAR_FAULT 0x0Cu
-#define PT_CLEAR_FAULT_LEN 0u
+#define PT_CLEAR_FAULT_FAULT 0u
+#define PT_CLEAR_FAULT_WORST 1u
+#define PT_CLEAR_FAULT_LEN 2u
 
 #define PT_STREAM 0x0Du
 #define PT_STREAM_DECIMATION 0u
 #define PT_STREAM_LEN 2u
+
+#define PT_COIL_HEAT 0x0Eu
+#define PT_COIL_HEAT_HEAT 0u
+#define PT_COIL_HEAT_LEN 2u
 
 #define PT_HELLO_REPLY 0x81u
 #define PT_HELLO_REPLY_MAGIC 0u
@@ -199,7 +216,12 @@
 #define PT_STATUS_REPLY_FAULT_STATE 27u
 #define PT_STATUS_REPLY_RESET_CAUSE 28u
 #define PT_STATUS_REPLY_BOOT_NONCE 29u
-#define PT_STATUS_REPLY_LEN 33u
+#define PT_STATUS_REPLY_WORST 33u
+#define PT_STATUS_REPLY_FLAGS 34u
+#define PT_STATUS_REPLY_CURRENT 35u
+#define PT_STATUS_REPLY_FORCE 37u
+#define PT_STATUS_REPLY_HEAT 39u
+#define PT_STATUS_REPLY_LEN 41u
 
 #define PT_ACK 0x83u
 #define PT_ACK_CREDIT 0u
@@ -248,6 +270,7 @@
     X(START, 0) \
     X(STOP, 0) \
     X(CLEAR_FAULT, 0) \
-    X(STREAM, 0)
+    X(STREAM, 0) \
+    X(COIL_HEAT, 0)
 
 #endif

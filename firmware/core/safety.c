@@ -1,10 +1,8 @@
 #include "safety.h"
 
-void safety_init(struct safety *s)
+void safety_init(struct safety *s, struct hal_kept *kept, bool power_on)
 {
-    s->heat_ticks = 0;
-    s->heat_sum = 0;
-    s->heat = 0;
+    heat_init(&s->heat, kept, power_on);
     s->stray = 0;
     safety_begin(s);
 }
@@ -73,17 +71,6 @@ static int32_t still_span(struct safety_still *m, uint16_t counts, int16_t mover
     return (int32_t)m->high - m->low;
 }
 
-static bool too_hot(struct safety *s, int16_t current)
-{
-    s->heat_sum += (int32_t)((uint32_t)((int32_t)current * current) >> 10);
-    if (++s->heat_ticks == 1024u) {
-        s->heat += (s->heat_sum - s->heat) >> 10;
-        s->heat_ticks = 0;
-        s->heat_sum = 0;
-    }
-    return s->heat > SAFETY_HEAT_LIMIT;
-}
-
 static uint8_t sensors(struct safety *s, const struct safety_input *in)
 {
     bool current_rail = in->current_counts >= SAFETY_RAIL_HIGH;
@@ -117,11 +104,11 @@ static uint8_t sensors(struct safety *s, const struct safety_input *in)
 uint8_t safety_tick(struct safety *s, const struct safety_input *in)
 {
     /* Each counter advances in every tick, whatever else is found: no early return before them. */
-    bool hot = too_hot(s, in->current);
+    heat_tick(&s->heat, in->current);
     bool over_force = lasts(&s->over_force, in->armed && in->force > s->force_trip, SAFETY_FORCE_DEBOUNCE);
     bool stray = lasts(&s->stray, in->reference == 0 && in->current > SAFETY_STRAY_CURRENT, SAFETY_STRAY_TICKS);
     uint8_t sensor = in->armed ? sensors(s, in) : PT_FAULT_NONE;
-    if (in->armed && s->silent_ticks < 0xFFFFu)
+    if (in->awaited && s->silent_ticks < 0xFFFFu)
         s->silent_ticks++;
     if (in->driving)
         s->on_ticks++;
@@ -136,9 +123,9 @@ uint8_t safety_tick(struct safety *s, const struct safety_input *in)
         return PT_FAULT_STRAY_CURRENT;
     if (!in->armed)
         return PT_FAULT_NONE;
-    if (s->silent_ticks > s->heartbeat_ticks)
+    if (in->awaited && s->silent_ticks > s->heartbeat_ticks)
         return PT_FAULT_HEARTBEAT;
-    if (hot)
+    if (heat_is_too_much(&s->heat))
         return PT_FAULT_COIL_HEAT;
     if (s->on_ticks > s->on_ticks_limit)
         return PT_FAULT_ON_TIME;

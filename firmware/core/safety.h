@@ -8,6 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "heat.h"
 #include "protocol.h"
 
 /* Debounce and plausibility, in ticks of 100 us, 100 uA and mN. */
@@ -28,10 +29,6 @@
 #define SAFETY_STRAY_CURRENT 1000
 #define SAFETY_STRAY_TICKS 2000u
 
-/* I2t of the coil: a first-order average of the squared current over 2^20 ticks (105 s) may not pass
- * (1.25 A)^2. The full 1.5 A from cold trips after about two minutes. */
-#define SAFETY_HEAT_LIMIT 156250000L
-
 struct safety_input {
     int16_t reference; /* after the slew limit */
     int16_t current;
@@ -41,6 +38,7 @@ struct safety_input {
     uint16_t duty; /* applied since the last tick */
     uint16_t full; /* the largest duty */
     bool armed;    /* ARMED, RUNNING or RAMPING */
+    bool awaited;  /* ARMED or RUNNING: without signs of life from the host this ends */
     bool driving;  /* RUNNING or RAMPING: the output is on */
 };
 
@@ -70,15 +68,12 @@ struct safety {
     uint16_t stray;
     struct safety_still current_still;
     struct safety_still force_still;
-    /* Heat: the sum of the present 1024 ticks and the average. */
-    uint16_t heat_ticks;
-    int32_t heat_sum;
-    int32_t heat;
+    struct heat heat;
 };
 
-void safety_init(struct safety *s);
+void safety_init(struct safety *s, struct hal_kept *kept, bool power_on);
 void safety_begin(struct safety *s); /* at ARM: counters of the run to zero; the heat stays */
-void safety_alive(struct safety *s); /* a valid command came from the host */
+void safety_alive(struct safety *s); /* a sign of life came from the host */
 
 /* The first fault found in this tick, or PT_FAULT_NONE. */
 uint8_t safety_tick(struct safety *s, const struct safety_input *in);

@@ -34,6 +34,14 @@ void hal_watchdog_feed(void);
 void hal_critical_enter(void);
 void hal_critical_exit(void);
 
+/* Outlives every reset but power-on; after that it holds anything. */
+struct hal_kept {
+    uint32_t heat;    /* (100 uA)^2 */
+    uint32_t assumed; /* 1: nobody has told */
+    uint32_t check;
+};
+struct hal_kept *hal_kept(void);
+
 /* Identity. */
 uint8_t hal_reset_cause(void);  /* PT_RESET_... */
 uint32_t hal_boot_nonce(void);  /* another value at each start */

@@ -90,6 +90,7 @@ int main(void)
 
     uint32_t samples = TICKS / 10u;
     app.greeted = true;
+    (void)heat_tell(&app.safety.heat, 0);
     (void)app_stream(1);
     (void)app_wave_begin(samples, 10, 0);
     feed(samples);

@@ -4,6 +4,7 @@
 
 #include "app.h"
 #include "hal.h"
+#include "units.h"
 
 struct fake fake;
 
@@ -16,6 +17,8 @@ static uint8_t blocks[512][PT_MAX_PAYLOAD];
 static uint8_t block_length[512];
 static uint16_t block_head, block_tail;
 static uint8_t next_seq;
+static uint32_t beats;
+static struct hal_kept kept;
 
 void fake_reset(void)
 {
@@ -26,7 +29,9 @@ void fake_reset(void)
     rx_head = rx_tail = 0;
     block_head = block_tail = 0;
     frame_decoder_init(&host);
+    beats = 0;
     app_init();
+    (void)heat_tell(&app.safety.heat, 0);
 }
 
 static void coil_step(void)
@@ -78,6 +83,19 @@ struct frame fake_command_seq(uint8_t type, uint8_t seq, const uint8_t *payload,
 struct frame fake_command(uint8_t type, const uint8_t *payload, uint8_t length)
 {
     return fake_command_seq(type, ++next_seq, payload, length);
+}
+
+struct frame fake_beat(void)
+{
+    uint8_t p[PT_HEARTBEAT_LEN];
+    put_u32(p + PT_HEARTBEAT_COUNTER, ++beats);
+    return fake_command(PT_HEARTBEAT, p, sizeof p);
+}
+
+struct frame fake_clear_fault(void)
+{
+    const uint8_t p[PT_CLEAR_FAULT_LEN] = {app.fault, app.worst};
+    return fake_command(PT_CLEAR_FAULT, p, sizeof p);
 }
 
 uint16_t fake_telemetry(uint8_t *payload)
@@ -165,6 +183,11 @@ void hal_critical_enter(void)
 
 void hal_critical_exit(void)
 {
+}
+
+struct hal_kept *hal_kept(void)
+{
+    return &kept;
 }
 
 uint8_t hal_reset_cause(void)

@@ -22,7 +22,7 @@ struct fake {
 };
 extern struct fake fake;
 
-void fake_reset(void);                  /* power on: also calls app_init */
+void fake_reset(void);                  /* power on, the coil cold and known to be: also calls app_init */
 void fake_ticks(uint32_t n);            /* n ticks, the main loop after each */
 void fake_ticks_without_main(uint32_t n);
 bool fake_output_on(void);
@@ -32,6 +32,8 @@ void fake_receive(const uint8_t *bytes, uint16_t count); /* raw bytes, at most 2
 /* Sends a command and returns the reply (its payload valid until the next call); type 0: none came. */
 struct frame fake_command(uint8_t type, const uint8_t *payload, uint8_t length);
 struct frame fake_command_seq(uint8_t type, uint8_t seq, const uint8_t *payload, uint8_t length);
+struct frame fake_beat(void);        /* a heartbeat with the next counter */
+struct frame fake_clear_fault(void); /* names what is latched */
 uint16_t fake_telemetry(uint8_t *payload); /* oldest telemetry block received, its length; 0: none */
 
 #endif

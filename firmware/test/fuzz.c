@@ -46,11 +46,11 @@ static uint16_t next16(struct tape *t)
 static void check(void)
 {
     REQUIRE(app.state <= PT_STATE_FAULT);
-    REQUIRE(app.fault <= PT_FAULT_STRAY_CURRENT);
+    REQUIRE(app.fault <= PT_FAULT_CONVERTER);
     bool may_drive = app.state == PT_STATE_RUNNING || app.state == PT_STATE_RAMPING;
     REQUIRE(may_drive || !fake.pwm_enabled);
     REQUIRE(fake.pwm <= HAL_PWM_PERIOD);
-    REQUIRE(app.reference >= 0 && app.reference <= app.param[PT_PARAM_CURRENT_LIMIT]);
+    REQUIRE(app.reference >= 0 && app.reference <= app_param_maximum(PT_PARAM_CURRENT_LIMIT));
     REQUIRE(app.state != PT_STATE_RUNNING || app.fault == PT_FAULT_NONE);
     REQUIRE((app.state != PT_STATE_ARMED && app.state != PT_STATE_RUNNING) || (app.wave.committed && app.greeted));
     REQUIRE((uint16_t)(app.wave.head - app.wave.tail) <= PT_WAVE_BUFFER_SAMPLES);
@@ -144,7 +144,7 @@ static void sensible_command(struct tape *t)
         (void)fake_command(PT_STREAM, p, PT_STREAM_LEN);
         break;
     default:
-        (void)fake_command(app.fault == PT_FAULT_NONE ? PT_HEARTBEAT : PT_CLEAR_FAULT, NULL, 0);
+        (void)(app.fault == PT_FAULT_NONE ? fake_beat() : fake_clear_fault());
         break;
     }
 }
@@ -314,7 +314,7 @@ static struct verdict frames(uint32_t count)
     struct frame f;
     frame_decoder_init(&d);
     for (uint32_t k = 0; k < count; k++) {
-        uint8_t type = (uint8_t)(draw(14) ? 1u + draw(13) : PT_TELEMETRY);
+        uint8_t type = (uint8_t)(draw(15) ? 1u + draw(14) : PT_TELEMETRY);
         uint8_t seq = (uint8_t)draw(256);
         for (uint8_t j = 0; j < PT_MAX_PAYLOAD; j++)
             payload[j] = (uint8_t)(draw(3) ? draw(256) : 0u);

@@ -108,7 +108,7 @@ static void alive_ticks(uint32_t n)
     while (n > 0) {
         uint32_t piece = n < 500 ? n : 500;
         fake_ticks(piece);
-        (void)plain(PT_HEARTBEAT);
+        (void)fake_beat();
         n -= piece;
     }
 }
@@ -199,7 +199,7 @@ static void a_silent_host_means_off_within_300_ms(void)
     CHECK(off_after(2000) <= APP_RAMP_TICKS);
     CHECK_EQUAL(app.state, PT_STATE_FAULT);
     CHECK_EQUAL(nak_of(begin(10, 10, 0)), PT_NAK_CODE_FAULT);
-    CHECK_EQUAL(state_of(plain(PT_CLEAR_FAULT)), PT_STATE_IDLE);
+    CHECK_EQUAL(state_of(fake_clear_fault()), PT_STATE_IDLE);
     CHECK_EQUAL(nak_of(begin(10, 10, 0)), 0);
 }
 
@@ -213,6 +213,119 @@ static void garbage_is_no_sign_of_life(void)
         (void)fake_command(PT_START, junk, 3);  /* wrong length */
     }
     CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+}
+
+/* Frames that a stuck wire repeats, and questions that any program may ask, keep nothing alive. */
+static void only_what_is_new_is_a_sign_of_life(void)
+{
+    const uint8_t older[PT_HEARTBEAT_LEN] = {1, 0, 0, 0};
+    running(5000, 1000);
+    alive_ticks(1000);
+    for (uint8_t k = 0; k < 25; k++) {
+        fake_ticks(100);
+        CHECK_EQUAL(fake_command(PT_HEARTBEAT, older, PT_HEARTBEAT_LEN).type, PT_ACK);
+        CHECK_EQUAL(plain(PT_STATUS).type, PT_STATUS_REPLY);
+        CHECK_EQUAL(plain(PT_START).type, k < 20 ? PT_ACK : PT_NAK);
+        CHECK_EQUAL(data(0, 5000, SAMPLES).type, k < 20 ? PT_ACK : PT_NAK); /* refused once it ramps */
+    }
+    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+    CHECK_EQUAL(app.snapshot.tick, 3000);
+}
+
+/* While it ramps down the host is not waited for: it could not do more by being silent. */
+static void the_ramp_needs_no_heartbeat(void)
+{
+    running(15000, 1000);
+    alive_ticks(3000);
+    fake_ticks(1950);
+    CHECK_EQUAL(state_of(plain(PT_STOP)), PT_STATE_RAMPING);
+    fake_ticks(2000);
+    CHECK_EQUAL(app.fault, PT_FAULT_NONE);
+    CHECK_EQUAL(app.state, PT_STATE_IDLE);
+}
+
+static void what_a_host_has_not_seen_it_cannot_clear(void)
+{
+    running(12000, 1000);
+    alive_ticks(1000);
+    fake_ticks(2001); /* silence, then over-current during the ramp */
+    const uint8_t first[] = {PT_FAULT_HEARTBEAT, PT_FAULT_HEARTBEAT};
+    const uint8_t both[] = {PT_FAULT_HEARTBEAT, PT_FAULT_OVER_CURRENT};
+    CHECK_EQUAL(nak_of(fake_command(PT_CLEAR_FAULT, first, 2)), PT_NAK_CODE_STATE); /* still ramping */
+    fake.force_current = 3400;
+    fake_ticks(1);
+    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    CHECK_EQUAL(nak_of(fake_command(PT_CLEAR_FAULT, first, 2)), PT_NAK_CODE_FAULT);
+    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+    fake.force_current = -1;
+    CHECK_EQUAL(state_of(fake_command(PT_CLEAR_FAULT, both, 2)), PT_STATE_IDLE);
+    CHECK_EQUAL(app.fault, PT_FAULT_NONE);
+    CHECK_EQUAL(state_of(fake_command(PT_CLEAR_FAULT, both, 2)), PT_STATE_IDLE); /* once more: nothing to do */
+}
+
+static void a_greeting_restores_every_parameter(void)
+{
+    fake_reset();
+    (void)hello(PT_PROTOCOL_MAJOR);
+    for (uint8_t id = 0; id < PT_PARAM_COUNT; id++)
+        CHECK_EQUAL(set_param(id, app_param_minimum(id)).type, PT_PARAM_REPLY);
+    struct frame f = hello(PT_PROTOCOL_MAJOR);
+    CHECK_EQUAL(get_i16(f.payload + PT_HELLO_REPLY_FORCE_TRIP), 15000);
+    ready(15000, 1000, SAMPLES);
+    (void)arm(fake.nonce);
+    CHECK_EQUAL(app.safety.force_trip, 15000);
+    CHECK_EQUAL(app.pid.kp, 7680);
+}
+
+static struct frame coil_heat(uint16_t per_mille)
+{
+    uint8_t p[PT_COIL_HEAT_LEN];
+    put_u16(p, per_mille);
+    return fake_command(PT_COIL_HEAT, p, sizeof p);
+}
+
+static uint16_t heat(bool assumed)
+{
+    struct frame f = plain(PT_STATUS);
+    CHECK_EQUAL((f.payload[PT_STATUS_REPLY_FLAGS] & PT_STATUS_HEAT_ASSUMED) != 0, assumed);
+    return get_u16(f.payload + PT_STATUS_REPLY_HEAT);
+}
+
+static void the_coil_is_hot_until_told_and_over_any_reset_but_power_on(void)
+{
+    fake_reset();
+    fake.reset_cause = PT_RESET_POWER;
+    app_init();
+    CHECK_EQUAL(heat(true), 1000);
+    CHECK_EQUAL(nak_of(coil_heat(2001)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(coil_heat(300).type, PT_ACK);
+    CHECK_EQUAL(heat(false), 300);
+    CHECK_EQUAL(nak_of(coil_heat(200)), PT_NAK_CODE_RANGE); /* it knows better now */
+    CHECK_EQUAL(coil_heat(800).type, PT_ACK);
+    static const uint8_t warm[] = {PT_RESET_WATCHDOG, PT_RESET_EXTERNAL, PT_RESET_SOFTWARE, PT_RESET_BROWN_OUT};
+    for (uint8_t k = 0; k < sizeof warm; k++) {
+        fake.reset_cause = warm[k];
+        app_init();
+        CHECK_EQUAL(heat(false), 800);
+    }
+    hal_kept()->heat ^= 1u; /* the memory did not hold */
+    app_init();
+    CHECK_EQUAL(heat(true), 1000);
+    fake.reset_cause = PT_RESET_WATCHDOG;
+    app_init();
+    CHECK_EQUAL(heat(true), 1000); /* assumed it stays */
+}
+
+static void a_hot_coil_stays_hot_over_a_reset(void)
+{
+    running(15000, 1000);
+    app.safety.heat.average = HEAT_LIMIT - 100000;
+    for (uint32_t k = 0; k < 200 && app.fault == PT_FAULT_NONE; k++)
+        alive_ticks(100);
+    CHECK_EQUAL(app.fault, PT_FAULT_COIL_HEAT);
+    fake.reset_cause = PT_RESET_WATCHDOG;
+    app_init();
+    CHECK(app.safety.heat.average > HEAT_LIMIT - 200000);
 }
 
 static void over_current_kills_in_the_same_tick(void)
@@ -243,7 +356,7 @@ static void is_off_latched_and_told(uint8_t fault)
     CHECK_EQUAL(f.type, PT_STATUS_REPLY);
     CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT], fault);
     CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT_STATE], PT_STATE_RUNNING);
-    CHECK_EQUAL(plain(PT_HEARTBEAT).payload[PT_ACK_FAULT], fault);
+    CHECK_EQUAL(fake_beat().payload[PT_ACK_FAULT], fault);
     fake.force_current = fake.force_force = -1;
     fake_ticks(3000); /* the cause is gone, the fault is not */
     CHECK_EQUAL(app.fault, fault);
@@ -251,7 +364,7 @@ static void is_off_latched_and_told(uint8_t fault)
     CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_FAULT);
     CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE);
     CHECK(!fake.pwm_enabled);
-    CHECK_EQUAL(state_of(plain(PT_CLEAR_FAULT)), PT_STATE_IDLE);
+    CHECK_EQUAL(state_of(fake_clear_fault()), PT_STATE_IDLE);
 }
 
 static void a_broken_sensor_is_off_within_its_time_and_told(void)
@@ -288,7 +401,7 @@ static void full_current_without_any_force_is_off_within_600_ms(void)
         fake.force_force = 228 + (int32_t)(ticks & 1u); /* nothing, but alive */
         fake_ticks(1);
         if (ticks % 500 == 0)
-            (void)plain(PT_HEARTBEAT);
+            (void)fake_beat();
     }
     CHECK(ticks <= 6000);
     is_off_latched_and_told(PT_FAULT_NO_FORCE);
@@ -317,10 +430,10 @@ static void every_ramping_fault_is_off_within_100_ms_and_told(void)
 
     running(15000, 1000); /* heat */
     alive_ticks(1000);
-    app.safety.heat = SAFETY_HEAT_LIMIT + 1000000;
+    app.safety.heat.average = HEAT_LIMIT + 1000000;
     fake_ticks(1);
     CHECK(off_after(2000) <= APP_RAMP_TICKS);
-    app.safety.heat = 0;
+    app.safety.heat.average = 0;
     is_off_latched_and_told(PT_FAULT_COIL_HEAT);
 }
 
@@ -461,7 +574,7 @@ static void an_older_repetition_changes_nothing_and_is_no_refusal(void)
     ready(5000, 10, SAMPLES);
     put_u32(nonce, fake.nonce);
     CHECK_EQUAL(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN).type, PT_ACK);
-    CHECK_EQUAL(fake_command_seq(PT_HEARTBEAT, 201, NULL, 0).type, PT_ACK);
+    CHECK_EQUAL(fake_command_seq(PT_STREAM, 201, (const uint8_t[]){10, 0}, PT_STREAM_LEN).type, PT_ACK);
     CHECK_EQUAL(state_of(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN)), PT_STATE_ARMED);
     CHECK_EQUAL(fake_command_seq(PT_START, 202, NULL, 0).type, PT_ACK);
     uint8_t session = app.session;
@@ -486,7 +599,7 @@ static void a_host_that_does_not_read_costs_samples_not_replies(void)
     running(5000, 1000);
     fake.tx_space = FRAME_MAX_ENCODED; /* room for a reply only */
     alive_ticks(20000);
-    CHECK_EQUAL(plain(PT_HEARTBEAT).type, PT_ACK);
+    CHECK_EQUAL(fake_beat().type, PT_ACK);
     CHECK_EQUAL(fake_telemetry(p), 0);
     fake.tx_space = 4096;
     (void)plain(PT_STOP);
@@ -563,6 +676,12 @@ int main(void)
     RUN(another_major_version_is_answered_but_never_armed);
     RUN(a_silent_host_means_off_within_300_ms);
     RUN(garbage_is_no_sign_of_life);
+    RUN(only_what_is_new_is_a_sign_of_life);
+    RUN(the_ramp_needs_no_heartbeat);
+    RUN(what_a_host_has_not_seen_it_cannot_clear);
+    RUN(a_greeting_restores_every_parameter);
+    RUN(the_coil_is_hot_until_told_and_over_any_reset_but_power_on);
+    RUN(a_hot_coil_stays_hot_over_a_reset);
     RUN(over_current_kills_in_the_same_tick);
     RUN(over_force_kills_at_the_third_sample);
     RUN(a_broken_sensor_is_off_within_its_time_and_told);

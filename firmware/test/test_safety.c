@@ -3,10 +3,12 @@
 
 static struct safety s;
 static struct safety_input in;
+static struct hal_kept kept;
 
 static void normal(void)
 {
-    safety_init(&s);
+    safety_init(&s, &kept, true);
+    (void)heat_tell(&s.heat, 0);
     s.current_trip = 16500;
     s.force_trip = 15000;
     s.heartbeat_ticks = 2000;
@@ -19,6 +21,7 @@ static void normal(void)
     in.duty = 1000;
     in.full = 7853;
     in.armed = true;
+    in.awaited = true;
     in.driving = true;
 }
 
@@ -82,7 +85,7 @@ static void silence_trips_after_the_heartbeat_time(void)
         safety_alive(&s);
     }
     normal();
-    in.armed = in.driving = false;
+    in.armed = in.awaited = in.driving = false;
     CHECK_EQUAL(until_fault(10000, &fault, true, true), 0);
 }
 
@@ -176,7 +179,7 @@ static void current_with_the_output_off_trips(void)
 {
     uint8_t fault = 0;
     normal();
-    in.armed = in.driving = false;
+    in.armed = in.awaited = in.driving = false;
     in.reference = 0;
     in.current = 1200;
     CHECK_EQUAL(until_fault(10000, &fault, true, true), SAFETY_STRAY_TICKS);
@@ -203,10 +206,10 @@ static void the_heat_model_stops_a_constant_overload(void)
     /* ARM does not forget the heat; it cools while the output is off. */
     safety_begin(&s);
     CHECK_EQUAL(until_fault(1, &fault, true, true), 1);
-    in.armed = in.driving = false;
+    in.armed = in.awaited = in.driving = false;
     in.current = in.reference = 0;
     CHECK_EQUAL(until_fault(200000, &fault, true, true), 0);
-    in.armed = in.driving = true;
+    in.armed = in.awaited = in.driving = true;
     CHECK_EQUAL(until_fault(1000, &fault, true, true), 0);
 }
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 MAGIC = 0x52545031  # "1PTR" on the wire: tells our firmware from whatever else sits behind a port
-PROTOCOL_MAJOR = 1
+PROTOCOL_MAJOR = 2
 PROTOCOL_MINOR = 0
 FIRMWARE_MAJOR = (
     0  # of the firmware that comes with this program; below 1.0.0 each minor version is another one
 )
-FIRMWARE_MINOR = 1
+FIRMWARE_MINOR = 2
 FIRMWARE_PATCH = 0
 
 MAX_PAYLOAD = 128  # bytes: the longest frame stays under 254, so COBS adds exactly one byte
@@ -25,6 +25,9 @@ MAX_DECIMATION = 10_000
 HEARTBEAT_MAX_MS = 200
 CURRENT_UNIT_A = 1e-4
 FORCE_UNIT_N = 1e-3
+HEAT_UNIT = 1e-3  # of the heat at which the device stops: a squared current of HEAT_LIMIT_A2, averaged
+HEAT_LIMIT_A2 = 1.25**2
+HEAT_TAU_S = 2**20 / TICK_RATE_HZ  # the coil's heat decays by a factor of e in this time
 
 
 class State(IntEnum):
@@ -38,7 +41,7 @@ class State(IntEnum):
 
 
 class Fault(IntEnum):
-    """Why the device latched a fault: the first cause."""
+    """Why the device latched a fault. OUTPUT_NOT_OFF is the gravest: nothing in the device can switch off."""
 
     NONE = 0
     HEARTBEAT = 1
@@ -56,6 +59,13 @@ class Fault(IntEnum):
     TICK_OVERRUN = 13
     WAVE_CRC = 14
     STRAY_CURRENT = 15
+    CURRENT_IMPLAUSIBLE = 16
+    FORCE_IMPLAUSIBLE = 17
+    FORCE_ZERO = 18
+    COMPARATOR = 19
+    OUTPUT_NOT_OFF = 20
+    TICK_LOST = 21
+    CONVERTER = 22
 
 
 FAULT_TEXT: dict[Fault, str] = {
@@ -75,6 +85,13 @@ FAULT_TEXT: dict[Fault, str] = {
     Fault.TICK_OVERRUN: "the control interrupt missed its tick",
     Fault.WAVE_CRC: "the uploaded reference does not match its checksum",
     Fault.STRAY_CURRENT: "current flows although the reference is zero",
+    Fault.CURRENT_IMPLAUSIBLE: "the current reading does not fit the voltage on the coil",
+    Fault.FORCE_IMPLAUSIBLE: "the force reading does not fit the current",
+    Fault.FORCE_ZERO: "the force sensor does not read zero before the play",
+    Fault.COMPARATOR: "the hardware's own over-current limit was reached",
+    Fault.OUTPUT_NOT_OFF: "CURRENT FLOWS ON ALTHOUGH THE OUTPUT WAS SWITCHED OFF: cut the supply now",
+    Fault.TICK_LOST: "the control interrupt stayed away; a timer of its own switched off",
+    Fault.CONVERTER: "a sensor's converter gave no new reading",
 }
 
 
@@ -117,10 +134,14 @@ class ResetCause(IntEnum):
     WATCHDOG = 2
     BROWN_OUT = 3
     SOFTWARE = 4
+    CLOCK = 5
 
 
 FLAG_LAST = 1  # the last block of a session
 FLAG_SLEW = 2  # the slew limit held the reference back within this block
+
+STATUS_OUTPUT_NOT_OFF = 1  # current flows although the output is off, now or since the fault was latched
+STATUS_HEAT_ASSUMED = 2  # nobody has told the device how hot the coil is since power-on: it assumes the limit
 
 
 @dataclass(frozen=True, slots=True)

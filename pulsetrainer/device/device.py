@@ -7,8 +7,8 @@ import logging
 import os
 import threading
 import time
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
@@ -33,6 +33,12 @@ DEFAULT_PORT = "bench:"
 _INTERRUPTED = "interrupted"
 _STOPPED = "stopped"
 _RAMP_S = 0.11  # the device counts its way back to zero as on-time
+# The limits that the greeting tells, by their parameters' names.
+_GREETED = {
+    **{name: name for name in ("current_limit", "current_trip", "force_trip", "slew_limit")},
+    "on_time": "on_time_s",
+    "heartbeat": "heartbeat_ms",
+}
 _TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
 
 
@@ -101,7 +107,10 @@ class Device:
     def _greet(self) -> None:
         with self._turn:
             self._hello = self._session.hello()
-        latched = describe_fault(self._status(), self._hello.tick_rate_Hz)
+        status = self._status()
+        if self._port.starts_cold and status.flags & codes.STATUS_HEAT_ASSUMED:
+            self._ask(m.CoilHeat(0))
+        latched = describe_fault(status, self._hello.tick_rate_Hz)
         self.info = DeviceInfo.from_wire(self._hello, latched)
 
     def __enter__(self) -> Self:
@@ -173,7 +182,10 @@ class Device:
         reply = self._ask(m.SetParam(row.id, value))
         if not isinstance(reply, m.ParamReply) or reply.value != value:
             raise DeviceError(f"the device did not take {name}={value}", hint="flash the firmware again")
-        self._greet()  # the limits in force have changed
+        if name in _GREETED:  # a new greeting would restore the defaults
+            limit: dict[str, Any] = {_GREETED[name]: value}
+            self._hello = replace(self._hello, **limit)
+            self.info = DeviceInfo.from_wire(self._hello, self.info.latched_fault)
         return reply.value
 
     def lower(self, limits: Limits) -> None:

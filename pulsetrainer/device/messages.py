@@ -74,7 +74,7 @@ def _field_names(cls: type) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Hello(Message):
-    """Who are you? Resets the link's sequence and stops whatever an earlier host left running."""
+    """Who are you? Stops whatever an earlier host left running and restores every parameter's default."""
 
     TYPE: ClassVar[int] = 0x01
     magic: U32
@@ -91,9 +91,10 @@ class Status(Message):
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat(Message):
-    """The host is alive."""
+    """The host is alive; a sign of life only if ``counter`` is larger than any since the greeting."""
 
     TYPE: ClassVar[int] = 0x03
+    counter: U32
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,9 +169,11 @@ class Stop(Message):
 
 @dataclass(frozen=True, slots=True)
 class ClearFault(Message):
-    """Forget a latched fault."""
+    """Forget just this latched fault and this worst one (see ``StatusReply``); refused if others are."""
 
     TYPE: ClassVar[int] = 0x0C
+    fault: U8
+    worst: U8
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,12 +184,26 @@ class Stream(Message):
     decimation: U16
 
 
+@dataclass(frozen=True, slots=True)
+class CoilHeat(Message):
+    """Tell the device how hot its coil is, in units of ``codes.HEAT_UNIT``.
+
+    A lower value than the device's own is taken only while that is assumed (``STATUS_HEAT_ASSUMED``).
+    """
+
+    TYPE: ClassVar[int] = 0x0E
+    heat: U16
+
+
 # --- device to host ------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class HelloReply(Message):
-    """Who the device is and what it will do at most."""
+    """Who the device is and what it will do at most.
+
+    This layout and that of ``Hello`` are the same in all versions: else two could not tell each other apart.
+    """
 
     TYPE: ClassVar[int] = 0x81
     magic: U32
@@ -213,7 +230,10 @@ class HelloReply(Message):
 
 @dataclass(frozen=True, slots=True)
 class StatusReply(Message):
-    """The full state; ``fault_*`` is the snapshot at the first fault."""
+    """The full state; ``fault`` is the first cause, ``fault_*`` its snapshot, ``worst`` the gravest since.
+
+    ``current`` and ``force`` are the readings of now, in every state; ``flags`` are ``codes.STATUS_*``.
+    """
 
     TYPE: ClassVar[int] = 0x82
     state: U8
@@ -230,6 +250,11 @@ class StatusReply(Message):
     fault_state: U8
     reset_cause: U8
     boot_nonce: U32
+    worst: U8
+    flags: U8
+    current: I16
+    force: I16
+    heat: U16
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,7 +313,7 @@ class Telemetry(Message):
 
 COMMANDS: tuple[type[Message], ...] = (
     Hello, Status, Heartbeat, GetParam, SetParam, WaveBegin, WaveData,
-    WaveCommit, Arm, Start, Stop, ClearFault, Stream,
+    WaveCommit, Arm, Start, Stop, ClearFault, Stream, CoilHeat,
 )  # fmt: skip
 REPLIES: tuple[type[Message], ...] = (HelloReply, StatusReply, Ack, Nak, ParamReply, Telemetry)
 BY_TYPE: dict[int, type[Message]] = {m.TYPE: m for m in (*COMMANDS, *REPLIES)}

@@ -161,7 +161,8 @@ class Player:
             self._session.receive()
             self._request(m.Stop())
         if self._ack.fault:
-            self._request(m.ClearFault())
+            status = self._status()
+            self._request(m.ClearFault(status.fault, status.worst))
         self._request(m.Stream(self.decimation))
         self._request(m.WaveBegin(n, self._ticks_per_sample, zlib.crc32(self._wire)))
         while self._sent < n and self._send_chunk(self._ack.credit):
@@ -205,7 +206,7 @@ class Player:
             if self._send_chunk(self._credit()):
                 continue
             if self._beat_due():
-                self._request(m.Heartbeat())
+                self._request(self._session.next_beat())
             else:
                 self._session.receive()
 

@@ -16,6 +16,7 @@ from pulsetrainer.device.frames import Frame, FrameReader, encode
 from pulsetrainer.device.messages import (
     BY_TYPE,
     COMMANDS,
+    Heartbeat,
     Hello,
     HelloReply,
     Message,
@@ -81,6 +82,7 @@ class Session:
         self.on_telemetry: Callable[[Telemetry], None] = lambda _: None
         self.sent_at_s = 0.0
         self.rejected = 0
+        self._beats = 0
 
     @property
     def damaged(self) -> int:
@@ -156,6 +158,11 @@ class Session:
             f"({len(self._timeouts_s)} tries, {sum(self._timeouts_s):g} s)",
             hint="its output goes off by itself; check cable and power, then open it again",
         )
+
+    def next_beat(self) -> Heartbeat:
+        """Return a heartbeat that the device has not heard yet."""
+        self._beats += 1
+        return Heartbeat(self._beats)
 
     def hello(self) -> HelloReply:
         """Find out who is there, from whatever state and noise the line is in.

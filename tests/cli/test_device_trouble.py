@@ -93,18 +93,18 @@ def _started(folder: Path, port: str) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize(
     ("major", "older", "remedy"),
-    [(0, "the device is older", "flash the firmware"), (2, "the program is older", "pip install --upgrade")],
+    [(1, "the device is older", "flash the firmware"), (3, "the program is older", "pip install --upgrade")],
 )
 def test_another_protocol_names_both_versions_and_who_is_older(folder, firmware, major, older, remedy):
     """Exit 4 before anything moves."""
     port, _ = firmware(defines=(f"-DPT_PROTOCOL_MAJOR={major}u",))
-    refused(folder, port, f"speaks protocol {major}.0", "this program 1.0", older, remedy)
+    refused(folder, port, f"speaks protocol {major}.0", "this program 2.0", older, remedy)
 
 
 @pytest.mark.parametrize(
     ("define", "version", "older", "remedy"),
     [
-        ("-DPT_FIRMWARE_MAJOR=1u", "1.1.0", "the program is older", "pip install --upgrade"),
+        ("-DPT_FIRMWARE_MAJOR=1u", "1.2.0", "the program is older", "pip install --upgrade"),
         ("-DPT_FIRMWARE_MINOR=0u", "0.0.0", "the device is older", "flash the firmware"),
     ],
 )
@@ -113,7 +113,7 @@ def test_another_firmware_names_both_versions_and_who_is_older(
 ):
     """The same protocol but another generation of firmware: exit 4 before anything moves."""
     port, _ = firmware(defines=(define,))
-    refused(folder, port, f"firmware {version}", "this program's firmware 0.1.0", older, remedy)
+    refused(folder, port, f"firmware {version}", "this program's firmware 0.2.0", older, remedy)
 
 
 def test_a_device_that_is_not_ours(folder):

@@ -16,7 +16,7 @@ from pulsetrainer.simulation.bench import Bench
 from pulsetrainer.simulation.emulator import QEMU_TIMEOUTS_S, Emulator
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     import numpy as np
@@ -51,15 +51,37 @@ class Wire:
         """Return the reply to a command."""
         return self.session.request(command)
 
+    def beat(self) -> m.Ack:
+        """Return the acknowledgement of a heartbeat."""
+        reply = self.ask(self.session.next_beat())
+        assert isinstance(reply, m.Ack)
+        return reply
+
+    def clear_fault(self) -> m.Message:
+        """Clear just the faults that the device tells of."""
+        status = self.status()
+        return self.ask(m.ClearFault(status.fault, status.worst))
+
     def status(self) -> m.StatusReply:
         """Return the full state."""
         reply = self.ask(m.Status())
         assert isinstance(reply, m.StatusReply)
         return reply
 
-    def start(self, samples: np.ndarray, *, total: int | None = None, decimation: int = 10) -> m.HelloReply:
-        """Greet, upload ``samples`` [100 uA] at 1 kHz of ``total`` announced, arm and start."""
+    def start(
+        self,
+        samples: np.ndarray,
+        *,
+        total: int | None = None,
+        decimation: int = 10,
+        parameters: Mapping[int, int] | None = None,
+    ) -> m.HelloReply:
+        """Greet, set, upload ``samples`` [100 uA] at 1 kHz of ``total`` announced, arm and start."""
         hello = self.session.hello()
+        for number, value in (parameters or {}).items():
+            self.ask(m.SetParam(number, value))
+        if self.status().flags & codes.STATUS_HEAT_ASSUMED:
+            self.ask(m.CoilHeat(0))
         wire = samples.astype("<i2").tobytes()
         self.ask(m.Stream(decimation))
         self.ask(m.WaveBegin(total or len(samples), 10, zlib.crc32(wire)))
@@ -75,6 +97,7 @@ class Wire:
         """Return the status once the device is in one of ``states``."""
         deadline = time.monotonic() + seconds
         while True:
+            self.beat()
             status = self.status()
             if status.state in states:
                 return status

@@ -13,7 +13,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pulsetrainer.device import messages as m
 from pulsetrainer.device import ports
 from pulsetrainer.device.codes import Fault, State
 from pulsetrainer.device.device import open_device
@@ -168,7 +167,7 @@ def test_a_cable_pulled_in_mid_play(carrier):
     status = one.wait_for(State.FAULT)
     assert Fault(status.fault) == Fault.HEARTBEAT
     assert status.fault_tick - recording.tick[-1] < 2000 + 1500  # 200 ms after the last command, not later
-    assert one.ask(m.Heartbeat()).state == State.FAULT
+    assert one.beat().state == State.FAULT
 
 
 def test_a_kind_of_port_announces_itself():

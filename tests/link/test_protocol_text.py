@@ -80,6 +80,9 @@ def test_limits_are_the_compiled_ones():
         f"a run longer than {codes.PARAMETERS[4].maximum} s",
         f"Flag {codes.FLAG_LAST} marks the last block",
         f"flag {codes.FLAG_SLEW} says that the limit was at work",
+        f"(STATUS_REPLY's flag {codes.STATUS_OUTPUT_NOT_OFF}) is the gravest",
+        f"allows (STATUS_REPLY's flag {codes.STATUS_HEAT_ASSUMED})",
+        f"times exp(-t / {codes.HEAT_TAU_S:.2f} s)",
         f"within\n{1000 * TIMEOUTS_S[0]:.0f} ms: the same frame again, five times",
     ],
 )
@@ -90,8 +93,11 @@ def test_numbers_in_the_prose(said):
 
 def test_what_the_safety_unit_counts_is_what_is_told():
     """Debounce and plausibility: from firmware/core/safety.h into the fault table."""
-    header = (firmware_dir() / "core" / "safety.h").read_text(encoding="utf-8")
-    number = {name: int(value) for name, value in re.findall(r"#define SAFETY_(\w+) (\d+)[uL]?\b", header)}
+    core = firmware_dir() / "core"
+    header = "".join((core / name).read_text(encoding="utf-8") for name in ("safety.h", "heat.h"))
+    number = {
+        name: int(value) for name, value in re.findall(r"#define (?:SAFETY_)?(\w+) (\d+)[uL]?\b", header)
+    }
     told = {name: row[1] for row in rows("fault") for name in row[0].split(", ")}
 
     def amperes(name: str) -> str:

@@ -52,7 +52,7 @@ def test_the_whole_firmware_under_the_sanitizers(wire):
     one.transport.write(np.random.default_rng(4).bytes(3000))
     one.start((5000 - 5000 * np.cos(np.arange(900) / 50)).astype(np.int16), decimation=1)
     assert one.wait_for(State.FAULT).fault == Fault.OVER_FORCE
-    one.ask(m.ClearFault())
+    one.clear_fault()
     one.start(np.full(300, 3000, dtype=np.int16))
     one.ask(m.Stop())
     one.wait_for(State.IDLE)
@@ -74,16 +74,16 @@ def test_late_and_doubled_replies_are_ignored(wire):
     one = wire("bench:")
     one.session.hello()
     for _ in range(3):
-        one.transport.write(encode(Frame(m.Heartbeat.TYPE, 99, b"")))
+        one.transport.write(encode(Frame(m.Heartbeat.TYPE, 99, m.Heartbeat(1).pack())))
     assert isinstance(one.ask(m.Status()), m.StatusReply)
     assert isinstance(one.ask(m.GetParam(0)), m.ParamReply)
 
 
 def test_another_protocol_major_is_named_with_the_remedy(wire):
     """Both versions and what to do are in the message."""
-    newer = wire("bench:", firmware_executable(("-DPT_PROTOCOL_MAJOR=2u",)))
+    newer = wire("bench:", firmware_executable(("-DPT_PROTOCOL_MAJOR=3u",)))
     with pytest.raises(
-        DeviceError, match=r"protocol 2\.0, this program 1\.0: the program is older"
+        DeviceError, match=r"protocol 3\.0, this program 2\.0: the program is older"
     ) as caught:
         newer.session.hello()
     assert "pip install --upgrade" in caught.value.hint
@@ -104,7 +104,7 @@ def test_another_minor_version_is_fine(wire):
 def test_another_firmware_generation_is_named_with_the_remedy(wire):
     """The same protocol, but a firmware that this program does not come with."""
     newer = wire("bench:", firmware_executable(("-DPT_FIRMWARE_MAJOR=1u",)))
-    said = r"\(firmware 1\.1\.0\) is of another generation than .* firmware 0\.1\.0: the program is older"
+    said = r"\(firmware 1\.2\.0\) is of another generation than .* firmware 0\.2\.0: the program is older"
     with pytest.raises(DeviceError, match=said) as caught:
         newer.session.hello()
     assert "pip install --upgrade" in caught.value.hint
@@ -120,14 +120,14 @@ def test_an_answer_to_something_else_is_none(wire):
     one.session.hello()
     one.session._seq = 40
     for seq in range(41, 44):
-        one.transport.write(encode(Frame(m.Heartbeat.TYPE, seq, b"")))
+        one.transport.write(encode(Frame(m.Heartbeat.TYPE, seq, m.Heartbeat(1).pack())))
         one.transport.write(encode(Frame(m.GetParam.TYPE, seq, b"\x07")))
         one.transport.write(encode(Frame(m.Start.TYPE, seq, b"")))  # a refusal
     assert isinstance(one.ask(m.Status()), m.StatusReply)
     reply = one.ask(m.GetParam(3))
     assert isinstance(reply, m.ParamReply)
     assert reply.id == 3
-    assert isinstance(one.ask(m.Heartbeat()), m.Ack)
+    assert isinstance(one.beat(), m.Ack)
     assert one.session.rejected >= 3
 
 

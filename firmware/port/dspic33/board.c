@@ -22,6 +22,7 @@
 
 static uint8_t cause;
 static PERSISTENT uint32_t nonce;
+static PERSISTENT struct hal_kept kept;
 
 void board_clock(void)
 {
@@ -105,6 +106,11 @@ void hal_critical_exit(void)
 {
     MEMORY_BARRIER();
     REG_WRITE(_ADCAN2IE, 1);
+}
+
+struct hal_kept *hal_kept(void)
+{
+    return &kept;
 }
 
 uint8_t hal_reset_cause(void)

@@ -32,6 +32,7 @@ static uint8_t cause;
 static uint32_t nonce;
 static uint64_t ticks;
 static uint64_t fed_at;
+static struct hal_kept kept;
 
 /* --- provoked faults -------------------------------------------------------------------------- */
 
@@ -185,6 +186,11 @@ void hal_critical_enter(void)
 
 void hal_critical_exit(void)
 {
+}
+
+struct hal_kept *hal_kept(void)
+{
+    return &kept;
 }
 
 uint8_t hal_reset_cause(void)

@@ -5,7 +5,7 @@
  * the device nor a host that is merely slow:
  *   - disarmed, time stands still once the coil has settled: nothing can happen, and two equal captures
  *     give equal numbers however long the pauses between them were;
- *   - armed but not started, and while playing or ramping down whenever the host has been silent for half the
+ *   - armed but not started, and while playing whenever the host has been silent for half the
  *     heartbeat (100 ms of device time), the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
  *     for at most half a second of wall time; after that it goes on at the wall clock, so that a
  *     host that is really gone trips the 200 ms heartbeat like on a real device.
@@ -68,8 +68,6 @@ static bool must_wait(void)
         /* By commands, not by bytes: a damaged one must not let the rest of the heartbeat run off. */
         return app.safety.silent_ticks >= app.safety.heartbeat_ticks / 2 || wave_ticks_left(&app.wave) < 2 * BATCH ||
                telemetry_waiting(&app.telemetry) >= TELEMETRY_HIGH;
-    case PT_STATE_RAMPING: /* after the last sample the heartbeat still counts; after a fault nobody is asked */
-        return app.fault == PT_FAULT_NONE && app.safety.silent_ticks >= app.safety.heartbeat_ticks / 2;
     case PT_STATE_ARMED:
         return true;
     default:

@@ -26,8 +26,9 @@ extern volatile struct retained {
     uint32_t boots;
     uint32_t cause; /* of the next start */
     uint32_t break_tick[BREAKS_COUNT]; /* by the loader too; plus 1, 0: never */
+    struct hal_kept kept;
 } retained;
-typedef char retained_fits_its_place[sizeof(struct retained) <= 64u ? 1 : -1];
+typedef char retained_fits_its_place[sizeof(struct retained) <= 256u ? 1 : -1];
 
 static struct solenoid plant;
 static struct solenoid_params params;
@@ -274,6 +275,11 @@ void hal_uart_tx(const uint8_t *bytes, uint16_t count)
         tx_ring[tx_head & (TX_RING - 1u)] = bytes[k];
         tx_head = (uint16_t)(tx_head + 1u);
     }
+}
+
+struct hal_kept *hal_kept(void)
+{
+    return (struct hal_kept *)&retained.kept;
 }
 
 /* --- identity ----------------------------------------------------------------------------------- */
