@@ -46,9 +46,9 @@ $(D)/run.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
 
 # the paper: relays, closest match, spline; ours: continuous reading, exact inverse
 $(D)/model-paper.h5: $(D)/run.h5 $(CORE)
-	$(PT) identify $< --operator relay -o $@ --overwrite
+	$(PT) identify $< --reading relay -o $@ --overwrite
 $(D)/model-continuous.h5: $(D)/run.h5 $(CORE)
-	$(PT) identify $< --operator continuous -o $@ --overwrite
+	$(PT) identify $< --reading continuous -o $@ --overwrite
 
 # the second act: the same device, not told what it hides, on a signal that tells causes apart
 $(D)/diagnostic.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)

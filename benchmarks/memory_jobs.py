@@ -12,9 +12,9 @@ import core_jobs
 import numpy as np
 
 import oracle
-from pulsetrainer.core.equations import Record
 from pulsetrainer.core.identification import identify
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 
 SEED = 20_000
 
@@ -56,8 +56,8 @@ def ours(job, plane, **options):
 
 def dense(job, plane):
     """Run the naive fit: a row of relay states for every sample, scipy's nnls."""
-    levels = plane.levels.tolist()
-    states = oracle.relay_states(*oracle.relays(levels), job.input)
+    edges = plane.edges.tolist()
+    states = oracle.relay_states(*oracle.relays(edges), job.input)
     masses, offset = oracle.dense_fit(states, job.output)
     return lambda: {"objective": oracle.sum_of_squares(states, job.output, masses, offset)}
 

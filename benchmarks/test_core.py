@@ -9,11 +9,11 @@ from measuring import in_own_process, seconds, taking_turns
 
 import oracle
 from pulsetrainer.core import input_noise
-from pulsetrainer.core.equations import Record
 from pulsetrainer.core.identification import identify
 from pulsetrainer.core.inversion import invert
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 
 N, LEVELS = 20_000, 48
 SEEDS = (1, 2, 3, 4, 5)
@@ -34,8 +34,8 @@ def fitted(job):
 
 
 def _relays(operator: Preisach):
-    levels = operator.plane.levels.tolist()
-    return oracle.relays(levels), np.asarray(operator.masses)
+    edges = operator.plane.edges.tolist()
+    return oracle.relays(edges), np.asarray(operator.masses)
 
 
 def test_forward(table, job, fitted):
@@ -147,18 +147,18 @@ def test_identify_much(table, name, what, most_s, most_MB):
 def test_invert(table, fitted):
     """5000 samples with 46 turning points, against the closest match over all levels."""
     target = _reference(fitted)
-    levels, masses = fitted.plane.levels.tolist(), np.asarray(fitted.masses)
+    edges, masses = fitted.plane.edges.tolist(), np.asarray(fitted.masses)
     ours, wanted = _turns(invert(fitted, target).input), _turns(target)
     ratios = {}
     for name, naive in (
-        ("all levels tried", oracle.try_all_levels),
+        ("all levels tried", oracle.try_all_edges),
         ("levels stepped", oracle.closest_match),
     ):
-        found = np.asarray(naive(levels, masses, target - fitted.offset))
+        found = np.asarray(naive(edges, masses, target - fitted.offset))
         staircase = found if found.ndim == 1 else found[0]
         took = taking_turns(
             lambda: invert(fitted, target),
-            lambda naive=naive: naive(levels, masses, target - fitted.offset),
+            lambda naive=naive: naive(edges, masses, target - fitted.offset),
             3,
         )
         table.add(
@@ -166,7 +166,7 @@ def test_invert(table, fitted):
             ours=f"{1e3 * took.ours:.2f} ms, {ours} reversals",
             baseline=f"{1e3 * took.baseline:.0f} ms, {_turns(staircase)} reversals, {name}",
             figure=f"{took.ratio:.0f} times, {ours} reversals for {wanted}",
-            bar="60 times, 46 for 46" if naive is oracle.try_all_levels else "",
+            bar="60 times, 46 for 46" if naive is oracle.try_all_edges else "",
         )
         ratios[name] = took.ratio
     assert ratios["all levels tried"] >= 60

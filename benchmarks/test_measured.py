@@ -89,7 +89,7 @@ def compare(case: Case, folder: Path) -> tuple[float, ...]:
     fit = identify.run(identify.Options((there,), folder / "model.h5", force=True), CONTEXT)
     found = evaluate.run(evaluate.Options((here,), (folder / "model.h5",)), CONTEXT).evaluation.models[0]
     model = store.read(folder / "model.h5", Model)
-    low, high = float(model.levels[0]), float(model.levels[-1])
+    low, high = float(model.edges[0]), float(model.edges[-1])
     known = np.arange(one.input.size) >= known_from(one.input, low, high)
     baseline = PrandtlIshlinskii.fit(one.input, one.output, known)
     # the baseline follows the halves as one record; both are scored on the same samples

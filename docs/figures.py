@@ -116,7 +116,7 @@ def everett() -> Figure:
     alpha, beta = 0.75, 0.3
     field = np.full((model.plane.n_h, model.plane.n_h), np.nan)
     field[model.plane.cell_indices] = np.minimum(model.weights, np.quantile(model.weights, 0.97))
-    edges = model.plane.levels
+    edges = model.plane.edges
     shown = np.ma.masked_invalid(field)
     left.pcolormesh(edges, edges, shown, cmap="Blues", rasterized=True)
     left.fill([beta, beta, alpha], [beta, alpha, alpha], facecolor="none", edgecolor=VERMILION, linewidth=2)

@@ -103,7 +103,7 @@ def _arguments(command: Any) -> Iterator[str]:
 def _options(command: Any, *, of: str) -> Iterator[str]:
     yield f"| option of {of} | what | default |\n|---|---|---|"
     for one in command.params:
-        if one.param_type_name == "option" and one.name != "help":
+        if one.param_type_name == "option" and one.name != "help" and not one.hidden:
             names = ", ".join(f"`{name}`" for name in (*one.opts, *one.secondary_opts))
             variable = f" (environment: `{one.envvar}`)" if one.envvar else ""
             yield f"| {names} | {_cell(one.help or '')}{variable} | {_default(one)} |"
@@ -187,13 +187,13 @@ WORDS = {
     "method": "joint or alternating",
     "name": "its name",
     "next_experiment": "what to measure next, in words",
-    "operator": "how the weights are read: continuous or relay",
     "output_quantity": "what the output is",
     "output_unit": "unit of the output",
     "p_value": "over the whole library; 0 for what is read off the raw data",
     "polarity": "1; or -1 where the output falls as the input rises",
     "quick": "screened only",
     "repeats": "how often each drive was played",
+    "reading": "how the weights are read: continuous or relay",
     "samples": "of the records that were fitted",
     "signal": "the excitation, or the table that was imported",
     "smoothing": "length below which the density was smoothed, share of the input's range",
@@ -332,7 +332,7 @@ def _roff(text: str) -> str:
 def _listed(command: Any) -> Iterator[str]:
     """Yield the arguments and options of a command, each with what it is."""
     for one in command.params:
-        if one.name == "help":
+        if one.name == "help" or getattr(one, "hidden", False):
             continue
         if one.param_type_name == "argument":
             head = f".I {_roff((one.metavar or one.name.upper()).strip('{}[]'))}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pulsetrainer.artefacts.data import LARGEST, BoolArray, Data, FloatArray, beyond_all_quantities
+from pulsetrainer.artefacts.data import LARGEST, Attribute, BoolArray, Data, FloatArray, beyond_all_quantities
 from pulsetrainer.artefacts.diagnosis import Cause, Diagnosis, Profile
 from pulsetrainer.artefacts.evaluation import DriveError, Evaluation, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.artefacts.model import Extension, Fit, Model, Parameter
@@ -13,6 +13,7 @@ from pulsetrainer.artefacts.waveform import Waveform
 __all__ = [
     "KINDS",
     "LARGEST",
+    "Attribute",
     "BoolArray",
     "Cause",
     "Data",

@@ -9,7 +9,8 @@ How a field is stored follows from its type and its ``Data`` annotation:
 - ``finite``: neither NaN nor infinity is written or read (what drives a device, what a model is).
   In any array, and in numbers but for infinity, what is beyond ``LARGEST`` is refused too; NaN is missing.
 - ``path``: the dataset's name in the file where it is not the field's name.
-- ``str``, ``int``, ``float``, ``bool``: an attribute.
+- ``str``, ``int``, ``float``, ``bool``: an attribute; ``Attribute(path)`` names it in the file where that is
+  not the field's name.
 - a dataclass: a group; a tuple of dataclasses: a group of numbered groups.
 - ``None``: nothing is written.
 
@@ -53,6 +54,13 @@ class Data:
         )
         for name, value in fields:
             object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """Marks a text or number whose attribute in the file has another name than the field."""
+
+    path: str
 
 
 def beyond_all_quantities(values: NDArray[Any]) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from pulsetrainer.artefacts.data import BoolArray, Data, FloatArray
+from pulsetrainer.artefacts.data import Attribute, BoolArray, Data, FloatArray
 from pulsetrainer.errors import DataError
 
 
@@ -65,8 +65,9 @@ class Model:
 
     kind: ClassVar[str] = "model"
 
-    levels: Annotated[
-        FloatArray, Data("@input_unit", "input levels: edges of the cells", "level", finite=True)
+    edges: Annotated[
+        FloatArray,
+        Data("@input_unit", "input levels: edges of the cells", "level", path="levels", finite=True),
     ]  # (L,)
     weights: Annotated[
         FloatArray, Data("@weights_unit", "Preisach weights mu", "cell", finite=True)
@@ -78,7 +79,7 @@ class Model:
     output_unit: str = "N"
     input_quantity: str = "current"
     output_quantity: str = "force"
-    operator: str = "continuous"  # how the weights are read: "continuous" | "relay"
+    reading: Annotated[str, Attribute("operator")] = "continuous"  # of the weights: "continuous" | "relay"
     polarity: int = 1  # -1: the output falls when the input rises
     # 90 % interval of every weight, where a bootstrap was made
     weights_lower: Annotated[
@@ -91,7 +92,7 @@ class Model:
     extensions: tuple[Extension, ...] = ()
 
     def __post_init__(self) -> None:
-        n_h = np.size(self.levels) - 1
+        n_h = np.size(self.edges) - 1
         if np.size(self.weights) != n_h * (n_h + 1) // 2:
             raise DataError(
                 f"a model with {n_h} levels has {n_h * (n_h + 1) // 2} cells, "

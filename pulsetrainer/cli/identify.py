@@ -13,7 +13,7 @@ from pulsetrainer.cli.options import AsJson, Force, Out
 from pulsetrainer.cli.settings import variable
 
 
-class Operator(StrEnum):
+class Reading(StrEnum):
     """How the weights are read."""
 
     continuous = "continuous"
@@ -39,9 +39,11 @@ def identify(
             min=2, max=_MOST_LEVELS, help="Levels of the Preisach plane.", envvar=variable("levels")
         ),
     ] = 48,
-    operator: Annotated[
-        Operator, typer.Option(help="continuous, or relay as in the paper.")
-    ] = Operator.continuous,
+    reading: Annotated[
+        Reading,
+        typer.Option("--reading", help="How the weights are read: continuous, or relay as in the paper."),
+    ] = Reading.continuous,
+    operator: Annotated[Reading | None, typer.Option("--operator", hidden=True)] = None,
     method: Annotated[Method, typer.Option(help="joint, or alternating as in the paper.")] = Method.joint,
     smoothing: Annotated[
         str | None,
@@ -77,7 +79,7 @@ def identify(
         tuple(runs),
         out,
         levels,
-        operator.value,
+        (operator or reading).value,
         method.value,
         smooth,
         bootstrap,

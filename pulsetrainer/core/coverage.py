@@ -81,7 +81,7 @@ def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:
     if covered.shape != (plane.n_q,):
         raise ArgumentError(
             f"covered must have shape ({plane.n_q},), got {covered.shape}",
-            hint="coverage and levels must come from the same model",
+            hint="coverage and edges must come from the same model",
         )
     if np.all(covered):
         return None
@@ -102,12 +102,12 @@ def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:
             if size[right] > best * (1 + 1e-12):
                 best, where = float(size[right]), (low, high, int(left[right]), right)
     low, high, left_band, right_band = where
-    levels = plane.levels
+    edges = plane.edges
     return Gap(
-        alpha_low=float(levels[max(low, left_band)]),
-        alpha_high=float(levels[high]),
-        beta_low=float(levels[left_band]),
-        beta_high=float(levels[right_band]),
+        alpha_low=float(edges[max(low, left_band)]),
+        alpha_high=float(edges[high]),
+        beta_low=float(edges[left_band]),
+        beta_high=float(edges[right_band]),
         share=best / whole,
         uncovered=float(plane.areas[~covered].sum()) / whole,
     )

@@ -14,69 +14,37 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # its parts load when they are first used
 
-from pulsetrainer.core.memory import State, Trace
+from pulsetrainer.core.memory import Trace
 from pulsetrainer.core.operator import base_rows, follow, steps
-from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading, finite_vector
-from pulsetrainer.errors import ArgumentError
+from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading
+from pulsetrainer.core.record import Record
 
 _CHUNK = 200_000  # samples whose sparse rows are held at one time
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
-    """One record to be fitted: input, output and, if some samples count less, their weights."""
-
-    input: FloatArray  # (n,)
-    output: FloatArray  # (n,)
-    weight: FloatArray | None = None  # (n,) 0 masks a sample out of the fit, not out of the memory
-    start: State | None = None  # None: negative saturation
-
-    def __post_init__(self) -> None:
-        u = finite_vector("input", self.input, at_least=2)
-        v = np.ones(u.size) if self.weight is None else finite_vector("weight", self.weight)
-        y = np.asarray(self.output, dtype=np.float64)
-        if y.shape != u.shape or v.shape != u.shape:
-            raise ArgumentError(
-                f"input, output and weight must have one length, got {u.shape}, {y.shape} and {v.shape}",
-                hint="cut the record to the samples that have both",
-            )
-        if np.any(v < 0):
-            raise ArgumentError(f"weight must not be negative, got {v.min():g}", hint="0 masks a sample")
-        finite_vector("output", y[v > 0], at_least=0)  # masked samples may be anything
-        object.__setattr__(self, "input", u)
-        object.__setattr__(self, "output", y)
-
-    @property
-    def weights(self) -> FloatArray:
-        """Weight of every sample (n,): ones unless given."""
-        return np.ones(self.input.size) if self.weight is None else np.asarray(self.weight, dtype=np.float64)
-
-    @property
-    def fitted_output(self) -> FloatArray:
-        """The output (n,), zero where it has no weight: what is masked may be anything, NaN too."""
-        return np.where(self.weights > 0, self.output, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
 class NormalEquations:
-    """Sums over all samples in the coordinates of the cells' masses; relays are -1 or +1."""
+    """Sums over all samples in the coordinates of the cells' masses; relays are -1 or +1.
+
+    v is the sample weight.
+    """
 
     plane: Plane
     gram: FloatArray  # (n_q, n_q) sum v r r'
     moment: FloatArray  # (n_q,) sum v r y
     row_sum: FloatArray  # (n_q,) sum v r
-    weight: float  # sum v
+    weight_sum: float  # sum v
     output_sum: float  # sum v y
     output_square: float  # sum v y^2
 
     def centred(self) -> tuple[FloatArray, FloatArray]:
         """Gram matrix and right side with the offset eliminated: rows and outputs minus their means."""
-        gram = self.gram - np.outer(self.row_sum, self.row_sum / self.weight)
-        return gram, self.moment - self.row_sum * (self.output_sum / self.weight)
+        gram = self.gram - np.outer(self.row_sum, self.row_sum / self.weight_sum)
+        return gram, self.moment - self.row_sum * (self.output_sum / self.weight_sum)
 
     def offset(self, masses: FloatArray) -> float:
         """Best offset y0 for given masses (n_q,)."""
-        return float(self.output_sum - self.row_sum @ masses) / self.weight
+        return float(self.output_sum - self.row_sum @ masses) / self.weight_sum
 
     def sum_of_squares(self, masses: FloatArray, offset: float) -> float:
         """Weighted sum of squared residuals, from the sums alone (rounding: about 1e-12 of sum v y^2)."""
@@ -85,12 +53,12 @@ class NormalEquations:
             - 2 * (self.moment @ masses + offset * self.output_sum)
             + masses @ self.gram @ masses
             + 2 * offset * (self.row_sum @ masses)
-            + offset**2 * self.weight
+            + offset**2 * self.weight_sum
         )
 
     def rms(self, masses: FloatArray, offset: float) -> float:
         """Weighted rms error, output unit."""
-        return float(np.sqrt(max(self.sum_of_squares(masses, offset), 0.0) / self.weight))
+        return float(np.sqrt(max(self.sum_of_squares(masses, offset), 0.0) / self.weight_sum))
 
     def __sub__(self, part: NormalEquations) -> NormalEquations:
         """Sums over the samples that are not in ``part``."""
@@ -99,7 +67,7 @@ class NormalEquations:
             self.gram - part.gram,
             self.moment - part.moment,
             self.row_sum - part.row_sum,
-            self.weight - part.weight,
+            self.weight_sum - part.weight_sum,
             self.output_sum - part.output_sum,
             self.output_square - part.output_square,
         )
@@ -109,14 +77,15 @@ class NormalEquations:
 class NodeSums:
     """Sums over samples in the coordinates of the Everett nodes.
 
-    Here a row rises from 0, all relays down, to 2 E(high, low), all up; the constant -W is left out.
+    v is the sample weight. Here a row rises from 0, all relays down, to 2 E(high, low), all up; the constant
+    -W is left out.
     """
 
     plane: Plane
     gram: scipy.sparse.csr_array  # (n_q, n_q) sum v r r'
     moment: FloatArray  # (n_q,) sum v r y
     row_sum: FloatArray  # (n_q,) sum v r
-    weight: float  # sum v
+    weight_sum: float  # sum v
     output_sum: float  # sum v y
     output_square: float  # sum v y^2
 
@@ -133,7 +102,7 @@ class NodeSums:
             self.gram + other.gram,
             self.moment + other.moment,
             self.row_sum + other.row_sum,
-            self.weight + other.weight,
+            self.weight_sum + other.weight_sum,
             self.output_sum + other.output_sum,
             self.output_square + other.output_square,
         )
@@ -144,13 +113,13 @@ class NodeSums:
         cells = plane.adjoint(plane.adjoint(self.gram.toarray()).T.copy())
         row_sum, moment = plane.adjoint(self.row_sum), plane.adjoint(self.moment)
         # so far rows rise from 0, all relays down, to 2: subtract the constant 1 from each
-        cells += self.weight - row_sum[:, None] - row_sum[None, :]
+        cells += self.weight_sum - row_sum[:, None] - row_sum[None, :]
         return NormalEquations(
             plane,
             cells,
             moment - self.output_sum,
-            row_sum - self.weight,
-            self.weight,
+            row_sum - self.weight_sum,
+            self.weight_sum,
             self.output_sum,
             self.output_square,
         )
@@ -202,7 +171,9 @@ def node_sums(plane: Plane, records: Sequence[Record], reading: Reading) -> Node
     for record in records:
         path = follow(plane, record.input, record.start, reading)
         every = np.arange(record.input.size)
-        part = _part_sums(plane, path, base_rows(plane, path), every, record.fitted_output, record.weights)
+        part = _part_sums(
+            plane, path, base_rows(plane, path), every, record.fitted_output, record.sample_weight
+        )
         total = total + part
     return total
 
@@ -217,7 +188,7 @@ def parted_sums(
     sums = [NodeSums.nothing(plane) for _ in range(count)]
     for record, part in zip(records, parts, strict=True):
         path = follow(plane, record.input, record.start, reading)
-        base, y, v = base_rows(plane, path), record.fitted_output, record.weights
+        base, y, v = base_rows(plane, path), record.fitted_output, record.sample_weight
         for k in range(count):
             sums[k] = sums[k] + _part_sums(plane, path, base, np.flatnonzero(part == k), y, v)
     return sums

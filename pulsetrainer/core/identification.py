@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from pulsetrainer.core import large, nnls
 from pulsetrainer.core.coverage import coverage
-from pulsetrainer.core.equations import NormalEquations, Record, node_sums, normal_equations
-from pulsetrainer.core.levels import thinned
+from pulsetrainer.core.edges import thinned
+from pulsetrainer.core.equations import NormalEquations, node_sums, normal_equations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import choose, smoothed
 from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
 from pulsetrainer.errors import ArgumentError, ConvergenceError
@@ -68,13 +69,13 @@ class Identified:
     smoothing: float = 0.0  # s, share of the input's range; see ``core.smoothing``
     tried: tuple[tuple[float, float], ...] = ()  # (s, held-out rms) when it was chosen, output unit
     stiffness: float = 0.0  # t, how alike the loops are along the diagonal; see ``core.stiffness``
-    samples: int = 0  # with weight; fewer than cells: what the data do not ask for is zero
+    samples: int = 0  # that count; fewer than cells: what the data do not ask for is zero
 
 
 def correlation_of(records: Sequence[Record]) -> float:
     """Return the correlation of input and output, -1..1; 0 where one of them does not vary."""
-    u = np.concatenate([r.input if r.weight is None else r.input[r.weight > 0] for r in records])
-    y = np.concatenate([r.output if r.weight is None else r.output[r.weight > 0] for r in records])
+    u = np.concatenate([r.input[r.sample_weight > 0] for r in records])
+    y = np.concatenate([r.output[r.sample_weight > 0] for r in records])
     # both scaled to 1 first: the product of two small numbers must not underflow
     u, y = (
         x / max(float(np.abs(x).max(initial=0.0)), np.finfo(float).tiny) for x in (u - u.mean(), y - y.mean())
@@ -131,7 +132,7 @@ def identify(
     records
         Measured inputs and outputs; all share one set of weights and one offset.
     plane
-        The levels; inputs outside are clipped.
+        Where the weights live; inputs outside its range are clipped.
     polarity
         1, -1, or None to detect it.
     smoothing
@@ -141,14 +142,15 @@ def identify(
     Raises
     ------
     ArgumentError
-        No records, no weight, an input or an output that does not vary, fewer samples than levels, an
-        unknown method, a smoothing out of range, or ``method="alternating"`` on a plane too large for it.
+        No records, no sample that counts, an input or an output that does not vary, fewer samples than
+        levels, an unknown method, a smoothing out of range, or ``method="alternating"`` on a plane too
+        large for it.
     ConvergenceError
         The fit did not settle.
     """
     samples = _check(records, plane, method, smoothing)
     sign = polarity_of(records, plane, reading) if polarity is None else polarity
-    turned = [Record(r.input, sign * r.output, r.weight, r.start) for r in records]
+    turned = [r.turned(sign) for r in records]
     tried: tuple[tuple[float, float], ...] = ()
     if smoothing == "auto":
         choice = choose(turned, plane, reading)
@@ -169,8 +171,8 @@ def identify(
 
 
 def _span(records: Sequence[Record]) -> float:
-    """Span of the output over all samples with weight."""
-    return float(np.ptp(np.concatenate([r.output[r.weights > 0] for r in records])))
+    """Span of the output over all samples that count."""
+    return float(np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in records])))
 
 
 def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = "continuous") -> FloatArray:
@@ -189,7 +191,7 @@ def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = 
         return np.zeros(len(records))
     coarse = plane if plane.n_h <= _SIGN_LEVELS else thinned(plane, _SIGN_LEVELS)
     sign = polarity_of(records, plane, reading)
-    turned = [Record(r.input, sign * r.output, r.weight, r.start) for r in records]
+    turned = [r.turned(sign) for r in records]
     single = [normal_equations(coarse, [record], reading) for record in turned]
     whole = normal_equations(coarse, turned, reading)
     shared_gram, shared_rhs = smoothed(whole, _SIGN_SMOOTHING)
@@ -198,22 +200,22 @@ def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = 
     shared = nnls.solve(shared_gram, shared_rhs).x
     gram = bent + np.sum([g for g, _ in centred], axis=0)
     own = nnls.solve(gram, np.sum([f for _, f in centred], axis=0)).x
-    levels = np.asarray([one.offset(own) for one in single])
+    offsets = np.asarray([one.offset(own) for one in single])
     before = whole.sum_of_squares(shared, whole.offset(shared))
-    after = sum(one.sum_of_squares(own, level) for one, level in zip(single, levels, strict=True))
+    after = sum(one.sum_of_squares(own, y0) for one, y0 in zip(single, offsets, strict=True))
     if after > (1.0 - SHIFTED) ** 2 * before:
         return np.zeros(len(records))
-    weight = np.asarray([one.weight for one in single])
-    return sign * (levels - float(weight @ levels / weight.sum()))
+    weight = np.asarray([one.weight_sum for one in single])
+    return sign * (offsets - float(weight @ offsets / weight.sum()))
 
 
 def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: Smoothing) -> int:
-    """Return the number of samples with weight, or raise ArgumentError when they cannot be fitted."""
-    samples = sum(int(np.count_nonzero(r.weights)) for r in records)
+    """Return the number of samples that count, or raise ArgumentError when they cannot be fitted."""
+    samples = sum(int(np.count_nonzero(r.sample_weight)) for r in records)
     if samples == 0:
         raise ArgumentError(
-            f"records must hold at least one sample with weight, got {len(records)} records without any",
-            hint="record a run, or give some sample a weight above 0",
+            f"records must hold at least one sample that counts, got none in {len(records)} records",
+            hint="record a run, or give some sample a sample_weight above 0",
         )
     if method not in ("joint", "alternating"):
         raise ArgumentError(f"method must be 'joint' or 'alternating', got {method!r}", hint="use 'joint'")
@@ -222,13 +224,13 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
             f"smoothing must be 'auto' or a number in 0..1, got {smoothing!r}", hint="use 'auto'"
         )
     inputs = np.concatenate([np.clip(r.input, plane.low, plane.high) for r in records])
-    outputs = np.concatenate([r.output[r.weights > 0] for r in records])
+    outputs = np.concatenate([r.output[r.sample_weight > 0] for r in records])
     for name, values in (("input", inputs), ("output", outputs)):
         if np.ptp(values) <= 1e-12 * np.abs(values).max():
             raise ArgumentError(
                 f"the {name} does not vary: it is {values[0]:g} in all of its {values.size} samples "
-                f"(levels are {plane.low:g} .. {plane.high:g})",
-                hint="check the wiring, and that the run sweeps the range of the levels",
+                f"(the plane spans {plane.low:g} .. {plane.high:g})",
+                hint="check the wiring, and that the run sweeps the range of the plane",
             )
     if samples < plane.n_h:
         raise ArgumentError(
@@ -289,8 +291,8 @@ def _alternate(
     The plain alternation creeps: ten thousand rounds at 48 levels. Its moves are a piecewise linear
     function of the offset, so the next offset is taken where the line through the last two moves is zero.
     """
-    offset = equations.output_sum / equations.weight
-    spread = np.sqrt(max(equations.output_square / equations.weight - offset**2, 0.0))
+    offset = equations.output_sum / equations.weight_sum
+    spread = np.sqrt(max(equations.output_square / equations.weight_sum - offset**2, 0.0))
     passive: NDArray[np.bool_] | None = None
     before: tuple[float, float] | None = None
     for iteration in range(1, limit + 1):

@@ -5,7 +5,7 @@ inverse is interpolation between a few dozen points. The memory of the wanted ou
 extremes as the memory of the input, so one trace of the target tells every branch. That is
 ``invert``, and ``InverseStream`` is the same sample by sample.
 
-``closest_match`` is the method of the original device: step the input level by level until the output is
+``closest_match`` is the method of the original device: step the input edge by edge until the output is
 nearest (Tan, Venkataraman, Krishnaprasad 2001; Tan, Baras, Krishnaprasad 2005); ``smoothed`` is the
 spline that takes its steps off.
 """
@@ -40,46 +40,46 @@ class Inverse:
 class _Branches:
     """How far the input must go from a turning point until the output has moved by so much.
 
-    Along a branch the rise at level l is (1 - t) R[k, l] + t R[k + 1, l], for a turn at the fraction t
+    Along a branch the rise at edge l is (1 - t) R[k, l] + t R[k + 1, l], for a turn at the fraction t
     of band k, with R twice the Everett function, continued symmetrically. It never falls (sums of masses,
-    rounded monotonically), and is linear between levels. ``reach`` and ``reach_all`` round alike.
+    rounded monotonically), and is linear between edges. ``reach`` and ``reach_all`` round alike.
     """
 
     def __init__(self, operator: Preisach) -> None:
         self.plane = operator.plane
         self.rises = 2.0 * (operator.grid + operator.grid.T)
         self.rows: list[list[float]] = self.rises.tolist()
-        self.levels: list[float] = operator.plane.levels.tolist()
+        self.edges: list[float] = operator.plane.edges.tolist()
 
     def reach(self, origin: float, need: float, *, rising: bool) -> float:
         """Input at which the branch from ``origin`` has moved by ``need``; where it is flat, the nearest."""
-        levels, n_h = self.levels, self.plane.n_h
-        k = bisect_right(levels, origin, 1, n_h) - 1
-        t = (origin - levels[k]) / (levels[k + 1] - levels[k])
+        edges, n_h = self.edges, self.plane.n_h
+        k = bisect_right(edges, origin, 1, n_h) - 1
+        t = (origin - edges[k]) / (edges[k + 1] - edges[k])
         near, far = self.rows[k], self.rows[k + 1]
         first, step, last = (k + 1, 1, n_h - k - 1) if rising else (k, -1, k)
 
         def rise(steps: int) -> float:
-            level = first + step * steps
-            return (1.0 - t) * near[level] + t * far[level]
+            edge = first + step * steps
+            return (1.0 - t) * near[edge] + t * far[edge]
 
         need = min(need, rise(last))
-        begin, end = 0, last  # the first level at which the rise is enough
+        begin, end = 0, last  # the first edge at which the rise is enough
         while begin < end:
             middle = (begin + end) // 2
             if rise(middle) >= need:
                 end = middle
             else:
                 begin = middle + 1
-        after, beyond = rise(begin), levels[first + step * begin]
-        before, u = (rise(begin - 1), levels[first + step * (begin - 1)]) if begin else (0.0, origin)
+        after, beyond = rise(begin), edges[first + step * begin]
+        before, u = (rise(begin - 1), edges[first + step * (begin - 1)]) if begin else (0.0, origin)
         if after > before:
             u += (need - before) / (after - before) * (beyond - u)
         return min(u, beyond) if rising else max(u, beyond)
 
     def reach_all(self, origin: FloatArray, need: FloatArray, rising: NDArray[np.bool_]) -> FloatArray:
         """The same for many samples (n,) at once, by bisection of all of them."""
-        levels, n_h = self.plane.levels, self.plane.n_h
+        edges, n_h = self.plane.edges, self.plane.n_h
         k, t = self.plane.bands(origin)
         near = self.rises.ravel()
         far = self.rises[1:].ravel()
@@ -89,8 +89,8 @@ class _Branches:
         begin, end = np.zeros_like(k), np.where(rising, n_h - k - 1, k)
 
         def rise(steps: IntArray) -> FloatArray:
-            level = row + step * steps
-            return (1.0 - t) * near.take(level) + t * far.take(level)
+            edge = row + step * steps
+            return (1.0 - t) * near.take(edge) + t * far.take(edge)
 
         need = np.minimum(need, rise(end))
         while np.any(begin < end):
@@ -99,10 +99,10 @@ class _Branches:
             end = np.where(enough, middle, end)
             begin = np.where(enough, begin, np.minimum(middle + 1, end))
         inside = begin > 0
-        after, beyond = rise(begin), levels[first + step * begin]
+        after, beyond = rise(begin), edges[first + step * begin]
         previous = np.where(inside, begin - 1, 0)
         before = np.where(inside, rise(previous), 0.0)
-        u = np.where(inside, levels[first + step * previous], origin)
+        u = np.where(inside, edges[first + step * previous], origin)
         gap = after - before
         u += np.divide(need - before, gap, out=np.zeros_like(u), where=gap > 0) * (beyond - u)
         return np.where(rising, np.minimum(u, beyond), np.maximum(u, beyond))
@@ -236,9 +236,9 @@ class InverseStream:
 
 
 def closest_match(operator: Preisach, target: ArrayLike, start: State | None = None) -> Inverse:
-    """Return the input levels (n,) whose relay output is nearest to each target (n,) in turn.
+    """Return the edges (n,) as inputs whose relay output is nearest to each target (n,) in turn.
 
-    From the present level and memory: while the output is below the target step up one level, keeping
+    From the present edge and memory: while the output is below the target step up one edge, keeping
     the memory before the step; at the target, or at saturation, keep the nearer of the last two
     (Tan, Baras, Krishnaprasad 2005, section 4). Mirrored when the output is above the target.
 
@@ -250,26 +250,26 @@ def closest_match(operator: Preisach, target: ArrayLike, start: State | None = N
     wanted = finite_vector("target", target)
     _check_not_empty(operator)
     clipped, worst, y = _into_reach(operator, wanted)
-    grid, levels, top = operator.grid, operator.plane.levels, operator.plane.n_h
+    grid, edges, top = operator.grid, operator.plane.edges, operator.plane.n_h
     state = start or negative_saturation(operator.plane.low)
     rounded = operator.plane.round_to_nodes(np.asarray(state.extremes))
-    settled = trace(rounded, negative_saturation(levels[0]), levels[0], levels[-1]).final
-    memory = _LevelMemory(grid, [int(k) for k in np.searchsorted(levels, settled.extremes)])
+    settled = trace(rounded, negative_saturation(edges[0]), edges[0], edges[-1]).final
+    memory = _EdgeMemory(grid, [int(k) for k in np.searchsorted(edges, settled.extremes)])
     chosen = np.empty(y.size, dtype=np.int64)
     for n, goal in enumerate(y.tolist()):
         direction = 1 if memory.output < goal else -1
         before = memory
-        while direction * (goal - memory.output) > 0 and 0 <= memory.level + direction <= top:
+        while direction * (goal - memory.output) > 0 and 0 <= memory.edge + direction <= top:
             before, memory = memory, memory.moved(direction)
         if abs(before.output - goal) < abs(memory.output - goal):
             memory = before
-        chosen[n] = memory.level
-    final = State(tuple(levels[memory.extremes].tolist()))
-    return Inverse(levels[chosen], clipped, worst, final)
+        chosen[n] = memory.edge
+    final = State(tuple(edges[memory.extremes].tolist()))
+    return Inverse(edges[chosen], clipped, worst, final)
 
 
-class _LevelMemory:
-    """A relay memory in whole levels: remembered extremes and the output they give."""
+class _EdgeMemory:
+    """A relay memory in numbers of edges: remembered extremes and the output they give."""
 
     __slots__ = ("extremes", "grid", "output")
 
@@ -278,7 +278,7 @@ class _LevelMemory:
         self.output = self._sum() if output is None else output
 
     @property
-    def level(self) -> int:
+    def edge(self) -> int:
         return self.extremes[-1]
 
     def _sum(self) -> float:
@@ -287,23 +287,23 @@ class _LevelMemory:
             y += 2.0 * float(self.grid[b, a] - self.grid[a, b])  # one of the two is zero
         return y
 
-    def moved(self, direction: int) -> _LevelMemory:
-        """Return the memory after one level up or down."""
+    def moved(self, direction: int) -> _EdgeMemory:
+        """Return the memory after one edge up or down."""
         stack = list(self.extremes)
-        level = stack[-1] + direction
+        edge = stack[-1] + direction
         if len(stack) > 1 and (stack[-1] - stack[-2]) * direction > 0:
             stack.pop()
-        while len(stack) > 1 and (level - stack[-2]) * direction >= 0:
+        while len(stack) > 1 and (edge - stack[-2]) * direction >= 0:
             del stack[-2 if len(stack) > 2 else -1 :]
-        if level != stack[-1]:
-            stack.append(level)
-        return _LevelMemory(self.grid, stack)
+        if edge != stack[-1]:
+            stack.append(edge)
+        return _EdgeMemory(self.grid, stack)
 
 
 def smoothed(inputs: ArrayLike, time_s: ArrayLike, step: float, low: float, high: float) -> FloatArray:
-    """Return a staircase of levels ``step`` apart as a cubic smoothing spline, kept within [low, high].
+    """Return a staircase of edges ``step`` apart as a cubic smoothing spline, kept within [low, high].
 
-    The spline may differ from the staircase by the rounding error of the levels and no more: its
+    The spline may differ from the staircase by the rounding error of the edges and no more: its
     residual is allowed the variance of a uniform error, step^2 / 12 per sample.
 
     Raises

@@ -63,7 +63,7 @@ def solve(
     """
     problem = _Problem(sums, smoothing)
     usable, count = problem.usable, int(problem.usable.sum())
-    size = np.sqrt(max(sums.output_square / sums.weight - (sums.output_sum / sums.weight) ** 2, 0.0))
+    size = np.sqrt(max(sums.output_square / sums.weight_sum - (sums.output_sum / sums.weight_sum) ** 2, 0.0))
     largest = float(np.abs(problem.rhs).max())
     m = np.where(usable, 2.0 * size / count, 0.0)
     lam = np.where(usable, 0.01 * largest, 0.0)
@@ -127,8 +127,8 @@ class _Problem:
         # cells the data never touch are not part of the problem: any curvature keeps them at zero
         extra = scipy.sparse.diags_array(np.where(self.usable, _RIDGE, 1.0) * largest)
         self.extra = (extra + penalty(self.plane, diagonal, smoothing)).tocsr()
-        self.mean = sums.row_sum / np.sqrt(sums.weight)
-        self.rhs_nodes = sums.moment - sums.row_sum * (sums.output_sum / sums.weight)
+        self.mean = sums.row_sum / np.sqrt(sums.weight_sum)
+        self.rhs_nodes = sums.moment - sums.row_sum * (sums.output_sum / sums.weight_sum)
         self.rhs = self.plane.adjoint(self.rhs_nodes)
 
     def gradient(self, masses: FloatArray) -> FloatArray:
@@ -140,7 +140,9 @@ class _Problem:
     def offset(self, masses: FloatArray) -> float:
         """Best offset y0; rows in node space lack the constant -W, so the mass of the plane is added."""
         e = self.plane.everett_nodes(masses)
-        return float(self.sums.output_sum - self.sums.row_sum @ e) / self.sums.weight + float(masses.sum())
+        return float(self.sums.output_sum - self.sums.row_sum @ e) / self.sums.weight_sum + float(
+            masses.sum()
+        )
 
     def kkt_violation(self, masses: FloatArray) -> float:
         """Largest violation of the optimality conditions, relative to the largest entry of the right side."""
@@ -246,8 +248,8 @@ def centred_diagonal(sums: NodeSums) -> FloatArray:
     diagonal = plane.adjoint(
         np.bincount(corner, weights=pairs.data[inside], minlength=plane.n_q).astype(np.float64)
     )
-    diagonal -= plane.adjoint(sums.row_sum) ** 2 / sums.weight
-    diagonal[diagonal <= 1e-13 * sums.weight] = 0.0  # rounding of relays that never switched
+    diagonal -= plane.adjoint(sums.row_sum) ** 2 / sums.weight_sum
+    diagonal[diagonal <= 1e-13 * sums.weight_sum] = 0.0  # rounding of relays that never switched
     return diagonal
 
 

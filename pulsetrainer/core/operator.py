@@ -34,12 +34,12 @@ class Rows(NamedTuple):
 
 def steps(plane: Plane, to: FloatArray, origin: FloatArray) -> scipy.sparse.csr_array:
     """Rows (n, n_q) in node space of the signed output steps 2 G(to, origin)."""
-    corner, weight = plane.corners(to, origin)
+    corner, share = plane.corners(to, origin)
     number, sign = plane.signed_nodes
-    weight *= 2.0 * sign[corner]
+    share *= 2.0 * sign[corner]
     pointer = np.arange(to.size + 1, dtype=np.int64) * 4
     rows = scipy.sparse.csr_array(
-        (weight.T.ravel(), number[corner].T.ravel(), pointer), shape=(to.size, plane.n_q)
+        (share.T.ravel(), number[corner].T.ravel(), pointer), shape=(to.size, plane.n_q)
     )
     rows.sum_duplicates()
     rows.eliminate_zeros()

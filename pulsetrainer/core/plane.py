@@ -1,6 +1,6 @@
 """The discrete Preisach plane and its Everett surface.
 
-The half-plane alpha >= beta over [L_0, L_n] is cut by n_h + 1 levels into n_q = n_h (n_h + 1) / 2 cells.
+The half-plane alpha >= beta over [L_0, L_n] is cut by n_h + 1 edges L into n_q = n_h (n_h + 1) / 2 cells.
 Cell (i, j), i >= j, holds the relays that switch up in [L_i, L_i+1] and down in [L_j, L_j+1]; cells
 are numbered k = i (i + 1) / 2 + j. Cells on the diagonal are triangles: half the area.
 
@@ -103,24 +103,24 @@ MOST_LEVELS = 10_000  # fifty million cells
 
 @dataclass(frozen=True)
 class Plane:
-    """The levels of a discrete Preisach plane; everything else follows from them."""
+    """The edges of the cells of a discrete Preisach plane; everything else follows from them."""
 
-    levels: FloatArray  # (n_h + 1,) edges of the cells, strictly increasing
+    edges: FloatArray  # (n_h + 1,) borders of the cells, input unit, strictly increasing
 
     def __post_init__(self) -> None:
-        levels = finite_vector("levels", self.levels)
-        if levels.size < 3:
+        edges = finite_vector("edges", self.edges)
+        if edges.size < 3:
             raise ArgumentError(
-                f"a Preisach plane needs at least 2 levels (3 edges), got {levels.size} edges",
+                f"a Preisach plane needs at least 2 levels (3 edges), got {edges.size} edges",
                 hint="use more levels, 48 for instance",
             )
-        if not np.all(np.diff(levels) > 0):
+        if not np.all(np.diff(edges) > 0):
             raise ArgumentError(
-                f"levels must strictly increase, got {levels[0]:g} .. {levels[-1]:g} with a smallest step of "
-                f"{np.diff(levels).min():g}",
+                f"edges must strictly increase, got {edges[0]:g} .. {edges[-1]:g} with a smallest step of "
+                f"{np.diff(edges).min():g}",
                 hint="the input range must not be zero",
             )
-        object.__setattr__(self, "levels", levels)
+        object.__setattr__(self, "edges", edges)
 
     @classmethod
     def uniform(cls, low: float, high: float, n_h: int) -> Plane:
@@ -142,7 +142,7 @@ class Plane:
     @property
     def n_h(self) -> int:
         """Number of levels."""
-        return self.levels.size - 1
+        return self.edges.size - 1
 
     @property
     def n_q(self) -> int:
@@ -152,12 +152,12 @@ class Plane:
     @property
     def low(self) -> float:
         """Lower end of the input range."""
-        return float(self.levels[0])
+        return float(self.edges[0])
 
     @property
     def high(self) -> float:
         """Upper end of the input range."""
-        return float(self.levels[-1])
+        return float(self.edges[-1])
 
     @cached_property
     def cell_indices(self) -> tuple[IntArray, IntArray]:
@@ -169,13 +169,13 @@ class Plane:
     def areas(self) -> FloatArray:
         """Areas A_k of the cells (n_q,), input unit squared; diagonal cells count half."""
         i, j = self.cell_indices
-        step = np.diff(self.levels)
+        step = np.diff(self.edges)
         return step[i] * step[j] * np.where(i == j, 0.5, 1.0)
 
     @cached_property
     def thresholds(self) -> FloatArray:
         """Middles of the bands (n_h,): where the relays of the paper's reading switch."""
-        return 0.5 * (self.levels[1:] + self.levels[:-1])
+        return 0.5 * (self.edges[1:] + self.edges[:-1])
 
     def check_weights(self, weights: ArrayLike) -> FloatArray:
         """Return ``weights`` (n_q,) when they can belong to this plane.
@@ -189,7 +189,7 @@ class Plane:
         if array.shape != (self.n_q,):
             raise ArgumentError(
                 f"weights must have shape ({self.n_q},) for {self.n_h} levels, got {array.shape}",
-                hint="weights and levels must come from the same model",
+                hint="weights and edges must come from the same model",
             )
         if not np.all(np.isfinite(array)) or np.any(array < 0):
             k = int(np.flatnonzero(~(array >= 0) | ~np.isfinite(array))[0])
@@ -210,7 +210,7 @@ class Plane:
         if packed.shape[-1:] != (self.n_q,):
             raise ArgumentError(
                 f"cell values must have shape (..., {self.n_q}) for {self.n_h} levels, got {packed.shape}",
-                hint="cell values and levels must come from the same model",
+                hint="cell values and edges must come from the same model",
             )
         i, j = self.cell_indices
         square = np.zeros((*packed.shape[:-1], self.n_h, self.n_h))
@@ -257,7 +257,7 @@ class Plane:
         if nodes.shape != (self.n_q,):
             raise ArgumentError(
                 f"node values must have shape ({self.n_q},) for {self.n_h} levels, got {nodes.shape}",
-                hint="node values and levels must come from the same model",
+                hint="node values and edges must come from the same model",
             )
         grid = np.zeros((self.n_h + 1, self.n_h + 1))
         i, j = self.cell_indices
@@ -265,23 +265,23 @@ class Plane:
         return grid
 
     def bands(self, values: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Band index and fraction in [0, 1] of each input value; values outside are clipped to the edges."""
+        """Band index and fraction in [0, 1] of each input value; values outside are clipped to the ends."""
         fraction = np.clip(values, self.low, self.high)
-        band = self.levels[1:-1].searchsorted(fraction, side="right")
-        fraction -= self.levels[band]
+        band = self.edges[1:-1].searchsorted(fraction, side="right")
+        fraction -= self.edges[band]
         fraction /= self._steps[band]
         return band, fraction
 
     @cached_property
     def _steps(self) -> FloatArray:
-        return np.diff(self.levels)
+        return np.diff(self.edges)
 
     def round_to_nodes(self, values: FloatArray) -> FloatArray:
-        """Round each value to a level, as the relays of the paper's reading see it.
+        """Round each value to an edge, as the relays of the paper's reading see it.
 
         Relays switch at the middles of the bands: a relay is up from its threshold on.
         """
-        return self.levels[np.searchsorted(self.thresholds, values, side="right")]
+        return self.edges[np.searchsorted(self.thresholds, values, side="right")]
 
     @cached_property
     def signed_nodes(self) -> tuple[IntArray, FloatArray]:
@@ -292,7 +292,7 @@ class Plane:
         return number.astype(np.int64), np.sign(a - b).astype(np.float64)
 
     def corners(self, to: FloatArray, origin: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Flat grid numbers and bilinear weights, each (4, n), of the points (to, origin)."""
+        """Flat grid numbers and bilinear shares, each (4, n), of the points (to, origin)."""
         i, s = self.bands(to)
         j, t = self.bands(origin)
         first = i * (self.n_h + 1) + j

@@ -104,9 +104,9 @@ def identification(low: float, high: float, *, n_h: int, speed: float, rate_Hz: 
         An empty range, fewer than 2 levels, a speed or rate that is not positive, or a step from one
         sample to the next that is wider than the range.
     """
-    levels = Plane.uniform(low, high, n_h).levels
+    edges = Plane.uniform(low, high, n_h).edges
     _check_step(speed / rate_Hz if rate_Hz > 0 else 0.0, high - low)
-    bottoms = levels[-2::-1]
+    bottoms = edges[-2::-1]
     turns = np.empty(2 * n_h + 1)
     turns[0], turns[1::2], turns[2::2] = low, high, bottoms
     return Signal(through(turns, speed, rate_Hz), rate_Hz, "identification")

@@ -14,7 +14,7 @@ they are coupled along the diagonal only.
 The output sees the density through two integrals, so a ripple of wavelength 2 pi / k enters the first sum
 as k^-4 and B as k^4: the two meet at k = 1 / s. The number s is therefore a length, as a share of the
 input's range: what is narrower than s in the density is smoothed away. It has no units and does not
-depend on the number of levels or samples. Where levels crowd (``core.levels``), x is the number of the level
+depend on the number of levels or samples. Where edges crowd (``core.edges``), x is the number of the edge
 over n_h instead: what is smoothed away is narrower there too.
 """
 
@@ -28,9 +28,10 @@ import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
 
 from pulsetrainer.core import nnls
-from pulsetrainer.core.equations import NodeSums, NormalEquations, Record, parted_sums
-from pulsetrainer.core.levels import thinned
+from pulsetrainer.core.edges import thinned
+from pulsetrainer.core.equations import NodeSums, NormalEquations, parted_sums
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
 
 # Blocks are dealt out to this many folds in turn, so that each fold is spread over the whole record.
@@ -188,7 +189,7 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> Choice:
     coarse = plane if plane.n_h <= CHOICE_LEVELS else thinned(plane, CHOICE_LEVELS)
     folds = [blocks(r.input, plane.low, plane.high) % FOLDS for r in records]
     sums = parted_sums(coarse, records, reading, folds, FOLDS)
-    held_out = [part for part in sums if part.weight > 0]
+    held_out = [part for part in sums if part.weight_sum > 0]
     if len(held_out) < 2:
         raise ArgumentError(
             f"smoothing='auto' needs at least {2 * FOLDS} samples to hold some out, "
@@ -213,13 +214,13 @@ class _HeldOut:
     def __call__(self, smoothing: float) -> float:
         if smoothing not in self.errors:
             total = sum(self._error(k, smoothing) for k in range(len(self.parts)))
-            self.errors[smoothing] = float(np.sqrt(max(total, 0.0) / self.whole.weight))
+            self.errors[smoothing] = float(np.sqrt(max(total, 0.0) / self.whole.weight_sum))
         return self.errors[smoothing]
 
     def _error(self, k: int, smoothing: float) -> float:
         rest = self.whole - self.parts[k]
         gram, rhs = rest.centred()
-        gram += self.unit * (smoothing**8 * rest.weight / self.whole.weight)
+        gram += self.unit * (smoothing**8 * rest.weight_sum / self.whole.weight_sum)
         found = nnls.solve(gram, rhs, passive=self.passive[k])
         self.passive[k] = found.passive
         return self.parts[k].sum_of_squares(found.x, rest.offset(found.x))

@@ -19,9 +19,10 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import nnls
-from pulsetrainer.core.equations import NormalEquations, Record, parted_sums
-from pulsetrainer.core.levels import thinned
+from pulsetrainer.core.edges import thinned
+from pulsetrainer.core.equations import NormalEquations, parted_sums
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.core.record import Record
 
 STRENGTHS = (0.1, 1.0, 10.0, 100.0)  # 100 is within a few per cent of t -> infinity
 HELD_OUT = 0.5  # of the samples of each record, the last ones
@@ -65,10 +66,10 @@ def choose_stiffness(records: Sequence[Record], plane: Plane, reading: Reading) 
     coarse = plane if plane.n_h <= _LEVELS else thinned(plane, _LEVELS)
     parts = []
     for record in records:
-        known = np.cumsum(record.weights > 0)
+        known = np.cumsum(record.sample_weight > 0)
         parts.append((known > (1.0 - HELD_OUT) * known[-1]).astype(np.int64))
     fitted, held_out = (part.dense() for part in parted_sums(coarse, records, reading, parts, 2))
-    if min(fitted.weight, held_out.weight) <= 0:
+    if min(fitted.weight_sum, held_out.weight_sum) <= 0:
         return 0.0
     errors = {t: _error(fitted, held_out, t) for t in (0.0, *STRENGTHS)}
     enough = (1.0 + TOLERANCE) * min(errors.values())
@@ -81,4 +82,4 @@ def _error(fitted: NormalEquations, held_out: NormalEquations, strength: float) 
         gram += stiffness_penalty(fitted.plane, np.diagonal(gram).copy(), strength).toarray()
     found = nnls.solve(gram, rhs)
     squares = held_out.sum_of_squares(found.x, fitted.offset(found.x))
-    return float(np.sqrt(max(squares, 0.0) / held_out.weight))
+    return float(np.sqrt(max(squares, 0.0) / held_out.weight_sum))

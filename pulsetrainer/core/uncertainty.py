@@ -20,11 +20,12 @@ import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.core import nnls
-from pulsetrainer.core.equations import NodeSums, Record, parted_sums
+from pulsetrainer.core.equations import NodeSums, parted_sums
 from pulsetrainer.core.identification import Identified, fits_dense, penalised
 from pulsetrainer.core.memory import State
 from pulsetrainer.core.operator import Preisach, outputs
 from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
 
 # More blocks cost memory and time, and do not change the intervals any more.
@@ -141,7 +142,7 @@ def bootstrap(
         raise ArgumentError(
             f"the bootstrap needs dense matrices, too large for {plane.n_h} levels", hint="use 48 levels"
         )
-    turned = [Record(r.input, sign * r.output, r.weight, r.start) for r in records]
+    turned = [r.turned(sign) for r in records]
     length = block or block_length([_residual(operator, record) for record in records])
     parts, count = _blocks(records, length)
     if count < 2:
@@ -163,7 +164,7 @@ def bootstrap(
 
 def _residual(operator: Preisach, record: Record) -> FloatArray:
     """Residual (n,) of the samples with weight."""
-    fitted = record.weights > 0
+    fitted = record.sample_weight > 0
     return (record.fitted_output - operator(record.input, record.start))[fitted]
 
 
@@ -171,7 +172,7 @@ def _blocks(records: Sequence[Record], length: int) -> tuple[list[IntArray], int
     """Numbers of the blocks of all samples, -1 where the weight is zero, and how many there are."""
     parts, count = [], 0
     for record in records:
-        fitted = record.weights > 0
+        fitted = record.sample_weight > 0
         place = np.cumsum(fitted) - 1
         parts.append(np.where(fitted, count + place // length, -1).astype(np.int64))
         count += -(-int(fitted.sum()) // length)
@@ -192,7 +193,7 @@ class _Stack:
         self.gram = scipy.sparse.csr_array(entries, shape=(self.place.size, len(sums)))
         self.moment = np.stack([s.moment for s in sums])
         self.row_sum = np.stack([s.row_sum for s in sums])
-        self.scalars = np.asarray([(s.weight, s.output_sum, s.output_square) for s in sums])
+        self.scalars = np.asarray([(s.weight_sum, s.output_sum, s.output_square) for s in sums])
 
     def weighted(self, drawn: FloatArray) -> NodeSums:
         """Sums over a resample in which block k comes ``drawn[k]`` times."""

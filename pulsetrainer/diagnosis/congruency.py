@@ -22,9 +22,9 @@ from scipy import linalg
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.answer import Estimate
 from pulsetrainer.diagnosis.causes.base import Cause
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Fitted, weights_for
 from pulsetrainer.diagnosis.problem import Problem
@@ -69,7 +69,7 @@ class Contrast:
         return Estimate(quantity.name, self.value, quantity.unit, self.value - half, self.value + half)
 
 
-def loops_of(records: Sequence[Measured], low: float, high: float) -> list[Loop]:
+def loops_of(records: Sequence[Record], low: float, high: float) -> list[Loop]:
     """Return the closed minor loops that were traced more than once, in equal time, by their kind."""
     reach = high - low
     found: list[tuple[int, int, int, int, float, float]] = []
@@ -84,12 +84,12 @@ def loops_of(records: Sequence[Measured], low: float, high: float) -> list[Loop]
             inside = top < high - _SAME * reach and bottom > low + _SAME * reach
             if wide > _NARROWEST * reach and closed and inside:
                 whole = slice(int(at[j]), int(at[j + 2]) + 1)
-                if np.all(record.weight[whole] > 0):
+                if np.all(record.sample_weight[whole] > 0):
                     found.append((k, int(at[j]), int(at[j + 1]), int(at[j + 2]), float(bottom), float(top)))
     kinds: list[tuple[float, float, float]] = []
     loops = []
     for k, begin, turn, end, bottom, top in found:
-        took = (end - begin) * records[k].dt_s
+        took = (end - begin) * records[k].step
         equal = [
             kind
             for kind, (a, b, seconds) in enumerate(kinds)

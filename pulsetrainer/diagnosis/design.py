@@ -23,6 +23,7 @@ from pulsetrainer.core import nnls
 from pulsetrainer.core.memory import Trace
 from pulsetrainer.core.operator import Preisach, base_rows, follow, steps
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import penalty
 from pulsetrainer.errors import DataError
 
@@ -32,18 +33,6 @@ _MOST_ROWS = 20_000
 # Spaced as the time constants of a creep; the longest must have gone by well before the record's end.
 _START_S = (0.2, 0.8, 3.2)
 _START_SHARE = 6.0
-
-
-@dataclass(frozen=True)
-class Measured:
-    """One record at even time steps; gaps have been filled and have no weight."""
-
-    dt_s: float
-    input: FloatArray  # (n,)
-    output: FloatArray  # (n,) polarity 1
-    weight: FloatArray  # (n,) 0 or 1
-    reference: FloatArray | None = None
-    timed: bool = True  # False: only the order of the samples is known, dt_s is 1
 
 
 @dataclass(frozen=True)
@@ -125,7 +114,7 @@ class Bins:
         return total
 
 
-def bins_of(records: Sequence[Measured]) -> Bins:
+def bins_of(records: Sequence[Record]) -> Bins:
     """Bins over the samples with weight.
 
     Raises
@@ -133,18 +122,18 @@ def bins_of(records: Sequence[Measured]) -> Bins:
     DataError
         Hardly any sample has weight.
     """
-    duration = sum(r.input.size * r.dt_s for r in records)
+    duration = sum(r.input.size * r.step for r in records)
     width = max(_BIN_S, duration / _MOST_ROWS)
     numbers, record, time, widths, count = [], [], [], [], 0
     for k, r in enumerate(records):
-        per_bin = max(1, round(width / r.dt_s))
-        raw = np.where(r.weight > 0, np.arange(r.input.size) // per_bin, -1)
+        per_bin = max(1, round(width / r.step))
+        raw = np.where(r.sample_weight > 0, np.arange(r.input.size) // per_bin, -1)
         used, inverse = np.unique(raw, return_inverse=True)
         first = int(used[0] == -1)
         numbers.append(np.where(raw >= 0, inverse - first + count, -1).astype(np.int64))
         size = used.size - first
         record.append(np.full(size, k))
-        time.append((used[first:] + 0.5) * per_bin * r.dt_s)
+        time.append((used[first:] + 0.5) * per_bin * r.step)
         widths.append(per_bin)
         count += size
     if count < 100:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.record import Record
 from pulsetrainer.core.signals import through
 from pulsetrainer.diagnosis.answer import Answer
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.design import Design, Measured
+from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Simulator
 from pulsetrainer.diagnosis.problem import Problem, problem_for
@@ -43,7 +44,7 @@ def best_experiment(answer: Answer, names: Sequence[str]) -> Experiment:
     for words, shares in _experiments().items():
         u = plane.low + (plane.high - plane.low) * shares
         y = answer.final.simulator.operator(u)
-        record = Measured(1.0 / _RATE_HZ, u, y, np.ones(u.size))
+        record = Record(u, y, dt_s=1.0 / _RATE_HZ)
         problem = problem_for([record], plane.low, plane.high, plane.n_h)
         found.append(Experiment(words, _smallest_distance(answer, problem, terms, others), here))
     return max(found, key=lambda one: one.distance)

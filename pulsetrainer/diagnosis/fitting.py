@@ -146,7 +146,7 @@ def _rows(problem: Problem, terms: Sequence[Term]) -> Design:
         return shown_output(through, columns, replace(problem.frames[k], dt_s=dt_s))
 
     def shown(columns: FloatArray) -> FloatArray:
-        steps = [record.dt_s for record in problem.records]
+        steps = [record.step for record in problem.records]
         return problem.bins.filtered(columns, one, steps) if through else columns
 
     return Design.build(problem.plane, problem.bins, problem.paths(before), problem.smoothing, shown)

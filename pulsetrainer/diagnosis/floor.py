@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import gates
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.fitting import Fitted, weights_for
 from pulsetrainer.diagnosis.problem import LEVELS, Problem
 
@@ -63,9 +63,9 @@ class Floor:
         return replace(self, discretisation=float(np.sqrt(fall / ((LEVELS / COARSE_LEVELS) ** 2 - 1.0))))
 
 
-def floor_of(records: Sequence[Measured], firings: Sequence[gates.Firing], problem: Problem) -> Floor:
+def floor_of(records: Sequence[Record], firings: Sequence[gates.Firing], problem: Problem) -> Floor:
     """Return the floor of some records from their raw noise and steps, discretisation left out."""
-    noise = float(np.sqrt(np.mean([gates.noise_of(r.output, r.weight) ** 2 for r in records])))
+    noise = float(np.sqrt(np.mean([gates.noise_of(r.output, r.sample_weight) ** 2 for r in records])))
     coarse_step = max(gates.coarse_step(r.output) for r in records)
     jump = max((f.value for f in firings if f.cause == "stick-slip"), default=0.0)
     held = (coarse_step**2 + jump**2) / 12.0  # does not average out

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.design import Measured
+from pulsetrainer.core.record import Record
 
 BoolArray = NDArray[np.bool_]
 
@@ -62,7 +62,7 @@ def spacing_of(y: FloatArray) -> float:
     return float(np.median(np.diff(values))) if values.size > 1 else 0.0
 
 
-def check(record: Measured, low: float, high: float) -> list[Firing]:
+def check(record: Record, low: float, high: float) -> list[Firing]:
     """All gates on one record; ``low`` and ``high`` are the range that was identified."""
     wild = _outliers(record)
     calm = record
@@ -81,7 +81,7 @@ def check(record: Measured, low: float, high: float) -> list[Firing]:
     return [one for one in found if one is not None]
 
 
-def _saturated(record: Measured) -> Firing | None:
+def _saturated(record: Record) -> Firing | None:
     """Maxima, or minima, that repeat exactly far more often than the values just inside them."""
     y, span = record.output, float(np.ptp(record.output))
     step = spacing_of(y)
@@ -106,7 +106,7 @@ def _saturated(record: Measured) -> Firing | None:
     return None
 
 
-def _outliers(record: Measured) -> Firing | None:
+def _outliers(record: Record) -> Firing | None:
     """Samples far from the median around them, farther than fast turns go."""
     y = record.output
     apart = np.abs(y - ndimage.median_filter(y, 7, mode="nearest"))
@@ -139,10 +139,10 @@ def _off_line(y: FloatArray, at: int, side: int) -> float:
     return float(abs(y[at] - np.median(near - slope * steps)))
 
 
-def jumps(record: Measured, reach: float) -> Firing | None:
+def jumps(record: Record, reach: float) -> Firing | None:
     """Jumps that last, while the input moves slowly: far more than noise or a smooth branch makes."""
     y, sigma = record.output, noise_of(record.output)
-    wide = max(3, round(0.006 / record.dt_s))
+    wide = max(3, round(0.006 / record.step))
     if y.size < 20 * wide or coarse_step(y) > 0:
         return None
     total = np.concatenate(([0.0], np.cumsum(y)))
@@ -150,7 +150,7 @@ def jumps(record: Measured, reach: float) -> Firing | None:
     jump = np.zeros(y.size)
     jump[at] = (total[at + wide] - 2.0 * total[at] + total[at - wide]) / wide
     size = np.abs(jump)
-    rate = ndimage.uniform_filter1d(np.gradient(record.input, record.dt_s), 5 * wide) / reach
+    rate = ndimage.uniform_filter1d(np.gradient(record.input, record.step), 5 * wide) / reach
     moved = np.abs(rate)
     # where the input changes its rate other causes make jumps too
     change = np.abs(np.roll(rate, -6 * wide) - np.roll(rate, 6 * wide))
@@ -172,7 +172,7 @@ def jumps(record: Measured, reach: float) -> Firing | None:
     )
 
 
-def _quantised(record: Measured) -> Firing | None:
+def _quantised(record: Record) -> Firing | None:
     y = record.output
     step, span = spacing_of(y), float(np.ptp(y))
     # steps show where values come again; in a short record all may differ, far apart as they are
@@ -188,7 +188,7 @@ def _quantised(record: Measured) -> Firing | None:
     )
 
 
-def _tracking(record: Measured, reach: float) -> Firing | None:
+def _tracking(record: Record, reach: float) -> Firing | None:
     if record.reference is None:
         return None
     error = np.abs(record.input - record.reference)
@@ -204,7 +204,7 @@ def _tracking(record: Measured, reach: float) -> Firing | None:
     )
 
 
-def _outside(record: Measured, low: float, high: float) -> Firing | None:
+def _outside(record: Record, low: float, high: float) -> Firing | None:
     """Input beyond the range; what it leaves in the memory lasts until the other end is reached."""
     slack = _OUTSIDE_SHARE * (high - low)
     above, below = record.input > high + slack, record.input < low - slack
@@ -222,7 +222,9 @@ def _outside(record: Measured, low: float, high: float) -> Firing | None:
         beyond,
         "u",
         # an input that never comes to the other end leaves hardly any: then what is outside must do
-        lasting if record.weight[~lasting].sum() > _LEFT_OVER * record.weight.sum() else outside,
+        lasting
+        if record.sample_weight[~lasting].sum() > _LEFT_OVER * record.sample_weight.sum()
+        else outside,
     )
 
 

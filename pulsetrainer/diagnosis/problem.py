@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes.base import Frame
-from pulsetrainer.diagnosis.design import Bins, Followed, Measured, bins_of
+from pulsetrainer.diagnosis.design import Bins, Followed, bins_of
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.errors import DataError
 
@@ -24,7 +25,7 @@ _KEPT = 6  # followed inputs: some ten megabytes each
 class Problem:
     """The data, the plane on which the weights live, and how they are averaged."""
 
-    records: tuple[Measured, ...]
+    records: tuple[Record, ...]
     frames: tuple[Frame, ...]
     plane: Plane
     bins: Bins
@@ -45,7 +46,7 @@ class Problem:
         return self._followed[terms]
 
 
-def problem_for(records: Sequence[Measured], low: float, high: float, levels: int = LEVELS) -> Problem:
+def problem_for(records: Sequence[Record], low: float, high: float, levels: int = LEVELS) -> Problem:
     """The records with masks applied, ready to be fitted.
 
     Raises
@@ -55,7 +56,7 @@ def problem_for(records: Sequence[Measured], low: float, high: float, levels: in
     """
     bins = bins_of(records)
     measured = bins.average([r.output for r in records])
-    moved = np.concatenate([np.clip(r.input[r.weight > 0], low, high) for r in records])
+    moved = np.concatenate([np.clip(r.input[r.sample_weight > 0], low, high) for r in records])
     if np.ptp(measured) == 0 or np.ptp(moved) == 0:
         what = "output" if np.ptp(measured) == 0 else "input"
         raise DataError(
@@ -65,15 +66,15 @@ def problem_for(records: Sequence[Measured], low: float, high: float, levels: in
     span, reach = float(np.ptp(measured)), high - low
     ends = _ends(records, low, high)
     frames = tuple(
-        Frame(r.dt_s, r.input, span, reach, k, len(records), low, ends) for k, r in enumerate(records)
+        Frame(r.step, r.input, span, reach, k, len(records), low, ends) for k, r in enumerate(records)
     )
     return Problem(tuple(records), frames, Plane.uniform(low, high, levels), bins, measured, SMOOTHING)
 
 
-def _ends(records: Sequence[Measured], low: float, high: float) -> tuple[float, float]:
+def _ends(records: Sequence[Record], low: float, high: float) -> tuple[float, float]:
     """Mean outputs near both ends of the input's range, or as near as the records come to them."""
-    u = np.concatenate([r.input[r.weight > 0] for r in records])
-    y = np.concatenate([r.output[r.weight > 0] for r in records])
+    u = np.concatenate([r.input[r.sample_weight > 0] for r in records])
+    y = np.concatenate([r.output[r.sample_weight > 0] for r in records])
     near = _NEAR_END * (high - low)
     bottom = y[u <= max(low, float(u.min())) + near]
     top = y[u >= min(high, float(u.max())) - near]

@@ -29,9 +29,9 @@ def rates(problem: Problem) -> FloatArray:
     reach = problem.plane.high - problem.plane.low
     per_record = []
     for record in problem.records:
-        width = max(3, round(0.01 / record.dt_s))
+        width = max(3, round(0.01 / record.step))
         even = np.convolve(np.pad(record.input, width, mode="edge"), np.ones(width) / width, "same")
-        per_record.append(np.gradient(even[width:-width], record.dt_s) / reach)
+        per_record.append(np.gradient(even[width:-width], record.step) / reach)
     return problem.bins.average(per_record)
 
 
@@ -50,7 +50,7 @@ def groups(problem: Problem) -> list[Group]:
     at_level = problem.plane.low + (np.arange(_GROUPS) + 0.5) / _GROUPS * reach
     count = speed.size
     by_time = np.arange(count) * _GROUPS // count
-    ends = np.cumsum([0.0] + [r.input.size * r.dt_s for r in problem.records])
+    ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
     time = problem.bins.time_s + ends[problem.bins.record]
     at_time = np.asarray([time[by_time == k].mean() for k in range(_GROUPS)])
     direction = np.sign(np.where(speed < _RATE_EDGES[1], 0.0, rate)).astype(np.int64) + 1

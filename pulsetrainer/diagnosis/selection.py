@@ -15,11 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import congruency, gates, sticking
 from pulsetrainer.diagnosis.answer import Answer, Estimate, Finding
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Fitted, refit, weights_for
 from pulsetrainer.diagnosis.floor import COARSE_LEVELS, floor_of
@@ -45,7 +45,7 @@ Firings = Sequence[tuple[int, gates.Firing]]
 
 
 def diagnose(
-    records: Sequence[Measured],
+    records: Sequence[Record],
     low: float,
     high: float,
     *,
@@ -75,8 +75,8 @@ def diagnose(
     return search.quick() if quick else search.full()
 
 
-def _masked(record: Measured, firings: Sequence[gates.Firing]) -> Measured:
-    weight = record.weight.copy()
+def _masked(record: Record, firings: Sequence[gates.Firing]) -> Record:
+    weight = record.sample_weight.copy()
     output = record.output
     for firing in firings:
         if firing.mask is not None:
@@ -86,7 +86,7 @@ def _masked(record: Measured, firings: Sequence[gates.Firing]) -> Measured:
         output = output.copy()  # causes filter the output: wild samples must not reach the filters
         good = np.flatnonzero(~bad)
         output[bad] = np.interp(np.flatnonzero(bad), good, output[good])
-    return replace(record, weight=weight, output=output)
+    return replace(record, sample_weight=weight, output=output)
 
 
 class _Search:
@@ -94,7 +94,7 @@ class _Search:
 
     def __init__(
         self,
-        records: Sequence[Measured],
+        records: Sequence[Record],
         low: float,
         high: float,
         firings: Firings,

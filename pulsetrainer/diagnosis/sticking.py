@@ -38,7 +38,7 @@ Strokes = list[tuple[FloatArray, FloatArray]]  # model's output and residual, ea
 
 def sawtooth(problem: Problem, fitted: Fitted) -> Firing | None:
     """Return the size of the jumps if what a model leaves is such a sawtooth."""
-    noise = [noise_of(record.output, record.weight) for record in problem.records]
+    noise = [noise_of(record.output, record.sample_weight) for record in problem.records]
     white = float(np.mean(np.square(noise)))
     strokes = _strokes(problem, fitted)
     if not strokes or white <= 0.0:
@@ -70,7 +70,7 @@ def _strokes(problem: Problem, fitted: Fitted) -> Strokes:
         left = record.output - said
         turns = input_noise.real_turns(record.input, 0.02 * reach)
         for begin, end in pairwise(turns.tolist()):
-            if end - begin > 5 * _SAMPLES and np.all(record.weight[begin:end] > 0):
+            if end - begin > 5 * _SAMPLES and np.all(record.sample_weight[begin:end] > 0):
                 found.append((said[begin:end], left[begin:end] - left[begin:end].mean()))
     return found
 

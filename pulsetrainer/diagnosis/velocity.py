@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # its parts load when they are first used
 
-from pulsetrainer.core.equations import Record
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.record import Record
 
 POOR = 0.05  # of the output's span: a fit better than this needs no such question
 BETTER = 0.75  # f(v) must leave less than this share of what the operator leaves
@@ -48,7 +48,7 @@ def compare(
         Time step of each record, s; None where only the order of the samples is known: the direction of
         motion then takes the place of the velocity.
     """
-    kept = [r.weights > 0 for r in records]
+    kept = [r.sample_weight > 0 for r in records]
     output = np.concatenate([r.output[k] for r, k in zip(records, kept, strict=True)])
     left = np.concatenate([e[k] for e, k in zip(residuals, kept, strict=True)])
     timed = all(step is not None for step in dt_s)

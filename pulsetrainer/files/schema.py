@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import numpy as np
 
-from pulsetrainer.artefacts import Data
+from pulsetrainer.artefacts import Attribute, Data
 
 Role = Literal["array", "number", "attribute", "list", "group", "groups"]
 TIME = "time"
@@ -27,11 +27,13 @@ class FieldPlan:
     optional: bool
     default: Any = MISSING
     data: Data | None = None
+    attribute: Attribute | None = None
 
     @property
     def path(self) -> str:
         """The dataset's, group's or attribute's name in the file."""
-        return self.name if self.data is None or self.data.path is None else self.data.path
+        mark = self.data or self.attribute
+        return self.name if mark is None or mark.path is None else mark.path
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -87,16 +89,17 @@ def plan_of(cls: type) -> tuple[FieldPlan, ...]:
     hints = get_type_hints(cls, include_extras=True)
     plans = []
     for field in dataclasses.fields(cls):
-        hint, data = hints[field.name], None
+        hint, data, attribute = hints[field.name], None, None
         if get_origin(hint) is Annotated:
             hint, *marks = get_args(hint)
             data = next((mark for mark in marks if isinstance(mark, Data)), None)
+            attribute = next((mark for mark in marks if isinstance(mark, Attribute)), None)
         hint, optional = _without_none(hint)
         role, item = _role(hint, is_dataset=data is not None)
         default = field.default
         if field.default_factory is not MISSING:
             default = field.default_factory()
-        plans.append(FieldPlan(field.name, role, item, optional, default, data))
+        plans.append(FieldPlan(field.name, role, item, optional, default, data, attribute))
     return tuple(plans)
 
 

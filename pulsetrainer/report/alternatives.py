@@ -23,18 +23,18 @@ def _range(values: NDArray[np.float64], unit: str) -> str:
 
 def density(model: Model) -> str:
     """Say where the density is largest and how much of the plane was covered."""
-    n_h = model.levels.size - 1
+    n_h = model.edges.size - 1
     i, j = np.tril_indices(n_h)
     covered = int(np.count_nonzero(model.covered))
     text = (
         f"Colour map over the half-plane of switching levels, {model.input_quantity} "
-        f"{_range(model.levels, model.input_unit)}: {n_h} levels, "
+        f"{_range(model.edges, model.input_unit)}: {n_h} levels, "
         f"{covered} of {model.weights.size} cells covered."
     )
     off_diagonal = np.where((i != j) & model.covered, model.weights, 0.0)
     if off_diagonal.max(initial=0.0) > 0:
         k = int(np.argmax(off_diagonal))
-        beta, alpha = model.levels[j[k] : j[k] + 2].mean(), model.levels[i[k] : i[k] + 2].mean()
+        beta, alpha = model.edges[j[k] : j[k] + 2].mean(), model.edges[i[k] : i[k] + 2].mean()
         text += (
             " Off the diagonal the density is greatest, "
             f"{off_diagonal[k]:.3g} {pretty_unit(model.weights_unit)}, for relays that switch up "

@@ -81,8 +81,8 @@ def headroom(axes: Axes, share: float = 0.16) -> None:
 
 def density(panel: FigureBase, model: Model) -> None:
     """Draw the weights of a model over the half-plane alpha >= beta, cells that were not covered hatched."""
-    levels = model.levels
-    n_h = levels.size - 1
+    edges = model.edges
+    n_h = edges.size - 1
     rows, columns = np.tril_indices(n_h)  # the order of the cells: k = i (i + 1) / 2 + j
     field = np.full((n_h, n_h), np.nan)
     field[rows, columns] = np.where(model.covered, model.weights, np.nan)
@@ -92,20 +92,20 @@ def density(panel: FigureBase, model: Model) -> None:
     axes.grid(visible=False)
     top = _scale(model, rows != columns)
     mesh = axes.pcolormesh(
-        levels,
-        levels,
+        edges,
+        edges,
         np.ma.masked_invalid(field),
         norm=PowerNorm(_DENSITY_GAMMA, vmin=0.0, vmax=top),
         cmap=colormaps["viridis"].with_extremes(over=VERMILION),
         rasterized=True,  # as vectors a thousand seams would shine through
     )
-    corner = [(levels[0], levels[0]), (levels[0], levels[-1]), (levels[-1], levels[-1])]
+    corner = [(edges[0], edges[0]), (edges[0], edges[-1]), (edges[-1], edges[-1])]
     half_plane = Polygon(corner, closed=True, facecolor="none", edgecolor=MUTED, linewidth=0.8)
     axes.add_patch(half_plane)
     mesh.set_clip_path(half_plane)  # diagonal cells are triangles
     missing = np.flatnonzero(~model.covered)
     if missing.size:
-        cells = [_cell(levels, int(rows[k]), int(columns[k])) for k in missing]
+        cells = [_cell(edges, int(rows[k]), int(columns[k])) for k in missing]
         axes.add_collection(
             PolyCollection(cells, facecolors=GRID, edgecolors=MUTED, hatch="/////", linewidths=0.0)
         )
@@ -132,9 +132,9 @@ def _scale(model: Model, off_diagonal: BoolArray) -> float:
     return 1.0
 
 
-def _cell(levels: FloatArray, i: int, j: int) -> list[tuple[float, float]]:
+def _cell(edges: FloatArray, i: int, j: int) -> list[tuple[float, float]]:
     """Return the corners (beta, alpha) of cell (i, j); a triangle on the diagonal."""
-    left, right, low, high = levels[j], levels[j + 1], levels[i], levels[i + 1]
+    left, right, low, high = edges[j], edges[j + 1], edges[i], edges[i + 1]
     corners = [(left, low), (left, high), (right, high), (right, low)]
     return corners[:3] if i == j else corners
 
@@ -143,7 +143,7 @@ def _facts(model: Model) -> str:
     """Return what stands in the empty half of the plane."""
     covered = int(np.count_nonzero(model.covered))
     lines = [
-        f"{model.levels.size - 1} levels, {model.weights.size} cells",
+        f"{model.edges.size - 1} levels, {model.weights.size} cells",
         f"{covered} covered" + (", the rest hatched" if covered < model.weights.size else ""),
         f"offset {model.offset:.4g} {pretty_unit(model.output_unit)}".rstrip().replace("-", "−"),
     ]

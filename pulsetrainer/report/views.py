@@ -209,7 +209,7 @@ def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
 def model_section(model: Model) -> Section:
     """Return the part of the page about the model behind the waveforms."""
     facts = [
-        ("levels", _count(model.levels.size - 1, "model.levels")),
+        ("levels", _count(model.edges.size - 1, "model.levels")),
         ("cells", _count(model.weights.size, "model.cells")),
         (label("offset", model.output_unit), number(model.offset, "model.offset", ".4g")),
     ]

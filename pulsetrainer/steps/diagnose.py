@@ -14,8 +14,8 @@ from pulsetrainer.artefacts import Cause, Diagnosis, Extension, Model, Parameter
 from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import residual, wording
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import seen_input
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.problem import problem_for
@@ -77,7 +77,7 @@ def run(options: Options, context: Context) -> Result:
         raise UsageError("diagnose needs at least one run", hint="pulsetrainer capture diagnostic -o run.h5")
     model = store.read(options.model, Model)
     runs = [store.read(path, Run) for path in options.runs]
-    low, high = float(model.levels[0]), float(model.levels[-1])
+    low, high = float(model.edges[0]), float(model.edges[-1])
     records = []
     for path, one in zip(options.runs, runs, strict=True):
         _check_fits(path, one, options.model, model)
@@ -127,12 +127,12 @@ def _check_fits(path: Path, one: Run, model_path: Path, model: Model) -> None:
             f"{model.input_unit} and {model.output_unit}",
             hint="use a model of the same device, in the same units",
         )
-    if model.operator != "continuous":
+    if model.reading != "continuous":
         raise DataError(
             f"{model_path} reads its weights as relays, whose steps would be taken for causes",
-            hint="identify it with the continuous operator: pulsetrainer identify RUN.h5 -o model.h5",
+            hint="identify it with the continuous reading: pulsetrainer identify RUN.h5 -o model.h5",
         )
-    low, high = float(model.levels[0]), float(model.levels[-1])
+    low, high = float(model.edges[0]), float(model.edges[-1])
     u = one.input[np.isfinite(one.input)]
     if u.size == 0 or np.mean((u >= low - 0.02 * (high - low)) & (u <= high + 0.02 * (high - low))) < 0.5:
         span = f"{u.min():.4g} .. {u.max():.4g}" if u.size else "nothing"
@@ -143,7 +143,7 @@ def _check_fits(path: Path, one: Run, model_path: Path, model: Model) -> None:
         )
 
 
-def measured_of(path: Path, one: Run, polarity: int, low: float, high: float) -> Measured:
+def measured_of(path: Path, one: Run, polarity: int, low: float, high: float) -> Record:
     """Return a run on even time steps; filled gaps and samples that are not numbers have no weight.
 
     Raises
@@ -182,30 +182,30 @@ def measured_of(path: Path, one: Run, polarity: int, low: float, high: float) ->
         u, y, weight = (x[:cut].reshape(-1, per).mean(axis=1) for x in (u, y, weight))
         reference = None if reference is None else reference[:cut].reshape(-1, per).mean(axis=1)
         weight = np.where(weight < 1.0, 0.0, 1.0)
-    return Measured(step * per, u, polarity * y, weight, reference)
+    return Record(u, polarity * y, weight, dt_s=step * per, reference=reference)
 
 
-def _untimed(path: Path, one: Run, polarity: int, low: float, high: float) -> Measured:
+def _untimed(path: Path, one: Run, polarity: int, low: float, high: float) -> Record:
     """Return a run of which only the order of the samples is known."""
     if not (np.isfinite(one.input).all() and np.isfinite(one.output).all()):
         raise DataError(f"{path} holds samples that are no numbers", hint="record it again")
     weight = np.ones(one.input.size)
     weight[: known_from(one.input, low, high)] = 0.0
-    return Measured(1.0, one.input, polarity * one.output, weight, one.reference, timed=False)
+    return Record(one.input, polarity * one.output, weight, reference=one.reference)
 
 
-def _artefact(answer: Answer, runs: Sequence[Run], records: Sequence[Measured], model: Model) -> Diagnosis:
+def _artefact(answer: Answer, runs: Sequence[Run], records: Sequence[Record], model: Model) -> Diagnosis:
     problem = answer.problem
     span = float(np.ptp(problem.measured))
     errors = [
-        (predict(model, r.input, r.dt_s) * model.polarity - r.output)[r.weight > 0]
+        (predict(model, r.input, r.step) * model.polarity - r.output)[r.sample_weight > 0]
         for r in answer.problem.records
     ]
     left = root_mean_square(np.concatenate(errors))
     after_residual = answer.final.residual
     extended = None if answer.quick else _extended(answer, model)
     thin = slice(None, None, max(1, problem.bins.count // _TRACE_SAMPLES))
-    ends = np.cumsum([0.0] + [r.input.size * r.dt_s for r in records])
+    ends = np.cumsum([0.0] + [r.input.size * r.step for r in records])
     time_s = problem.bins.time_s + ends[problem.bins.record]
     sign = model.polarity
     first = runs[0]
@@ -278,12 +278,12 @@ def _extended(answer: Answer, model: Model) -> Model | None:
     lasting = [pair for pair in answer.terms if pair[0].cause.lasting]
     if not lasting:
         return None
-    low, high = float(model.levels[0]), float(model.levels[-1])
-    plane = Plane(model.levels)
-    if plane.n_h > MOST_LEVELS or not np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]):
+    low, high = float(model.edges[0]), float(model.edges[-1])
+    plane = Plane(model.edges)
+    if plane.n_h > MOST_LEVELS or not np.allclose(np.diff(plane.edges), np.diff(plane.edges)[0]):
         plane = Plane.uniform(low, high, min(plane.n_h, MOST_LEVELS))
     problem = problem_for(answer.problem.records, low, high, plane.n_h)
-    if not np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]):
+    if not np.allclose(np.diff(plane.edges), np.diff(plane.edges)[0]):
         raise DataError("only models with even levels can be extended", hint="identify the model again")
     fitted = weights_for(problem, answer.final.terms, None)
     operator = fitted.simulator.operator
@@ -293,7 +293,7 @@ def _extended(answer: Answer, model: Model) -> Model | None:
     ]
     units = {"u": model.input_unit, "y": model.output_unit}
     return Model(
-        levels=plane.levels,
+        edges=plane.edges,
         weights=operator.weights,
         offset=model.polarity * operator.offset,
         covered=coverage(plane, seen),
@@ -302,7 +302,7 @@ def _extended(answer: Answer, model: Model) -> Model | None:
         output_unit=model.output_unit,
         input_quantity=model.input_quantity,
         output_quantity=model.output_quantity,
-        operator="continuous",
+        reading="continuous",
         polarity=model.polarity,
         extensions=tuple(
             Extension(

@@ -18,11 +18,11 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer import __version__
 from pulsetrainer.core import signals
+from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import DEFAULT_PORT, open_device
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.diagnosis import gates
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.errors import PulsetrainerError
 from pulsetrainer.simulation import build
 
@@ -269,13 +269,7 @@ def _noise(recording: Trace, held: slice, range_A: float) -> Iterator[Finding]:
 
 def _rails(recording: Trace, top: float) -> Iterator[Finding]:
     """Saturation, tracking and what else the raw data show by themselves."""
-    measured = Measured(
-        _GRID_S,
-        recording.current_A,
-        recording.force_N,
-        np.ones(recording.force_N.size),
-        recording.reference_A,
-    )
+    measured = Record(recording.current_A, recording.force_N, dt_s=_GRID_S, reference=recording.reference_A)
     fired = {one.cause: one for one in gates.check(measured, 0.0, top) if one.cause != "out-of-range"}
     cut = fired.pop("saturation", None)
     if cut is None:

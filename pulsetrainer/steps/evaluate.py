@@ -289,7 +289,7 @@ def _start(model: Model, parts: Sequence[Run], known: Sequence[int]) -> tuple[St
     A run that never reaches an end of the model's range leaves open what came before it. Tried are both
     saturations and the demagnetised state; the one that predicts best is taken.
     """
-    low, high = float(model.levels[0]), float(model.levels[-1])
+    low, high = float(model.edges[0]), float(model.edges[-1])
     near = 0.01 * (high - low)
     if any(np.any((one.input <= low + near) | (one.input >= high - near)) for one in parts):
         return None, "known"

@@ -62,12 +62,12 @@ def run(options: Options, context: Context) -> Result:
             hint="run `pulsetrainer diagnose RUN.h5 --model model.h5 -o diagnosis.h5` without --quick, "
             "on a run of `pulsetrainer capture diagnostic`",
         )
-    same_range = np.allclose(extended.levels[[0, -1]], model.levels[[0, -1]])
+    same_range = np.allclose(extended.edges[[0, -1]], model.edges[[0, -1]])
     if not same_range or (extended.input_unit, extended.output_unit) != (model.input_unit, model.output_unit):
         raise DataError(
-            f"{options.diagnosis} is of a model over {extended.levels[0]:.4g} .. {extended.levels[-1]:.4g} "
-            f"{extended.input_unit}, but {options.model} spans {model.levels[0]:.4g} .. "
-            f"{model.levels[-1]:.4g} {model.input_unit}",
+            f"{options.diagnosis} is of a model over {extended.edges[0]:.4g} .. {extended.edges[-1]:.4g} "
+            f"{extended.input_unit}, but {options.model} spans {model.edges[0]:.4g} .. "
+            f"{model.edges[-1]:.4g} {model.input_unit}",
             hint="give the model that was diagnosed",
         )
     context.progress(0.5)
@@ -84,7 +84,7 @@ def run(options: Options, context: Context) -> Result:
     return Result(
         options.output,
         extended.extensions,
-        extended.levels.size - 1,
+        extended.edges.size - 1,
         diagnosis.static_percent,
         diagnosis.extended_percent,
     )

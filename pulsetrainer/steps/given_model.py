@@ -14,12 +14,11 @@ import numpy as np
 
 from pulsetrainer.artefacts import Cause, Diagnosis, Model, Parameter, Run
 from pulsetrainer.core import input_noise
-from pulsetrainer.core.equations import Record
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import condition, velocity
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.steps.modelling import predict, start_of
 
 if TYPE_CHECKING:
@@ -37,26 +36,26 @@ _SPEED_MATTERS = 0.6  # f(v) must leave less than this share of what f(sign v) l
 
 
 def judged(
-    diagnosis: Diagnosis, answer: Answer, records: Sequence[Measured], model: Model, first: Run
+    diagnosis: Diagnosis, answer: Answer, records: Sequence[Record], model: Model, first: Run
 ) -> Diagnosis:
     """Add what the records say of the model as given: another condition, or the wrong kind of model."""
     timed = all(record.timed for record in records)
-    low, high = float(model.levels[0]), float(model.levels[-1])
+    low, high = float(model.edges[0]), float(model.edges[-1])
     # records have polarity 1: what the model says is turned alike; noise in the input is no motion
     core = [
-        Record(input_noise.clean(r.input).input, r.output, r.weight, start_of(r.input, low, high))
+        Record(input_noise.clean(r.input).input, r.output, r.sample_weight, start_of(r.input, low, high))
         for r in records
     ]
     said = [
-        model.polarity * predict(model, one.input, r.dt_s if r.timed else None, one.start)
+        model.polarity * predict(model, one.input, r.step, one.start)
         for r, one in zip(records, core, strict=True)
     ]
     residuals = [one.output - p for one, p in zip(core, said, strict=True)]
-    kept = [one.weights > 0 for one in core]
+    kept = [one.sample_weight > 0 for one in core]
     evidence: list[str] = []
     if not timed:
         evidence.append(_UNTIMED)
-    compared = velocity.compare(core, [r.dt_s if r.timed else None for r in records], residuals)
+    compared = velocity.compare(core, [r.step for r in records], residuals)
     wrong = velocity.warning(compared, first.input_quantity, first.output_quantity)
     if wrong:
         diagnosis = _of_another_kind(diagnosis, core, residuals, compared, wrong)

@@ -12,16 +12,16 @@ import numpy as np
 from pulsetrainer.artefacts import BoolArray, Fit, Model, Run
 from pulsetrainer.core import input_noise, metrics, uncertainty
 from pulsetrainer.core.coverage import coverage, largest_gap
+from pulsetrainer.core.edges import plane_for
 from pulsetrainer.core.identification import (
     Identified,
     Method,
-    Record,
     Smoothing,
     identify,
     offsets_between,
 )
-from pulsetrainer.core.levels import plane_for
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import atomic_write, provenance, store
@@ -45,7 +45,7 @@ class Options:
     runs: tuple[Path, ...]
     output: Path
     levels: int = 48
-    operator: Reading = "continuous"
+    reading: Reading = "continuous"
     method: Method = "joint"
     smoothing: Smoothing | None = None  # None: "auto", or 0 for relays, as in the paper
     bootstrap: int = 0  # refits to resampled blocks
@@ -173,18 +173,18 @@ def _fitted(
     low, high = reach
     records = [record_of(one, low, high) for one in runs]
     plane = _plane(records, low, high, options)
-    shifts = offsets_between(records, plane, options.operator)
+    shifts = offsets_between(records, plane, options.reading)
     if np.any(shifts):
         _note_shifts(names, shifts, runs, context)
         records = [record_of(one, low, high, shift) for one, shift in zip(runs, shifts, strict=True)]
     smoothing = options.smoothing
     if smoothing is None:
-        smoothing = 0.0 if options.operator == "relay" else "auto"
-    found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
+        smoothing = 0.0 if options.reading == "relay" else "auto"
+    found = identify(records, plane, reading=options.reading, method=options.method, smoothing=smoothing)
     if not _is_even(plane) and _misfit(records, found) > _CROWDED_MISFIT:
         # what is steep here is nothing that the operator can follow: closer levels would learn it by heart
         plane = Plane.uniform(low, high, options.levels)
-        found = identify(records, plane, reading=options.operator, method=options.method, smoothing=smoothing)
+        found = identify(records, plane, reading=options.reading, method=options.method, smoothing=smoothing)
     if not _is_even(plane):
         context.note("the loop is steep: the levels lie closer where the output changes")
     return records, found, shifts
@@ -257,19 +257,19 @@ def _half_width(fit: Fit) -> float | None:
 
 def _plane(records: Sequence[Record], low: float, high: float, options: Options) -> Plane:
     """Return the levels: even for relays, as in the paper, else where the output changes."""
-    if options.operator == "relay":
+    if options.reading == "relay":
         return Plane.uniform(low, high, options.levels)
     return plane_for(records, low, high, options.levels)
 
 
 def _is_even(plane: Plane) -> bool:
-    return bool(np.allclose(np.diff(plane.levels), np.diff(plane.levels)[0]))
+    return bool(np.allclose(np.diff(plane.edges), np.diff(plane.edges)[0]))
 
 
 def _misfit(records: Sequence[Record], found: Identified) -> float:
     """Rms error of the fit as a share of the output's span."""
-    left = [e[r.weights > 0] for e, r in zip(_residuals(records, found), records, strict=True)]
-    span = float(np.ptp(np.concatenate([r.output[r.weights > 0] for r in records])))
+    left = [e[r.sample_weight > 0] for e, r in zip(_residuals(records, found), records, strict=True)]
+    span = float(np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in records])))
     return metrics.root_mean_square(np.concatenate(left)) / span
 
 
@@ -301,7 +301,7 @@ def _model(
     plane = operator.plane
     measured, predicted = [], []
     for record in records:
-        known = record.weights > 0
+        known = record.sample_weight > 0
         measured.append(record.output[known])
         predicted.append(operator(record.input, record.start)[known])
     errors = metrics.prediction(np.concatenate(measured), np.concatenate(predicted))
@@ -330,7 +330,7 @@ def _model(
         predicted_upper=None if band is None else band.upper[shown],
     )
     return Model(
-        levels=plane.levels,
+        edges=plane.edges,
         weights=operator.weights,
         offset=operator.offset,
         covered=covered,
@@ -339,7 +339,7 @@ def _model(
         output_unit=first.output_unit,
         input_quantity=first.input_quantity,
         output_quantity=first.output_quantity,
-        operator=operator.reading,
+        reading=operator.reading,
         polarity=operator.polarity,
         weights_lower=None if weights is None else weights.lower,
         weights_upper=None if weights is None else weights.upper,

@@ -11,9 +11,9 @@ import numpy as np
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage
-from pulsetrainer.core.equations import Record
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.files import provenance, run_from_table, store
 from pulsetrainer.steps import preflight
 from pulsetrainer.steps.show import run_facts

@@ -40,7 +40,7 @@ class Options:
     beat: str | None = (
         None  # of a record of several beats: its number from 1, or "mean"; None: all is one period
     )
-    inversion: Inversion | None = None  # None: what suits the model's operator
+    inversion: Inversion | None = None  # None: what suits the model's reading
     force_min: float | None = None  # None: the lowest the model can reach
     force_max: float | None = None
     periods: int = 4  # the first one is not scored
@@ -128,8 +128,8 @@ def run(options: Options, context: Context) -> Result:
         )
     if method in ("continuous", "extended") and operator.reading == "relay":
         raise UsageError(
-            f"{options.model} was identified with the relay operator, which has no continuous inverse",
-            hint="give --method closest-match, or identify with --operator continuous",
+            f"{options.model} was identified with the relay reading, which has no continuous inverse",
+            hint="give --method closest-match, or identify with --reading continuous",
         )
     low, high = _force_range(options, operator, model.output_unit)
     if method == "extended":
@@ -194,7 +194,7 @@ def _within_beats(
 
     A lag, a creep or heat keep a pulse from the ends that the hysteresis would reach in a long time.
     """
-    low, high = float(model.levels[0]), float(model.levels[-1])
+    low, high = float(model.edges[0]), float(model.edges[-1])
     rate = options.rate_Hz
     rising = model.polarity > 0
     inputs = train(shape, periods=4, rate_Hz=rate, low=low if rising else high, high=high if rising else low)
@@ -279,7 +279,7 @@ def _compensated(
         return exact.input, exact.clipped
     plane = operator.plane
     steps = inversion.closest_match(operator, wanted)
-    step = float(np.diff(plane.levels).mean())
+    step = float(np.diff(plane.edges).mean())
     time_s = np.arange(wanted.size) / rate
     return inversion.smoothed(steps.input, time_s, step, plane.low, plane.high), steps.clipped
 

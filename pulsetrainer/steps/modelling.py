@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.artefacts import Model, Run
-from pulsetrainer.core.identification import Record
 from pulsetrainer.core.memory import State, positive_saturation
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import DataError
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def extended_of(model: Model) -> Extended:
     Raises
     ------
     ArgumentError
-        Levels or weights are not those of a Preisach plane.
+        Edges or weights are not those of a Preisach plane.
     DataError
         The model was extended by causes that this version does not know.
     """
@@ -67,20 +67,20 @@ def operator_of(model: Model) -> Preisach:
     Raises
     ------
     ArgumentError
-        Levels or weights are not those of a Preisach plane.
+        Edges or weights are not those of a Preisach plane.
     DataError
-        The model's operator is unknown.
+        The model's reading is unknown.
     """
-    if model.operator not in ("continuous", "relay"):
+    if model.reading not in ("continuous", "relay"):
         raise DataError(
-            f"the model's operator must be 'continuous' or 'relay', got {model.operator!r}",
+            f"the model's reading must be 'continuous' or 'relay', got {model.reading!r}",
             hint="identify the model again",
         )
     return Preisach(
-        Plane(model.levels),
+        Plane(model.edges),
         model.weights,
         model.offset,
-        "relay" if model.operator == "relay" else "continuous",
+        "relay" if model.reading == "relay" else "continuous",
         model.polarity,
     )
 

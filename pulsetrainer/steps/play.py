@@ -188,7 +188,7 @@ def _play(
         waveform=waveform,
         compensated=_playback(kept["compensated"][:whole], waveform.time_s.size),
         scaled=_playback(kept["scaled"][:whole], waveform.time_s.size),
-        input_range=float(np.ptp(model.levels)) if model else float(np.ptp(waveform.scaled)),
+        input_range=float(np.ptp(model.edges)) if model else float(np.ptp(waveform.scaled)),
         complete=not fault,
         dropped_samples=dropped,
     ), (fault, remedy)

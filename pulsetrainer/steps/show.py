@@ -113,11 +113,11 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
 def _model(model: Model) -> dict[str, Any]:
     fit = model.fit
     return {
-        "levels": model.levels.size - 1,
+        "levels": model.edges.size - 1,
         "cells": model.weights.size,
-        "operator": model.operator,
+        "operator": model.reading,
         "polarity": model.polarity,
-        f"input ({model.input_quantity})": _span(model.levels, model.input_unit),
+        f"input ({model.input_quantity})": _span(model.edges, model.input_unit),
         "offset": f"{model.offset:.4g} {shown(model.output_unit)}".rstrip(),
         "positive weights": int(np.sum(model.weights > 0)),
         "fit_rms_percent": fit.rms_percent if fit else None,

@@ -12,8 +12,8 @@ import numpy as np
 
 import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.core import signals
+from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import open_device
-from pulsetrainer.diagnosis.design import Measured
 
 RATE_HZ = 1000.0
 HIGH_A = 1.5
@@ -127,7 +127,7 @@ class Case:
 class Data:
     """What the judge gets to see."""
 
-    records: list[Measured]
+    records: list[Record]
     high: float  # of the range that was identified
     played: float  # highest current
 
@@ -183,7 +183,7 @@ def measure(case: Case) -> Data:
     return Data(records, range_high, high)
 
 
-def _play(case: Case, high: float, seconds: float | None = None) -> Measured | None:
+def _play(case: Case, high: float, seconds: float | None = None) -> Record | None:
     value = signals.diagnostic(0.0, high, rate_Hz=RATE_HZ).value
     if seconds is not None:
         value = value[: round(seconds * RATE_HZ)]
@@ -194,7 +194,7 @@ def _play(case: Case, high: float, seconds: float | None = None) -> Measured | N
         got = device.play(value, RATE_HZ)
     if got.fault:
         return None
-    return Measured(DT_S, got.current_A, got.force_N, np.ones(got.force_N.size), got.reference_A)
+    return Record(got.current_A, got.force_N, dt_s=DT_S, reference=got.reference_A)
 
 
 def size_percent(case: Case, data: Data) -> float:
@@ -216,7 +216,7 @@ def size_percent(case: Case, data: Data) -> float:
     return float(100 * np.sqrt(np.mean(difference**2)) / np.ptp(twin.output))
 
 
-def _spoilt(case: Case, record: Measured) -> Measured:
+def _spoilt(case: Case, record: Record) -> Record:
     """The record with what the bench itself cannot hide."""
     rng = np.random.default_rng([case.seed, 77])
     t, y = np.arange(record.output.size) * DT_S, record.output

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,10 @@ import hidden
 
 import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.core import signals
+from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import open_device
 from pulsetrainer.diagnosis import gates, residual
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
@@ -52,7 +53,7 @@ def test_one_rate_is_said_to_be_one_rate():
         with open_device(port) as device:
             got = device.play(value, 1000.0)
         forces.append(got.force_N)
-    record = Measured(1e-3, got.current_A, got.force_N, np.ones(got.force_N.size), got.reference_A)
+    record = Record(got.current_A, got.force_N, dt_s=1e-3, reference=got.reference_A)
     answer = diagnose([record], 0.0, 1.5, rng=np.random.default_rng(0))
     assert "one single rate" in residual.excitation_limits(answer.problem)
     assert "no holds" in residual.excitation_limits(answer.problem)
@@ -93,7 +94,7 @@ def test_autocorrelated_noise_does_not_alarm():
     shape = rng.standard_normal(record.output.size)
     wander = np.convolve(shape, np.exp(-np.arange(60) / 12.0), "same")
     y = model + 0.02 * wander / wander.std() + 0.02 * rng.standard_normal(wander.size)
-    noisy = Measured(record.dt_s, record.input, y, record.weight, record.reference)
+    noisy = replace(record, output=y)
     again = problem_for([noisy], 0.0, high)
     base = weights_for(again, (), None)
     scores = screen(again, base, np.random.default_rng(0))

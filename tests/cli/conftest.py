@@ -23,9 +23,9 @@ def run(tmp_path):
 def as_built(tmp_path_factory) -> Path:
     """A folder in which the whole chain has been run on the as-built bench, by both methods."""
     folder = tmp_path_factory.mktemp("as-built")
-    for operator in ("relay", "continuous"):
-        document = chain(folder, "bench:", operator=operator, waveforms=("normal", "bifid"))
-        (folder / f"{operator}.json").write_text(json.dumps(document))
+    for reading in ("relay", "continuous"):
+        document = chain(folder, "bench:", reading=reading, waveforms=("normal", "bifid"))
+        (folder / f"{reading}.json").write_text(json.dumps(document))
     return folder
 
 

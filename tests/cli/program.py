@@ -42,22 +42,22 @@ def pulsetrainer(folder: Path, *words: object, env: dict[str, str] | None = None
     return Ran(done.returncode, done.stdout, done.stderr)
 
 
-def chain(folder: Path, port: str, *, operator: str, waveforms: tuple[str, ...]) -> dict:
+def chain(folder: Path, port: str, *, reading: str, waveforms: tuple[str, ...]) -> dict:
     """Capture once, identify, invert, play and evaluate on a bench; return the evaluation as JSON."""
     steps: list[list[object]] = []
     if not (folder / "run.h5").exists():
         steps.append(["capture", "identification", "--port", port, "-o", "run.h5"])
-    steps.append(["identify", "run.h5", "--operator", operator, "-o", f"model-{operator}.h5"])
+    steps.append(["identify", "run.h5", "--reading", reading, "-o", f"model-{reading}.h5"])
     for name in waveforms:
-        drive, played = f"drive-{name}-{operator}.h5", f"played-{name}-{operator}.h5"
-        steps.append(["invert", name, "--model", f"model-{operator}.h5", "-o", drive])
+        drive, played = f"drive-{name}-{reading}.h5", f"played-{name}-{reading}.h5"
+        steps.append(["invert", name, "--model", f"model-{reading}.h5", "-o", drive])
         steps.append(["play", drive, "--port", port, "-o", played])
     for words in steps:
         done = pulsetrainer(folder, *words)
         assert done.code == 0, (words, done)
-    played = [f"played-{name}-{operator}.h5" for name in waveforms]
+    played = [f"played-{name}-{reading}.h5" for name in waveforms]
     done = pulsetrainer(
-        folder, "evaluate", *played, "-o", f"evaluation-{operator}.h5", "--html", f"{operator}.html", "--json"
+        folder, "evaluate", *played, "-o", f"evaluation-{reading}.h5", "--html", f"{reading}.html", "--json"
     )
     assert done.code == 0, done
     return done.json

@@ -54,7 +54,20 @@ def test_smoothing_is_chosen_reported_and_stored(run, record, tmp_path):
     assert stored.smoothing == chosen
     assert run(*base, "--smoothing", "0.04").json["smoothing"] == 0.04
     assert run(*base, "--smoothing", "0").json["smoothing"] == 0
-    assert run(*base, "--operator", "relay").json["smoothing"] == 0
+    assert run(*base, "--reading", "relay").json["smoothing"] == 0
+
+
+def test_the_reading_has_an_older_name(run, record, tmp_path):
+    """``--operator`` still says how the weights are read; the file keeps its attribute ``operator``."""
+    import h5py
+
+    record()
+    base = ("identify", "run.h5", "--levels", "12", "--overwrite", "-o")
+    assert run(*base, "new.h5", "--reading", "relay").code == 0
+    assert run(*base, "old.h5", "--operator", "relay").code == 0
+    with h5py.File(tmp_path / "new.h5") as new, h5py.File(tmp_path / "old.h5") as old:
+        assert new.attrs["operator"] == old.attrs["operator"] == "relay"
+        assert np.array_equal(new["weights"], old["weights"])
 
 
 @pytest.mark.parametrize("text", ["much", "-1", "2", "nan"])

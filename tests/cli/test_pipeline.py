@@ -18,8 +18,8 @@ PUBLISHED_REDUCTION = {"normal": 73.9, "bifid": 70.3}
 PUBLISHED_MAX = 7.8
 
 
-def _waveforms(folder, operator):
-    document = json.loads((folder / f"{operator}.json").read_text())
+def _waveforms(folder, reading):
+    document = json.loads((folder / f"{reading}.json").read_text())
     return {w["name"]: w for w in document["waveforms"]}
 
 
@@ -34,7 +34,7 @@ def test_the_papers_method_reaches_the_papers_figures(as_built):
 
 def test_the_continuous_inverse_is_better_on_every_figure(as_built):
     """Mean, max, rms and loop of the compensated drive, and the reduction."""
-    relay, continuous = (_waveforms(as_built, operator) for operator in ("relay", "continuous"))
+    relay, continuous = (_waveforms(as_built, reading) for reading in ("relay", "continuous"))
     for name in relay:
         for metric in ("mean_abs_error_percent", "max_abs_error_percent", "rms_error_percent"):
             assert continuous[name]["compensated"][metric] < relay[name]["compensated"][metric], (
@@ -48,16 +48,16 @@ def test_the_continuous_inverse_is_better_on_every_figure(as_built):
 
 def test_the_current_loop_follows_within_one_percent(as_built):
     """Tracking error of the firmware's PID on all demo waveforms, from telemetry."""
-    for operator in ("relay", "continuous"):
-        for name, figures in _waveforms(as_built, operator).items():
+    for reading in ("relay", "continuous"):
+        for name, figures in _waveforms(as_built, reading).items():
             for drive in ("scaled", "compensated"):
                 tracking = figures[drive]["current_tracking_max_percent"]
-                assert tracking < 1.0, (operator, name, drive, tracking)
+                assert tracking < 1.0, (reading, name, drive, tracking)
 
 
 def test_on_the_ideal_bench_almost_nothing_is_left(tmp_path):
     """Static hysteresis only: at least 88 % less mean error and at most 2.5 % of full force."""
-    document = chain(tmp_path, "bench:?ideal", operator="continuous", waveforms=("normal", "bifid"))
+    document = chain(tmp_path, "bench:?ideal", reading="continuous", waveforms=("normal", "bifid"))
     for figures in document["waveforms"]:
         assert figures["mean_error_reduction_percent"] >= 88.0, figures
         assert figures["compensated"]["max_abs_error_percent"] <= 2.5, figures

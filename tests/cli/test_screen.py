@@ -51,7 +51,7 @@ def test_bash_completes_commands_and_options(tmp_path):
     """Of a command the first letters, of an option the dashes."""
     assert completed(tmp_path, "pulsetrainer id") == ["identify"]
     assert {"capture", "compare"} <= set(completed(tmp_path, "pulsetrainer c"))
-    assert "--operator" in completed(tmp_path, "pulsetrainer identify --op")
+    assert "--reading" in completed(tmp_path, "pulsetrainer identify --re")
     assert {"--out", "--overwrite", "--json"} <= set(completed(tmp_path, "pulsetrainer capture --"))
 
 

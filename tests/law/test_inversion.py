@@ -58,7 +58,7 @@ def test_inverse_after_forward(world):
     u = np.clip(world.input, world.plane.low, world.plane.high)
     # the output moves at least by the mass on the diagonal: what rounding of the output is worth in input
     i, j = world.plane.cell_indices
-    slope = 2 * np.min(world.operator.masses[i == j] / np.diff(world.plane.levels))
+    slope = 2 * np.min(world.operator.masses[i == j] / np.diff(world.plane.edges))
     found = invert(world.operator, y, world.start)
     assert found.input == pytest.approx(u, rel=0, abs=4 * world.slack / slope)
     assert found.clipped == 0
@@ -73,9 +73,9 @@ def test_inverse_is_what_bisection_finds(drawn):
     operator = Preisach(plane, mu, world.operator.offset, "continuous", world.operator.polarity)
     target = target[:8]
     wanted_masses = np.clip(operator.polarity * (target - operator.offset), -operator.total, operator.total)
-    expected = oracle.invert(plane.levels, operator.masses, wanted_masses, world.past)
+    expected = oracle.invert(plane.edges, operator.masses, wanted_masses, world.past)
     i, j = plane.cell_indices
-    slope = 2 * np.min(operator.masses[i == j] / np.diff(plane.levels))
+    slope = 2 * np.min(operator.masses[i == j] / np.diff(plane.edges))
     slack = 4 * world.slack * (1 + operator.total / world.operator.total) / slope
     assert invert(operator, target, world.start).input == pytest.approx(expected, rel=0, abs=slack)
 
@@ -165,7 +165,7 @@ def test_an_empty_band_is_crossed_at_once(plane, data):
     i, j = plane.cell_indices
     mu = np.where((i == gap) | (j == gap), 0.0, 1.0)
     operator = Preisach(plane, mu)
-    left, right = plane.levels[gap], plane.levels[gap + 1]
+    left, right = plane.edges[gap], plane.edges[gap + 1]
     u = np.linspace(plane.low, plane.high, 7 * plane.n_h + 1)
     y = operator(u)
     found = invert(operator, y)
@@ -202,9 +202,9 @@ def test_closest_match_is_that_of_the_naive_twin(drawn):
     operator, past, target = drawn
     plane = operator.plane
     goals = np.clip(operator.polarity * (target - operator.offset), -operator.total, operator.total)
-    level, reached = oracle.closest_match(plane.levels, operator.masses, goals, past)
+    level, reached = oracle.closest_match(plane.edges, operator.masses, goals, past)
     found = closest_match(operator, target, state_after(plane, past))
-    assert np.array_equal(found.input, plane.levels[level])
+    assert np.array_equal(found.input, plane.edges[level])
     played = operator(found.input, state_after(plane, past))
     assert played == pytest.approx(operator.offset + operator.polarity * reached, rel=0, abs=1e-9)
 
@@ -258,7 +258,7 @@ def test_slew_limit_is_kept_and_nothing_is_nearer(plane, data, share):
     u = np.array(data.draw(st.lists(values(plane), min_size=1, max_size=30)))
     slope = max(share, 1e-3) * (plane.high - plane.low) / plane.n_h
     limited = slew_limited(u, 1000.0, slope * 1000.0)
-    slack = 1e-12 * (np.abs(plane.levels).max() + plane.high - plane.low + slope * u.size)
+    slack = 1e-12 * (np.abs(plane.edges).max() + plane.high - plane.low + slope * u.size)
     assert np.all(np.abs(np.diff(limited)) <= slope + slack)
     below, above = oracle.slope_envelope(u, slope), -oracle.slope_envelope(-u, slope)
     assert limited == pytest.approx(0.5 * (below + above), rel=0, abs=slack)

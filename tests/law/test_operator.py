@@ -23,11 +23,11 @@ def close(actual, expected, slack):
 
 def naive(world):
     """Outputs of a world by the oracle of its reading."""
-    levels, masses = world.plane.levels, world.operator.weights * oracle.areas(world.plane.levels)
+    edges, masses = world.plane.edges, world.operator.weights * oracle.areas(world.plane.edges)
     if world.operator.reading == "relay":
-        y = oracle.relay_output(*oracle.relays(levels), masses, world.input, world.past)
+        y = oracle.relay_output(*oracle.relays(edges), masses, world.input, world.past)
     else:
-        y = oracle.continuous_output(levels, masses, world.input, world.past)
+        y = oracle.continuous_output(edges, masses, world.input, world.past)
     return world.operator.offset + world.operator.polarity * y
 
 
@@ -44,10 +44,10 @@ def test_output_is_that_of_the_naive_twin(world):
 def test_continuous_reading_is_many_small_relays(world, parts, data):
     """On inputs that are multiples of a fraction of a band, many relays in each cell give the same."""
     plane = world.plane
-    cuts = np.interp(np.arange(plane.n_h * parts + 1) / parts, np.arange(plane.n_h + 1), plane.levels)
+    cuts = np.interp(np.arange(plane.n_h * parts + 1) / parts, np.arange(plane.n_h + 1), plane.edges)
     on_cuts = st.lists(st.sampled_from(cuts.tolist()), min_size=1, max_size=20)
     past, u = data.draw(on_cuts, label="past"), data.draw(on_cuts, label="input")
-    alpha, beta, mass = oracle.subdivided(plane.levels, world.operator.masses, parts)
+    alpha, beta, mass = oracle.subdivided(plane.edges, world.operator.masses, parts)
     y = world.operator.polarity * oracle.relay_output(alpha, beta, mass, u, past)
     close(world.operator(u, state_after(plane, past)), world.operator.offset + y, world.slack)
 
@@ -58,12 +58,12 @@ def test_design_rows_are_the_mean_states(world):
     path = follow(world.plane, world.input, world.start, world.operator.reading)
     own, base = rows(world.plane, path)
     cells = world.plane.adjoint((own + base[path.anchor]).toarray()) - 1.0
-    levels = world.plane.levels
+    edges = world.plane.edges
     if world.operator.reading == "relay":
-        states = oracle.relay_states(*oracle.relays(levels), world.input, world.past)
+        states = oracle.relay_states(*oracle.relays(edges), world.input, world.past)
     else:
-        states = oracle.continuous_states(levels, world.input, world.past)
-    close(cells, states, 1e-14 * (50 + np.abs(levels).max() / np.diff(levels).min()))
+        states = oracle.continuous_states(edges, world.input, world.past)
+    close(cells, states, 1e-14 * (50 + np.abs(edges).max() / np.diff(edges).min()))
 
 
 # --- the classical laws -----------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ def test_continuous_output_is_lipschitz(world):
     plane, masses = world.plane, world.operator.masses
     i, j = plane.cell_indices
     per_band = np.bincount(i, masses, plane.n_h), np.bincount(j, masses, plane.n_h)
-    steepest = 2 * np.max(np.maximum(*per_band) / np.diff(plane.levels))
+    steepest = 2 * np.max(np.maximum(*per_band) / np.diff(plane.edges))
     y = world.operator(world.input, world.start)
     moved = np.abs(np.diff(np.clip(world.input, plane.low, plane.high)))
     assert np.all(np.abs(np.diff(y)) <= steepest * moved + world.slack)
@@ -166,7 +166,7 @@ def test_reflection_symmetry(world):
     distance = np.abs(world.input[:, None] - plane.thresholds).min(axis=1)
     u = np.where(distance > 1e-12 * (plane.high - plane.low), world.input, plane.low)
     past = [v for v in world.past if np.abs(v - plane.thresholds).min() > 1e-12 * (plane.high - plane.low)]
-    turned_plane = Plane(-plane.levels[::-1])
+    turned_plane = Plane(-plane.edges[::-1])
     i, j = plane.cell_indices
     square = np.zeros((plane.n_h, plane.n_h))
     square[plane.n_h - 1 - j, plane.n_h - 1 - i] = operator.weights
@@ -184,7 +184,7 @@ def test_units_do_not_matter(world, shift, scale):
     distance = np.abs(world.input[:, None] - plane.thresholds).min(axis=1)
     u = np.where(distance > 1e-9 * (plane.high - plane.low), world.input, plane.high)
     zero = shift * (plane.high - plane.low)
-    moved = Plane((plane.levels + zero) * scale)
+    moved = Plane((plane.edges + zero) * scale)
     other = Preisach(
         moved, operator.masses / moved.areas, operator.offset, operator.reading, operator.polarity
     )

@@ -23,7 +23,7 @@ def masses_on_planes(draw):
 def test_everett_nodes_are_sums_over_triangles(drawn):
     """Two cumulative sums give what adding up the cells of every triangle gives."""
     plane, masses = drawn
-    expected = oracle.everett(plane.levels, masses)
+    expected = oracle.everett(plane.edges, masses)
     assert plane.everett_nodes(masses) == pytest.approx(expected, rel=1e-13, abs=1e-15 * masses.sum())
 
 
@@ -59,7 +59,7 @@ def test_many_at_once_are_the_same_one_by_one(drawn):
 @given(planes())
 def test_areas_fill_the_half_plane(plane):
     """Cells have the areas of their rectangles and triangles and together half the square."""
-    assert plane.areas == pytest.approx(oracle.areas(plane.levels), rel=1e-14)
+    assert plane.areas == pytest.approx(oracle.areas(plane.edges), rel=1e-14)
     assert plane.areas.sum() == pytest.approx(0.5 * (plane.high - plane.low) ** 2, rel=1e-12)
 
 
@@ -74,7 +74,7 @@ def test_signed_everett_is_antisymmetric(drawn, data):
         corner, weight = plane.corners(to, origin)
         return (weight * signed[corner]).sum(axis=0)
 
-    slack = 1e-15 * masses.sum() * (10 + np.abs(plane.levels).max() / np.diff(plane.levels).min())
+    slack = 1e-15 * masses.sum() * (10 + np.abs(plane.edges).max() / np.diff(plane.edges).min())
     assert everett(a, b) == pytest.approx(-everett(b, a), rel=0, abs=slack)
     assert everett(a, a) == pytest.approx(0.0, abs=slack)
 
@@ -86,8 +86,8 @@ def test_bands_and_fractions_give_the_value_back(plane, data):
     band, fraction = plane.bands(u)
     assert np.all((band >= 0) & (band < plane.n_h))
     assert np.all((fraction >= 0) & (fraction <= 1))
-    back = plane.levels[band] + fraction * np.diff(plane.levels)[band]
-    size = np.abs(plane.levels).max()
+    back = plane.edges[band] + fraction * np.diff(plane.edges)[band]
+    size = np.abs(plane.edges).max()
     assert back == pytest.approx(np.clip(u, plane.low, plane.high), rel=0, abs=4e-16 * size)
 
 
@@ -96,7 +96,7 @@ def test_rounding_to_nodes_is_what_the_relays_see(plane, data):
     """An input and its rounded value switch the same relays: up from a threshold on."""
     u = np.array(data.draw(st.lists(values(plane), min_size=1, max_size=10)))
     rounded = plane.round_to_nodes(u)
-    assert np.all(np.isin(rounded, plane.levels))
+    assert np.all(np.isin(rounded, plane.edges))
     seen, switched = u[:, None] >= plane.thresholds, rounded[:, None] >= plane.thresholds
     assert np.array_equal(seen, switched)
 
@@ -106,4 +106,4 @@ def test_numbering_of_the_cells():
     plane = Plane.uniform(0.0, 1.0, 5)
     i, j = plane.cell_indices
     assert np.array_equal(i * (i + 1) // 2 + j, np.arange(plane.n_q))
-    assert list(zip(i.tolist(), j.tolist(), strict=True)) == oracle.cells(plane.levels)
+    assert list(zip(i.tolist(), j.tolist(), strict=True)) == oracle.cells(plane.edges)

@@ -39,7 +39,7 @@ def values(plane, *, inside=False):
     margin = 0.0 if inside else 0.2 * (plane.high - plane.low)
     return st.one_of(
         st.floats(plane.low - margin, plane.high + margin),
-        st.sampled_from(plane.levels.tolist()),
+        st.sampled_from(plane.edges.tolist()),
         st.sampled_from(plane.thresholds.tolist()),
     )
 
@@ -102,7 +102,7 @@ class World:
     @property
     def slack(self) -> float:
         """Rounding that an output may show: sums of tens of terms, inputs tens of steps away from zero."""
-        size = np.abs(self.plane.levels).max() / np.diff(self.plane.levels).min()
+        size = np.abs(self.plane.edges).max() / np.diff(self.plane.edges).min()
         return 1e-15 * (20.0 + size) * (self.operator.total + abs(self.operator.offset)) * 20.0
 
 

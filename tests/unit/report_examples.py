@@ -90,14 +90,14 @@ def fit(n=2000, *, time=True, seed=2):
 def model(n_h=48, *, with_fit=True, seed=3, extensions=()):
     """Return a model: a ridge near the diagonal, a reversible part on it, a corner that was not covered."""
     rng = np.random.default_rng(seed)
-    levels = np.linspace(0.0, FULL_CURRENT, n_h + 1)
+    edges = np.linspace(0.0, FULL_CURRENT, n_h + 1)
     i, j = np.tril_indices(n_h)
-    alpha, beta = (levels[i] + levels[i + 1]) / 2, (levels[j] + levels[j + 1]) / 2
+    alpha, beta = (edges[i] + edges[i + 1]) / 2, (edges[j] + edges[j + 1]) / 2
     weights = 9.0 * np.exp(-(((alpha - beta - 0.15) / 0.12) ** 2) - ((alpha + beta - 1.8) / 0.9) ** 2)
     weights += np.where(i == j, 60.0, 0.0)
     weights = np.maximum(weights + rng.normal(0, 0.6, weights.size), 0.0)
     return Model(
-        levels=levels,
+        edges=edges,
         weights=weights,
         offset=0.213,
         covered=~((i > 0.9 * n_h) & (j < 0.12 * n_h)),

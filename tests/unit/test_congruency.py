@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from pulsetrainer.core import signals
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import congruency
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Frame
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
@@ -34,10 +34,10 @@ def _operator(n_h: int, weights: np.ndarray | None = None) -> Preisach:
     return Preisach(plane, weights * 7.0 / total, 7.0)
 
 
-def _measured(k: float, noise: float, seed: int) -> Measured:
+def _measured(k: float, noise: float, seed: int) -> Record:
     model = Extended.of(_operator(90), [("load-dependence", (k,))] if k else [])
     y = model(INPUT, DT) + noise * np.random.default_rng(seed).standard_normal(INPUT.size)
-    return Measured(DT, INPUT, y, np.ones(INPUT.size))
+    return Record(INPUT, y, dt_s=DT)
 
 
 def _contrast(k: float, noise: float, seed: int) -> congruency.Contrast:
@@ -74,7 +74,7 @@ def test_no_weights_make_equal_loops_differ(seed, n_h):
         np.asarray(turns), 6.0, 1 / DT
     )  # a hundred samples a stroke: loops equal to the sample
     output = _operator(n_h, weights)(u)
-    loops = congruency.loops_of([Measured(DT, u, output, np.ones(u.size))], 0.0, HIGH)
+    loops = congruency.loops_of([Record(u, output, dt_s=DT)], 0.0, HIGH)
     assert len(loops) == 6
     assert np.ptp([output[loop.begin] for loop in loops]) > 0 or n_h < 6
     assert np.abs(congruency.contrasts(loops, [output])).max() < 1e-9 * np.ptp(output)
@@ -114,7 +114,7 @@ def test_what_another_cause_may_still_change_is_taken_off():
     """A lag in the model whose constant is known within some error must not pass for a feedback."""
     model = Extended.of(_operator(90), [("output-lag", (0.01,))])
     y = model(INPUT, DT) + 0.02 * np.random.default_rng(3).standard_normal(INPUT.size)
-    problem = problem_for([Measured(DT, INPUT, y, np.ones(INPUT.size))], 0.0, HIGH)
+    problem = problem_for([Record(INPUT, y, dt_s=DT)], 0.0, HIGH)
     fitted = refit(problem, (Term(library()["output-lag"], (0.008,)),), None)
     wrong = weights_for(problem, (Term(fitted.terms[0].cause, (0.0095,)),), fitted)
     found = congruency.fitted_contrast(problem, wrong, LOAD, np.random.default_rng(3))

@@ -7,9 +7,10 @@ import pytest
 
 from pulsetrainer.core import inversion, memory, metrics, nnls, signals, waveforms
 from pulsetrainer.core.coverage import coverage
-from pulsetrainer.core.identification import Record, identify
+from pulsetrainer.core.identification import identify
 from pulsetrainer.core.operator import Preisach, outputs
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
 
 PLANE = Plane.uniform(0.0, 1.0, 4)
@@ -31,7 +32,7 @@ NO_VECTOR = {
 
 FIVE = np.arange(5.0)
 TAKES_A_VECTOR = {
-    "levels": Plane,
+    "edges": Plane,
     "input": OPERATOR,
     "input, relays": RELAYS,
     "input, many weights": lambda u: outputs(PLANE, ONES[None], np.zeros(1), u),
@@ -77,10 +78,10 @@ def train(**changes):
     return waveforms.train(shape(), **(right | changes))
 
 
-def fit(u, y, *, n_h=4, low=0.0, high=1.0, weight=None):
+def fit(u, y, *, n_h=4, low=0.0, high=1.0, sample_weight=1.0):
     """A fit of one record."""
     return identify(
-        [Record(np.asarray(u, dtype=float), np.asarray(y), weight)], Plane.uniform(low, high, n_h)
+        [Record(np.asarray(u, dtype=float), np.asarray(y), sample_weight)], Plane.uniform(low, high, n_h)
     )
 
 
@@ -89,7 +90,7 @@ SWEEP = np.concatenate((np.linspace(0, 1, 20), np.linspace(1, 0, 20)))
 # Each call, and words its message must hold: the argument, what it was, what was expected.
 BAD = {
     # the plane
-    "no levels": (lambda: Plane(np.array([])), ["levels", "at least 1", "(0,)"]),
+    "no levels": (lambda: Plane(np.array([])), ["edges", "at least 1", "(0,)"]),
     "one level": (lambda: Plane.uniform(0.0, 1.0, 1), ["n_h", "at least 2", "1"]),
     "levels without end": (lambda: Plane.uniform(0.0, 1.0, 10**400), ["n_h", "at most 10000", "10000000"]),
     "no level count": (lambda: Plane.uniform(0.0, 1.0, 0), ["n_h", "at least 2", "0"]),
@@ -98,10 +99,10 @@ BAD = {
     "input range of zero": (lambda: Plane.uniform(1.0, 1.0, 4), ["low < high", "low = 1", "high = 1"]),
     "input range upside down": (lambda: Plane.uniform(2.0, 1.0, 4), ["low < high", "low = 2", "high = 1"]),
     "input range of NaN": (lambda: Plane.uniform(0.0, NAN, 4), ["low < high", "nan"]),
-    "input range too small for floats": (lambda: Plane.uniform(1.0, 1.0 + 4e-16, 48), ["levels", "increase"]),
+    "input range too small for floats": (lambda: Plane.uniform(1.0, 1.0 + 4e-16, 48), ["edges", "increase"]),
     "infinite input range": (lambda: Plane.uniform(-1e308, 1e308, 4), ["range"]),
-    "repeated levels": (lambda: Plane(np.array([0.0, 0.5, 0.5, 1.0])), ["levels", "strictly increase"]),
-    "falling levels": (lambda: Plane(np.array([1.0, 0.5, 0.0])), ["levels", "strictly increase", "-0.5"]),
+    "repeated levels": (lambda: Plane(np.array([0.0, 0.5, 0.5, 1.0])), ["edges", "strictly increase"]),
+    "falling levels": (lambda: Plane(np.array([1.0, 0.5, 0.0])), ["edges", "strictly increase", "-0.5"]),
     "masses of the wrong length": (lambda: PLANE.everett_nodes(np.ones(9)), ["(..., 10)", "(9,)"]),
     "nodes of the wrong length": (lambda: PLANE.masses_of(np.ones(11)), ["(10,)", "(11,)"]),
     # the operator
@@ -183,7 +184,10 @@ BAD = {
         ["weight", "negative", "-1"],
     ),
     "no records": (lambda: identify([], PLANE), ["at least one sample", "0 records"]),
-    "nothing but masked samples": (lambda: fit(SWEEP, SWEEP, weight=0 * SWEEP), ["at least one", "weight"]),
+    "nothing but masked samples": (
+        lambda: fit(SWEEP, SWEEP, sample_weight=0 * SWEEP),
+        ["at least one", "counts"],
+    ),
     "constant input": (lambda: fit(np.full(40, 0.5), SWEEP), ["input", "not vary", "0.5", "40"]),
     "input outside the levels": (lambda: fit(SWEEP, SWEEP, low=2.0, high=3.0), ["input", "not vary", "2"]),
     "constant output": (lambda: fit(SWEEP, np.full(40, 0.7)), ["output", "not vary", "0.7", "40"]),

@@ -10,9 +10,10 @@ from scipy.optimize import nnls as reference
 from oracle import cells
 from pulsetrainer.core import equations, identification, nnls
 from pulsetrainer.core.coverage import Gap, coverage, largest_gap
-from pulsetrainer.core.identification import Record, identify
+from pulsetrainer.core.identification import identify
 from pulsetrainer.core.operator import follow, rows
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
 
 PLANE = Plane.uniform(-1.0, 1.0, 12)
@@ -77,7 +78,7 @@ def test_sums_of_parts_are_the_sums_of_the_whole():
     parts = equations.parted_sums(PLANE, [record], "continuous", [part], 3)
     whole = equations.node_sums(PLANE, [record], "continuous").dense()
     summed = sum(parts[1:], start=parts[0]).dense()
-    for name in ("gram", "moment", "row_sum", "weight", "output_sum", "output_square"):
+    for name in ("gram", "moment", "row_sum", "weight_sum", "output_sum", "output_square"):
         assert np.allclose(getattr(summed, name), getattr(whole, name), rtol=1e-12, atol=1e-9), name
     masked = Record(record.input, record.output, (part == 1).astype(float))
     alone = equations.normal_equations(PLANE, [masked], "continuous")
@@ -135,7 +136,7 @@ RAMP = np.linspace(-1.0, 1.0, 40)
     ("act", "words"),
     [
         (lambda: identify([], PLANE), ["records", "0 records"]),
-        (lambda: identify([Record(RAMP, RAMP, np.zeros(40))], PLANE), ["weight"]),
+        (lambda: identify([Record(RAMP, RAMP, np.zeros(40))], PLANE), ["counts"]),
         (lambda: identify([Record(RAMP, np.ones(40))], PLANE), ["output", "does not vary", "1"]),
         (lambda: identify([Record(np.ones(40), RAMP)], PLANE), ["input", "does not vary"]),
         (lambda: identify([Record(RAMP[:5], RAMP[:5])], PLANE), ["12 levels", "got 5"]),
@@ -187,7 +188,7 @@ def test_dense_matrices_are_refused_beyond_the_stated_memory():
 
 def brute_gap(plane, covered):
     """Area of the largest uncovered rectangle cut by the diagonal, by trying all of them."""
-    n, index = plane.n_h, {cell: k for k, cell in enumerate(cells(plane.levels))}
+    n, index = plane.n_h, {cell: k for k, cell in enumerate(cells(plane.edges))}
     best = 0.0
     for a in range(n):
         for b in range(a, n):

@@ -7,9 +7,10 @@ import pytest
 from core_jobs import job
 
 from pulsetrainer.core import input_noise
-from pulsetrainer.core.identification import Record, identify
+from pulsetrainer.core.identification import identify
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
 
 PLANE = Plane.uniform(-1.0, 1.0, 48)

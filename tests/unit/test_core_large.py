@@ -7,10 +7,11 @@ import pytest
 from core_jobs import curves, plant, random_reversals
 
 from pulsetrainer.core import identification, large, nnls
-from pulsetrainer.core.equations import Record, node_sums
+from pulsetrainer.core.equations import node_sums
 from pulsetrainer.core.identification import identify
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import smoothed
 from pulsetrainer.errors import ConvergenceError
 
@@ -105,7 +106,7 @@ def test_the_diagonal_is_that_of_the_dense_matrix():
     u = signal("random", rng)
     sums = node_sums(PLANE, [Record(u, u)], "continuous")
     gram, _ = sums.dense().centred()
-    assert np.allclose(large.centred_diagonal(sums), np.diagonal(gram), atol=1e-9 * sums.weight)
+    assert np.allclose(large.centred_diagonal(sums), np.diagonal(gram), atol=1e-9 * sums.weight_sum)
 
 
 def test_the_stencil_undoes_the_cumulative_sums():

@@ -7,9 +7,10 @@ import pytest
 from core_jobs import curves, job, plant
 
 from pulsetrainer.core import smoothing
-from pulsetrainer.core.identification import Record, identify
+from pulsetrainer.core.identification import identify
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 
 ALL = slice(None)
 

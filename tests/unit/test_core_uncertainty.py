@@ -9,8 +9,9 @@ from scipy.signal import lfilter
 
 from pulsetrainer.core import identification, uncertainty
 from pulsetrainer.core.equations import parted_sums
-from pulsetrainer.core.identification import Record, identify
+from pulsetrainer.core.identification import identify
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
 
 N_H = 10
@@ -84,7 +85,7 @@ def test_a_resample_is_a_refit_of_the_drawn_blocks():
     drawn = np.random.default_rng(4).multinomial(20, np.full(20, 1 / 20)).astype(float)
     direct = identification.normal_equations(PLANE, [Record(INPUT, CLEAN, drawn[part])], "continuous")
     mixed = stack.weighted(drawn).dense()
-    for name in ("gram", "moment", "row_sum", "weight", "output_sum", "output_square"):
+    for name in ("gram", "moment", "row_sum", "weight_sum", "output_sum", "output_square"):
         assert np.allclose(getattr(mixed, name), getattr(direct, name), atol=1e-8), name
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -9,10 +11,10 @@ from scipy import ndimage
 from pulsetrainer.core import signals
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import experiment, gates, screening
 from pulsetrainer.diagnosis.causes import cause_named, library
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
@@ -141,11 +143,11 @@ def test_the_diagnostic_signal_has_what_the_causes_need():
         signals.diagnostic(1.0, 1.0, rate_Hz=1000.0)
 
 
-def _record(y: np.ndarray, u: np.ndarray | None = None, reference: np.ndarray | None = None) -> Measured:
-    return Measured(DT, np.linspace(0, 1.5, y.size) if u is None else u, y, np.ones(y.size), reference)
+def _record(y: np.ndarray, u: np.ndarray | None = None, reference: np.ndarray | None = None) -> Record:
+    return Record(np.linspace(0, 1.5, y.size) if u is None else u, y, dt_s=DT, reference=reference)
 
 
-def _fired(record: Measured) -> dict:
+def _fired(record: Record) -> dict:
     return {f.cause: f for f in gates.check(record, 0.0, 1.5)}
 
 
@@ -236,21 +238,21 @@ def test_the_noise_is_that_of_the_samples_with_weight():
     assert gates.noise_of(y) < 0.01
 
 
-def _lagging(n_h: int = 24, rate_Hz: float = 200.0, **causes: tuple[float, ...]) -> Measured:
+def _lagging(n_h: int = 24, rate_Hz: float = 200.0, **causes: tuple[float, ...]) -> Record:
     """A short diagnostic record of a device with some causes."""
     u = signals.diagnostic(0.0, 1.5, rate_Hz=rate_Hz).value[: round(40 * rate_Hz)]
     named = [(name.replace("_", "-"), values) for name, values in causes.items()]
     y = Extended.of(_operator(n_h), named)(u, 1 / rate_Hz)
     noise = 0.01 * np.random.default_rng(8).standard_normal(u.size)
-    return Measured(1 / rate_Hz, u, y + noise, np.ones(u.size))
+    return Record(u, y + noise, dt_s=1 / rate_Hz)
 
 
 def test_what_happened_before_a_record_does_not_bend_the_creep():
     """A finger that was pressed before goes on relaxing: it is fitted freely, and the constants are right."""
     record = _lagging(creep=(0.08, 0.7))
-    t = np.arange(record.input.size) * record.dt_s
+    t = np.arange(record.input.size) * record.step
     before = 0.4 * np.exp(-t / 0.7) + 0.3 * np.exp(-t / 2.8)
-    record = Measured(record.dt_s, record.input, record.output + before, record.weight)
+    record = replace(record, output=record.output + before)
     problem = problem_for([record], 0.0, 1.5)
     fitted = refit(problem, (Term(library()["creep"], (0.03, 1.0)),), weights_for(problem, (), None))
     assert fitted.terms[0].values == pytest.approx((0.08, 0.7), rel=0.1)
@@ -271,7 +273,7 @@ def test_the_best_experiment_tells_lags_apart_better_than_one_rate_does():
     u = signals.identification(0.0, 1.5, n_h=12, speed=1.5, rate_Hz=200.0).value
     y = Extended.of(_operator(), [("output-lag", (0.02,))])(u, 0.005)
     y += 0.01 * np.random.default_rng(9).standard_normal(u.size)
-    answer = diagnose([Measured(0.005, u, y, np.ones(u.size))], 0.0, 1.5, rng=np.random.default_rng(0))
+    answer = diagnose([Record(u, y, dt_s=0.005)], 0.0, 1.5, rng=np.random.default_rng(0))
     best = experiment.best_experiment(answer, ("output-lag", "delay"))
     assert best.distance > 3.0 * best.distance_here
 
@@ -279,10 +281,8 @@ def test_the_best_experiment_tells_lags_apart_better_than_one_rate_does():
 def test_a_step_is_found_where_it_is():
     """The moment within a sample or two, the size within a few per cent."""
     record = _lagging()
-    y = record.output + 0.15 * (np.arange(record.input.size) * record.dt_s > 17.3)
-    answer = diagnose(
-        [Measured(record.dt_s, record.input, y, record.weight)], 0.0, 1.5, rng=np.random.default_rng(0)
-    )
+    y = record.output + 0.15 * (np.arange(record.input.size) * record.step > 17.3)
+    answer = diagnose([replace(record, output=y)], 0.0, 1.5, rng=np.random.default_rng(0))
     assert answer.verdict == "step"
     values = {e.name: e for e in answer.findings[0].parameters}
     assert values["time"].value == pytest.approx(17.3, abs=0.02)
@@ -311,11 +311,10 @@ def test_what_does_not_vary_is_refused(constant):
     """A clear error, not a verdict."""
     u = signals.diagnostic(0.0, 1.5, rate_Hz=200.0).value
     y = _operator()(u)
-    record = Measured(
-        0.005,
+    record = Record(
         np.full_like(u, 0.7) if constant == "input" else u,
         np.full_like(y, 3.0) if constant == "output" else y,
-        np.ones(u.size),
+        dt_s=0.005,
     )
     with pytest.raises(DataError, match=f"the {constant} does not vary"):
         diagnose([record], 0.0, 1.5, rng=np.random.default_rng(0))

@@ -8,8 +8,8 @@ import pytest
 from pulsetrainer.core import signals
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import gates, sticking
-from pulsetrainer.diagnosis.design import Measured
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.gates import Firing
 from pulsetrainer.diagnosis.problem import problem_for
@@ -37,9 +37,9 @@ def _stuck(y: FloatArray, force: float) -> FloatArray:
     return np.asarray(path)[::10]
 
 
-def _sawtooth(y: FloatArray, seed: int = 1) -> tuple[Firing | None, Measured]:
+def _sawtooth(y: FloatArray, seed: int = 1) -> tuple[Firing | None, Record]:
     noisy = y + NOISE * np.random.default_rng(seed).standard_normal(y.size)
-    record = Measured(DT, INPUT, noisy, np.ones(y.size))
+    record = Record(INPUT, noisy, dt_s=DT)
     problem = problem_for([record], 0.0, 1.5)
     return sticking.sawtooth(problem, weights_for(problem, (), None)), record
 

@@ -1,11 +1,11 @@
-"""Where the levels of a plane should lie: evenly, or crowded where the output changes.
+"""Where the edges of a plane should lie: evenly, or crowded where the output changes.
 
 An even plane of n_h levels knows nothing finer than range / n_h. A steep loop, such as that of electrical
-steel, changes by half of its span within an eighth of the range: its levels are placed at even steps of
+steel, changes by half of its span within an eighth of the range: its edges are placed at even steps of
 
     C(u) = (F(u) + (u - low) / (high - low)) / 2
 
-where F is the share of the output's variation that lies below u, over all branches: half of the levels
+where F is the share of the output's variation that lies below u, over all branches: half of the edges
 follow the input, half the output.
 """
 
@@ -16,11 +16,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from pulsetrainer.core.equations import Record
 from pulsetrainer.core.input_noise import real_turns
 from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.record import Record
 
-# Where half of the output's variation happens within less than this share of the range, levels crowd.
+# Where half of the output's variation happens within less than this share of the range, edges crowd.
 STEEP = 0.15
 _BINS = 192  # of the histogram of the output's variation
 _COARSE = 48  # bins on which the steepness is judged
@@ -30,20 +30,20 @@ _SWING = 0.02  # of the range: turns below it end no branch
 def variation(records: Sequence[Record], low: float, high: float, bins: int) -> FloatArray:
     """Variation of the output (bins,) in even bins of the input, over all branches of all records.
 
-    A branch is read along its input, sorted, at the edges of the bins: noise of the output within a bin
+    A branch is read along its input, sorted, at the ends of the bins: noise of the output within a bin
     does not count.
     """
-    edges = np.linspace(low, high, bins + 1)
+    ends = np.linspace(low, high, bins + 1)
     total = np.zeros(bins)
     for record in records:
-        kept = record.weights > 0
+        kept = record.sample_weight > 0
         u, y = record.input[kept], record.output[kept]
         if u.size < 2:
             continue
         turns = real_turns(u, _SWING * (high - low))
         for a, b in pairwise(np.unique(np.concatenate(([0], turns, [u.size - 1]))).tolist()):
             order = np.argsort(u[a : b + 1], kind="stable")
-            total += np.abs(np.diff(np.interp(edges, u[a : b + 1][order], y[a : b + 1][order])))
+            total += np.abs(np.diff(np.interp(ends, u[a : b + 1][order], y[a : b + 1][order])))
     return total
 
 
@@ -58,7 +58,7 @@ def steepness(records: Sequence[Record], low: float, high: float) -> float:
 
 
 def plane_for(records: Sequence[Record], low: float, high: float, n_h: int) -> Plane:
-    """Return a plane of ``n_h`` levels over [low, high]: even, or crowded where the loop is steep.
+    """Return a plane of ``n_h`` levels over [low, high]: its edges even, or crowded where the loop is steep.
 
     Raises
     ------
@@ -71,14 +71,14 @@ def plane_for(records: Sequence[Record], low: float, high: float, n_h: int) -> P
     sizes = variation(records, low, high, _BINS)
     along = np.concatenate(([0.0], np.cumsum(sizes) / sizes.sum()))
     mixed = 0.5 * (along + np.linspace(0.0, 1.0, _BINS + 1))
-    levels = np.interp(np.linspace(0.0, 1.0, n_h + 1), mixed, np.linspace(low, high, _BINS + 1))
-    levels[0], levels[-1] = low, high
-    return Plane(levels)
+    edges = np.interp(np.linspace(0.0, 1.0, n_h + 1), mixed, np.linspace(low, high, _BINS + 1))
+    edges[0], edges[-1] = low, high
+    return Plane(edges)
 
 
 def thinned(plane: Plane, n_h: int) -> Plane:
-    """Return a plane of ``n_h`` levels that crowd where those of ``plane`` do."""
+    """Return a plane of ``n_h`` levels, their edges crowded where those of ``plane`` do."""
     at = np.linspace(0.0, plane.n_h, n_h + 1)
-    levels = np.interp(at, np.arange(plane.n_h + 1), plane.levels)
-    levels[0], levels[-1] = plane.low, plane.high
-    return Plane(levels)
+    edges = np.interp(at, np.arange(plane.n_h + 1), plane.edges)
+    edges[0], edges[-1] = plane.low, plane.high
+    return Plane(edges)
