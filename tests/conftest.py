@@ -1,15 +1,21 @@
-"""How long the laws are tried: quickly by default, longer with ``HYPOTHESIS_PROFILE=ci``.
+"""How long the laws are tried, and what is made once for all workers.
 
-Runs are not derandomised, so every run looks at new examples; a failure prints the blob that replays it.
+Laws are tried quickly by default, longer with ``HYPOTHESIS_PROFILE=ci``. Runs are not derandomised, so every
+run looks at new examples; a failure prints the blob that replays it.
 """
 
 from __future__ import annotations
 
+import fcntl
 import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
 
 # as the program does: two workers with two threads each wait for each other
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
@@ -17,3 +23,23 @@ settings.register_profile(
 )
 settings.register_profile("ci", parent=settings.get_profile("quick"), max_examples=300)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory) -> Callable[[str, Callable[[Path], None]], Path]:
+    """Return a folder by its name, filled by the first worker that asks; the others wait and share it."""
+    root = tmp_path_factory.getbasetemp()
+    root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+
+    def folder(name: str, fill: Callable[[Path], None]) -> Path:
+        there, whole = root / name, root / f"{name}.whole"
+        with (root / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not whole.exists():
+                shutil.rmtree(there, ignore_errors=True)
+                there.mkdir()
+                fill(there)
+                whole.touch()
+        return there
+
+    return folder

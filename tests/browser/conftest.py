@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from program import pulsetrainer
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # one short record for all: six seconds of the device, twelve levels
@@ -25,15 +24,6 @@ STEPS = (
     "extend diagnosis.h5 --model model.h5 -o extended.h5",
     "evaluate run.h5 --model model.h5 --model extended.h5 -o prediction.h5 --html prediction.html",
 )
-# one interpreter for all steps: numpy and matplotlib are imported once
-ONE_PROCESS = """
-import sys
-from pulsetrainer.cli import app, guard
-for step in sys.argv[1:]:
-    sys.argv = ["pulsetrainer", *step.split()]
-    code = guard.funnel(app.app, sys.argv[1:])
-    assert code == 0, step
-"""
 
 
 @dataclass(frozen=True)
@@ -47,19 +37,15 @@ class Report:
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory) -> Path:
+def folder(made_once) -> Path:
     """A folder in which the program has made all reports."""
-    here = tmp_path_factory.mktemp("reports")
-    done = subprocess.run(
-        [sys.executable, "-c", ONE_PROCESS, *STEPS],
-        cwd=here,
-        env={**os.environ, "PULSETRAINER_PORT": "bench:?seed=1", "OMP_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return here
+
+    def fill(here: Path) -> None:
+        for step in STEPS:
+            done = pulsetrainer(here, *step.split(), env={"PULSETRAINER_PORT": "bench:?seed=1"})
+            assert done.code == 0, (step, done)
+
+    return made_once("reports", fill)
 
 
 @pytest.fixture(scope="session", params=["evaluation", "prediction", "diagnosis"])

@@ -11,8 +11,6 @@ from pathlib import Path, PurePath
 import h5py
 import pytest
 
-pytestmark = pytest.mark.xdist_group("browser")
-
 MEASURING = Path(__file__).with_name("measuring.js").read_text()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -15,19 +16,10 @@ import pytest
 from program import PROGRAM, pulsetrainer
 
 
-@pytest.fixture(scope="module")
-def ready(tmp_path_factory) -> Path:
-    """A folder with a small run, a model, a drive and a playback."""
-    folder = tmp_path_factory.mktemp("ready")
-    for words in (
-        ["capture", "identification", "--speed", "12", "--levels", "12", "-o", "run.h5"],
-        ["identify", "run.h5", "--levels", "12", "-o", "model.h5"],
-        ["invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--periods", "1"],
-        ["play", "drive.h5", "-o", "played.h5", "--repeats", "1"],
-    ):
-        done = pulsetrainer(folder, *words)
-        assert done.code == 0, done
-    return folder
+@pytest.fixture
+def ready(small_chain, tmp_path) -> Path:
+    """A folder of the test's own with a small run, a model, a drive and a playback."""
+    return Path(shutil.copytree(small_chain, tmp_path / "ready"))
 
 
 def refused(folder: Path, words: list[object], code: int, *said: str, env=None) -> str:

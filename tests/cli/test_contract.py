@@ -11,13 +11,13 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from program import PROGRAM, pulsetrainer
+
+from program import PROGRAM, cold, program_on_path, pulsetrainer
 
 ROOT = Path(__file__).resolve().parents[2]
 WAVEFORM_KEYS = {"mean_abs_error_percent", "max_abs_error_percent"}
 
 
-@pytest.mark.xdist_group("pipeline")
 def test_identify_reports_the_agreed_keys(as_built):
     """levels, cells, offset, fit, coverage, iterations, seconds."""
     done = pulsetrainer(as_built, "identify", "run.h5", "-o", "again.h5", "--json")
@@ -31,7 +31,6 @@ def test_identify_reports_the_agreed_keys(as_built):
     assert {"offset", "fit_rms", "iterations", "seconds"} <= set(document)
 
 
-@pytest.mark.xdist_group("pipeline")
 def test_evaluate_reports_the_agreed_keys(as_built):
     """Of a playback: both drives and the reduction; of a run: every model with its gain over the first."""
     done = pulsetrainer(as_built, "evaluate", "played-normal-continuous.h5", "--json")
@@ -48,7 +47,6 @@ def test_evaluate_reports_the_agreed_keys(as_built):
     assert continuous["gain_percent"] > 30
 
 
-@pytest.mark.xdist_group("pipeline")
 def test_show_and_plot_take_every_kind(as_built):
     """run, model, waveform, playback, evaluation."""
     kinds = {
@@ -104,11 +102,9 @@ def test_make_redoes_only_what_is_stale(tmp_path):
     make = shutil.which("make")
     assert make, "make is part of the set-up"
     venv = tmp_path / "venv"
-    (venv / "bin").mkdir(parents=True)
+    venv.mkdir()
+    (venv / "bin").symlink_to(program_on_path())
     (venv / "installed").touch()
-    script = venv / "bin" / "pulsetrainer"
-    script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m pulsetrainer "$@"\n')
-    script.chmod(0o755)
     build = tmp_path / "demo"
     words = [make, "-C", str(ROOT), "demo", f"D={build}", f"VENV={venv}", "-o", str(venv / "installed")]
     clean = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
@@ -161,6 +157,6 @@ def test_a_wheel_carries_firmware_and_waveforms(tmp_path):
         ["identify", "run.h5", "--levels", "12", "-o", "model.h5"],
         ["invert", "bifid", "--model", "model.h5", "-o", "drive.h5"],
     ):
-        done = pulsetrainer(tmp_path, *words, env=env)
+        done = cold(tmp_path, *words, env=env)
         assert done.code == 0, done
     assert list((tmp_path / "cache").rglob("host-*")), "the bench was built in the cache"

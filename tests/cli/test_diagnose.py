@@ -184,7 +184,6 @@ def test_the_wrong_files_are_named(bench):
     assert "nowhere.h5" in json.dumps(done.json["error"])
 
 
-@pytest.mark.xdist_group("pipeline")
 @pytest.mark.timeout(600)
 def test_the_as_built_bench_is_told_what_it_hides(extended):
     """Its causes by name without being told, with the truth within the intervals."""
@@ -201,7 +200,6 @@ def test_the_as_built_bench_is_told_what_it_hides(extended):
         assert low <= truth <= high, (cause, found[cause])
 
 
-@pytest.mark.xdist_group("pipeline")
 @pytest.mark.timeout(600)
 def test_the_extended_model_tracks_and_predicts_better(extended):
     """88 % less mean error and at most 3 % on both pulses; 40 % less on a run that was never fitted."""

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 from program import chain, pulsetrainer
 
-pytestmark = pytest.mark.xdist_group("pipeline")
-
 # Carneiro, Abreu, Restivo 2018: the published device
 PUBLISHED_REDUCTION = {"normal": 73.9, "bifid": 70.3}
 PUBLISHED_MAX = 7.8

@@ -14,15 +14,20 @@ import numpy as np
 import pytest
 from pages import ROOT, Block, blocks
 
+from program import program_on_path
+
 HOW_TO = ROOT / "docs" / "how-to"
 # Blocks that a test cannot run inside itself: they install into .venv and start this very test.
 NOT_RUN = ("make demo", "make test")
 
 
 @pytest.fixture(scope="session")
-def given(tmp_path_factory) -> Path:
+def given(made_once) -> Path:
     """What the pages take for granted: artefacts of the tutorial, records of the reader's bench."""
-    folder = tmp_path_factory.mktemp("given")
+    return made_once("given", _give)
+
+
+def _give(folder: Path) -> None:
     for line in (
         "pulsetrainer capture identification -o run.h5",
         "pulsetrainer capture identification --speed 2 --levels 12 -o other.h5",
@@ -39,17 +44,17 @@ def given(tmp_path_factory) -> Path:
         np.savetxt(folder / name, columns, delimiter=",", header="t_s,current_A,force_N", comments="")
     shutil.copy(folder / "other.h5", folder / "other-run.h5")
     shutil.copytree(ROOT / "workflow", folder / "workflow")
-    return folder
 
 
 def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run one command as a shell would, with this interpreter's programs first."""
+    """Run one command as a shell would, with the program and this interpreter's programs first."""
+    first = (str(program_on_path()), str(Path(sys.executable).parent))
     return subprocess.run(
         ["sh", "-c", command],
         cwd=folder,
         env={
             **os.environ,
-            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+            "PATH": os.pathsep.join((*first, os.environ["PATH"])),
             "COLUMNS": "100",
         },
         capture_output=True,
@@ -68,15 +73,10 @@ RUN = {
     HOW_TO / "ci.md": ("played.h5", "last-week.h5"),
     HOW_TO / "batches.md": ("workflow",),
 }  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
-# the README takes as long as all others together
-GROUPS = [
-    pytest.param(page, id=page.stem, marks=pytest.mark.xdist_group(f"docs-{page.stem == 'README'}"))
-    for page in RUN
-]
 
 
 @pytest.mark.timeout(900)  # a page is a dozen commands; on a busy machine each takes its time
-@pytest.mark.parametrize("page", GROUPS)
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
 def test_commands_of_a_page_run(page, given, tmp_path):
     """In the order of the page; what a page shows as output is what came out."""
     for name in RUN[page]:

@@ -16,16 +16,18 @@ _RUN = Path(__file__).with_name("run.py")
 
 
 @pytest.fixture(scope="module")
-def table(tmp_path_factory) -> list[dict]:
+def table(made_once) -> list[dict]:
     """The rows of a small table, tried once for all tests."""
-    path = tmp_path_factory.mktemp("faults") / "table.json"
-    words = [sys.executable, _RUN, "--sample", "--json", path]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=280, check=False)
-    assert path.exists(), done.stdout + done.stderr
-    return json.loads(path.read_text())
+
+    def fill(folder: Path) -> None:
+        path = folder / "table.json"
+        words = [sys.executable, _RUN, "--sample", "--json", path]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=280, check=False)
+        assert path.exists(), done.stdout + done.stderr
+
+    return json.loads((made_once("faults", fill) / "table.json").read_text())
 
 
-@pytest.mark.xdist_group("faults")
 @pytest.mark.parametrize("fault", ["kill -9", "full", "read-only", "input", "output", "locked", "fuzzed"])
 def test_nothing_is_lost_and_every_failure_is_told(table, fault):
     """Nothing lost, nothing half-written, no hang, no wrong exit."""
@@ -35,7 +37,6 @@ def test_nothing_is_lost_and_every_failure_is_told(table, fault):
         assert sum(row[count] for row in rows) == 0, [row["complaints"] for row in rows]
 
 
-@pytest.mark.xdist_group("faults")
 def test_the_arguments_of_every_command_are_fuzzed(table):
     """Taken from the program's own list: a new command is among them without being named here."""
     (row,) = (row for row in table if row["fault"] == "fuzzed arguments")

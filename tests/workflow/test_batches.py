@@ -14,19 +14,23 @@ import h5py
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.xdist_group("batches")
+from program import program_on_path, pulsetrainer
 
 ROOT = Path(__file__).parents[2]
 SNAKEFILE = ROOT / "workflow" / "Snakefile"
-PROGRAM = f"{sys.executable} -m pulsetrainer"
 # a short record, one repeat: the point is which commands run, not how good the model is
 SHORT = {"capture": "--levels 12 --speed 3", "identify": "--levels 12", "play": "--repeats 1"}
 DEVICES = "name\tport\nleft\tbench:?seed=3\nright\tbench:?seed=4\n"
 
 
+def program() -> str:
+    """Return the program as a command of a shell."""
+    return str(program_on_path() / "pulsetrainer")
+
+
 def snakemake(folder: Path, *words: object, **config: object) -> subprocess.CompletedProcess[str]:
     """Run the Snakefile in ``folder`` with a configuration of its own."""
-    (folder / "my.json").write_text(json.dumps({"out": "out", "program": PROGRAM, **config}))
+    (folder / "my.json").write_text(json.dumps({"out": "out", "program": program(), **config}))
     command = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--configfile", "my.json", *words]
     done = subprocess.run(
         list(map(str, command)), cwd=folder, capture_output=True, text=True, check=False, timeout=240
@@ -38,8 +42,8 @@ def snakemake(folder: Path, *words: object, **config: object) -> subprocess.Comp
 def by_hand(folder: Path, *lines: str) -> None:
     """Run commands as a person types them."""
     for line in lines:
-        done = subprocess.run([*PROGRAM.split(), *line.split()], cwd=folder, capture_output=True, check=False)
-        assert done.returncode == 0, (line, done.stderr)
+        done = pulsetrainer(folder, *line.split())
+        assert done.code == 0, (line, done)
 
 
 def figures(path: Path) -> dict[str, np.ndarray]:
@@ -61,28 +65,28 @@ def same(one: Path, other: Path) -> bool:
 
 
 @pytest.fixture(scope="module")
-def hand(tmp_path_factory) -> Path:
+def hand(made_once) -> Path:
     """The right device by hand."""
-    folder = tmp_path_factory.mktemp("hand")
-    by_hand(
-        folder,
+    lines = (
         f"capture identification --port bench:?seed=4 {SHORT['capture']} -o run.h5",
         f"identify run.h5 {SHORT['identify']} -o model.h5",
         "invert normal --model model.h5 -o drive.h5",
         f"play drive.h5 --port bench:?seed=4 {SHORT['play']} -o played.h5",
         "evaluate played.h5 -o evaluation.h5",
     )
-    return folder
+    return made_once("hand", lambda folder: by_hand(folder, *lines))
 
 
 @pytest.fixture(scope="module")
-def batch(tmp_path_factory) -> Path:
+def batch(made_once) -> Path:
     """Both devices by Snakemake, on two cores."""
-    folder = tmp_path_factory.mktemp("batch")
-    (folder / "two.tsv").write_text(DEVICES)
-    done = snakemake(folder, "--cores", 2, devices="two.tsv", pulses=["normal"], **SHORT)
-    assert done.returncode == 0, done.said
-    return folder
+
+    def fill(folder: Path) -> None:
+        (folder / "two.tsv").write_text(DEVICES)
+        done = snakemake(folder, "--cores", 2, devices="two.tsv", pulses=["normal"], **SHORT)
+        assert done.returncode == 0, done.said
+
+    return made_once("batch", fill)
 
 
 def test_snakemake_makes_what_the_commands_make(batch, hand):
@@ -96,7 +100,7 @@ def test_make_makes_what_the_commands_make(tmp_path, hand):
     """The same commands by pattern rules, side by side."""
     (tmp_path / "two.tsv").write_text(DEVICES)
     options = [f"{name.upper()}={words}" for name, words in SHORT.items()]
-    command = ["make", "-f", str(ROOT / "workflow" / "Makefile"), "-j2", f"PT={PROGRAM}", "DEVICES=two.tsv"]
+    command = ["make", "-f", str(ROOT / "workflow" / "Makefile"), "-j2", f"PT={program()}", "DEVICES=two.tsv"]
     command += ["OUT=out", "PULSES=normal", *options, "out/right/report.html"]
     quiet = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     done = subprocess.run(command, cwd=tmp_path, env=quiet, capture_output=True, text=True, check=False)
