@@ -7,9 +7,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from program import Ran, chain, pulsetrainer
 
 from mistakes import PREPARATION
+from program import Ran, chain, pulsetrainer
 
 
 @pytest.fixture

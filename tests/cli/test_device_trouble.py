@@ -13,8 +13,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from program import PROGRAM, pulsetrainer
 
+from program import PROGRAM, pulsetrainer
 from pulsetrainer.device.device import open_device
 from pulsetrainer.simulation.build import firmware_executable
 

@@ -7,8 +7,8 @@ import shutil
 
 import numpy as np
 import pytest
-from program import pulsetrainer
 
+from program import pulsetrainer
 from pulsetrainer.core import signals
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane

@@ -12,8 +12,8 @@ import time
 from pathlib import Path
 
 import numpy as np
-from program import PROGRAM, pulsetrainer
 
+from program import PROGRAM, pulsetrainer
 from pulsetrainer.artefacts import Run
 from pulsetrainer.core import signals
 from pulsetrainer.errors import DataError

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from program import pulsetrainer
 
 DATA = Path(__file__).resolve().parents[1] / "data"

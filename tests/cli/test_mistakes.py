@@ -8,10 +8,10 @@ import subprocess
 import sys
 
 import typer
-from program import pulsetrainer
 
 from command_lines import READS_ONLY, WRITERS
 from mistakes import INSIDE, at_once, lay_out
+from program import pulsetrainer
 from pulsetrainer.cli.app import app
 
 HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich", "pydantic")

@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 import h5py
 import numpy as np
 import pytest
+
 from program import chain, pulsetrainer
 
 # Carneiro, Abreu, Restivo 2018: the published device

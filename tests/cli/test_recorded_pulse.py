@@ -7,8 +7,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from program import pulsetrainer
 
+from program import pulsetrainer
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.waveforms import Shape
 

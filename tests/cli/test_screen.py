@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 import report_examples
-from program import PROGRAM
 from store_examples import header
 
 import pulsetrainer.cli
+from program import PROGRAM
 from pulsetrainer.files import store
 
 BIN = Path(sys.executable).parent

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import h5py
 import pint
+
 from program import pulsetrainer
 
 
