@@ -1,7 +1,7 @@
-"""Write the reference: ``python docs/make.py`` writes commands.md, pulsetrainer.1, format.md, decisions/README.md.
+"""Write the reference: ``python docs/make.py`` writes the pages that are made from the code.
 
 They are read off the code: the commands off the program's own parser, the format off the annotations that
-the store writes by, the decisions off their titles. ``--check`` writes nothing and exits 1 where a page is not what the code says.
+the store writes by, the architecture off the imports, the decisions off their titles. ``--check`` writes nothing and exits 1 where a page is not what the code says.
 """  # noqa: INP001 - a folder of pages with its script, not a package
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+from architecture import architecture_page
 
 from pulsetrainer import __version__
 from pulsetrainer.artefacts import KINDS
@@ -368,6 +369,7 @@ PAGES = {
     "pulsetrainer.1": manual_page,
     "format.md": format_page,
     "decisions/README.md": decisions_page,
+    "../ARCHITECTURE.md": lambda: architecture_page(MARK),
 }
 
 
@@ -380,7 +382,7 @@ def main() -> int:
             stale.append(name)
             if "--check" not in sys.argv:
                 path.write_text(text, encoding="utf-8")
-                print(f"wrote docs/{name}")
+                print(f"wrote {path.resolve().relative_to(HERE.parent)}")
     if stale and "--check" in sys.argv:
         print(f"out of date: {', '.join(stale)}; run `make docs`", file=sys.stderr)
         return 1

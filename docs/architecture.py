@@ -1,0 +1,134 @@
+"""The page of the architecture, read off the code: a drawing of the imports, every module in a sentence."""  # noqa: INP001 - a folder of pages with its scripts, not a package
+
+from __future__ import annotations
+
+import ast
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import grimp
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = "pulsetrainer"
+PAGE = """\
+# Architecture
+
+{mark}
+
+A command is one verb with files: it loads what its arguments name, calls one function of `steps`, saves the result and
+prints it. The nouns (`artefacts`) are frozen dataclasses that know no file. The verbs (`steps`) go from nouns to nouns.
+[CONTRIBUTING.md](CONTRIBUTING.md) says which files to touch for a new command, cause, artefact or pulse,
+[docs/decisions](docs/decisions/README.md) why things are as they are.
+
+## Who imports whom
+
+An arrow points from a part to a part that it imports. An arrow that follows from others is left out: where `a` imports
+`b` and `b` imports `c`, `a` may import `c`.
+
+```mermaid
+{drawing}
+```
+
+| part | imports |
+|---|---|
+{imports}
+
+## The rules
+
+Checked by `make lint` (`lint-imports`; the contracts are in `pyproject.toml`):
+
+{contracts}
+
+Held by `tests/unit/test_house_rules.py`: outside `cli` nothing prints or exits; random numbers come from a generator that
+is passed in; the core and the diagnosis read no clock and no environment. Errors are one family
+(`pulsetrainer/errors.py`), and `pulsetrainer/cli/guard.py` alone turns them into exit codes.
+
+The firmware in `firmware/` is C99 without a heap: `core` (protocol, control, safety; no hardware), `hal` (what a port must
+offer), `port` (the host's pseudo-terminal, an emulated Cortex-M4F, the dsPIC33), `plant` (the simulated solenoid).
+[PROTOCOL.md](firmware/PROTOCOL.md) is what both sides speak.
+
+## Where to find what
+
+{modules}
+"""
+
+
+def architecture_page(mark: str) -> str:
+    """Return the page: drawing, contracts and modules."""
+    graph = grimp.build_graph(PACKAGE, include_external_packages=False)
+    imports = _imports(graph)
+    return PAGE.format(
+        mark=mark,
+        drawing="\n".join(_drawing(imports)),
+        imports="\n".join(
+            f"| `{part}` | {', '.join(f'`{one}`' for one in sorted(below)) or 'nothing of the package'} |"
+            for part, below in sorted(imports.items())
+        ),
+        contracts="\n".join(f"- {name}." for name in _contracts()),
+        modules="\n".join(_modules()),
+    )
+
+
+def _imports(graph: grimp.ImportGraph) -> dict[str, set[str]]:
+    """Return the direct imports between the parts: the folders and modules right below the package."""
+    parts = {child for child in graph.find_children(PACKAGE) if not child.endswith("__main__")}
+    for part in parts:
+        if graph.find_children(part):
+            graph.squash_module(part)
+    return {
+        _short(part): {
+            _short(one) for one in graph.find_modules_directly_imported_by(part) & (parts - {part})
+        }
+        for part in parts
+    }
+
+
+def _short(module: str) -> str:
+    return module.removeprefix(f"{PACKAGE}.")
+
+
+def _drawing(imports: dict[str, set[str]]) -> Iterator[str]:
+    """Yield a flow chart of the imports without those that follow from others."""
+    yield "flowchart TD"
+    for part, below in sorted(imports.items()):
+        for one in sorted(below):
+            if not any(one in _reached(other, imports) for other in below - {one}):
+                yield f"  {part} --> {one}"
+
+
+def _reached(part: str, imports: dict[str, set[str]]) -> set[str]:
+    """Return all parts that a part imports, directly or through others."""
+    found: set[str] = set()
+    todo = [part]
+    while todo:
+        for one in imports[todo.pop()] - found:
+            found.add(one)
+            todo.append(one)
+    return found
+
+
+def _contracts() -> list[str]:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    return [contract["name"] for contract in settings["tool"]["importlinter"]["contracts"]]
+
+
+def _modules() -> Iterator[str]:
+    """Yield every module with the first sentence of its docstring, folder by folder."""
+    root = ROOT / PACKAGE
+    folders = [root, *sorted(path.parent for path in root.rglob("__init__.py") if path.parent != root)]
+    for folder in folders:
+        yield f"### {folder.relative_to(ROOT)}\n"
+        yield f"{_sentence(folder / '__init__.py')}\n"
+        for path in sorted(folder.glob("*.py")):
+            if path.name not in ("__init__.py", "__main__.py"):
+                yield f"- [{path.name}]({path.relative_to(ROOT)}): {_sentence(path)}"
+        yield ""
+
+
+def _sentence(path: Path) -> str:
+    text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    return " ".join(text.partition("\n\n")[0].split()).replace("``", "`")
