@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import judge
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 SEED = 4242
 
 

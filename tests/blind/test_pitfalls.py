@@ -66,6 +66,7 @@ def test_one_rate_is_said_to_be_one_rate():
     assert left < 0.25 * lag
 
 
+@pytest.mark.slow
 def test_discretisation_is_not_named_as_physics():
     """Without any noise all that is left is discretisation, and it is highly significant: still 'none'."""
     answer = _diagnosed({"noise": 0, "current-noise": 0})
@@ -105,6 +106,7 @@ def test_autocorrelated_noise_does_not_alarm():
     assert coloured(base.residual, 2, rng).shape == (again.bins.count, 2)
 
 
+@pytest.mark.slow
 def test_friction_is_held_by_the_weights_and_not_named():
     """Coulomb friction with elastic presliding is a Preisach operator.
 
@@ -123,6 +125,7 @@ def test_friction_is_held_by_the_weights_and_not_named():
     assert _diagnosed({"coulomb": 0.3}).verdict == "none"
 
 
+@pytest.mark.slow
 def test_the_wrong_lag_does_not_hide_a_resonance():
     """A delay explains most of a field lag and a resonance together; what it leaves is not its own kind."""
     settings = {"field-lag": 0.0121, "resonance": 17.2, "resonance-zeta": 0.27, "noise": 0.002}
@@ -138,6 +141,7 @@ def test_the_wrong_lag_does_not_hide_a_resonance():
     assert min(alone, key=lambda fitted: fitted.squares).names == ("delay",)
 
 
+@pytest.mark.slow
 def test_a_hum_is_not_taken_for_sticking_as_well():
     """It jumps between flat runs too, as the gate on the raw data says; less the hum nothing jumps."""
     device = {"seed": 4901, "noise-seed": 504, "noise": 0.00121}

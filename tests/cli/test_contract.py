@@ -97,6 +97,7 @@ def test_a_pipe_gets_no_bar_and_a_terminal_does(tmp_path):
         assert (b"capturing" in seen) is bar, seen
 
 
+@pytest.mark.slow
 def test_make_redoes_only_what_is_stale(tmp_path):
     """The demo as file rules: nothing twice; a changed pulse redoes that pulse and the report."""
     make = shutil.which("make")
@@ -125,6 +126,7 @@ def test_make_redoes_only_what_is_stale(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_a_wheel_carries_firmware_and_waveforms(tmp_path):
     """Away from the checkout the package still builds its bench and knows its pulses."""
     build = [

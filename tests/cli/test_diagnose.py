@@ -185,6 +185,7 @@ def test_the_wrong_files_are_named(bench):
 
 
 @pytest.mark.timeout(600)
+@pytest.mark.slow
 def test_the_as_built_bench_is_told_what_it_hides(extended):
     """Its causes by name without being told, with the truth within the intervals."""
     answer = json.loads((extended / "diagnosis.json").read_text())
@@ -201,6 +202,7 @@ def test_the_as_built_bench_is_told_what_it_hides(extended):
 
 
 @pytest.mark.timeout(600)
+@pytest.mark.slow
 def test_the_extended_model_tracks_and_predicts_better(extended):
     """88 % less mean error and at most 3 % on both pulses; 40 % less on a run that was never fitted."""
     played = [f"played-{name}-extended.h5" for name in ("normal", "bifid")]

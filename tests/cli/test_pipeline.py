@@ -76,6 +76,7 @@ def test_the_rest_of_the_library_plays_too(as_built, waveform):
 
 
 @pytest.mark.timeout(600)
+@pytest.mark.slow
 def test_the_figures_stay_within_their_bounds(extended, request):
     """tests/regression/bounds.toml, two-sided: much better fails too and asks for a conscious change."""
     bounds = request.config.rootpath / "tests" / "regression" / "bounds.toml"

@@ -73,10 +73,14 @@ RUN = {
     HOW_TO / "ci.md": ("played.h5", "last-week.h5"),
     HOW_TO / "batches.md": ("workflow",),
 }  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
+SLOW = ("README", "measured")
+PAGES = [
+    pytest.param(page, id=page.stem, marks=pytest.mark.slow if page.stem in SLOW else ()) for page in RUN
+]
 
 
 @pytest.mark.timeout(900)  # a page is a dozen commands; on a busy machine each takes its time
-@pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES)
 def test_commands_of_a_page_run(page, given, tmp_path):
     """In the order of the page; what a page shows as output is what came out."""
     for name in RUN[page]:

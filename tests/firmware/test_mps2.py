@@ -29,7 +29,6 @@ pytestmark = [
         not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
         reason=f"needs apt-get install -y --no-install-recommends {DEBIAN_PACKAGES}",
     ),
-    pytest.mark.xdist_group("qemu"),
 ]
 
 

@@ -19,13 +19,11 @@ from pulsetrainer.simulation import build
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES
 from pulsetrainer.simulation.options import QemuOptions, Wire, parse_qemu
 
-pytestmark = pytest.mark.realtime
 RANGE_A = 1.5
 needs_emulator = pytest.mark.skipif(
     not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
     reason=f"needs apt-get install -y --no-install-recommends {DEBIAN_PACKAGES}",
 )
-group = pytest.mark.xdist_group("qemu")
 
 
 def strokes(seconds: float) -> np.ndarray:
@@ -111,7 +109,8 @@ def test_ziglang_stands_in_for_the_arm_compiler(monkeypatch):
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
+@pytest.mark.slow
 def test_two_starts_are_told_apart():
     """It says who it is and why it started; the boot nonce differs from start to start."""
     nonces = set()
@@ -161,7 +160,8 @@ def measure_pace(tell) -> float:
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
+@pytest.mark.slow
 def test_ten_seconds_of_strokes_at_the_pace_of_the_wall_clock(tell):
     """Ticks over wall time 0.99 to 1.01 with telemetry on, no tick or sample lost, tracking under 1 %."""
     ratios: list[float] = []
@@ -173,7 +173,7 @@ def test_ten_seconds_of_strokes_at_the_pace_of_the_wall_clock(tell):
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
 def test_reference_is_the_one_of_the_bench(tell):
     """The same core plays the same reference: equal at every tick, whatever the processor."""
     with open_device("qemu:") as device:
@@ -192,7 +192,8 @@ def test_reference_is_the_one_of_the_bench(tell):
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
+@pytest.mark.slow
 def test_step_settles_quickly(tell):
     """A step of two thirds of the range: settled into 1 % of the range soon after the slew limit lets it."""
     at, low, high = 500, 0.2, 1.2  # all of it fits the buffer: the line is too slow to stream at 10 kHz
@@ -216,7 +217,8 @@ def test_step_settles_quickly(tell):
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_bad_wire_costs_counted_samples_only(seed, tell):
     """Three bad bytes in ten thousand: played to its end, each reference right, the lost ones counted."""
@@ -241,7 +243,8 @@ def test_a_bad_wire_costs_counted_samples_only(seed, tell):
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
+@pytest.mark.slow
 def test_an_emulator_that_dies_leaves_what_was_recorded():
     """Killed in mid-play: the recording is kept, incomplete, and says why."""
     with open_device("qemu:") as device:
@@ -259,7 +262,7 @@ def test_an_emulator_that_dies_leaves_what_was_recorded():
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
 def test_an_emulator_that_will_not_start_is_quoted(monkeypatch):
     """What the emulator complained about reaches the user."""
     monkeypatch.setattr("pulsetrainer.simulation.emulator._REAL_TIME", "shift=nonsense")
@@ -278,7 +281,8 @@ device.play([0.5] * 60_000, 1000)
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
 @pytest.mark.parametrize("how", ["close", "SIGKILL", "SIGTERM"])
 def test_no_emulator_is_left_behind(how):
@@ -298,7 +302,7 @@ def test_no_emulator_is_left_behind(how):
 
 
 @needs_emulator
-@group
+@pytest.mark.realtime
 def test_commands_take_the_port_unchanged(tmp_path):
     """`pulsetrainer capture FILE.csv --port qemu:` and `show` of what it wrote."""
     table = tmp_path / "strokes.csv"

@@ -21,7 +21,7 @@ QEMU = pytest.param(
     "qemu:",
     marks=[
         pytest.mark.realtime,
-        pytest.mark.xdist_group("qemu"),
+        pytest.mark.slow,
         pytest.mark.skipif(
             not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
             reason=f"needs apt-get install -y --no-install-recommends {DEBIAN_PACKAGES}",

@@ -89,6 +89,7 @@ def batch(made_once) -> Path:
     return made_once("batch", fill)
 
 
+@pytest.mark.slow
 def test_snakemake_makes_what_the_commands_make(batch, hand):
     """Each number of the evaluation is that of the commands by hand; another device has other numbers."""
     assert same(batch / "out/right/evaluation.h5", hand / "evaluation.h5")
@@ -109,6 +110,7 @@ def test_make_makes_what_the_commands_make(tmp_path, hand):
     assert not (tmp_path / "out/left").exists()
 
 
+@pytest.mark.slow
 def test_summary_is_a_table_of_all_devices(batch):
     """One column a device, with the numbers of its file."""
     with (batch / "out/summary.csv").open(newline="") as file:
@@ -120,6 +122,7 @@ def test_summary_is_a_table_of_all_devices(batch):
             assert float(rows[f"normal.{name}"][column]) == stored["waveforms/0000/" + name.replace(".", "/")]
 
 
+@pytest.mark.slow
 def test_what_is_there_is_not_made_again(batch):
     """A second start finds nothing to do; a device that is lost is made again alone."""
     (batch / "two.tsv").write_text(DEVICES)
