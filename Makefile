@@ -17,7 +17,7 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo test test-slow lint faults bench blind docs bounds firmware-mps2 firmware-cost clean help
+.PHONY: demo test test-slow lint faults bench mutate blind docs bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -98,6 +98,9 @@ faults: $(VENV)/installed-test  ## kill -9, full disks, damaged files, fuzzing: 
 
 bench: $(VENV)/installed-test  ## speed and memory, as ratios in one run
 	$(BIN)/python -m pytest benchmarks -p no:xdist --timeout=0 -s
+
+mutate: $(VENV)/installed-test  ## whether the tests notice small faults in PACKAGE (core): COUNT of them (40) by SEED (1)
+	$(BIN)/python tests/mutation/mutate.py $(or $(PACKAGE),core) --seed $(or $(SEED),1) --count $(or $(COUNT),40)
 
 blind: $(VENV)/installed-test  ## the full blind grid of the diagnosis on all cores (hours of processor time)
 	$(BIN)/python tests/blind/run.py -o build/blind.h5

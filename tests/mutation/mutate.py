@@ -1,0 +1,239 @@
+"""``make mutate``: whether the tests notice small faults in the code.
+
+Faults are drawn by seed and put one at a time into a copy of the tree; the tests that run the faulty line are
+tried, the quickest first (coverage says which). The table says noticed or not, file, line and change.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import multiprocessing
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import coverage
+import hypothesis
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.signal
+import scipy.sparse.linalg
+
+from faults import Fault, faults_in
+
+WARM = (hypothesis, np, scipy)  # loaded once: every fork has them
+
+ROOT = Path(__file__).resolve().parents[2]
+UNIT = "tests/unit/test_"
+PACKAGES = {  # the tests that answer for a package
+    "core": ("tests/law", f"{UNIT}core_*.py", f"{UNIT}beats.py", f"{UNIT}waveform*.py"),
+    "diagnosis": (
+        f"{UNIT}diagnosis*.py",
+        f"{UNIT}congruency.py",
+        f"{UNIT}sticking.py",
+        "tests/blind/test_p*.py",
+    ),
+    "files": tuple(
+        f"{UNIT}{one}*.py" for one in ("store", "table", "recorder", "provenance", "units", "file")
+    ),
+    "device": ("tests/link", "tests/device"),
+    "simulation": ("tests/link", "tests/device", "tests/simulation"),
+    "report": tuple(f"{UNIT}{one}*.py" for one in ("figures", "html", "report")),
+    "steps": ("tests/cli", "tests/steps"),
+    "cli": ("tests/cli",),
+}
+MEMORY = 6_000_000_000  # a fault must not take the machine with it
+
+
+def main() -> int:
+    """Run the table for one package."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("package", choices=PACKAGES)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--tests", nargs="+", help="files or folders instead of the package's own")
+    parser.add_argument("--only", default="", help="files whose path holds this text")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="mutate-") as folder:
+        tree = _copied(Path(folder) / "tree")
+        chosen = _tests(tree, options.tests or PACKAGES[options.package])
+        source = f"pulsetrainer/{options.package}"
+        runs, times = _recorded(tree, Path(folder), source, chosen)
+        faults = [
+            fault
+            for path in sorted((tree / source).rglob("*.py"))
+            if options.only in str(path.relative_to(tree))
+            for fault in faults_in(str(path.relative_to(tree)), path.read_bytes())
+        ]
+        drawn = random.Random(options.seed).sample(faults, min(options.count, len(faults)))
+        print(f"{options.package}, seed {options.seed}: {len(drawn)} of {len(faults)} faults", flush=True)
+        return _table(tree, Path(folder), drawn, runs, times)
+
+
+def _table(
+    tree: Path,
+    folder: Path,
+    drawn: list[Fault],
+    runs: dict[str, dict[str, list[str]]],
+    times: dict[str, float],
+) -> int:
+    """Try the faults one by one and print what came of each; 1 where one went unnoticed."""
+    equal = {(e["file"], e["line"], e["change"]): e["why"] for e in _equivalent()}
+    tally: defaultdict[str, int] = defaultdict(int)
+    for fault in sorted(drawn, key=lambda one: (one.path, one.line)):
+        why = equal.get((fault.path, fault.text, fault.change))
+        begun = time.monotonic()
+        tests = _order(fault, runs.get(fault.path, {}), times)
+        result = f"equal: {why}" if why else _tried(tree, folder, fault, tests, times)
+        tally[result.split(":", maxsplit=1)[0]] += 1
+        took = f"{time.monotonic() - begun:.0f} s, {len(tests)} tests"
+        said = result.upper() if result == "unnoticed" else result
+        print(f"{said} | {fault.path}:{fault.line} | {fault.change} | {took}", flush=True)
+    count = tally["noticed"] + tally["unnoticed"]
+    print(f"noticed {tally['noticed']} of {count}" + (f", {tally['equal']} equal" if tally["equal"] else ""))
+    return int(tally["unnoticed"] > 0)
+
+
+def _equivalent() -> list[dict[str, str]]:
+    """Faults that change nothing, looked at one by one."""
+    return tomllib.loads((Path(__file__).parent / "equivalent.toml").read_text()).get("fault", [])
+
+
+def _copied(tree: Path) -> Path:
+    """Copy what git knows, or would know, of the working tree."""
+    words = ["git", "ls-files", "-co", "--exclude-standard", "-z"]
+    listed = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in filter(None, listed.split("\0")):
+        if (ROOT / name).is_file():
+            (tree / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, tree / name)
+    return tree
+
+
+def _tests(tree: Path, patterns: Iterable[str]) -> list[str]:
+    """The test files and folders that there are."""
+    return sorted({str(path.relative_to(tree)) for one in patterns for path in tree.glob(one)})
+
+
+def _pytest(tree: Path, *words: str, limit_s: float | None = None, **env: str) -> int:
+    """Run pytest on the copy, in a fork that has numpy already; return its exit code, -9 if too slow."""
+    child = multiprocessing.get_context("fork").Process(target=_child, args=(tree, words, env))
+    child.start()
+    child.join(limit_s)
+    if child.is_alive():
+        os.killpg(child.pid, signal.SIGKILL)
+        child.join()
+    return child.exitcode
+
+
+def _child(tree: Path, words: tuple[str, ...], env: dict[str, str]) -> None:
+    os.setsid()
+    os.chdir(tree)
+    paths = [str(tree), str(tree / "tests/mutation"), *filter(None, [env.get("PYTHONPATH")])]
+    os.environ.update(env, PYTHONPATH=os.pathsep.join(paths))
+    sys.path[:0] = paths
+    log = os.open("pytest.log", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(log, 1)
+    os.dup2(log, 2)
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    coverage.process_startup()
+    sys.exit(pytest.main(["-q", "-p", "chosen", "-p", "no:cacheprovider", *words]))
+
+
+def _recorded(
+    tree: Path, folder: Path, source: str, tests: list[str]
+) -> tuple[dict[str, dict[str, list[str]]], dict[str, float]]:
+    """Which tests run each line of each file of ``source``, and how long each test takes; kept in build/."""
+    digest = hashlib.sha256("".join(tests).encode())
+    for path in sorted(path for top in (source, "tests") for path in (tree / top).rglob("*.py")):
+        digest.update(path.read_bytes())
+    kept = ROOT / "build" / "mutation" / f"{digest.hexdigest()[:16]}.json"
+    if not kept.exists():
+        data, rc = folder / "coverage", folder / "rc"
+        rc.write_text(
+            f"[run]\nparallel = true\nsource = {tree / source}\ndata_file = {data}\n"
+            "context = ${PYTEST_CURRENT_TEST-}\n"
+        )
+        (folder / "sitecustomize.py").write_text("import coverage\ncoverage.process_startup()\n")
+        env = {
+            "COVERAGE_PROCESS_START": str(rc),
+            "MUTATION_TIMES": str(folder / "times"),
+            "PYTHONPATH": str(folder),
+        }
+        if _pytest(tree, *tests, "--timeout=0", **env) != 0:
+            raise SystemExit(
+                f"the tests fail without any fault:\n{(tree / 'pytest.log').read_text()[-3000:]}"
+            )
+        combined = coverage.Coverage(config_file=str(rc))
+        combined.combine()
+        found = combined.get_data()
+        runs = {
+            str(Path(path).relative_to(tree)): {
+                str(line): sorted(filter(None, contexts))
+                for line, contexts in found.contexts_by_lineno(path).items()
+            }
+            for path in found.measured_files()
+        }
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_text(json.dumps({"runs": runs, "times": json.loads((folder / "times").read_text())}))
+    known = json.loads(kept.read_text())
+    return known["runs"], known["times"]
+
+
+def _order(fault: Fault, lines: dict[str, list[str]], times: dict[str, float]) -> list[str]:
+    """The tests that may notice a fault: those that run its statement, the quickest first.
+
+    What no single test runs (a constant) concerns all tests that run anything in the file. What is run while
+    a test is set up may serve the others of its file.
+    """
+    wanted = lines if fault.at_import else {str(k) for k in fault.lines}
+    contexts = {one for line in wanted for one in lines.get(line, [])}
+    direct = {one.rsplit(" (", 1)[0] for one in contexts}
+    shared = {one.split("::")[0] for one in contexts if one.endswith("(setup)")}
+    besides = [name for name in times if name.split("::")[0] in shared and name not in direct]
+    return [
+        one for group in (direct, besides) for one in sorted(group, key=lambda name: times.get(name, 0.0))
+    ]
+
+
+def _tried(tree: Path, folder: Path, fault: Fault, tests: list[str], times: dict[str, float]) -> str:
+    """Put a fault in, run the tests, take it out again."""
+    if not tests:
+        return "unnoticed"
+    path, chosen = tree / fault.path, folder / "chosen.json"
+    source = path.read_bytes()
+    chosen.write_text(json.dumps(tests))
+    shutil.rmtree(
+        path.parent / "__pycache__", ignore_errors=True
+    )  # as old and as long as before: it would be used
+    path.write_bytes(fault.put_into(source))
+    try:
+        limit = 60.0 + 5.0 * sum(times.get(one, 0.0) for one in tests)
+        files = sorted({one.split("::")[0] for one in tests})
+        slowest = 60 + round(5 * max(times.get(one, 0.0) for one in tests))
+        code = _pytest(tree, "-x", f"--timeout={slowest}", *files, limit_s=limit, MUTATION_TESTS=str(chosen))
+    finally:
+        path.write_bytes(source)
+        shutil.rmtree(path.parent / "__pycache__", ignore_errors=True)
+    if code == 5:
+        raise SystemExit(f"none of the tests that run {fault.path}:{fault.line} is there any more")
+    return "unnoticed" if code == 0 else "noticed"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
