@@ -40,8 +40,10 @@ class UsageError(PulsetrainerError):
 class ExistsError(UsageError):
     """The output is there already, and nobody said that it may be overwritten."""
 
-    def __init__(self, path: Path | str) -> None:
-        super().__init__(f"the output {path} already exists", hint="allow overwriting, or name another file")
+    def __init__(self, path: Path | str, message: str = "") -> None:
+        super().__init__(
+            message or f"the output {path} already exists", hint="allow overwriting, or name another file"
+        )
         self.path = Path(path)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pulsetrainer.errors import DataError, ExistsError, UsageError
-from pulsetrainer.files.file_lock import Lease, sweep
+from pulsetrainer.files.file_lock import Lease, create_locked, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -82,7 +82,7 @@ def replacing(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     try:
         temporary, lease = _claim(target)
         yield temporary
-        publish(temporary, target, overwrite=overwrite)
+        _publish(temporary, target, overwrite=overwrite)
     except OSError as error:
         raise cannot_write(path, error) from error
     finally:
@@ -94,18 +94,11 @@ def replacing(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
 
 
 def _claim(target: Path) -> tuple[Path, Lease]:
-    """Make a temporary file that no other process uses, with a lease on it.
-
-    Between its making and the lease another process may have swept it away; then it is made again.
-    """
+    """Make a temporary file that no other process uses, with a lease on it."""
     while True:
         temporary = target.with_name(f".{_stem(target)}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
-        temporary.open("xb").close()
-        with contextlib.suppress(FileNotFoundError):
-            lease = Lease(temporary)
-            if lease.is_on(temporary):
-                return temporary, lease
-            lease.end()
+        if lease := create_locked(temporary):
+            return temporary, lease
 
 
 def _stem(target: Path) -> str:
@@ -120,7 +113,7 @@ def _leftovers(target: Path) -> list[Path]:
     return []
 
 
-def publish(temporary: Path, target: Path, *, overwrite: bool) -> None:
+def _publish(temporary: Path, target: Path, *, overwrite: bool) -> None:
     """Give a finished file its final name, at once and for good.
 
     Raises

@@ -1,7 +1,7 @@
 """A checksum behind the last byte of an artefact, where HDF5 does not look.
 
 HDF5 guards only part of a file by itself: a flipped bit in a text can crash the library, one in a dataset is
-a wrong number. A file that a user edits with h5py loses the seal (HDF5 cuts what it does not know) and
+a wrong number. A file that a user edits with h5py loses the checksum (HDF5 cuts what it does not know) and
 is read without it.
 """
 
@@ -11,21 +11,17 @@ import re
 import zlib
 from pathlib import Path
 
-from pulsetrainer.errors import DamagedFileError, DataError
+from pulsetrainer.errors import DamagedFileError
+from pulsetrainer.files.input_file import unreadable
 
 _FORMAT = b"\npulsetrainer crc32 %08x\n"
 _PATTERN = re.compile(rb"\npulsetrainer crc32 ([0-9a-f]{8})\n")
-SEAL_LENGTH = len(_FORMAT % 0)
+CHECKSUM_LENGTH = len(_FORMAT % 0)
 _BLOCK = 1 << 20
 
 
-def seal_of(crc: int) -> bytes:
-    """Return the bytes to append to a file whose content has this checksum."""
-    return _FORMAT % crc
-
-
-def append_seal(path: Path) -> None:
-    """Append the seal to a file that is complete.
+def append_checksum(path: Path) -> None:
+    """Append its checksum to a file that is complete.
 
     Raises
     ------
@@ -34,11 +30,11 @@ def append_seal(path: Path) -> None:
     """
     crc = _crc(path, path.stat().st_size)
     with path.open("ab") as stream:
-        stream.write(seal_of(crc))
+        stream.write(_FORMAT % crc)
 
 
-def check_seal(path: Path) -> None:
-    """Raise where the content of a sealed file is not what it was; a file without a seal passes.
+def check_checksum(path: Path) -> None:
+    """Raise where the content of a file is not what it was; a file without a checksum passes.
 
     Raises
     ------
@@ -46,16 +42,16 @@ def check_seal(path: Path) -> None:
         The checksum differs, or the file cannot be read.
     """
     try:
-        length = path.stat().st_size - SEAL_LENGTH
+        length = path.stat().st_size - CHECKSUM_LENGTH
         if length < 0:
             return
         with path.open("rb") as stream:
             stream.seek(length)
-            seal = _PATTERN.fullmatch(stream.read())
-        if seal is None or int(seal[1], 16) == _crc(path, length):
+            found = _PATTERN.fullmatch(stream.read())
+        if found is None or int(found[1], 16) == _crc(path, length):
             return
     except OSError as error:
-        raise DataError(f"{path} cannot be read: {error.strerror or error}", hint="check the disk") from error
+        raise unreadable(path, error) from error
     raise DamagedFileError(f"{path} is damaged: its checksum is not the one it was written with", path=path)
 
 

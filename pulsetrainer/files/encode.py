@@ -6,6 +6,7 @@ dimension scales, so that h5py, xarray and netCDF readers see them by name.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -21,11 +22,17 @@ if TYPE_CHECKING:
 
 INDEX_AXIS = "sample"  # the axis of records without time: a dataset "time" always is a time in seconds
 _CHUNK = 16384
-_GROWING_CHUNK = 4096  # some seconds of a capture: little is left empty in the last one
 _COMPRESS_ABOVE_BYTES = 4096
 _WRITE_AGAIN = "write the artefact again with the command that makes it"
 
 Axes = dict[str, h5py.Dataset]
+
+
+@dataclass(frozen=True, slots=True)
+class Later:
+    """Stands for an array (size,) that is written piece by piece when its dataset is there."""
+
+    size: int
 
 
 def values_of(artefact: Any) -> dict[str, Any]:
@@ -40,7 +47,6 @@ def encode(
     values: Mapping[str, Any],
     *,
     inherited: Axes | None = None,
-    growing: bool = False,
 ) -> None:
     """Write the fields of a dataclass into a group.
 
@@ -51,11 +57,9 @@ def encode(
     cls
         The dataclass.
     values
-        Its fields by name.
+        Its fields by name; ``Later`` for an array that the caller fills in afterwards.
     inherited
         The axis ``time`` of the group above, used where the dataclass has none of its own.
-    growing
-        Lay out the arrays of one axis so that they can be appended to.
 
     Raises
     ------
@@ -69,16 +73,16 @@ def encode(
     # the scale first, for the others are attached to it
     for plan in sorted(plans, key=lambda plan: not plan.is_time_axis):
         if values[plan.name] is not None:
-            _put(group, plan, values, axes, growing=growing)
+            _put(group, plan, values, axes)
         elif not plan.optional:
             raise DataError(f"{plan.name!r} is missing and must be there", hint=_WRITE_AGAIN)
 
 
-def _put(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes, *, growing: bool) -> None:
+def _put(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes) -> None:
     """Write one field of any role."""
     value = values[plan.name]
     if plan.role == "array":
-        _put_array(group, plan, values, axes, growing=growing)
+        _put_array(group, plan, values, axes)
     elif plan.role == "number":
         _put_number(group, plan, value, values)
     elif plan.role == "attribute":
@@ -97,17 +101,18 @@ def _time_of(axes: Axes) -> Axes:
     return {TIME: axes[TIME]} if TIME in axes else {}
 
 
-def _put_array(
-    group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes, *, growing: bool
-) -> None:
+def _put_array(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes) -> None:
     """Write one array and attach its axes."""
-    array = _checked(plan, np.asarray(values[plan.name]))
+    value = values[plan.name]
     is_bool = plan.type is np.bool_
-    dataset = group.create_dataset(
-        plan.path,
-        data=array.astype(np.uint8 if is_bool else plan.type, copy=False),
-        **_storage(array, growing=growing),
-    )
+    stored = np.uint8 if is_bool else plan.type
+    if isinstance(value, Later):
+        # a view of one number: it has a shape, and takes no memory
+        array = np.broadcast_to(np.zeros(1, dtype=stored), value.size)
+        dataset = group.create_dataset(plan.path, array.shape, stored, **_storage(array))
+    else:
+        array = _checked(plan, np.asarray(value))
+        dataset = group.create_dataset(plan.path, data=array.astype(stored, copy=False), **_storage(array))
     _describe(dataset, plan, values)
     if is_bool:
         dataset.attrs["dtype"] = "bool"  # xarray's own sign for a boolean in an integer
@@ -144,11 +149,8 @@ def _checked(plan: FieldPlan, array: np.ndarray[Any, Any]) -> np.ndarray[Any, An
     return array
 
 
-def _storage(array: np.ndarray[Any, Any], *, growing: bool = False) -> dict[str, Any]:
+def _storage(array: np.ndarray[Any, Any]) -> dict[str, Any]:
     """Return how an array lies in the file."""
-    if growing and array.ndim == 1:
-        # no filter: a chunk rewritten at every flush must keep its size and place
-        return {"chunks": (_GROWING_CHUNK,), "maxshape": (None,)}
     if array.nbytes <= _COMPRESS_ABOVE_BYTES:
         return {}
     chunks = (*(1 for _ in array.shape[:-1]), min(array.shape[-1], _CHUNK))

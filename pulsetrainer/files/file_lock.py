@@ -49,6 +49,23 @@ class Lease:
             os.close(handle)
 
 
+def create_locked(path: Path) -> Lease | None:
+    """Create an empty file with a lease on it; None where another process swept it away in between.
+
+    Raises
+    ------
+    OSError
+        It exists already, or cannot be created.
+    """
+    path.open("xb").close()
+    with contextlib.suppress(FileNotFoundError):
+        lease = Lease(path)
+        if lease.is_on(path):
+            return lease
+        lease.end()
+    return None
+
+
 def is_abandoned(path: Path) -> bool:
     """Whether the process that wrote an unfinished file has ended."""
     return _alone_with(path, lambda: None)

@@ -11,6 +11,7 @@ from pathlib import Path
 from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
+JOURNAL = b"pulsetrainer journal 1\n"  # what a recording under way begins with
 
 
 def check_file(path: Path | str) -> None:
@@ -30,18 +31,28 @@ def check_artefact(path: Path | str) -> None:
     Raises
     ------
     DataError
-        As ``check_file``; or it is empty or no HDF5 file.
+        As ``check_file``; or it is empty, and neither an HDF5 file nor a recording that was cut off.
     """
-    path = Path(path)
-    start = _first_bytes(path)
+    start = _first_bytes(Path(path))
     if not start:
         raise DamagedFileError(f"{path} is empty", path=path)
-    if start != _HDF5:
+    if not start.startswith((_HDF5, JOURNAL)):
         raise NotAnArtefactError(f"{path} is not an HDF5 file", path=path)
 
 
+def is_journal(path: Path | str) -> bool:
+    """Whether a file is a recording under way, or one that was cut off.
+
+    Raises
+    ------
+    DataError
+        As ``check_file``.
+    """
+    return _first_bytes(Path(path)) == JOURNAL
+
+
 def _first_bytes(path: Path) -> bytes:
-    """Return as many bytes as tell an HDF5 file."""
+    """Return as many bytes as tell what a file is."""
     try:
         if path.is_dir():
             raise DataError(f"{path} is a folder, expected a file", hint=_names_in(path, path))
@@ -50,11 +61,16 @@ def _first_bytes(path: Path) -> bytes:
         if not path.is_file():
             raise DataError(f"{path} is not an ordinary file", hint="name a file on disk")
         with path.open("rb") as stream:
-            return stream.read(len(_HDF5))
+            return stream.read(len(JOURNAL))
     except OSError as error:
-        raise DataError(
-            f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
-        ) from error
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: Path | str, error: OSError) -> DataError:
+    """Return the error for a file that cannot be read, with the system's reason in it."""
+    return DataError(
+        f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
+    )
 
 
 def _names_in(folder: Path, path: Path) -> str:

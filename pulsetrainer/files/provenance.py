@@ -25,6 +25,7 @@ import numpy as np
 
 from pulsetrainer import __version__
 from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.files.input_file import unreadable
 
 PROGRAM = "pulsetrainer"
 _LIBRARIES = ("numpy", "scipy", "h5py")
@@ -229,9 +230,7 @@ def sha256_of(path: Path | str) -> str:
             while block := stream.read(_HASH_BLOCK):
                 digest.update(block)
     except OSError as error:
-        raise DataError(
-            f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
-        ) from error
+        raise unreadable(path, error) from error
     return digest.hexdigest()
 
 

@@ -1,13 +1,12 @@
 """A run that is on disk while it is measured: a program that dies loses nothing that was appended.
 
-The file grows under a name of its own beside the final one. HDF5's single-writer mode keeps its structure
-readable at every moment, and the sample count is written last: a reader trusts that many samples.
+The samples go into a journal beside the final name. When the recording ends, the journal is written as HDF5
+in one step and removed.
 """
 
 from __future__ import annotations
 
 import contextlib
-import errno
 import itertools
 import os
 import re
@@ -15,31 +14,27 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-import h5py
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.errors import ArgumentError, DataError, PulsetrainerError
-from pulsetrainer.files.atomic_write import cannot_write, check_output, publish
-from pulsetrainer.files.checksum import append_seal
-from pulsetrainer.files.encode import encode
-from pulsetrainer.files.file_lock import Lease, is_abandoned, sweep
+from pulsetrainer.files import journal, store
+from pulsetrainer.files.atomic_write import cannot_write, check_output
+from pulsetrainer.files.encode import Later
+from pulsetrainer.files.file_lock import Lease, create_locked, is_abandoned, sweep
+from pulsetrainer.files.input_file import is_journal
+from pulsetrainer.files.journal import COLUMNS, Journal, Recording
 from pulsetrainer.files.schema import plan_of
-from pulsetrainer.files.store import LIBVER, read, read_samples, write_root
 
 if TYPE_CHECKING:
+    import h5py
     from numpy.typing import ArrayLike
 
     from pulsetrainer.files.provenance import Header
 
-# HDF5 must never meet a full disk: it would fail while closing and crash when the program ends. One
-# batch allocates four chunks of 32 KB at most per 4096 samples; the rest is for its own structures.
-_RESERVE_BYTES = 1 << 20
-_BYTES_PER_SAMPLE = 32
-_CACHE_BYTES = 1 << 16
-_COLUMNS = ("time_s", "reference", "input", "output")
+_RESERVE_BYTES = 1 << 20  # beside the samples: for the texts and for HDF5's own structures
+_BYTES_PER_SAMPLE = 8 * len(COLUMNS) + 1  # and the seam
 _COPIED_SAMPLES = 1 << 16  # at a time
-_CHUNK_BYTES = 1 << 15  # a smaller file holds no sample
 
 
 class RunRecorder:
@@ -58,13 +53,13 @@ class RunRecorder:
         Replace an existing file.
     input_unit, output_unit, input_quantity, output_quantity, signal
         As in ``Run``.
-    in_parts
-        Whether there will be seams; without, ``begin_part`` is an error.
+    earlier
+        A recording that was cut off, and its file: a journal goes on, an artefact is copied.
 
     Raises
     ------
     UsageError
-        See ``store.check_output``.
+        See ``atomic_write.check_output``.
     DataError
         The disk is full or failed.
     """
@@ -80,51 +75,43 @@ class RunRecorder:
         input_quantity: str = "current",
         output_quantity: str = "force",
         signal: str = "",
-        in_parts: bool = False,
+        earlier: tuple[Path, Run] | None = None,
     ) -> None:
         check_output(path, overwrite)
         self._final = Path(path)
         self._overwrite = overwrite
-        self._samples = 0
-        self._last_time = -np.inf
-        self._finished = False
-        self._at_seam = False
-        self._lease: Lease | None = None
-        self._superseded: list[Path] = []
-        self.dropped_samples = 0  # set it as losses become known: an interrupted run tells them too
-        empty = np.zeros(0)
-        values: dict[str, Any] = dict.fromkeys(_COLUMNS, empty) | {
+        self._header = header
+        self._texts = {
             "input_unit": input_unit,
             "output_unit": output_unit,
             "input_quantity": input_quantity,
             "output_quantity": output_quantity,
             "signal": signal,
-            "complete": False,
-            "dropped_samples": 0,
-            "seam": np.zeros(0, dtype=np.bool_) if in_parts else None,
         }
-        self.partial = _claim_partial(self._final)
+        self._samples = 0
+        self._last_time = -np.inf
+        self._seams: list[int] = []  # numbers of the samples that come first after a pause
+        self._complete: bool | None = None  # None: not finished
+        self.dropped_samples = 0  # set it as losses become known: an interrupted run tells them too
+        if earlier is not None and is_journal(earlier[0]):
+            self.partial, self._lease = earlier[0], Lease(earlier[0])
+            end = Recording.read(self.partial).end
+        else:
+            self.partial, self._lease = _claim_partial(self._final)
+            end = 0
         try:
             self._check_space(0)
-            # the cache holds one chunk: the samples before it are not needed any more
-            self._file = h5py.File(
-                self.partial, "w", libver=LIBVER, locking="best-effort", rdcc_nbytes=_CACHE_BYTES
-            )
-            write_root(self._file, Run, header, samples=0)
-            encode(self._file, Run, values, growing=True)
-            self._file.swmr_mode = True
-            self._lease = Lease(self.partial)  # not before: HDF5 has the file locked until here
-            if not self._lease.is_on(self.partial):  # between its making and HDF5's lock
-                raise FileNotFoundError(errno.ENOENT, "another process removed it, try again")  # noqa: TRY301
+            self._journal = Journal(self.partial, end)
+            self._journal.describe(header, self._texts)
+            if earlier is not None:
+                self._take_over(earlier[1], copied=end == 0)
         except BaseException as error:
-            self.partial.unlink(missing_ok=True)
-            self._end_lease()
-            if isinstance(error, OSError | RuntimeError):
+            if end == 0:
+                self.partial.unlink(missing_ok=True)
+            self._lease.end()
+            if isinstance(error, OSError):
                 raise cannot_write(self.partial, error) from error
             raise
-        paths = {plan.name: plan.path for plan in plan_of(Run)}
-        self._datasets = {name: self._file[paths[name]] for name in _COLUMNS}
-        self._seam = self._file[paths["seam"]] if in_parts else None
 
     @property
     def samples(self) -> int:
@@ -146,85 +133,61 @@ class RunRecorder:
         DataError
             The disk is full or failed; what was appended before is kept.
         """
-        arrays: dict[str, FloatArray] = {
-            name: np.atleast_1d(np.asarray(array, dtype=np.float64))
-            for name, array in zip(_COLUMNS, (time_s, reference, input, output), strict=True)
-        }
-        count = self._check_batch(arrays)
+        columns = [np.atleast_1d(np.asarray(a, dtype="<f8")) for a in (time_s, reference, input, output)]
+        count = self._check_batch(columns)
         if count == 0:
             return
         self._check_space(count)
-        total = self._samples + count
+        tag = b"PART" if self._seams[-1:] == [self._samples] else b"DATA"
         try:
-            for name, dataset in self._datasets.items():
-                dataset.resize(total, axis=0)
-                dataset[self._samples :] = arrays[name]
-                dataset.flush()
-            if self._seam is not None:
-                self._seam.resize(total, axis=0)  # with zeros
-                self._seam[self._samples] = self._at_seam
-                self._seam.flush()
-            self._file.attrs.modify("samples", np.int64(total))
-            self._file.flush()
-        except (OSError, RuntimeError) as error:
+            self._journal.append(tag, np.stack(columns).tobytes(), self.dropped_samples)
+        except OSError as error:
             raise cannot_write(self.partial, error) from error
-        self._samples = total
-        self._last_time = float(arrays["time_s"][-1])
-        self._at_seam = False
+        self._samples += count
+        self._last_time = float(columns[0][-1])
 
     def begin_part(self) -> None:
-        """Say that the device was off since the last sample: the next one is the first of a new part.
+        """Say that the device was off since the last sample: the next one is the first of a new part."""
+        if self._samples and self._seams[-1:] != [self._samples]:
+            self._seams.append(self._samples)
 
-        Raises
-        ------
-        ArgumentError
-            The recorder was not made for parts.
-        """
-        if self._seam is None:
-            raise ArgumentError("this recorder was not made for parts", hint="this is a bug in the caller")
-        self._at_seam = self._samples > 0
-
-    def take_over(self, path: Path | str, run: Run) -> None:
-        """Begin with the samples of an interrupted recording.
-
-        When this one has its name, that one is removed, and what it had been begun with.
-
-        Raises
-        ------
-        ArgumentError, DataError
-            As ``append``; the run lacks time or reference.
-        """
+    def _take_over(self, run: Run, *, copied: bool) -> None:
+        """Begin with the samples of a recording that was cut off; those of a journal are there already."""
         if run.time_s is None or run.reference is None:
             raise ArgumentError("a recording has a time and a reference", hint="this is a bug in the caller")
+        self.dropped_samples = run.dropped_samples
         for part in run.parts():
             self.begin_part()
-            arrays = [getattr(part, name) for name in _COLUMNS]
-            for start in range(0, part.input.size, _COPIED_SAMPLES):
-                self.append(*(array[start : start + _COPIED_SAMPLES] for array in arrays))
-        self.dropped_samples = run.dropped_samples
-        self._superseded = [Path(path), *(left for left, _ in interrupted(self._final) if _begins(run, left))]
+            if copied:
+                arrays = [getattr(part, name) for name in COLUMNS]
+                for start in range(0, part.input.size, _COPIED_SAMPLES):
+                    self.append(*(array[start : start + _COPIED_SAMPLES] for array in arrays))
+            else:
+                self._samples += part.input.size
+        self._last_time = float(run.time_s[-1])
 
-    def _check_batch(self, arrays: dict[str, FloatArray]) -> int:
+    def _check_batch(self, columns: list[FloatArray]) -> int:
         """Return the length of a batch that can be appended."""
-        if self._finished:
+        if self._complete is not None:
             raise ArgumentError("the run is finished: nothing can be appended", hint="record a new run")
-        if len({array.shape for array in arrays.values()}) != 1 or arrays["time_s"].ndim != 1:
-            shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
+            shapes = ", ".join(f"{n} {column.shape}" for n, column in zip(COLUMNS, columns, strict=True))
             raise ArgumentError(
                 f"a batch needs four arrays of one length: {shapes}", hint="this is a bug in the caller"
             )
-        time = np.concatenate(([self._last_time], arrays["time_s"]))
-        if not (np.all(np.diff(time) > 0) and np.all(np.isfinite(time[1:]))):
-            k = int(np.argmin((np.diff(time) > 0) & np.isfinite(time[1:])))
+        time = np.concatenate(([self._last_time], columns[0]))
+        fits = (np.diff(time) > 0) & np.isfinite(time[1:])
+        if not fits.all():
+            k = int(np.argmin(fits))
             raise ArgumentError(
                 f"the time of sample {self._samples + k} is {time[k + 1]:g} s after {time[k]:g} s: "
                 "it must increase",
                 hint="this is a bug in the caller",
             )
-        return len(arrays["time_s"])
+        return len(columns[0])
 
     def _check_space(self, count: int) -> None:
-        """Raise DataError while there still is room to keep what was recorded."""
+        """Raise DataError while there still is room for the file that the recording will become."""
         if not hasattr(os, "statvfs"):
             return
         try:
@@ -232,7 +195,7 @@ class RunRecorder:
         except OSError:
             return
         free = disk.f_bavail * disk.f_frsize
-        if free < _RESERVE_BYTES + count * _BYTES_PER_SAMPLE:
+        if free < _RESERVE_BYTES + (self._samples + 2 * count) * _BYTES_PER_SAMPLE:
             raise DataError(
                 f"the disk of {self.partial.parent} is full: {free} bytes are left",
                 hint="free some space, or write to another disk; what was recorded so far is kept",
@@ -251,52 +214,55 @@ class RunRecorder:
         Raises
         ------
         DataError
-            Nothing was recorded, or the disk failed.
+            Nothing was recorded, or the disk failed: the recording is kept in ``partial``.
         UsageError
-            Another process wrote the final name meanwhile; the run is kept under its partial name.
+            Another process wrote the final name meanwhile; the recording is kept in ``partial``.
         """
-        if self._finished:
+        if dropped_samples is not None:
+            self.dropped_samples = dropped_samples
+        if self._complete is None:
+            self._complete = complete
+        if not self.partial.exists():  # the run has its name, or nothing was recorded
             return self._final
-        self._finished = True
-        dropped = self.dropped_samples if dropped_samples is None else dropped_samples
         try:
-            if self._samples:
-                self._file.attrs.modify("complete", np.uint8(complete))
-                self._file.attrs.modify("dropped_samples", np.int64(dropped))
-            self._file.close()
             if not self._samples:
-                self.partial.unlink(missing_ok=True)
+                self.partial.unlink()
                 raise DataError(
-                    f"nothing was recorded, so {self._final} was not written",
-                    hint="check the device: pulsetrainer ports",
+                    f"nothing was recorded, so {self._final} was not written", hint="check the device"
                 )
-            with contextlib.suppress(OSError):  # without a seal the file is only less guarded
-                append_seal(self.partial)
-            publish(self.partial, self._final.resolve(), overwrite=self._overwrite)
-        except (OSError, RuntimeError) as error:
-            raise self._kept(cannot_write(self._final, error)) from error
+            self._convert()
+            self.partial.unlink(missing_ok=True)
         except PulsetrainerError as error:
-            self._kept(error)
+            if self.partial.exists():
+                error.message = f"{error.message}; the recording is kept in {self.partial}"
+                error.args = (error.message,)
             raise
         finally:
-            self._end_lease()
-        for path in self._superseded:
-            if path != self._final:
-                with contextlib.suppress(OSError):
-                    path.unlink(missing_ok=True)
+            self._journal.close()
+            self._lease.end()
         return self._final
 
-    def _end_lease(self) -> None:
-        if self._lease is not None:
-            self._lease.end()
+    def _convert(self) -> None:
+        """Write the journal as an artefact, piece by piece."""
+        seam = np.zeros(self._samples, dtype=np.bool_)
+        starts = [start for start in self._seams if start < self._samples]
+        seam[starts] = True
+        values: dict[str, Any] = dict.fromkeys(COLUMNS, Later(self._samples)) | self._texts
+        values |= {"complete": self._complete, "dropped_samples": self.dropped_samples}
+        values["seam"] = seam if starts else None
+        store.write_fields(self._final, Run, values, self._header, overwrite=self._overwrite, fill=self._fill)
 
-    def _kept(self, error: PulsetrainerError) -> PulsetrainerError:
-        """Return the error with the place where the samples are."""
-        if not self.partial.exists():
-            return error
-        error.message = f"{error.message}; the recording is kept in {self.partial}"
-        error.args = (error.message,)
-        return error
+    def _fill(self, file: h5py.File) -> None:
+        paths = {plan.name: plan.path for plan in plan_of(Run)}
+        start, kept = 0, []
+        for block in itertools.chain(journal.blocks(self.partial), [None]):
+            if block is not None:
+                kept.append(block.samples)
+            count = sum(samples.shape[1] for samples in kept)
+            if block is None or count >= _COPIED_SAMPLES:
+                for name, values in zip(COLUMNS, np.concatenate(kept, axis=1), strict=True):
+                    file[paths[name]][start : start + count] = values
+                start, kept = start + count, []
 
     def __enter__(self) -> Self:
         return self
@@ -309,25 +275,23 @@ class RunRecorder:
     ) -> None:
         if error is None:
             self.finish()
-            return
-        if not self._samples and not self._finished:
-            self._finished = True
-            with contextlib.suppress(OSError, RuntimeError):
-                self._file.close()
+        elif self._samples:
+            try:
+                self.finish(complete=False)
+            except PulsetrainerError as second:
+                # the first error tells why the block ended; this one, where the samples are
+                error.add_note(f"{second.message} ({second.hint})")
+        else:
+            self._complete = False
+            self._journal.close()
             self.partial.unlink(missing_ok=True)
-            self._end_lease()
-            return
-        try:
-            self.finish(complete=False)
-        except PulsetrainerError as second:
-            # the first error tells why the block ended; this one, where the samples are
-            error.add_note(f"{second.message} ({second.hint})")
+            self._lease.end()
 
 
 def interrupted(final: Path | str) -> list[tuple[Path, int]]:
     """Return what killed programs left of captures into ``final``, with the number of samples, longest first.
 
-    Files that hold no sample are removed; one whose writer is alive, or that cannot be read, is not listed.
+    Files that hold no sample are removed; one whose writer is alive, or that is damaged, is not listed.
     """
     final = Path(final)
     pattern = re.compile(rf"{re.escape(final.name)}\.partial(-\d+)?")
@@ -336,44 +300,27 @@ def interrupted(final: Path | str) -> list[tuple[Path, int]]:
         for path in sorted(entry for entry in final.parent.iterdir() if pattern.fullmatch(entry.name)):
             if not is_abandoned(path):
                 continue
-            try:
-                samples = read_samples(path)
-            except DataError:
-                if path.stat().st_size < _CHUNK_BYTES:
+            with contextlib.suppress(DataError):
+                samples = sum(block.samples.shape[1] for block in journal.blocks(path))
+                if samples:
+                    found.append((path, samples))
+                else:
                     sweep(path)
-                continue
-            if samples:
-                found.append((path, samples))
-            else:
-                sweep(path)
     return sorted(found, key=lambda pair: -pair[1])
 
 
-def _begins(run: Run, path: Path) -> bool:
-    """Whether a run begins with all the samples of this recording."""
-    with contextlib.suppress(DataError):
-        part = read(path, Run)
-        size = part.input.size
-        return (
-            size <= run.input.size
-            and np.array_equal(part.input, run.input[:size], equal_nan=True)
-            and np.array_equal(part.output, run.output[:size], equal_nan=True)
-        )
-    return False
-
-
-def _claim_partial(final: Path) -> Path:
-    """Create an empty file beside the final name and return its name.
+def _claim_partial(final: Path) -> tuple[Path, Lease]:
+    """Create an empty file beside the final name and return its name, with a lease on it.
 
     An older partial file is the recording of a program that was killed: it is never overwritten.
     """
     for k in itertools.count(1):
         partial = final.with_name(f"{final.name}.partial" if k == 1 else f"{final.name}.partial-{k}")
         try:
-            partial.open("xb").close()
+            if lease := create_locked(partial):
+                return partial, lease
         except FileExistsError:
             continue
         except OSError as error:
             raise cannot_write(partial, error) from error
-        return partial
     raise AssertionError  # itertools.count does not end

@@ -14,22 +14,22 @@ import h5py
 import numpy as np
 
 from pulsetrainer import __version__
-from pulsetrainer.artefacts import KINDS
+from pulsetrainer.artefacts import KINDS, Run
 from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, WrongKindError
 from pulsetrainer.files.atomic_write import check_output, replacing
-from pulsetrainer.files.checksum import append_seal, check_seal
+from pulsetrainer.files.checksum import append_checksum, check_checksum
 from pulsetrainer.files.decode import Origin, decode, text_of
-from pulsetrainer.files.encode import encode, values_of
-from pulsetrainer.files.growing import GrowingFile, is_growing
-from pulsetrainer.files.input_file import check_artefact
+from pulsetrainer.files.encode import Later, encode, values_of
+from pulsetrainer.files.input_file import check_artefact, is_journal, unreadable
+from pulsetrainer.files.journal import Recording
 from pulsetrainer.files.provenance import Header, Provenance, clean
 from pulsetrainer.files.schema import TIME, kind_of, plan_of
-from pulsetrainer.files.sheltered import Sheltered
+from pulsetrainer.files.unfailing_file import UnfailingFile
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
-__all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "read_samples", "write"]
+__all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "write"]
 
 FORMAT_VERSION = 1
 # from 1.10 on a file can be read while it grows, and HDF5 keeps checksums of most of its own structures
@@ -49,31 +49,50 @@ def write(path: Path | str, artefact: Any, header: Header, *, overwrite: bool = 
     DataError
         The artefact does not fit its own annotations, or the disk is full or failed.
     """
-    cls: type = type(artefact)
-    values = values_of(artefact)
+    write_fields(path, type(artefact), values_of(artefact), header, overwrite=overwrite)
+
+
+def write_fields(
+    path: Path | str,
+    cls: type,
+    values: Mapping[str, Any],
+    header: Header,
+    *,
+    overwrite: bool,
+    fill: Callable[[h5py.File], None] = lambda _file: None,
+) -> None:
+    """Write the fields of an artefact by name; ``fill`` writes those that are ``Later``.
+
+    Raises
+    ------
+    UsageError, DataError
+        As ``write``.
+    """
     with replacing(path, overwrite=overwrite) as temporary:
         try:
-            with Sheltered(temporary) as stream:
+            with UnfailingFile(temporary) as stream:
                 try:
                     with h5py.File(stream, "w", libver=LIBVER) as file:
-                        write_root(file, cls, header, samples=_samples(cls, values))
+                        _write_root(file, cls, header, samples=_samples(cls, values))
                         encode(file, cls, values)
+                        fill(file)
                 finally:
                     stream.check()  # also where HDF5 missed what had been dropped
         except DataError as error:
             raise DataError(f"{path} was not written: {error.message}", hint=error.hint) from error
-        append_seal(temporary)
+        append_checksum(temporary)
 
 
 def _samples(cls: type, values: Mapping[str, Any]) -> int | None:
     """Return the length of the root's time axis; None where the kind has none."""
     for plan in plan_of(cls):
-        if plan.dims[-1:] == (TIME,) and np.ndim(values[plan.name]):
-            return int(np.shape(values[plan.name])[-1])
+        value = values[plan.name]
+        if plan.dims[-1:] == (TIME,) and (isinstance(value, Later) or np.ndim(value)):
+            return value.size if isinstance(value, Later) else int(np.shape(value)[-1])
     return None
 
 
-def write_root(file: h5py.File, cls: type, header: Header, *, samples: int | None) -> None:
+def _write_root(file: h5py.File, cls: type, header: Header, *, samples: int | None) -> None:
     """Write the attributes that every kind has."""
     texts = {
         "kind": kind_of(cls),
@@ -109,9 +128,14 @@ def read_one_of(path: Path | str, *kinds: type) -> Any:
     DataError
         As ``read``.
     """
+    expected = [kind_of(kind) for kind in kinds]
+    recording = _recording(path)
+    if recording is not None and Run in kinds:
+        return recording.run
+    if recording is not None:
+        raise WrongKindError(path, expected, Run.kind)
     with _opened(path) as file:
         got = _kind(file, path)
-        expected = [kind_of(kind) for kind in kinds]
         if got not in expected:
             raise WrongKindError(path, expected, got)
         return _decode(file, path, got)
@@ -125,6 +149,8 @@ def read_any(path: Path | str) -> Any:
     DataError
         The file is absent, unreadable, damaged, not an artefact, or of a newer format.
     """
+    if recording := _recording(path):
+        return recording.run
     with _opened(path) as file:
         return _decode(file, path, _kind(file, path))
 
@@ -137,6 +163,8 @@ def read_header(path: Path | str) -> Header:
     DataError
         As ``read_any``.
     """
+    if recording := _recording(path):
+        return recording.header
     with _opened(path) as file:
         _kind(file, path)
         history = _root_text(file, path, "history")
@@ -152,17 +180,13 @@ def read_header(path: Path | str) -> Header:
         )
 
 
-def read_samples(path: Path | str) -> int:
-    """Read how many samples an artefact has along its time axis; 0 where it has none.
-
-    Raises
-    ------
-    DataError
-        As ``read_any``.
-    """
-    with _opened(path) as file:
-        _kind(file, path)
-        return _trusted(file, path) or 0
+def _recording(path: Path | str) -> Recording | None:
+    """Read a recording that is under way or was cut off; None where the file is something else."""
+    path = Path(path)
+    try:
+        return Recording.read(path) if is_journal(path) else None
+    except OSError as error:
+        raise unreadable(path, error) from error
 
 
 def _trusted(file: h5py.File, path: Path | str) -> int | None:
@@ -217,25 +241,12 @@ def _opened(path: Path | str) -> Iterator[h5py.File]:
     """Open a file for reading; whatever HDF5 finds wrong with it is a DataError."""
     path = Path(path)
     check_artefact(path)
-    check_seal(path)
+    check_checksum(path)
     try:
-        with _open(path) as file:
+        with h5py.File(path, "r", locking="best-effort") as file:
             yield file
     except _HDF5_ERRORS as error:
         raise _damaged(path, error) from error
-
-
-@contextlib.contextmanager
-def _open(path: Path) -> Iterator[h5py.File]:
-    """Open a file that is whole, or a capture that still grows or was killed."""
-    with path.open("rb") as stream:
-        growing = is_growing(stream.read(64))
-    if growing:
-        with contextlib.closing(GrowingFile(path)) as shown, h5py.File(shown, "r") as file:
-            yield file
-        return
-    with h5py.File(path, "r", locking="best-effort") as file:
-        yield file
 
 
 def _damaged(path: Path, error: Exception) -> DataError:

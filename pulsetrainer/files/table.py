@@ -26,6 +26,7 @@ from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
 from pulsetrainer.files.csv_dialect import Dialect, detect
 from pulsetrainer.files.csv_rows import parse
+from pulsetrainer.files.input_file import unreadable
 from pulsetrainer.files.units import symbol_of
 
 if TYPE_CHECKING:
@@ -196,9 +197,7 @@ def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None
         kept = sorted(set(keep(table))) if keep else list(range(len(table.names)))
         rows = parse(path, dialect, kept)
     except OSError as error:
-        raise DataError(
-            f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
-        ) from error
+        raise unreadable(path, error) from error
     except UnicodeError as error:
         raise DataError(f"{path} is not a text file: {error}", hint="export the record as CSV") from error
     except (csv.Error, ValueError, IndexError) as error:  # quotes that do not close, cells without end

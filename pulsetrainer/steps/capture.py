@@ -25,6 +25,7 @@ from pulsetrainer.steps import preflight, recording
 from pulsetrainer.steps.recording import Earlier, Tally, check_ended, conditioning_loop
 
 if TYPE_CHECKING:
+    from pulsetrainer.artefacts import Run
     from pulsetrainer.device.device import Device
     from pulsetrainer.steps.context import Context
 
@@ -231,11 +232,11 @@ def _record(
         options.output,
         header,
         signal=signal.name,
-        overwrite=options.force or (earlier is not None and earlier.path == options.output),
-        in_parts=earlier is not None or course.duration_s > device.longest_play_s,
+        overwrite=options.force or (earlier is not None and earlier.contains_final),
+        earlier=None if earlier is None else (earlier.path, earlier.run),
     ) as recorder:
         if earlier is not None:
-            _take_over(recorder, tally, earlier)
+            _count(tally, earlier.run)
         ending = recording.record(
             course,
             device,
@@ -266,10 +267,9 @@ def _record(
     )
 
 
-def _take_over(recorder: RunRecorder, tally: Tally, earlier: Earlier) -> None:
-    """Begin with what was recorded before."""
-    recorder.take_over(earlier.path, earlier.run)
-    for part in earlier.run.parts():
+def _count(tally: Tally, run: Run) -> None:
+    """Take in what was recorded before."""
+    for part in run.parts():
         assert part.reference is not None
         tally.add(part.reference, part.input, part.output)
         tally.end_part()

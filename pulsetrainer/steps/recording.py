@@ -23,7 +23,7 @@ from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.device.codes import MAX_DECIMATION
-from pulsetrainer.errors import ArgumentError, DataError, DeviceError, Interrupted, UsageError
+from pulsetrainer.errors import ArgumentError, DataError, DeviceError, ExistsError, Interrupted, UsageError
 from pulsetrainer.files import atomic_write, store
 from pulsetrainer.files.file_lock import Lease, is_abandoned
 from pulsetrainer.files.provenance import Header
@@ -51,6 +51,7 @@ class Earlier:
     header: Header
     at: int  # samples of the course that were played
     lease: Lease  # so that nobody else goes on with it meanwhile
+    contains_final: bool  # what has the final name is the beginning of this recording
 
 
 class Tally:
@@ -246,13 +247,11 @@ def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool
     preflight.check_resumable(path)
     found = interrupted(path)
     source = found[0][0] if found else None
+    final = None
     if path.exists():
         final = _unfinished(path, must_read=source is None)
         if final is None and source is not None and not force:
-            raise UsageError(
-                f"{source} can be continued, but {path} exists already",
-                hint="give --force too to replace it when the recording has ended",
-            )
+            raise ExistsError(path, f"{source} can be continued, but {path} already exists")
         if final is None and source is None:
             raise UsageError(f"there is nothing to resume: {path} is complete", hint="leave --resume out")
         if final is not None and (not found or final.input.size >= found[0][1]):
@@ -267,7 +266,15 @@ def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool
     lease = Lease(source)
     run, header = store.read(source, Run), store.read_header(source)
     _check_same(source, header.provenance.parameters, asked)
-    return Earlier(source, run, header, _played(source, run, course), lease)
+    contains = final is not None and _begins_with(run, final)
+    return Earlier(source, run, header, _played(source, run, course), lease, contains)
+
+
+def _begins_with(run: Run, earlier: Run) -> bool:
+    size = earlier.input.size
+    return np.array_equal(run.input[:size], earlier.input, equal_nan=True) and np.array_equal(
+        run.output[:size], earlier.output, equal_nan=True
+    )
 
 
 def _unfinished(path: Path, *, must_read: bool) -> Run | None:

@@ -18,8 +18,8 @@ import children
 import ready
 from children import DOCUMENTED, Child, Ended
 
-from command_lines import READS_ONLY, WRITERS, Writer
-from pulsetrainer.files.checksum import SEAL_LENGTH
+from command_lines import EXCITATION, READS_ONLY, WRITERS, Writer
+from pulsetrainer.files.checksum import CHECKSUM_LENGTH
 
 _SETTLE_S = 0.004  # the moments around a new file's appearance
 
@@ -297,17 +297,17 @@ def flipped(world: World, tries: int) -> Tally:
     return _damaged(world, tries, "bit-flipped input", _flip)
 
 
-def unsealed(world: World, tries: int) -> Tally:
+def without_checksum(world: World, tries: int) -> Tally:
     """The same without the checksum that would tell: whatever is in the file, an answer in words."""
 
     def damage(data: bytes, rng: random.Random) -> bytes:
-        return _flip(data[:-SEAL_LENGTH], rng)
+        return _flip(data[:-CHECKSUM_LENGTH], rng)
 
-    return _damaged(world, tries, "bit-flipped, unsealed input", damage)
+    return _damaged(world, tries, "bit-flipped, no checksum", damage)
 
 
 def _cut(data: bytes, rng: random.Random) -> bytes:
-    return data[: rng.randrange(len(data) - SEAL_LENGTH)]
+    return data[: rng.randrange(len(data) - CHECKSUM_LENGTH)]
 
 
 def _flip(data: bytes, rng: random.Random) -> bytes:
@@ -329,10 +329,38 @@ def _damaged(world: World, tries: int, fault: str, damage: Callable[[bytes, rand
             older = put_older(writer, folder)
             done = children.run(folder, writer.line(force=bool(older)), world.log)
             tally.tries += 1
-            # a bit of the seal, or of a file without one, may hit nothing that counts
+            # a bit of the checksum, or of a file without one, may hit nothing that counts
             lenient = (0, 3, 5) if fault.startswith("bit") else (3,)
             tally.judge(done, lenient)
             _look_after(tally, writer, folder, older, done)
+    return tally
+
+
+def damaged_recording(world: World, tries: int) -> Tally:
+    """Show, use and resume what a killed capture left, cut at a random byte or with flipped bits."""
+    tally = Tally("damaged recording")
+    resume = Writer("resume", (*EXCITATION, "--resume"), (("-o", "out.h5"),), (ready.CUT_OFF,))
+    identify = ("identify", ready.CUT_OFF, "--levels", "12")
+    able = (
+        Writer("show", ("show", ready.CUT_OFF), (), (ready.CUT_OFF,)),
+        Writer("identify", identify, (("-o", "model.h5"),), (ready.CUT_OFF,)),
+        resume,
+    )
+    for number in range(tries):
+        writer = able[number % len(able)]
+        with world.folder(writer) as folder:
+            victim, is_cut = folder / ready.CUT_OFF, number // len(able) % 2 == 0
+            data = victim.read_bytes()
+            victim.write_bytes(data[: world.rng.randrange(len(data))] if is_cut else _flip(data, world.rng))
+            found = victim.read_bytes()
+            done = children.run(folder, writer.line(force=False), world.log)
+            tally.tries += 1
+            # a cut one is shorter or holds nothing; damage is never passed over
+            tally.judge(done, (0, 2, 3, 5) if is_cut else (2, 3))
+            _look_after(tally, writer, folder, {}, done)
+            if not is_cut and (not victim.exists() or victim.read_bytes() != found):
+                tally.lost += 1
+                tally.blame("a damaged recording was changed:", done)
     return tally
 
 

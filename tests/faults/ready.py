@@ -9,9 +9,12 @@ import children
 import store_examples as examples
 
 from command_lines import EXCITATION, WRITERS
-from pulsetrainer.artefacts import Model
+from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import store
+from pulsetrainer.files.recorder import RunRecorder
+
+CUT_OFF = "out.h5.partial"
 
 
 def prepare(folder: Path) -> dict[str, float]:
@@ -32,6 +35,7 @@ def prepare(folder: Path) -> dict[str, float]:
     text = "t_s,current_A,force_N\n" + "".join(f"{t},{u},{y}\n" for t, u, y in rows)
     (folder / "run.csv").write_text(text)
     _diagnosis(folder)
+    _cut_off(folder)
     seconds = {}
     for writer in WRITERS:
         seconds[writer.name] = _surely(folder, writer.line(force=True), log).seconds
@@ -61,6 +65,17 @@ def _diagnosis(folder: Path) -> None:
     diagnosis = examples.diagnosis()
     extended = replace(model, fit=None, extensions=diagnosis.extended.extensions)
     store.write(folder / "diagnosis.h5", replace(diagnosis, extended=extended), examples.header())
+
+
+def _cut_off(folder: Path) -> None:
+    """Leave what a capture leaves that was killed: the journal of the first two thirds of the run."""
+    run, header = store.read(folder / "run.h5", Run), store.read_header(folder / "run.h5")
+    with RunRecorder(folder / "whole.h5", header, signal=run.signal) as recorder:
+        for start in range(0, 2 * run.input.size // 3, 50):
+            part = slice(start, start + 50)
+            recorder.append(run.time_s[part], run.reference[part], run.input[part], run.output[part])
+        shutil.copy(recorder.partial, folder / CUT_OFF)
+    (folder / "whole.h5").unlink()
 
 
 def copy_inputs(ready: Path, folder: Path, names: tuple[str, ...]) -> None:

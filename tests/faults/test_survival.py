@@ -28,7 +28,9 @@ def table(made_once) -> list[dict]:
     return json.loads((made_once("faults", fill) / "table.json").read_text())
 
 
-@pytest.mark.parametrize("fault", ["kill -9", "full", "read-only", "input", "output", "locked", "fuzzed"])
+@pytest.mark.parametrize(
+    "fault", ["kill -9", "full", "read-only", "input", "recording", "output", "locked", "fuzzed"]
+)
 def test_nothing_is_lost_and_every_failure_is_told(table, fault):
     """Nothing lost, nothing half-written, no hang, no wrong exit."""
     rows = [row for row in table if fault in row["fault"]]

@@ -184,7 +184,7 @@ def test_pint_parses_every_unit():
 
 
 def test_a_file_edited_by_the_user_is_read(tmp_path):
-    """Mending a title with h5py cuts the seal off; the file is read without it."""
+    """Mending a title with h5py cuts the checksum off; the file is read without it."""
     path = tmp_path / "a.h5"
     write(path, examples.run(), examples.header())
     with h5py.File(path, "r+") as file:

@@ -23,7 +23,7 @@ from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.next_step import next_step
 from pulsetrainer.errors import DataError, ExistsError, NotAnArtefactError, UsageError, WrongKindError
 from pulsetrainer.files import atomic_write, store
-from pulsetrainer.files.checksum import SEAL_LENGTH
+from pulsetrainer.files.checksum import CHECKSUM_LENGTH
 from pulsetrainer.files.store import check_output, read, read_any, read_header, write
 
 SEED = 20260102
@@ -37,7 +37,7 @@ def run_file(tmp_path):
 
 
 def _edit(path, change):
-    """Change a file as a user with h5py would; that cuts the seal off."""
+    """Change a file as a user with h5py would; that cuts the checksum off."""
     with h5py.File(path, "r+") as file:
         change(file)
 
@@ -216,11 +216,11 @@ def test_broken_header(run_file):
 
 
 def test_truncated_anywhere(run_file):
-    """Cut after any number of bytes, a file is refused; only without its seal alone is it whole."""
+    """Cut after any number of bytes, a file is refused; only without its checksum alone is it whole."""
     rng = random.Random(SEED)
     print("seed", SEED)
     content = run_file.read_bytes()
-    whole = len(content) - SEAL_LENGTH
+    whole = len(content) - CHECKSUM_LENGTH
     for size in [0, 1, 7, 8, 9, 511, whole - 1, *(rng.randrange(whole) for _ in range(60))]:
         run_file.write_bytes(content[:size])
         _refused(run_file, kinds.Run)
@@ -230,7 +230,7 @@ def test_truncated_anywhere(run_file):
 
 
 def test_flipped_bits(run_file):
-    """One flipped bit: an error, or, in the seal, the right data; never wrong data, never a crash."""
+    """One flipped bit: an error, or, in the checksum, the right data; never wrong data, never a crash."""
     rng = random.Random(SEED)
     print("seed", SEED)
     content = run_file.read_bytes()
@@ -243,7 +243,7 @@ def test_flipped_bits(run_file):
             artefact = read(run_file, kinds.Run)
         except DataError:
             continue
-        assert place >= len(content) - SEAL_LENGTH
+        assert place >= len(content) - CHECKSUM_LENGTH
         assert examples.equal(artefact, examples.run())
 
 
@@ -326,7 +326,7 @@ def test_outputs_that_cannot_be(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "error", [RuntimeError("bug"), KeyboardInterrupt(), OSError(28, "No space left on device")]
 )
-@pytest.mark.parametrize("step", ["encode", "publish"])
+@pytest.mark.parametrize("step", ["encode", "_publish"])
 def test_an_exception_in_the_middle_changes_nothing(run_file, error, step, monkeypatch):
     """Whatever fails, at whatever step: the old file is intact, nothing else is in the folder."""
     before = run_file.read_bytes()
@@ -334,7 +334,7 @@ def test_an_exception_in_the_middle_changes_nothing(run_file, error, step, monke
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr({"encode": store, "publish": atomic_write}[step], step, fail)
+    monkeypatch.setattr({"encode": store, "_publish": atomic_write}[step], step, fail)
     with pytest.raises(DataError if isinstance(error, OSError) else type(error)):
         write(run_file, examples.model(), examples.header(), overwrite=True)
     assert [entry.name for entry in run_file.parent.iterdir()] == ["run.h5"]

@@ -1,0 +1,206 @@
+"""A recording under way: an append-only file of checked blocks, beside the name that the run will have.
+
+What ``append`` has returned from survives the death of the program. The file is
+
+    JOURNAL, block, block, ...
+    block = head, content
+    head  = tag (4 letters), samples lost so far and length (8 bytes each), two crc32: of content and head
+
+A ``HEAD`` is JSON: the header of the artefact and the run's texts. Whoever goes on with a recording adds
+another, and the last one counts. ``DATA`` is little-endian float64 (4, n): time, reference, input, output.
+``PART`` is the same, and its first sample comes after a pause. The last block may be incomplete, where the
+writer was killed or is writing: it is ignored. Anything else that does not fit is damage.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import struct
+import zlib
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
+
+import numpy as np
+
+from pulsetrainer.artefacts import BoolArray, FloatArray, Run
+from pulsetrainer.errors import DamagedFileError, DataError
+from pulsetrainer.files.input_file import JOURNAL
+from pulsetrainer.files.provenance import Header, Provenance
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+COLUMNS = ("time_s", "reference", "input", "output")
+_HEAD = struct.Struct("<4sQQII")
+_LARGEST = 1 << 32  # bytes of a block; a batch of samples has some thousands
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One block of a journal."""
+
+    tag: bytes
+    dropped: int  # samples lost on the wire since the recording began
+    content: bytes
+    end: int  # in the file
+
+    @property
+    def samples(self) -> FloatArray:
+        """Time, reference, input and output, (4, n); none in a HEAD."""
+        if self.tag == b"HEAD":
+            return np.zeros((len(COLUMNS), 0))
+        return np.frombuffer(self.content, dtype="<f8").reshape(len(COLUMNS), -1)
+
+
+class Journal:
+    """A journal that is being written; ``at`` is the end of its last whole block.
+
+    Raises
+    ------
+    OSError
+        The file cannot be opened.
+    """
+
+    def __init__(self, path: Path, at: int = 0) -> None:
+        self._stream = path.open("r+b", buffering=0)
+        self._stream.truncate(at)
+        self._end = self._stream.seek(at)
+        if at == 0:
+            self._write(JOURNAL)
+
+    def describe(self, header: Header, texts: Mapping[str, str]) -> None:
+        """Say what is recorded.
+
+        Raises
+        ------
+        OSError
+            The disk is full or failed.
+        """
+        self.append(b"HEAD", json.dumps({"header": asdict(header), "run": dict(texts)}).encode())
+
+    def append(self, tag: bytes, content: bytes, dropped: int = 0) -> None:
+        """Append one block.
+
+        Raises
+        ------
+        OSError
+            The disk is full or failed; the journal is as it was before.
+        """
+        head = _HEAD.pack(tag, dropped, len(content), zlib.crc32(content), 0)[:-4]
+        self._write(head + struct.pack("<I", zlib.crc32(head)) + content)
+
+    def _write(self, data: bytes) -> None:
+        view = memoryview(data)
+        try:
+            while view:
+                view = view[self._stream.write(view) :]
+        except BaseException:
+            self._stream.truncate(self._end)
+            self._stream.seek(self._end)
+            raise
+        self._end += len(data)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+
+def blocks(path: Path) -> Iterator[Block]:
+    """Yield the whole blocks of a journal.
+
+    Raises
+    ------
+    DamagedFileError
+        A block is not as it was written.
+    OSError
+        The file cannot be read.
+    """
+    with path.open("rb") as stream:
+        start = stream.read(len(JOURNAL))
+        if not JOURNAL.startswith(start):
+            raise _damage(path, stream.tell())
+        if start != JOURNAL:
+            return  # its writer was killed before it had written anything
+        while block := _next_block(stream, path):
+            yield block
+
+
+def _next_block(stream: BinaryIO, path: Path) -> Block | None:
+    head = stream.read(_HEAD.size)
+    if len(head) < _HEAD.size:
+        return None
+    tag, dropped, length, crc, crc_of_head = _HEAD.unpack(head)
+    if crc_of_head != zlib.crc32(head[:-4]) or length > _LARGEST:
+        raise _damage(path, stream.tell())
+    content = stream.read(length)
+    if len(content) < length:
+        return None
+    if crc != zlib.crc32(content):
+        raise _damage(path, stream.tell())
+    return Block(tag, dropped, content, stream.tell())
+
+
+def _damage(path: Path, place: int) -> DamagedFileError:
+    return DamagedFileError(f"{path} is damaged before byte {place}", path=path, artefact="run")
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """What a journal holds."""
+
+    header: Header
+    run: Run  # not complete
+    end: int  # of the last whole block
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a whole journal.
+
+        Raises
+        ------
+        DamagedFileError
+            A block is not as it was written, or the journal has no HEAD.
+        OSError
+            The file cannot be read.
+        """
+        found = list(blocks(path))
+        heads = [block for block in found if block.tag == b"HEAD"]
+        if not heads:
+            raise DamagedFileError(f"{path} holds no recording yet", path=path, artefact="run")
+        header, texts = _described(path, heads[-1])
+        columns = np.concatenate([block.samples for block in found], axis=1)
+        arrays: dict[str, Any] = dict(zip(COLUMNS, columns, strict=True))
+        seam, dropped = _seam(found, columns.shape[1]), found[-1].dropped
+        run = Run(**arrays, **texts, seam=seam, complete=False, dropped_samples=dropped)
+        return cls(header, run, found[-1].end)
+
+
+def _seam(found: list[Block], samples: int) -> BoolArray | None:
+    """Return which samples (n,) come first after a pause; None where there was no pause."""
+    starts, count = [], 0
+    for block in found:
+        if block.tag == b"PART" and count:
+            starts.append(count)
+        count += block.samples.shape[1]
+    if not starts:
+        return None
+    seam = np.zeros(samples, dtype=np.bool_)
+    seam[starts] = True
+    return seam
+
+
+def _described(path: Path, block: Block) -> tuple[Header, dict[str, Any]]:
+    """Return the header and the texts of a HEAD."""
+    try:
+        said = json.loads(block.content)
+        fields = said["header"]
+        provenance = Provenance.from_json(json.dumps(fields["provenance"]))
+        header = Header(fields["title"], fields["created"], tuple(fields["history"]), provenance)
+        known = {field.name for field in dataclasses.fields(Run)}
+        return header, {name: text for name, text in said["run"].items() if name in known}
+    except (ValueError, KeyError, TypeError, AttributeError, DataError) as error:
+        raise DamagedFileError(
+            f"{path} does not say what it records: {error}", path=path, artefact="run"
+        ) from error
