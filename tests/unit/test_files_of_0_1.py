@@ -46,10 +46,11 @@ def test_runs():
 def test_models():
     """The weights, the fit, and what a model was extended by."""
     model = read(FOLDER / "model.h5", Model)
-    assert (model.levels.shape, model.weights.shape, model.covered.shape) == ((9,), (36,), (36,))
+    assert (model.edges.shape, model.weights.shape, model.covered.shape) == ((9,), (36,), (36,))
     assert model.weights.sum() == pytest.approx(277.9277628248693, **ABOUT)
     assert model.offset == pytest.approx(6.377516766121884, **ABOUT)
     assert model.covered.all()
+    assert model.reading == "continuous"
     assert model.fit.rms_percent == pytest.approx(0.5342465773107551, **ABOUT)
     assert model.fit.predicted.shape == (3277,)
 
