@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -14,7 +13,8 @@ import h5py
 import numpy as np
 import pytest
 
-from program import PROGRAM, pulsetrainer
+from program import PROGRAM, Ran, pulsetrainer
+from wording import refusal
 
 
 @pytest.fixture
@@ -23,43 +23,40 @@ def ready(small_chain, tmp_path) -> Path:
     return Path(shutil.copytree(small_chain, tmp_path / "ready"))
 
 
-def refused(folder: Path, words: list[object], code: int, *said: str, env=None) -> str:
-    """Run a command that must fail: its code, what its message says, no traceback, no new file."""
+def refused(folder: Path, words: list[object], code: int, name: str, env=None, **names: object) -> None:
+    """Run a command that must fail: its code and kind, its row of the table of messages, no new file."""
     before = sorted(path.name for path in folder.rglob("*"))
-    done = pulsetrainer(folder, *words, env=env)
-    assert done.code == code, done
-    assert "Traceback" not in done.err, done.err
-    assert done.err.startswith(("error: ", "note: ")), done.err
-    assert "\n  try: " in done.err, f"no next step in: {done.err}"
-    for text in said:
-        assert re.search(text, done.err), f"{text!r} not in: {done.err}"
+    refusal(pulsetrainer(folder, *words, "--json", env=env), code, name, **names)
     assert sorted(path.name for path in folder.rglob("*")) == before, "something was written"
-    return done.err
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "file", "expected", "got", "verb"),
     [
-        (["identify", "model.h5", "-o", "x.h5"], ["model.h5", "expected a run", "got a model"]),
-        (["identify", "played.h5", "-o", "x.h5"], ["played.h5", "expected a run", "got a playback"]),
-        (["invert", "normal", "--model", "run.h5", "-o", "x.h5"], ["run.h5", "expected a model", "identify"]),
-        (["play", "model.h5", "-o", "x.h5"], ["model.h5", "expected a waveform", "invert"]),
-        (["evaluate", "drive.h5", "-o", "x.h5"], ["drive.h5", "waveform"]),
-        (["identify", "absent.h5", "-o", "x.h5"], ["absent.h5"]),
+        (["identify", "model.h5", "-o", "x.h5"], "model.h5", "a run", "a model", "show model.h5"),
+        (["identify", "played.h5", "-o", "x.h5"], "played.h5", "a run", "a playback", "capture"),
+        (["invert", "normal", "--model", "run.h5", "-o", "x.h5"], "run.h5", "a model", "a run", "identify"),
+        (["play", "model.h5", "-o", "x.h5"], "model.h5", "a waveform", "a model", "invert"),
+        (["evaluate", "drive.h5", "-o", "x.h5"], "drive.h5", "a playback or a run", "a waveform", "play"),
     ],
 )
-def test_the_wrong_kind_of_file_names_both_kinds_and_the_next_step(ready, words, said):
+def test_the_wrong_kind_of_file_names_both_kinds_and_the_next_step(ready, words, file, expected, got, verb):
     """Expected a model, got a run; run identify."""
-    refused(ready, words, 3, *said)
+    refused(ready, words, 3, "wrong kind", file=file, expected=expected, got=got, verb=verb)
+
+
+def test_an_absent_file_is_named_with_those_that_are_there(ready):
+    """A name that was mistyped."""
+    refused(ready, ["identify", "absent.h5", "-o", "x.h5"], 3, "absent", file="absent.h5", near="played.h5")
 
 
 def test_an_existing_output_is_refused_and_kept(ready):
     """Without --overwrite nothing is replaced; with it, it is."""
     before = (ready / "model.h5").read_bytes()
-    refused(ready, ["identify", "run.h5", "-o", "model.h5"], 2, "model.h5 already exists", "--overwrite")
-    refused(ready, ["capture", "identification", "-o", "model.h5"], 2, "model.h5 already exists")
-    refused(ready, ["play", "drive.h5", "-o", "model.h5"], 2, "model.h5 already exists")
-    refused(ready, ["plot", "run.h5", "-o", "model.h5"], 2)
+    refused(ready, ["identify", "run.h5", "-o", "model.h5"], 2, "exists", file="model.h5")
+    refused(ready, ["capture", "identification", "-o", "model.h5"], 2, "exists", file="model.h5")
+    refused(ready, ["play", "drive.h5", "-o", "model.h5"], 2, "exists", file="model.h5")
+    refused(ready, ["plot", "run.h5", "-o", "model.h5"], 2, "no such figure", file="model.h5")
     assert (ready / "model.h5").read_bytes() == before
     assert (
         pulsetrainer(ready, "identify", "run.h5", "--levels", "12", "-o", "model.h5", "--overwrite").code == 0
@@ -67,27 +64,31 @@ def test_an_existing_output_is_refused_and_kept(ready):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "name", "names"),
     [
-        ("t_s,current_A\n0,0\n1,0.1\n", ["force_N"]),
-        ("t_s,current_A,force_N\n0,0,0\n1,nan,1\n2,1,2\n", ["current_A", "(line|row) 3|nan|NaN"]),
-        ("t_s,current_A,force_N\n0,0,0\n2,1,1\n1,2,2\n", ["time", "increase"]),
-        ("t_s,current_A,force_N\n0,0,0\n1,abc,1\n", ["abc", "line 3", "current_A"]),
-        ("", ["empty"]),
+        ("t_s,current_A\n0,0\n1,0.1\n", "no such column", {}),
+        (
+            "t_s,current_A,force_N\n0,0,0\n1,nan,1\n2,1,2\n",
+            "not finite",
+            {"value": "nan", "column": "current_A", "line": 3},
+        ),
+        ("t_s,current_A,force_N\n0,0,0\n2,1,1\n1,2,2\n", "time goes back", {}),
+        ("t_s,current_A,force_N\n0,0,0\n1,abc,1\n", "not a number", {}),
+        ("", "empty", {}),
     ],
     ids=["missing column", "NaN", "time goes back", "text", "empty"],
 )
-def test_import_names_file_and_column(run, tmp_path, text, said):
+def test_import_names_file_and_column(run, tmp_path, text, name, names):
     """A table that cannot be used."""
     (tmp_path / "bad.csv").write_text(text)
     words = ["import", "bad.csv", "--input", "current_A", "--output", "force_N", "-o", "run.h5"]
-    refused(tmp_path, words, 3, "bad.csv", *said)
+    refused(tmp_path, words, 3, name, file="bad.csv", **names)
 
 
 def test_a_waveform_beyond_the_force_range_names_the_range(ready):
     """And a range that would do."""
     words = ["invert", "normal", "--model", "model.h5", "--force-max", "40", "-o", "x.h5"]
-    refused(ready, words, 3, "40 N", r"reaches \d", "--force-max")
+    refused(ready, words, 3, "force out of reach")
 
 
 def test_a_damaged_file_is_named(ready, tmp_path):
@@ -98,83 +99,86 @@ def test_a_damaged_file_is_named(ready, tmp_path):
     (tmp_path / "folder.h5").mkdir()
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = np.arange(3)
-    for name in ("cut", "text", "folder", "other"):
-        refused(tmp_path, ["identify", f"{name}.h5", "-o", "x.h5"], 3, f"{name}.h5")
+    for stem, name in (
+        ("cut", "truncated"),
+        ("text", "not HDF5"),
+        ("folder", "a folder"),
+        ("other", "another program's"),
+    ):
+        words = ["identify", f"{stem}.h5", "-o", "x.h5"]
+        refused(tmp_path, words, 3, name, file=f"{stem}.h5", bytes=len(whole) // 2)
 
 
 def test_an_absent_port_is_exit_4(ready):
     """Named, with the next step."""
-    refused(ready, ["capture", "identification", "--port", "/dev/ttyNONE", "-o", "x.h5"], 4, "/dev/ttyNONE")
-    refused(ready, ["play", "drive.h5", "--port", "/dev/ttyNONE", "-o", "x.h5"], 4, "/dev/ttyNONE")
+    for words in (["capture", "identification"], ["play", "drive.h5"]):
+        port = "/dev/ttyNONE"
+        refused(ready, [*words, "--port", port, "-o", "x.h5"], 4, "no such port", port=port)
 
 
 def test_an_unknown_bench_parameter_offers_the_nearest(ready):
     """bench:?crep is a typing error, not a device."""
-    refused(
-        ready, ["capture", "identification", "--port", "bench:?crep=0.1", "-o", "x.h5"], 2, "crep", "creep"
-    )
+    words = ["capture", "identification", "--port", "bench:?crep=0.1", "-o", "x.h5"]
+    refused(ready, words, 2, "no such bench parameter")
 
 
 def test_no_compiler_names_both_remedies(ready, tmp_path):
     """Without cc and without ziglang the bench cannot be built: exit 4."""
     env = {"PATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache"), "CC": ""}
-    err = refused(ready, ["capture", "identification", "-o", "x.h5"], 4, "compiler", env=env)
-    assert "ziglang" in err
-    assert re.search(r"apt|gcc|build-essential", err)
+    refused(ready, ["capture", "identification", "-o", "x.h5"], 4, "no compiler", env=env)
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "said"),
+    ("option", "value", "name", "got"),
     [
-        ("--rate", "1e-308", "the rate must divide the device's 10000 Hz, got 1e-308 Hz"),
-        ("--rate", "1e308", "the rate must divide"),
-        ("--speed", "1e-300", "would have 7.35e+304 samples"),
-        ("--speed", "1e300", "from one sample to the next the signal would go 1e+297"),
-        ("--current-max", "1e308", "would have inf samples"),
+        ("--rate", "1e-308", "no such rate", "1e-308"),
+        ("--rate", "1e308", "no such rate", "1e+308"),
+        ("--speed", "1e-300", "too slow", "7.35e+304"),
+        ("--speed", "1e300", "too fast", ""),
+        ("--current-max", "1e308", "too slow", "inf"),
     ],
 )
-def test_numbers_no_device_can_follow_are_refused_before_anything_moves(run, option, value, said):
+def test_numbers_no_device_can_follow_are_refused_before_anything_moves(tmp_path, option, value, name, got):
     """The smallest and the largest number of the machine: in words, also in a dry run."""
-    for name in ("identification", "diagnostic") if option != "--speed" else ("identification",):
-        shown = run("capture", name, option, value, "--dry-run", "-o", "never.h5")
-        assert shown.code == 3
-        assert said in shown.err
-        assert "try:" in shown.err
+    for signal_ in ("identification", "diagnostic") if option != "--speed" else ("identification",):
+        words = ["capture", signal_, option, value, "--dry-run", "-o", "never.h5"]
+        refused(tmp_path, words, 3, name, got=got)
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "name", "names"),
     [
-        ("0,0\n,0.5\n0.2,1\n", "nan in column t_s, line 3"),
-        ("0,0\n0.1,\n0.2,1\n", "nan in column {value}, line 3"),
-        ("0,0\n0.1,inf\n0.2,1\n", "inf in column {value}, line 3"),
-        ("0,0\n0.1,1\n0.1,0.5\n", "does not increase at line 4"),
-        ("nan,0\nnan,1\nnan,0.5\n", "no numbers in column t_s"),
+        ("0,0\n,0.5\n0.2,1\n", "not finite", {"value": "nan", "column": "t_s", "line": 3}),
+        ("0,0\n0.1,\n0.2,1\n", "not finite", {"value": "nan", "line": 3}),
+        ("0,0\n0.1,inf\n0.2,1\n", "not finite", {"value": "inf", "line": 3}),
+        ("0,0\n0.1,1\n0.1,0.5\n", "time repeats", {}),
+        ("nan,0\nnan,1\nnan,0.5\n", "no numbers", {}),
     ],
 )
 @pytest.mark.parametrize(
     ("words", "value"),
     [(("capture", "x.csv", "--dry-run"), "current_A"), (("invert", "x.csv", "--model", "model.h5"), "p")],
 )
-def test_tables_of_signals_and_pulses_are_refused_by_line(ready, words, value, rows, said):
+def test_tables_of_signals_and_pulses_are_refused_by_line(ready, words, value, rows, name, names):
     """Missing, infinite or repeated: whatever reads a time and a value names the line."""
     (ready / "x.csv").write_text(f"t_s,{value}\n{rows}")
-    refused(ready, [*words, "-o", "never.h5"], 3, said.format(value=value))
+    refused(ready, [*words, "-o", "never.h5"], 3, name, **{"file": "x.csv", "column": value, **names})
 
 
 @pytest.mark.parametrize(
-    ("time", "top", "said"),
+    ("time", "top", "name", "names"),
     [
-        ("1e308", "1", "t_s, .* 1e.100"),
-        ("3", "1e308", "p, .* 1e.100"),
-        ("1e90", "1", "4 times 1e.93 samples"),
+        ("1e308", "1", "beyond all numbers", {"column": "t_s"}),
+        ("3", "1e308", "beyond all numbers", {"column": "p"}),
+        ("1e90", "1", "too many samples", {"times": 4, "samples": "1e+93", "most": "1e+08"}),
     ],
 )
-def test_pulses_beyond_all_numbers_are_refused_in_words(ready, time, top, said):
+def test_pulses_beyond_all_numbers_are_refused_in_words(ready, time, top, name, names):
     """What no quantity reaches, and a period that no memory holds."""
     first = f"-{time}" if time == "1e308" else "0"
     (ready / "x.csv").write_text(f"t_s,p\n{first},-{top}\n1,0\n2,{top}\n{time},0.5\n")
-    refused(ready, ["invert", "x.csv", "--model", "model.h5", "-o", "never.h5"], 3, said)
+    words = ["invert", "x.csv", "--model", "model.h5", "-o", "never.h5"]
+    refused(ready, words, 3, name, file="x.csv", **names)
 
 
 def test_libraries_warn_those_who_asked_for_details(ready):
@@ -191,7 +195,7 @@ def test_names_that_no_file_system_takes_are_refused_in_words(ready, command):
     more = {"show": (), "invert": ("--model", "model.h5")}.get(command, ())
     out = () if command == "show" else ("-o", "never.h5")
     for name in ("x" * 5000, "x" * 5000 + ".csv"):
-        refused(ready, [command, name, *more, *out], 3, "x{20}", "too long")
+        refused(ready, [command, name, *more, *out], 3, "name too long")
 
 
 def test_a_signal_in_milliseconds_is_one(ready):
@@ -202,25 +206,24 @@ def test_a_signal_in_milliseconds_is_one(ready):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "samples", "most"),
     [
-        (("capture", "identification", "--repeats", "1000000"), "1000000 times 98001 samples"),
-        (("invert", "normal", "--model", "model.h5", "--periods", "1000000"), "1000000 times 800 samples"),
-        (("play", "drive.h5", "--repeats", "1000000"), "1000000 times [0-9]+ samples"),
+        (("capture", "identification", "--repeats", "1000000"), "98001", "1e+09"),
+        (("invert", "normal", "--model", "model.h5", "--periods", "1000000"), "800", "1e+08"),
+        (("play", "drive.h5", "--repeats", "1000000"), "", "1e+08"),
     ],
 )
-def test_more_than_memory_and_days_can_hold_is_refused_at_once(ready, words, said):
+def test_more_than_memory_and_days_can_hold_is_refused_at_once(ready, words, samples, most):
     """The count of samples is told before they are made."""
-    refused(ready, [*words, "-o", "never.h5"], 3, said, "are more than")
+    names = {"times": "1000000", "samples": samples, "most": most}
+    refused(ready, [*words, "-o", "never.h5"], 3, "too many samples", **names)
 
 
-def test_usage_errors_are_exit_2_in_words(run):
-    """A missing option, an unknown command, an unknown signal or waveform."""
-    for words in (["identify", "run.h5"], ["frobnicate"], ["capture", "noise", "-o", "x.h5"]):
-        done = run(*words)
-        assert done.code == 2, done
-        assert done.err.startswith("error: "), done.err
-        assert "Traceback" not in done.err
+def test_usage_errors_are_exit_2_in_words(run, tmp_path):
+    """A missing option, an unknown command, an unknown signal."""
+    refused(tmp_path, ["identify", "run.h5"], 2, "option missing")
+    refused(tmp_path, ["frobnicate"], 2, "no such command")
+    refused(tmp_path, ["capture", "noise", "-o", "x.h5"], 2, "no such signal")
 
 
 def test_errors_are_json_too(run):
@@ -260,8 +263,7 @@ def test_control_c_stops_the_output_and_keeps_what_was_recorded(tmp_path):
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=30)
-    assert process.returncode == 130, (out, err)
-    assert "kept in run.h5" in err
+    refusal(Ran(process.returncode, out, err), 130, "interrupted")
     with h5py.File(tmp_path / "run.h5") as file:
         assert not file.attrs["complete"]
         kept = file["output"].shape[0]

@@ -6,6 +6,8 @@ import csv
 
 import pytest
 
+from wording import refusal
+
 
 @pytest.fixture
 def folder(as_built, run):
@@ -63,18 +65,15 @@ def test_as_figure_and_as_table(folder, tmp_path):
 
 def test_bad_input(run, as_built):
     """One file, a file of another kind: each its message."""
-    done = run("compare", as_built / "evaluation-relay.h5")
-    assert done.code == 2
-    assert "at least two" in done.err
-    done = run("compare", as_built / "evaluation-relay.h5", as_built / "run.h5")
-    assert done.code == 3
-    assert "expected an evaluation" in done.err or "evaluation" in done.err
+    refusal(run("compare", as_built / "evaluation-relay.h5", "--json"), 2, "one evaluation")
+    done = run("compare", as_built / "evaluation-relay.h5", as_built / "run.h5", "--json")
+    names = {"file": "run.h5", "expected": "an evaluation", "got": "a run", "verb": "evaluate"}
+    refusal(done, 3, "wrong kind", **names)
 
 
 def test_two_evaluations_without_a_common_figure(run, as_built, tmp_path):
     """A pulse against a prediction: nothing to compare, said so."""
     model = as_built / "model-continuous.h5"
     assert run("evaluate", as_built / "run.h5", "--model", model, "-o", tmp_path / "fit.h5").code == 0
-    done = run("compare", tmp_path / "fit.h5", as_built / "evaluation-relay.h5")
-    assert done.code == 3
-    assert "in common" in done.err
+    done = run("compare", tmp_path / "fit.h5", as_built / "evaluation-relay.h5", "--json")
+    refusal(done, 3, "nothing in common")

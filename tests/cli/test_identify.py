@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from wording import refusal
+
 ROWS = 4000
 
 
@@ -74,9 +76,8 @@ def test_the_reading_has_an_older_name(run, record, tmp_path):
 def test_smoothing_must_be_auto_or_a_share(run, record, text):
     """Anything else is a usage error that says what is expected."""
     record()
-    done = run("identify", "run.h5", "-o", "model.h5", "--smoothing", text)
-    assert done.code == 2
-    assert "auto or a number in 0..1" in done.out + done.err
+    done = run("identify", "run.h5", "-o", "model.h5", "--smoothing", text, "--json")
+    refusal(done, 2, "not a smoothing", got=text)
 
 
 def test_false_reversals_are_counted(run, record):

@@ -37,7 +37,12 @@ def _diagnosed(folder: Path, name: str, model: str):
 
 @pytest.mark.parametrize(
     "name",
-    [*(f"bh_ferrite_mnzn_{k}" for k in (1, 2, 3, 4)), *(f"bh_steel_m130_27s_{k}" for k in (1, 2, 3))],
+    [
+        "bh_ferrite_mnzn_1",
+        "bh_steel_m130_27s_1",
+        *(pytest.param(f"bh_ferrite_mnzn_{k}", marks=pytest.mark.slow) for k in (2, 3, 4)),
+        *(pytest.param(f"bh_steel_m130_27s_{k}", marks=pytest.mark.slow) for k in (2, 3)),
+    ],
 )
 def test_a_static_loop_fits_itself_and_has_no_cause(folder, name):
     """Magnetic loops without time: at most 0.3 % of the span, verdict none, and rate is not spoken of."""
@@ -50,6 +55,7 @@ def test_a_static_loop_fits_itself_and_has_no_cause(folder, name):
     assert not rates & {cause["id"] for cause in found["causes"]}
 
 
+@pytest.mark.slow
 def test_speed_is_predicted_and_torque_is_another_condition(folder):
     """A model from 0.1 Hz: 0.3 and 0.5 Hz within 0.6 % of span; four times the torque is no rate effect."""
     fitted = _identified(folder, "davinci_f0p1_torque10").json
@@ -99,6 +105,7 @@ def test_records_shifted_against_each_other_are_fitted_with_an_offset_each(folde
     ("name", "verdict"), [("mrdamper_ensaio1_1", "viscous"), ("mrdamper_ensaio9_1", "viscous"),
                           ("pneu_oring_7bar", "unknown")],
 )  # fmt: skip
+@pytest.mark.slow
 def test_a_force_that_follows_the_velocity_is_told(folder, name, verdict):
     """Identify and diagnose say that a Preisach model in the displacement is the wrong one."""
     done = _identified(folder, name)
@@ -109,7 +116,13 @@ def test_a_force_that_follows_the_velocity_is_told(folder, name, verdict):
     assert "is the wrong model" in found["evidence"][0]
 
 
-@pytest.mark.parametrize(("scale_u", "scale_y"), [(1e-9, 1e6), (1e6, 1e-9), (-1.0, 1.0), (1e-9, -1e-9)])
+@pytest.mark.parametrize(
+    ("scale_u", "scale_y"),
+    [
+        (1e-9, -1e-9),
+        *(pytest.param(*pair, marks=pytest.mark.slow) for pair in ((1e-9, 1e6), (1e6, 1e-9), (-1.0, 1.0))),
+    ],
+)
 def test_nothing_depends_on_the_size_of_the_units(folder, tmp_path, scale_u, scale_y):
     """Nanometres and meganewtons, turned signs: the same fit of a real record, to six digits."""
     t, u, y = np.loadtxt(DATA / "davinci_f0p3_torque40.csv", delimiter=",", skiprows=1).T

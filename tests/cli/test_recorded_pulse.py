@@ -11,6 +11,7 @@ import pytest
 from program import pulsetrainer
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.waveforms import Shape
+from wording import refusal
 
 RECORD = Path(__file__).resolve().parents[1] / "data" / "fingerbp_AAC3_3.csv"
 
@@ -50,7 +51,5 @@ def test_a_recorded_beat_is_played_like_one_of_the_library(as_built, tmp_path, b
 def test_a_beat_that_is_not_there_is_exit_3(as_built, tmp_path):
     """And no drive is written."""
     words = ["invert", RECORD, "--beat", "9", "--model", as_built / "model-continuous.h5", "-o", "drive.h5"]
-    done = pulsetrainer(tmp_path, *words)
-    assert done.code == 3
-    assert "6 whole beats" in done.err
+    refusal(pulsetrainer(tmp_path, *words, "--json"), 3, "no such beat")
     assert not list(tmp_path.iterdir())

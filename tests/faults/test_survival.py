@@ -12,6 +12,7 @@ import typer
 
 from pulsetrainer.cli.app import app
 
+pytestmark = pytest.mark.slow
 _RUN = Path(__file__).with_name("run.py")
 
 

@@ -268,6 +268,7 @@ def test_a_strong_resonance_converges():
     assert fitted.squares < 0.01 * base.squares
 
 
+@pytest.mark.slow
 def test_the_best_experiment_tells_lags_apart_better_than_one_rate_does():
     """On a record of one rate a lag before and one after the hysteresis are one; elsewhere they are not."""
     u = signals.identification(0.0, 1.5, n_h=12, speed=1.5, rate_Hz=200.0).value

@@ -62,6 +62,7 @@ def test_large_jumps_are_seen_one_by_one():
     assert fired["stick-slip"] == pytest.approx(0.54, rel=0.2)
 
 
+@pytest.mark.slow
 def test_other_errors_are_no_sawtooth():
     """Nothing, a wandering gain, steps now and then, ringing bursts: none has a sharp period."""
     y, t = _smooth()[::10], np.arange(INPUT.size) * DT

@@ -1,0 +1,128 @@
+"""What messages say, in one table: what is wrong, where, what was expected, what was got, what to do next.
+
+A test provokes an error, asserts its exit code and kind, and names the message by its row; only this table
+knows words. A row's parts are pieces of the message (``next``: of what comes after ``try:``), with the test's
+own names in braces. A part that does not apply is left out, but every row says what, and what to do next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from program import Ran
+
+KINDS = {
+    1: {"quality"},
+    2: {"usage"},
+    3: {"data", "argument"},
+    4: {"device"},
+    5: {"not-converged"},
+    70: {"bug"},
+    130: {"interrupted"},
+}
+
+
+@dataclass(frozen=True)
+class Message:
+    """One row: pieces of a message."""
+
+    what: str
+    next: str | None  # None: there is nothing to do
+    where: str = ""
+    expected: str = ""
+    got: str = ""
+
+
+KEPT = "kept in run.h5 (complete=false)"
+MESSAGES = {
+    # --- files -------------------------------------------------------------------------------------------
+    "wrong kind": Message("", "pulsetrainer {verb}", "{file}", "expected {expected}", "got {got}"),
+    "absent": Message("does not exist", "there is: {near}", "{file}"),
+    "a folder": Message("is a folder", "", "{file}", "expected a file"),
+    "exists": Message("already exists", "--overwrite", "{file}"),
+    "truncated": Message("truncated", "restore it", "{file}", got="{bytes} bytes"),
+    "not HDF5": Message("not an HDF5 file", "pulsetrainer import", "{file}"),
+    "another program's": Message("another program", "pulsetrainer import", "{file}", "kind"),
+    "name too long": Message("too long", "", "x" * 20),
+    "no such figure": Message("png, svg or pdf", "model.png", "{file}", got="h5"),
+    # --- tables ------------------------------------------------------------------------------------------
+    "no such column": Message("no column", "current_A", "{file}", "force_N", "t_s, current_A"),
+    "not finite": Message("not finite", "remove", "{file}", got="{value} in column {column}, line {line}"),
+    "not a number": Message("not a number", "line", "{file}", got="'abc' in column current_A, line 3"),
+    "time goes back": Message("does not increase", "sort", "{file}, column t_s", got="line 4: 1 s after 2 s"),
+    "time repeats": Message(
+        "does not increase", "drop the repeated rows", "{file}, column t_s", got="line 4: 0.1 s after 0.1 s"
+    ),
+    "no numbers": Message("no numbers", "another column", "{file}", "column t_s"),
+    "empty": Message("is empty", "export", "{file}"),
+    "beyond all numbers": Message(
+        "goes from", "those rows", "{file}, column {column}", "1e+100", "-1e+308 to 1e+308"
+    ),
+    # --- numbers -----------------------------------------------------------------------------------------
+    "force out of reach": Message("forces", "--force-max", "model.h5", r"reaches 0.5", "40 N"),
+    "no such rate": Message("the rate", "1000, 2000 or 5000 Hz", expected="10000 Hz", got="{got} Hz"),
+    "too slow": Message("a path of", "speed", got="{got} samples"),
+    "too fast": Message("from one sample to the next", "speed", expected="1.5", got="1e+297"),
+    "too many samples": Message(
+        "samples", "fewer", expected="more than {most}", got="{times} times {samples}"
+    ),
+    "not a smoothing": Message("--smoothing", "identify --help", expected="a number in 0..1", got="'{got}'"),
+    "no such beat": Message("beat", "--beat", "fingerbp_AAC3_3", "6 ", "9"),
+    # --- words -------------------------------------------------------------------------------------------
+    "option missing": Message("Missing option", "identify --help", expected="--out"),
+    "no such command": Message("No such command", "--help", got="frobnicate"),
+    "no such signal": Message("signal", "pulsetrainer capture", expected="diagnostic", got="noise"),
+    "no such bench parameter": Message("parameter", "creep", "bench", got="'crep'"),
+    "one evaluation": Message("at least two", "pulsetrainer compare"),
+    "nothing in common": Message("in common", "evaluat"),
+    # --- settings ----------------------------------------------------------------------------------------
+    "no such setting": Message("setting", "{next}", "pulsetrainer.toml", got="'{got}'"),
+    "not such a setting": Message("must be", "the file", "pulsetrainer.toml", "{expected}", "{got}"),
+    "not TOML": Message("cannot be read", "the file", "pulsetrainer.toml", got="line 1"),
+    "no file of settings": Message("settings", "--settings", "{file}"),
+    # --- device ------------------------------------------------------------------------------------------
+    "no such port": Message("no port", "pulsetrainer ports", "{port}"),
+    "no compiler": Message("C compiler", "pip install ziglang"),
+    "port is busy": Message("busy", "close the other program", "{port}"),
+    "not our device": Message("not a pulsetrainer device", "pulsetrainer ports", "{port}"),
+    "nobody answers": Message("nobody answers", "has power", "{port}"),
+    "older device": Message("the device is older", "flash the firmware", "", "{ours}", "{theirs}"),
+    "older program": Message("the program is older", "pip install --upgrade", "", "{ours}", "{theirs}"),
+    "beyond the limit": Message("the reference", "into the range", "sample", "0..0.4 A", "0.402 A"),
+    "limit raised": Message("limit", "lowered", expected="1.5 A", got="9 A"),
+    "tripped while conditioning": Message("force above its limit", "cause", "conditioning", got=" N"),
+    "force-high": Message("force above its limit", "cause", "during the capture", got=KEPT),
+    "current-rail": Message("current above its hard limit", "cause", "during the capture", got=KEPT),
+    "force-frozen": Message("force reading frozen", "cause", "during the capture", got=KEPT),
+    "tick-overrun": Message("missed its tick", "cause", "during the capture", got=KEPT),
+    "reset": Message("restarted in mid-play (cause: external)", "power supply", got=KEPT),
+    "hang": Message("restarted in mid-play (cause: watchdog)", "power supply", got=KEPT),
+    "port is gone": Message("is gone", "cable", "/dev/", got=KEPT),
+    "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),
+    "interrupted": Message("stopped by you", None, got=KEPT),
+    # --- gates and bugs ----------------------------------------------------------------------------------
+    "out of bounds": Message("1 of 1 bounds", "the bound", "{metric}", "[99, 100]", " = 9"),
+    "bug": Message("a bug: KeyError: 'force'", "--debug"),
+}
+
+
+def refusal(done: Ran, code: int, name: str, **names: object) -> None:
+    """Hold what every refusal is, and what this one says.
+
+    Its code, and its kind where it was asked for as JSON; no traceback; one message, one next step; each part
+    of its row.
+    """
+    assert done.code == code, done
+    assert "Traceback" not in done.err, done.err
+    row = MESSAGES[name]
+    said, _, tried = done.err.partition("\n  try: ")
+    assert said.startswith(("error: ", "note: ")), done.err
+    assert bool(tried) == (row.next is not None), f"what to do next: {done.err!r}"
+    if done.out.startswith("{"):
+        error = done.json["error"]
+        assert error["kind"] in KINDS[code]
+        assert f"error: {error['message']}" in said
+        assert error["hint"].strip() == tried.strip()
+    for field in fields(Message):
+        part = (getattr(row, field.name) or "").format(**names)
+        assert part in (tried if field.name == "next" else said), (name, field.name, part, done.err)
