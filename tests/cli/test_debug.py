@@ -5,6 +5,8 @@ from __future__ import annotations
 import pytest
 
 from mistakes import SIGNATURE
+from program import cold
+from wording import refusal
 
 # A script of the user's own that has the name of a library hides the library: the commonest way in which a
 # sound program breaks on somebody's computer. Nothing inside the program is replaced.
@@ -15,6 +17,12 @@ def _read(name):
 
 _read("force")
 """
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run commands in the test's own folder from the start of an interpreter: what is loaded is the point."""
+    return lambda *words: cold(tmp_path, *words)
 
 
 @pytest.fixture
@@ -29,11 +37,7 @@ def broken(tmp_path):
 def test_what_nobody_expected_is_a_bug_in_words(broken, run, words):
     """Exit 70, what happened, and how to see the rest; no traceback."""
     done = run(*words)
-    assert done.code == 70
-    assert done.err.startswith("error: a bug: KeyError: 'force'")
-    assert "\n  try: " in done.err
-    assert "--debug" in done.err
-    assert "Traceback" not in done.err + done.out
+    refusal(done, 70, "bug")
     assert 'File "' not in done.err
 
 
@@ -45,7 +49,7 @@ def test_debug_shows_every_frame_of_it(broken, run, place):
     done = run(*words)
     assert done.code == 70
     assert done.err.count("Traceback (most recent call last)") == 1
-    places = ["cli/guard.py", "cli/show.py", "artefacts/", "h5py.py", "return {}[name]", "KeyError: 'force'"]
+    places = ["cli/guard.py", "cli/show.py", "files/", "h5py.py", "return {}[name]", "KeyError: 'force'"]
     found = [done.err.find(place) for place in places]
     assert -1 not in found
     assert found == sorted(found), "outermost first"
