@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import typer
 from architecture import architecture_page
 
-from pulsetrainer import __version__
 from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.app import app
 from pulsetrainer.cli.settings import SETTINGS, VARIABLE
 from pulsetrainer.files.schema import FieldPlan, plan_of
+from pulsetrainer.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

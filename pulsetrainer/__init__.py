@@ -1,3 +1,62 @@
-"""A hysteretic solenoid that presses a true arterial pulse, without a force sensor in the loop."""
+"""A hysteretic solenoid that presses a true arterial pulse, without a force sensor in the loop.
 
-__version__ = "0.1.0"
+    import pulsetrainer as pt
+
+    run = pt.load("run.h5")
+    model = pt.identify(run)
+    drive = pt.invert("normal", model)
+
+Names are loaded when they are first used, so that the import itself costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from pulsetrainer.version import __version__
+
+if TYPE_CHECKING:
+    from pulsetrainer.api import invert, load, open_device, save
+    from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Waveform
+    from pulsetrainer.steps.compare import compare
+    from pulsetrainer.steps.evaluate import evaluate
+    from pulsetrainer.steps.identify import identify
+    from pulsetrainer.steps.play import play
+
+__all__ = [
+    "Diagnosis",
+    "Evaluation",
+    "Model",
+    "Playback",
+    "Run",
+    "Waveform",
+    "__version__",
+    "compare",
+    "evaluate",
+    "identify",
+    "invert",
+    "load",
+    "open_device",
+    "play",
+    "save",
+]
+
+_NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Waveform")
+_HOME = {
+    **dict.fromkeys(_NOUNS, "artefacts"),
+    **dict.fromkeys(("invert", "load", "open_device", "save"), "api"),
+    **{verb: f"steps.{verb}" for verb in ("compare", "evaluate", "identify", "play")},
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'pulsetrainer' has no attribute {name!r}")
+    found = getattr(import_module(f"pulsetrainer.{_HOME[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

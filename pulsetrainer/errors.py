@@ -12,15 +12,19 @@ from pathlib import Path
 
 
 class PulsetrainerError(Exception):
-    """Base of the family: a message for a person, a hint, an exit code, a stable kind for scripts."""
+    """Base of the family: a message for a person, a hint, an exit code, a stable kind for scripts.
+
+    ``kept`` is the artefact that a play had recorded when it was stopped, None where there is none.
+    """
 
     exit_code = 70
     kind = "bug"
 
-    def __init__(self, message: str, *, hint: str = "") -> None:
+    def __init__(self, message: str, *, hint: str = "", kept: object = None) -> None:
         super().__init__(message)
         self.message = message
         self.hint = hint
+        self.kept = kept
 
 
 class QualityError(PulsetrainerError):

@@ -7,6 +7,20 @@ from typing import Annotated, ClassVar
 
 from pulsetrainer.artefacts.data import Data, FloatArray
 from pulsetrainer.artefacts.model import Model
+from pulsetrainer.artefacts.shown import Shown
+
+METRICS = ("mean_abs_error_percent", "max_abs_error_percent", "rms_error_percent", "hysteresis_percent",
+           "current_tracking_max_percent")  # fmt: skip
+MODEL_METRICS = (
+    "rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent", "second_half_percent",
+)  # fmt: skip
+# Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631: the published device. The maxima are given for the
+# device as a whole, so they stand beside both pulses.
+_PUBLISHED_MAXIMA = {"scaled.max_abs_error_percent": 28.7, "compensated.max_abs_error_percent": 7.8}
+PUBLISHED: dict[str, dict[str, float]] = {
+    "normal": {"mean_error_reduction_percent": 73.9, **_PUBLISHED_MAXIMA},
+    "bifid": {"mean_error_reduction_percent": 70.3, **_PUBLISHED_MAXIMA},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +84,14 @@ class ModelEvaluation:
     start: str = "known"  # the state before the run: known, or which one was estimated
     outside_percent: Annotated[float, Data("percent", "samples outside the range of the model")] = 0.0
 
+    @property
+    def short_name(self) -> str:
+        """Name of the model without the folder and the ending of its file."""
+        return self.name.replace("\\", "/").rpartition("/")[2].removesuffix(".h5")
 
-@dataclass(frozen=True, slots=True)
-class Evaluation:
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Evaluation(Shown):
     """An error report: of played waveforms, or of models on a held-out run."""
 
     kind: ClassVar[str] = "evaluation"
@@ -80,3 +99,18 @@ class Evaluation:
     waveforms: tuple[WaveformEvaluation, ...] = ()
     models: tuple[ModelEvaluation, ...] = ()
     model: Model | None = None  # the model behind the first waveform, for the figures
+    notes: tuple[str, ...] = ()  # what a person should know about the comparison
+
+    def figures(self) -> dict[str, float]:
+        """All figures by dotted name: ``normal.continuous.scaled.max_abs_error_percent``."""
+        named: dict[str, float] = {}
+        for waveform in self.waveforms:
+            stem = f"{waveform.name}.{waveform.inversion}"
+            named[f"{stem}.mean_error_reduction_percent"] = waveform.mean_error_reduction_percent
+            for drive, errors in (("scaled", waveform.scaled), ("compensated", waveform.compensated)):
+                for metric in METRICS:
+                    named[f"{stem}.{drive}.{metric}"] = getattr(errors, metric)
+        for model in self.models:
+            for metric in MODEL_METRICS:
+                named[f"{model.short_name}.{metric}"] = getattr(model, metric)
+        return named

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Annotated, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pulsetrainer.artefacts.data import Attribute, BoolArray, Data, FloatArray
+from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.errors import DataError
 
 
@@ -38,6 +41,26 @@ class Fit:
     predicted_upper: Annotated[
         FloatArray | None, Data("@output_unit", "upper end of the predicted output", "time")
     ] = None
+    max_percent: Annotated[float, Data("percent", "largest error of the fit, of the output span")] = float(
+        "nan"
+    )
+    # standard deviation; NaN where the records cannot tell
+    input_noise: Annotated[float, Data("@input_unit", "noise of the measured input")] = float("nan")
+    false_reversals: int = 0  # taken out of the input before the fit
+    offsets: tuple[
+        float, ...
+    ] = ()  # of each run's output against their mean; zeros where one offset serves all
+    spacing: str = "even"  # of the levels: "even", or "crowded" where the loop is steep
+    stiffness: float = 0.0  # t, how alike the loops are along the diagonal; 0: the density is free
+    warning: str = ""  # that this kind of model is the wrong one, in words; empty where it is not
+    notes: tuple[str, ...] = ()  # what a person should know about the fit
+
+    @property
+    def output_uncertainty(self) -> float | None:
+        """Mean half width of the 90 % band of the predicted output, output unit; None without a bootstrap."""
+        if self.predicted_lower is None or self.predicted_upper is None:
+            return None
+        return 0.5 * float(np.mean(self.predicted_upper - self.predicted_lower))
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +82,8 @@ class Extension:
     parameters: tuple[Parameter, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Model:
+@dataclass(frozen=True, slots=True, repr=False)
+class Model(Shown):
     """An identified Preisach model: weights mu-hat per cell and offset y0-hat (Carneiro 2018, eq. 2)."""
 
     kind: ClassVar[str] = "model"
@@ -99,3 +122,33 @@ class Model:
                 f"but weights holds {np.size(self.weights)}",
                 hint="identify the model again: pulsetrainer identify RUN.h5 -o model.h5",
             )
+
+    @property
+    def levels(self) -> int:
+        """Number of levels n_h of the plane."""
+        return int(self.edges.size) - 1
+
+    def predict(self, inputs: ArrayLike, dt_s: float | None = None) -> FloatArray:
+        """Output (n,) for an input (n,) at even steps of ``dt_s`` s, from negative saturation.
+
+            y_t = y0 + sum_k mu_k A_k r_k(u_0 .. u_t)    (Carneiro 2018, eq. 2), then the extensions
+
+        Raises
+        ------
+        DataError
+            The model has extensions, which depend on time, and ``dt_s`` is not given.
+        ArgumentError
+            The input is no row of finite numbers.
+
+        Examples
+        --------
+        >>> import numpy as np, pulsetrainer as pt
+        >>> edges = np.array([0.0, 0.5, 1.0])
+        >>> model = pt.Model(edges=edges, weights=np.ones(3), offset=0.5, covered=np.ones(3, bool))
+        >>> model.predict([0.0, 1.0, 0.5, 0.0])
+        array([0.  , 1.  , 0.75, 0.  ])
+        """
+        # what a model predicts is the business of a floor above, which knows the causes
+        prediction = import_module("pulsetrainer.diagnosis.prediction")
+        predicted: FloatArray = prediction.predict(self, np.asarray(inputs, dtype=np.float64), dt_s)
+        return predicted

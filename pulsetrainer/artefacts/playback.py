@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 from pulsetrainer.artefacts.data import Data, FloatArray
+from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.artefacts.waveform import Waveform
 
 
@@ -20,8 +21,8 @@ class DrivePlayback:
     output_unit: str = "N"
 
 
-@dataclass(frozen=True, slots=True)
-class Playback:
+@dataclass(frozen=True, slots=True, repr=False)
+class Playback(Shown):
     """A waveform and what the device measured for each of its drives."""
 
     kind: ClassVar[str] = "playback"
@@ -36,3 +37,4 @@ class Playback:
     input_unit: str = "A"
     complete: bool = True
     dropped_samples: int = 0
+    fault: str = ""  # why the device stopped early; empty where it did not

@@ -9,10 +9,11 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from pulsetrainer.artefacts.data import BoolArray, Data, FloatArray, check_equal_length, check_time
+from pulsetrainer.artefacts.shown import Shown
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+@dataclass(frozen=True, slots=True, repr=False)
+class Run(Shown):
     """What a device, or a table from any bench, reported: nothing that a real device does not know."""
 
     kind: ClassVar[str] = "run"
@@ -38,16 +39,29 @@ class Run:
         check_equal_length(self, ("time_s", "input", "output", "reference", "seam"))
         check_time(self)
 
-    def parts(self) -> tuple[Run, ...]:
-        """Return the uninterrupted parts, each a run of its own; the run itself where it has no seam."""
+    @property
+    def dt_s(self) -> float | None:
+        """Time step, s: the median; None where the run has no time."""
+        if self.time_s is None or self.time_s.size < 2:
+            return None
+        return float(np.median(np.diff(self.time_s)))
+
+    def parts(self, at_least: int = 1) -> tuple[Run, ...]:
+        """Return the uninterrupted parts of ``at_least`` so many samples; the run itself where there is none.
+
+        After a seam the device had been off: what is slow in it (heat, creep) does not go on where it was.
+        Each part begins at the low end of the input, so that its memory is known.
+        """
         if self.seam is None or not np.any(self.seam):
             return (self,)
         edges = [0, *np.flatnonzero(self.seam[1:]) + 1, self.seam.size]
         arrays = [name for name in _RUN_ARRAYS if getattr(self, name) is not None]
-        return tuple(
+        parts = (
             replace(self, seam=None, **{name: getattr(self, name)[start:stop] for name in arrays})
             for start, stop in pairwise(edges)
+            if stop - start >= at_least
         )
+        return tuple(parts) or (self,)
 
 
 _RUN_ARRAYS = ("time_s", "input", "output", "reference")

@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
+import numpy as np
+
 from pulsetrainer.artefacts.data import BoolArray, Data, FloatArray, check_equal_length, check_time
 from pulsetrainer.artefacts.model import Model
+from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.errors import DataError
 
 
-@dataclass(frozen=True, slots=True)
-class Waveform:
+@dataclass(frozen=True, slots=True, repr=False)
+class Waveform(Shown):
     """A target force and the two currents that shall press it: compensated and merely scaled."""
 
     kind: ClassVar[str] = "waveform"
@@ -35,11 +38,30 @@ class Waveform:
     input_unit: str = "A"
     output_unit: str = "N"
     model: Model | None = None
+    period_s: float = float("nan")  # of one beat
+    notes: tuple[str, ...] = ()  # what a person should know about the inverse
 
     def __post_init__(self) -> None:
         check_equal_length(self, ("time_s", "target", "compensated", "scaled", "predicted", "scored"))
         check_time(self)
         if self.time_s.size < 2:
             raise DataError(
-                f"a waveform of {self.time_s.size} samples is none", hint="make it again: pulsetrainer invert"
+                f"a waveform needs at least 2 samples, this one has {self.time_s.size}",
+                hint="make it again from the pulse",
             )
+
+    @property
+    def rate_Hz(self) -> float:
+        """Samples a second."""
+        return 1.0 / float(np.median(np.diff(self.time_s)))
+
+    @property
+    def full_force(self) -> float:
+        """Largest absolute target that is scored, output unit: what errors are given in percent of."""
+        return float(np.abs(self.target[self.scored]).max())
+
+    @property
+    def predicted_max_error_percent(self) -> float:
+        """Largest error that the model expects for the compensated drive, of the full force."""
+        error = np.abs(self.predicted - self.target)[self.scored]
+        return 100.0 * float(error.max()) / self.full_force

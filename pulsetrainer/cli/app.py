@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from pulsetrainer import __version__
 from pulsetrainer.cli import (
     capture,
     compare,
@@ -26,6 +25,7 @@ from pulsetrainer.cli import (
     settings,
     show,
 )
+from pulsetrainer.version import __version__
 
 # Plain help: drawing it with rich would cost a third of the time until it shows.
 app = typer.Typer(

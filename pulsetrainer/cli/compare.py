@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import csv
+import io
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, Force
+from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, Overwrite
+from pulsetrainer.report.forms import figure_form
+from pulsetrainer.steps.asked import check_several
+
+if TYPE_CHECKING:
+    from pulsetrainer.steps.compare import Metric
 
 
 def compare(
+    context: typer.Context,
     files: Annotated[
         list[Path], typer.Argument(help="Evaluations, the oldest first.", metavar="EVALUATION.h5...")
     ],
@@ -20,36 +30,69 @@ def compare(
         typer.Option("-o", "--out", help="Figure (png, svg, pdf) or table (csv).", show_default=False),
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="All figures, not only the headlines.")] = False,
-    force: Force = False,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Lay several evaluations side by side.
+    """Compare several evaluations side by side.
 
     Before and after, device against device, week against week.
 
     Example: pulsetrainer compare before.h5 after.h5 -o change.png
     """
-    from pulsetrainer.steps import preflight
+    check_several(files)
+    form = figure_form(out, "a comparison", "csv") if out is not None else ""
+    job = Job(context, inputs=files, outputs=(out,), overwrite=overwrite, as_json=json)
+    from pulsetrainer.artefacts import Evaluation
+    from pulsetrainer.files import store
+    from pulsetrainer.steps.compare import compare as side_by_side
 
-    preflight.comparison_form(files, out)
-    preflight.check_files(outputs=(out,), force=force, artefacts=files)
-    from pulsetrainer.steps import compare as flow
+    labels = labels_of(files)
+    with job.working("comparing"):
+        evaluations = [job.load(path, Evaluation) for path in files]
+        headers = [store.read_header(path) for path in files]
+        metrics = side_by_side(evaluations, names=list(map(str, files)), everything=everything)
+        if out is not None and form == "csv":
+            job.write(out, _csv(files, metrics))
+        elif out is not None:
+            from pulsetrainer.report import comparison_figure, render
 
-    screen = Screen("compare", as_json=json)
-    with screen.working("comparing") as context:
-        result = flow.run(flow.Options(tuple(files), out, everything, force), context)
-    screen.result(result)
+            job.write(
+                out, render.encode(comparison_figure.draw(labels, {m.name: m.values for m in metrics}), form)
+            )
+    sources = [
+        {"file": path, "title": header.title, "created": header.created}
+        for path, header in zip(files, headers, strict=True)
+    ]
+    job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})
     words = {True: "better", False: "worse", None: ""}
-    screen.table(
+    job.screen.table(
         "errors, %, the change from the first to the last",
-        ["", *flow.labels_of(tuple(files)), "change", ""],
+        ["", *labels, "change", ""],
         [
             [_label(m.name), *m.values, None if m.change is None else f"{m.change:+.2f}", words[m.better]]
-            for m in result.metrics
+            for m in metrics
         ],
     )
-    if result.output is not None:
-        screen.whole(f"wrote {result.output}")
+    if out is not None:
+        job.screen.whole(f"wrote {out}")
+
+
+def _csv(files: Sequence[Path], metrics: Sequence[Metric]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["metric", *map(str, files), "change"])
+    writer.writerows([m.name, *m.values, m.change] for m in metrics)
+    return text.getvalue()
+
+
+def labels_of(files: Sequence[Path]) -> list[str]:
+    """Return short names of files that still tell them apart: the parts of their paths that differ."""
+    parts = [path.with_suffix("").parts for path in files]
+    if len({p[-1] for p in parts}) == len(parts):
+        return [p[-1] for p in parts]
+    if len({p[:-1] for p in parts}) == len(parts) and len({p[-1] for p in parts}) == 1:
+        return [Path(*p[:-1]).name or str(path) for p, path in zip(parts, files, strict=True)]
+    return [str(path) for path in files]
 
 
 _SHORT = {

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import shutil
 import sys
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
@@ -15,6 +13,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from pulsetrainer.report import tables
 from pulsetrainer.steps.context import Context, Progress
 
 _PIPE_WIDTH = 110
@@ -51,11 +50,12 @@ class Screen:
     @contextmanager
     def working(self, label: str) -> Iterator[Context]:
         """Give a flow its context, with a progress bar when stderr is a terminal."""
-        with self._bar(label) as progress:
+        with self.bar(label) as progress:
             yield Context(argv=sys.argv[1:], now=lambda: datetime.now(UTC), progress=progress, note=self.note)
 
     @contextmanager
-    def _bar(self, label: str) -> Iterator[Progress]:
+    def bar(self, label: str) -> Iterator[Progress]:
+        """Give a callable that takes the share of the work done; on a terminal it moves a bar."""
         if self.as_json or not sys.stderr.isatty():
             yield lambda _share: None
             return
@@ -79,17 +79,17 @@ class Screen:
         """Print names and values, one a line, unless JSON was asked for."""
         if self.as_json:
             return
-        names = [_label(name) for name in rows]
+        names = [tables.label(name) for name in rows]
         width = max((len(name) for name in names), default=0)
         self.line("", title, indent=2)
         for name, value in zip(names, rows.values(), strict=True):
-            self.line(f"  {name:<{width}}  ", _text(value))
+            self.line(f"  {name:<{width}}  ", tables.text(value))
 
     def line(self, lead: str, text: str, *, indent: int | None = None) -> None:
         """Print a line; on a terminal that is too narrow, on several, broken between words below ``lead``."""
         if self.as_json:
             return
-        sys.stdout.write(folded(lead, text, self.width if self.is_terminal else None, indent) + "\n")
+        sys.stdout.write(tables.folded(lead, text, self.width if self.is_terminal else None, indent) + "\n")
 
     def whole(self, text: str) -> None:
         """Print a line that is never folded, since a path or a command in it is copied in one piece."""
@@ -103,81 +103,10 @@ class Screen:
         """
         if self.as_json:
             return
-        drawn = _drawn(title, columns, rows)
-        if self.is_terminal and max(len(line) for line in _ESCAPE.sub("", drawn).splitlines()) > self.width:
-            drawn = "\n".join(_listed(title, columns, rows)) + "\n"
+        drawn = tables.drawn(title, columns, rows)
+        if (
+            self.is_terminal
+            and max(len(line) for line in tables.ESCAPE.sub("", drawn).splitlines()) > self.width
+        ):
+            drawn = "\n".join(tables.listed(title, columns, rows)) + "\n"
         sys.stdout.write(drawn)
-
-
-_ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
-_BROAD = 10_000  # as wide as the table needs: figures are never cut
-_NARROWEST = 24  # beside a lead; less, and the lines go on further left
-
-
-def folded(lead: str, text: str, width: int | None, indent: int | None = None) -> str:
-    """Return a line, folded between words to a width; None: not folded."""
-    if width is None or len(lead) + len(text) <= width:
-        return lead + text
-    if indent is None:
-        indent = len(lead) if width - len(lead) >= _NARROWEST else 4
-    return textwrap.fill(
-        text,
-        width,
-        initial_indent=lead,
-        subsequent_indent=" " * indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-
-
-def _drawn(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """Return a table, no wider than its figures, without blanks at the ends of its lines."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1))
-    for number, name in enumerate(columns):
-        table.add_column(Text(name), justify="right" if number else "left", no_wrap=True)
-    for row in rows:
-        table.add_row(*(Text(_text(cell)) for cell in row))
-    console = Console(width=_BROAD, markup=False, highlight=False)
-    with console.capture() as captured:
-        console.print(table)
-    lines = [line.rstrip() for line in captured.get().splitlines()]
-    while lines and not _ESCAPE.sub("", lines[0]).strip():
-        lines.pop(0)
-    return "\n".join([title, *lines]) + "\n"
-
-
-def _listed(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> Iterator[str]:
-    """Yield a table as a list: each row's name, below it its figures with the names of their columns."""
-    heads = [name.replace("-\n", "-").replace("\n", " ") for name in columns]
-    width = max((len(head) for head in heads[1:]), default=0)
-    yield title
-    for row in rows:
-        yield f"  {_text(row[0])}"
-        for head, cell in zip(heads[1:], row[1:], strict=True):
-            if cell not in (None, ""):
-                yield f"    {head:<{width}}  {_text(cell)}"
-
-
-def _label(name: str) -> str:
-    """Return the name of a figure as a person writes it, its unit behind a comma."""
-    for ending, unit in (("_percent", "%"), ("_Hz", "Hz")):
-        if name.endswith(ending):
-            name = f"{name.removesuffix(ending)}, {unit}"
-    return name.replace("_", " ")
-
-
-def _text(value: Any) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.2f}" if 0.1 <= abs(value) < 1e5 or value == 0 else f"{value:.3g}"
-    if isinstance(value, list | tuple):
-        return ", ".join(_text(item) for item in value) or "none"
-    return str(value)

@@ -28,15 +28,15 @@ def doctor(
 
     Example: pulsetrainer doctor --port /dev/ttyUSB0
     """
+    from pulsetrainer.doctor import examine
     from pulsetrainer.errors import QualityError
-    from pulsetrainer.steps import doctor as flow
 
     screen = Screen("doctor", as_json=json)
     named = context.parent.params.get("settings_file") if context.parent else None
     rows = settings.effective(settings.find(named, os.environ))
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
-    with screen.working("looking") as working:
-        result = flow.run(flow.Options(port, capture, words), working)
+    with screen.bar("looking") as progress:
+        result = examine(port, capture=capture, settings=words, progress=progress)
     payload = plain(result) | {"problems": result.problems}
     problem = f"{result.problems} of {len(result.findings)} findings stand in the way"
     hint = "follow the fixes, from the top"

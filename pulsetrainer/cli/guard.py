@@ -16,9 +16,9 @@ from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
-from pulsetrainer.cli.console import folded
-from pulsetrainer.cli.next_step import next_step
+from pulsetrainer.cli.next_step import as_options, next_step
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
+from pulsetrainer.report.tables import folded
 
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _DEBUG_HINT = "run it again with --debug for the whole traceback, and report it"
@@ -99,12 +99,12 @@ def _trace(debug: bool) -> None:
 
 def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
     """Write a problem to stderr for a person, and with ``as_json`` to stdout for a script."""
-    hint = next_step(problem)
+    message, hint = as_options(problem.message), as_options(next_step(problem))
     if as_json:
-        error = {"kind": problem.kind, "message": problem.message, "hint": hint}
+        error = {"kind": problem.kind, "message": message, "hint": hint}
         sys.stdout.write(json.dumps({"schema": 1, "command": command, "error": error}) + "\n")
     width = shutil.get_terminal_size().columns if sys.stderr.isatty() else None
-    sys.stderr.write(folded("error: ", problem.message, width, indent=2) + "\n")
+    sys.stderr.write(folded("error: ", message, width, indent=2) + "\n")
     for note in getattr(problem, "__notes__", ()):
         sys.stderr.write(folded("note: ", str(note), width, indent=2) + "\n")
     if hint:  # not folded: a command in it is copied in one piece

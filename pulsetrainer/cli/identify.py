@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from pulsetrainer.cli.console import Screen, plain
-from pulsetrainer.cli.options import AsJson, Force, Out
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, Out, Overwrite
 from pulsetrainer.cli.settings import variable
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts import Model
 
 
 class Reading(StrEnum):
@@ -31,6 +34,7 @@ _MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
 
 
 def identify(
+    context: typer.Context,
     runs: Annotated[list[Path], typer.Argument(help="Runs to fit together.", metavar="RUN.h5...")],
     out: Out,
     levels: Annotated[
@@ -60,54 +64,77 @@ def identify(
         ),
     ] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the resampling.")] = 0,
-    force: Force = False,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Fit a Preisach model to one or several runs.
 
     Example: pulsetrainer identify run.h5 -o model.h5
     """
-    from pulsetrainer.steps import preflight
+    job = Job(context, inputs=runs, outputs=(out,), overwrite=overwrite, as_json=json)
+    length = _smoothing(smoothing)
+    from pulsetrainer.artefacts import Run
+    from pulsetrainer.steps.identify import identify as fit
 
-    preflight.check_files(outputs=(out,), force=force, artefacts=runs)
-    smooth = _smoothing(smoothing)
-    from pulsetrainer.steps import identify as flow
-    from pulsetrainer.steps.show import shown
-
-    screen = Screen("identify", as_json=json)
-    options = flow.Options(
-        tuple(runs),
-        out,
-        levels,
-        (operator or reading).value,
-        method.value,
-        smooth,
-        bootstrap,
-        seed,
-        force,
-    )
-    with screen.working("fitting") as context:
-        result = flow.run(options, context)
-    screen.result(plain(result))
-    sure = {}
-    if result.output_uncertainty is not None:
-        sure["output known within"] = (
-            f"{result.output_uncertainty:.2g} {shown(result.output_unit)} (90 % band)"
+    with job.working("fitting") as progress:
+        model = fit(
+            [job.load(path, Run) for path in runs],
+            levels=levels,
+            reading=(operator or reading).value,
+            method=method.value,
+            smoothing=length,
+            bootstrap=bootstrap,
+            seed=seed,
+            names=[path.stem for path in runs],
+            progress=progress,
         )
-    unit = shown(result.output_unit)
-    screen.facts(
-        f"{result.output}: Preisach model of {result.levels} levels, {result.cells} cells",
+        job.save(out, model, f"Preisach model of {', '.join(path.stem for path in runs)}")
+    _show(job, out, model)
+
+
+def _show(job: Job, out: Path, model: Model) -> None:
+    from pulsetrainer.artefacts.units import with_unit
+
+    fit, unit = model.fit, model.output_unit
+    assert fit is not None
+    job.notes(fit.notes)
+    job.screen.result(_payload(out, model, job.seconds))
+    band = fit.output_uncertainty
+    job.screen.facts(
+        f"{out}: Preisach model of {model.levels} levels, {model.weights.size} cells",
         {
-            "fit": f"{result.fit_rms_percent:.3f} % rms, {result.fit_max_percent:.2f} % max, of the span",
-            "fit rms": f"{result.fit_rms:.4g} {unit}".rstrip(),
-            "offset y0": f"{result.offset:.4g} {unit}".rstrip(),
-            "cells switched": f"{result.coverage_percent:.1f} %",
-            "smoothing": f"{result.smoothing:.3g} of the range" if result.smoothing else "none",
-            "loop": "falling" if result.polarity < 0 else "rising",
-            **sure,
-            "took": f"{result.seconds:.2f} s, {result.iterations} iterations",
+            "fit": f"{fit.rms_percent:.3f} % rms, {fit.max_percent:.2f} % max, of the span",
+            "fit rms": with_unit(f"{fit.rms:.4g}", unit),
+            "offset y0": with_unit(f"{model.offset:.4g}", unit),
+            "cells switched": f"{fit.coverage_percent:.1f} %",
+            "smoothing": f"{fit.smoothing:.3g} of the range" if fit.smoothing else "none",
+            "loop": "falling" if model.polarity < 0 else "rising",
+            **({"output known within": with_unit(f"{band:.2g}", unit) + " (90 % band)"} if band else {}),
+            "took": f"{job.seconds:.2f} s, {fit.iterations} iterations",
         },
     )
+
+
+def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
+    fit = model.fit
+    assert fit is not None
+    same = (
+        "coverage_percent", "smoothing", "input_noise", "false_reversals", "output_uncertainty", "offsets",
+        "spacing", "stiffness", "warning", "iterations",
+    )  # fmt: skip
+    return {
+        "output": out,
+        "levels": model.levels,
+        "cells": model.weights.size,
+        "offset": model.offset,
+        "output_unit": model.output_unit,
+        "fit_rms": fit.rms,
+        "fit_rms_percent": fit.rms_percent,
+        "fit_max_percent": fit.max_percent,
+        "polarity": model.polarity,
+        **{name: getattr(fit, name) for name in same},
+        "seconds": seconds,
+    }
 
 
 def _smoothing(text: str | None) -> float | Literal["auto"] | None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, Force, Out, positive
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, Out, Overwrite, positive
 from pulsetrainer.cli.settings import variable
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts import Waveform
 
 
 class Inversion(StrEnum):
@@ -22,6 +25,7 @@ class Inversion(StrEnum):
 
 
 def invert(
+    context: typer.Context,
     waveform: Annotated[
         str, typer.Argument(help="A name of the library (normal, bifid, ...) or a CSV file.")
     ],
@@ -58,7 +62,7 @@ def invert(
             callback=positive, help="Fastest the drive may move, A/s.", envvar=variable("slew_A_per_s")
         ),
     ] = 30.0,
-    force: Force = False,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Find the current that presses a pulse.
@@ -67,38 +71,64 @@ def invert(
 
     Example: pulsetrainer invert normal --model model.h5 -o drive.h5
     """
-    from pulsetrainer.steps import preflight
+    from pulsetrainer.files.pulses import pulse_file, read_pulse
+    from pulsetrainer.steps.asked import check_beat, check_force_range
 
-    preflight.waveform_file(waveform)
-    preflight.check_beat(beat)
-    preflight.check_force_range(force_min, force_max)
-    preflight.check_files(outputs=(out,), force=force, artefacts=(model,))
-    from pulsetrainer.steps import invert as flow
+    pulse = pulse_file(waveform)
+    job = Job(context, inputs=(model,), outputs=(out,), overwrite=overwrite, as_json=json)
+    check_beat(beat)
+    check_force_range(force_min, force_max)
+    from pulsetrainer.artefacts import Model
+    from pulsetrainer.steps.invert import invert as inverse_of
 
-    screen = Screen("invert", as_json=json)
-    options = flow.Options(
-        waveform=waveform,
-        model=model,
-        output=out,
-        inversion=method.value if method else None,
-        beat=beat,
-        force_min=force_min,
-        force_max=force_max,
-        periods=periods,
-        slew_A_per_s=slew,
-        force=force,
-    )
-    with screen.working(f"inverting {waveform}") as context:
-        result = flow.run(options, context)
-    screen.result(result)
-    force_range, current = result.force_range, result.current_range
-    screen.facts(
-        f"{result.output}: {result.name} by {result.inversion} inversion",
+    with job.working(f"inverting {waveform}") as progress:
+        source = job.load(model, Model)
+        drive = inverse_of(
+            read_pulse(waveform),
+            source,
+            method=method.value if method else None,
+            force_min=force_min,
+            force_max=force_max,
+            beat=beat,
+            periods=periods,
+            slew_A_per_s=slew,
+            progress=progress,
+        )
+        if pulse.name == waveform:
+            job.uses(pulse)
+        job.save(out, drive, f"{drive.name} by {drive.inversion} inversion")
+    _show(job, out, drive)
+
+
+def _show(job: Job, out: Path, drive: Waveform) -> None:
+    from pulsetrainer.artefacts.units import with_unit
+
+    job.notes(drive.notes)
+    force = float(drive.target[drive.scored].min()), float(drive.target[drive.scored].max())
+    current = float(drive.compensated.min()), float(drive.compensated.max())
+    seconds = drive.time_s.size / drive.rate_Hz
+    job.screen.result(
         {
-            "length": f"{result.seconds:.2f} s, {result.samples} samples",
-            "force": f"{force_range[0]:.3f} .. {force_range[1]:.3f} {result.output_unit}",
-            "current": f"{current[0]:.3f} .. {current[1]:.3f} {result.input_unit}",
-            "out of reach": f"{result.clipped_samples} samples",
-            "expected error": f"{result.predicted_max_error_percent:.3f} % max of full force, by the model",
+            "output": out,
+            "name": drive.name,
+            "inversion": drive.inversion,
+            "samples": drive.time_s.size,
+            "seconds": seconds,
+            "force_range": force,
+            "current_range": current,
+            "clipped_samples": drive.clipped_samples,
+            "predicted_max_error_percent": drive.predicted_max_error_percent,
+            "input_unit": drive.input_unit,
+            "output_unit": drive.output_unit,
+        }
+    )
+    job.screen.facts(
+        f"{out}: {drive.name} by {drive.inversion} inversion",
+        {
+            "length": f"{seconds:.2f} s, {drive.time_s.size} samples",
+            "force": with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
+            "current": with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
+            "out of reach": f"{drive.clipped_samples} samples",
+            "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full force, by the model",
         },
     )

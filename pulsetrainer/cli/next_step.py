@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from typing import TYPE_CHECKING
 
@@ -66,6 +67,14 @@ def next_step(problem: PulsetrainerError) -> str:
     if isinstance(problem, NotAnArtefactError):
         return _after_foreign_file(problem.path)
     return problem.hint
+
+
+_PARAMETER = re.compile(r"`([a-z]+(?:_[a-z]+)*)`")
+
+
+def as_options(text: str) -> str:
+    """Return a text with the parameters in it as options: ```force_min``` is ``--force-min`` here."""
+    return _PARAMETER.sub(lambda found: f"--{found[1].replace('_', '-')}", text)
 
 
 def _after_wrong_kind(problem: WrongKindError) -> str:

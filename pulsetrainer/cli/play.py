@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, DryRun, Force, LimitCurrent, LimitForce, Out, Port
+from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port
 from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
-    from pulsetrainer.steps.play import Plan
+    from pulsetrainer.artefacts import Playback, Waveform
+    from pulsetrainer.device.device import DeviceInfo
 
 
 def play(
+    context: typer.Context,
     drive: Annotated[Path, typer.Argument(help="Waveform made by invert.")],
     out: Out,
     port: Port = None,
@@ -26,7 +29,7 @@ def play(
     limit_current: LimitCurrent = None,
     limit_force: LimitForce = None,
     dry_run: DryRun = False,
-    force: Force = False,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Press a pulse and record the force.
@@ -35,44 +38,93 @@ def play(
 
     Example: pulsetrainer play drive.h5 -o played.h5
     """
-    from pulsetrainer.steps import preflight
+    from pulsetrainer.simulation.options import check_port
 
-    preflight.check_port(port)
-    preflight.check_files(outputs=(out,), force=force, artefacts=(drive,))
+    check_port(port)
+    job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
+    from pulsetrainer.api import open_device
+    from pulsetrainer.artefacts import Playback, Waveform
     from pulsetrainer.device.device import Limits
-    from pulsetrainer.steps import play as flow
+    from pulsetrainer.device.schemes import redact
+    from pulsetrainer.errors import PulsetrainerError
+    from pulsetrainer.files.provenance import Device
+    from pulsetrainer.steps.play import play as press
 
-    screen = Screen("play", as_json=json)
-    options = flow.Options(drive, out, port, repeats, Limits(limit_current, limit_force), dry_run, force)
+    waveform, limits = job.load(drive, Waveform), Limits(limit_current, limit_force)
     if dry_run:
-        _show(screen, flow.plan(options))
+        _plan(job, out, port, waveform, repeats)
         return
-    with screen.working(f"playing {drive.name}") as context:
-        result = flow.run(options, context)
-    if result.dropped_samples:
-        screen.note(
-            f"{result.dropped_samples} samples were lost on the wire; they are left out of all errors"
+    stopped: PulsetrainerError | None = None
+    with job.working(f"playing {drive.name}") as progress, open_device(port, limits=limits) as device:
+        info = device.info
+        try:
+            played = press(waveform, device, repeats=repeats, progress=progress)
+        except PulsetrainerError as error:
+            if not isinstance(error.kept, Playback):
+                raise
+            stopped, played = error, error.kept
+    whole = played.compensated.output.shape[0]
+    job.save(
+        out,
+        played,
+        f"{waveform.name} by {waveform.inversion} inversion, played on {info.serial}",
+        device=Device(info.serial, info.firmware, redact(port or "")),
+    )
+    if stopped is not None:
+        stopped.message += f"; {whole} of {repeats} repeats were kept in {out}"
+        raise stopped
+    _show(job, out, played, info)
+
+
+def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
+    drive, repeats = played.waveform, played.compensated.output.shape[0]
+    seconds = float(drive.time_s[-1]) * repeats * 2
+    if played.dropped_samples:
+        job.notes(
+            [f"{played.dropped_samples} samples were lost on the wire; they are left out of all errors"]
         )
-    screen.result(result)
-    screen.facts(
-        f"{result.output}: {result.name} by {result.inversion} inversion on {result.serial}",
+    job.screen.result(
         {
-            "repeats": f"{result.repeats} of each drive, {result.seconds:.1f} s in all",
-            "samples": f"{result.samples} a repeat",
-            "lost": f"{result.dropped_samples} samples",
+            "output": out,
+            "name": drive.name,
+            "inversion": drive.inversion,
+            "repeats": repeats,
+            "samples": drive.time_s.size,
+            "seconds": seconds,
+            "dropped_samples": played.dropped_samples,
+            "complete": played.complete,
+            "serial": info.serial,
+            "firmware": info.firmware,
+        }
+    )
+    job.screen.facts(
+        f"{out}: {drive.name} by {drive.inversion} inversion on {info.serial}",
+        {
+            "repeats": f"{repeats} of each drive, {seconds:.1f} s in all",
+            "samples": f"{drive.time_s.size} a repeat",
+            "lost": f"{played.dropped_samples} samples",
         },
     )
 
 
-def _show(screen: Screen, plan: Plan) -> None:
+def _plan(job: Job, out: Path, port: str | None, drive: Waveform, repeats: int) -> None:
     """Say what would be played."""
-    screen.result(plan)
-    screen.facts(
-        f"would play {plan.name} by {plan.inversion} inversion on {plan.port} and write {plan.output}; "
+    from pulsetrainer.device.device import DEFAULT_PORT
+    from pulsetrainer.device.schemes import redact
+    from pulsetrainer.steps.play import plan
+
+    planned, where = plan(drive, repeats=repeats), redact(port or DEFAULT_PORT)
+    job.screen.result(
+        {"name": drive.name, "inversion": drive.inversion, "repeats": repeats}
+        | plain(planned)
+        | {"port": where, "output": out, "dry_run": True}
+    )
+    job.screen.facts(
+        f"would play {drive.name} by {drive.inversion} inversion on {where} and write {out}; "
         "nothing was done",
         {
-            "repeats": f"{plan.repeats} of each drive, {plan.seconds:.1f} s in all",
-            "samples": f"{plan.samples} a repeat, {plan.rate_Hz:g} a second",
-            "current": f"{plan.peak_current_A:.3f} A at most, {plan.rms_current_A:.3f} A rms",
+            "repeats": f"{repeats} of each drive, {planned.seconds:.1f} s in all",
+            "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
+            "current": f"{planned.peak_current_A:.3f} A at most, {planned.rms_current_A:.3f} A rms",
         },
     )

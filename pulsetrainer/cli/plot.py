@@ -7,28 +7,35 @@ from typing import Annotated
 
 import typer
 
-from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, Force, Out
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.report.forms import figure_form
 
 
 def plot(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
     out: Out,
-    force: Force = False,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Draw an artefact as PNG, SVG or PDF.
 
     Example: pulsetrainer plot model.h5 -o model.png
     """
-    from pulsetrainer.steps import preflight
+    form = figure_form(out, "a figure")
+    job = Job(context, inputs=(file,), outputs=(out,), overwrite=overwrite, as_json=json)
+    artefact = job.load_any(file)
+    from pulsetrainer.errors import DataError
+    from pulsetrainer.report import figures, render
 
-    preflight.figure_form(out, "a figure")
-    preflight.check_files(outputs=(out,), force=force, artefacts=(file,))
-    from pulsetrainer.steps import plot as flow
-
-    screen = Screen("plot", as_json=json)
-    with screen.working(f"drawing {file.name}") as context:
-        result = flow.run(flow.Options(file, out, force), context)
-    screen.result(result)
-    screen.whole(f"wrote {result.output}: a {result.kind}")
+    with job.working(f"drawing {file.name}"):
+        try:
+            picture = render.encode(figures.draw(artefact), form)
+        except (ValueError, ArithmeticError) as error:
+            raise DataError(
+                f"{file} cannot be drawn: {error}", hint=f"look at its values: pulsetrainer show {file}"
+            ) from error
+        job.write(out, picture)
+    job.screen.result({"output": out, "kind": artefact.kind})
+    job.screen.whole(f"wrote {out}: {artefact.kind}")

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
-from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.evaluate import tables
+from pulsetrainer.cli.evaluate import show_tables
+from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson
 
 
 def show(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
     json: AsJson = False,
 ) -> None:
@@ -22,31 +23,28 @@ def show(
 
     Example: pulsetrainer show model.h5
     """
-    from pulsetrainer.steps import preflight
-
-    preflight.check_files(artefacts=(file,))
+    job = Job(context, inputs=(file,), as_json=json)
     from pulsetrainer.artefacts import Evaluation
-    from pulsetrainer.steps import show as flow
+    from pulsetrainer.files import store
+    from pulsetrainer.report.facts import facts
 
-    screen = Screen("show", as_json=json)
-    with screen.working("reading") as context:
-        result = flow.run(flow.Options(file), context)
-    header = result.header
-    screen.result(
+    with job.working("reading"):
+        artefact, header = job.load_any(file), store.read_header(file)
+        found = facts(artefact)
+    job.screen.result(
         {
             "file": file,
-            "kind": result.kind,
+            "kind": artefact.kind,
             "title": header.title,
             "created": header.created,
             "history": header.history,
-            "facts": result.facts,
+            "facts": found,
         }
     )
-    title = f"{file}: {result.kind}, {header.title}, {header.created}"
-    known = {name: value for name, value in result.facts.items() if value is not None}
-    if isinstance(result.artefact, Evaluation):
-        screen.facts(title, {})
-        tables(screen, result.artefact)
+    title = f"{file}: {artefact.kind}, {header.title}, {header.created}"
+    if isinstance(artefact, Evaluation):
+        job.screen.facts(title, {})
+        show_tables(job.screen, artefact)
     else:
-        screen.facts(title, known)
-    screen.whole("\n".join(["history", *(f"  {line}" for line in header.history)]))
+        job.screen.facts(title, {name: value for name, value in found.items() if value is not None})
+    job.screen.whole("\n".join(["history", *(f"  {line}" for line in header.history)]))

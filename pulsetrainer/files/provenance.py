@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from pulsetrainer import __version__
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.input_file import unreadable
+from pulsetrainer.version import __version__
 
 PROGRAM = "pulsetrainer"
 _LIBRARIES = ("numpy", "scipy", "h5py")

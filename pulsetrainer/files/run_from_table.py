@@ -7,12 +7,13 @@ about its time, and what was made of it, goes to the ``note`` of the caller.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Run
+from pulsetrainer.artefacts.time_steps import GAP, steps_of
 from pulsetrainer.core.signals import MOST_SAMPLES
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.table import Table, read_table, split_unit
@@ -25,51 +26,12 @@ _SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, 
 _TIME_NAMES = frozenset(
     ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
 )
-GAP = 1.5  # a step longer than this times the median one is a gap
-# Steps within this share of the median are even: time stamps are written with few digits.
-EVEN = 0.02
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
-_LOOKED_AT = 1_000_000  # steps for their median
 _BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
 
 def _silent(_text: str) -> None:
     """Say nothing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Steps:
-    """How even the time stamps of a run are, s."""
-
-    median: float
-    shortest: float
-    longest: float  # that is no gap
-    gaps: int
-    longest_gap: float  # 0 where there is none
-
-    @property
-    def even(self) -> bool:
-        """True where no step differs from the median by more than ``EVEN``; gaps count apart."""
-        low, high = (1.0 - EVEN) * self.median, (1.0 + EVEN) * self.median
-        return low <= self.shortest and self.longest <= high
-
-
-def steps_of(time_s: FloatArray) -> Steps:
-    """Sum up the steps between time stamps (n,), n >= 2.
-
-    Of more than a million steps, the median is that of a million that lie evenly among them.
-    """
-    every = -(-(time_s.size - 1) // _LOOKED_AT)
-    median = float(np.median(time_s[1::every] - time_s[:-1:every]))
-    shortest, longest, gaps, longest_gap = np.inf, -np.inf, 0, 0.0
-    for k in range(0, time_s.size - 1, _BLOCK):
-        step = np.diff(time_s[k : k + _BLOCK + 1])
-        is_gap = step > GAP * median
-        shortest = min(shortest, float(step.min()))
-        longest = max(longest, float(step[~is_gap].max(initial=-np.inf)))
-        gaps += int(is_gap.sum())
-        longest_gap = max(longest_gap, float(step[is_gap].max(initial=0.0)))
-    return Steps(median, shortest, longest, gaps, longest_gap)
 
 
 def read_run(

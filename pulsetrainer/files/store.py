@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import h5py
 import numpy as np
 
-from pulsetrainer import __version__
 from pulsetrainer.artefacts import KINDS, Run
 from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, WrongKindError
 from pulsetrainer.files.atomic_write import check_output, replacing
@@ -25,6 +24,7 @@ from pulsetrainer.files.journal import Recording
 from pulsetrainer.files.provenance import Header, Provenance, clean
 from pulsetrainer.files.schema import TIME, kind_of, plan_of
 from pulsetrainer.files.unfailing_file import UnfailingFile
+from pulsetrainer.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

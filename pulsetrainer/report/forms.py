@@ -2,6 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Final
 
+from pulsetrainer.errors import UsageError
+
 FORMATS: Final = ("png", "svg", "pdf")
+
+
+def figure_form(path: Path, what: str, *more: str) -> str:
+    """Return the format that the name of a figure asks for; ``more`` are those that are no figures.
+
+    Raises
+    ------
+    UsageError
+        It is none that can be written.
+    """
+    form = path.suffix.lower().lstrip(".")
+    if form not in (*FORMATS, *more):
+        known = [*FORMATS, *more]
+        raise UsageError(
+            f"{what} is written as {', '.join(known[:-1])} or {known[-1]}, but {path} ends in {form!r}",
+            hint=f"name it {path.parent / (path.stem or 'figure')}.png",
+        )
+    return form

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from pulsetrainer.artefacts.evaluation import PUBLISHED
 from pulsetrainer.report import views
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ def render_evaluation(
     title: str,
     created: str,
     provenance_json: str,
-    published: views.Published | None = None,
+    published: views.Published = PUBLISHED,
     history: Sequence[str] = (),
 ) -> str:
     """Return the report of an evaluation as one self-contained HTML page.
@@ -39,7 +40,6 @@ def render_evaluation(
 
     """
     played = [(one, f"waveform-{k}") for k, one in enumerate(evaluation.waveforms, start=1)]
-    beside = published or {}
     return (
         environment()
         .get_template("evaluation.html.j2")
@@ -49,8 +49,8 @@ def render_evaluation(
             provenance=indented(provenance_json),
             history=tuple(history),
             readouts=[views.readout(one, identifier) for one, identifier in played],
-            overview=views.overview(played, beside),
-            compared=any(one.name in beside for one, _ in played),
+            overview=views.overview(played, published),
+            compared=any(one.name in published for one, _ in played),
             model=None if evaluation.model is None else views.model_section(evaluation.model),
             waveforms=[views.waveform_section(one, identifier) for one, identifier in played],
             prediction=views.prediction_section(evaluation.models) if evaluation.models else None,

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import atomic_write, store
-from pulsetrainer.steps import preflight
-from pulsetrainer.steps.evaluate import metrics_of
-
-if TYPE_CHECKING:
-    from pulsetrainer.steps.context import Context
+from pulsetrainer.steps.asked import check_several
 
 # What a person wants to see first; the others on request.
 HEADLINES = (
@@ -31,25 +22,6 @@ _SAME = 0.005  # smaller changes are no change: a figure is shown with two digit
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
-    """Which evaluations, and what is written."""
-
-    files: tuple[Path, ...]
-    output: Path | None = None  # a figure, or a table when it ends in .csv
-    everything: bool = False  # all metrics instead of the headlines
-    force: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """One evaluation."""
-
-    file: Path
-    title: str
-    created: str
-
-
-@dataclass(frozen=True, slots=True)
 class Metric:
     """One figure in all evaluations; None where an evaluation does not have it."""
 
@@ -59,46 +31,36 @@ class Metric:
     better: bool | None  # None: no change, or nothing to compare
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """The comparison."""
+def compare(
+    evaluations: Sequence[Evaluation], *, names: Sequence[str] = (), everything: bool = False
+) -> tuple[Metric, ...]:
+    """Return the figures of several evaluations side by side, the oldest first, and how each changed.
 
-    evaluations: tuple[Source, ...]
-    metrics: tuple[Metric, ...]
-    output: Path | None
-
-
-def run(options: Options, context: Context) -> Result:
-    """Lay the figures of several evaluations side by side.
+    Parameters
+    ----------
+    names
+        Names of the evaluations, for messages.
+    everything
+        All figures instead of the headlines.
 
     Raises
     ------
     UsageError
-        Fewer than two files, or an output that exists or is of no known form.
+        There are fewer than two evaluations.
     DataError
-        A file is no evaluation, or the evaluations have no figure in common.
+        They have no figure in common.
     """
-    form = preflight.comparison_form(options.files, options.output)
-    preflight.check_files(outputs=(options.output,), force=options.force)
-    evaluations = [store.read(path, Evaluation) for path in options.files]
-    headers = [store.read_header(path) for path in options.files]
-    context.progress(0.4)
-    sources = tuple(
-        Source(path, header.title, header.created)
-        for path, header in zip(options.files, headers, strict=True)
-    )
+    check_several(evaluations)
     every = _figures(evaluations)
-    names = [n for n in dict.fromkeys(n for one in every for n in one) if options.everything or _headline(n)]
-    metrics = tuple(_metric(name, tuple(one.get(name) for one in every)) for name in names)
+    wanted = [n for n in dict.fromkeys(n for one in every for n in one) if everything or _headline(n)]
+    metrics = tuple(_metric(name, tuple(one.get(name) for one in every)) for name in wanted)
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
+        listed = ", ".join(names) or "these evaluations"
         raise DataError(
-            f"no two of {', '.join(map(str, options.files))} have a figure in common",
+            f"no two of {listed} have a figure in common",
             hint="evaluate the same pulses, with the same inversion, or the same models",
         )
-    if options.output is not None:
-        _write(options, form, sources, metrics)
-    context.progress(1.0)
-    return Result(sources, metrics, options.output)
+    return metrics
 
 
 def _figures(evaluations: Sequence[Evaluation]) -> list[dict[str, float]]:
@@ -113,8 +75,8 @@ def _figures(evaluations: Sequence[Evaluation]) -> list[dict[str, float]]:
     for one in evaluations:
         renamed = {f"{w.name}.{w.inversion}.": f"{w.name}." for w in one.waveforms} if by_pulse else {}
         if one_model:
-            renamed |= {f"{Path(m.name).stem}.": "model." for m in one.models}
-        figures = metrics_of(one)
+            renamed |= {f"{m.short_name}.": "model." for m in one.models}
+        figures = one.figures()
         for old, new in renamed.items():
             figures = {
                 new + name.removeprefix(old) if name.startswith(old) else name: value
@@ -135,31 +97,3 @@ def _metric(name: str, values: tuple[float | None, ...]) -> Metric:
     if change is not None and abs(change) >= _SAME:
         better = (change > 0) == name.endswith(_RISING)
     return Metric(name, values, change, better)
-
-
-def _write(options: Options, form: str, sources: tuple[Source, ...], metrics: tuple[Metric, ...]) -> None:
-    assert options.output is not None
-    if form == "csv":
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["metric", *(str(s.file) for s in sources), "change"])
-        writer.writerows([m.name, *m.values, m.change] for m in metrics)
-        content = text.getvalue().encode()
-    else:
-        from pulsetrainer.report import comparison_figure, render  # draws: a table need not wait for it
-
-        labels = labels_of(options.files)
-        picture = comparison_figure.draw(labels, {m.name: m.values for m in metrics})
-        content = render.encode(picture, form)
-    with atomic_write.replacing(options.output, overwrite=options.force) as temporary:
-        temporary.write_bytes(content)
-
-
-def labels_of(files: tuple[Path, ...]) -> list[str]:
-    """Return short names of files that still tell them apart: the parts of their paths that differ."""
-    parts = [path.with_suffix("").parts for path in files]
-    if len({p[-1] for p in parts}) == len(parts):
-        return [p[-1] for p in parts]
-    if len({p[:-1] for p in parts}) == len(parts) and len({p[-1] for p in parts}) == 1:
-        return [Path(*p[:-1]).name or str(path) for p, path in zip(parts, files, strict=True)]
-    return [str(path) for path in files]

@@ -2,333 +2,224 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Fit, Model, Run
+from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core import input_noise, metrics, uncertainty
 from pulsetrainer.core.coverage import coverage, largest_gap
-from pulsetrainer.core.edges import plane_for
-from pulsetrainer.core.identification import (
-    Identified,
-    Method,
-    Smoothing,
-    identify,
-    offsets_between,
-)
-from pulsetrainer.core.plane import FloatArray, Plane, Reading
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.fit import Fitted, fit
+from pulsetrainer.core.identification import Method, Smoothing
+from pulsetrainer.core.initial_state import known_from
+from pulsetrainer.core.plane import Plane, Reading
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import atomic_write, provenance, store
-from pulsetrainer.steps.modelling import known_from, parts_of, record_of, step_of
-from pulsetrainer.steps.show import shown as shown_unit
+from pulsetrainer.steps.progress import Progress, silent
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pulsetrainer.steps.context import Context
-
-_TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
-_CROWDED_MISFIT = 0.02  # of the span, rms: beyond it levels do not crowd
-_WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
+TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
+SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
+WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
 
-@dataclass(frozen=True, slots=True)
-class Options:
-    """Which runs to fit, and how."""
+def identify(
+    runs: Run | Sequence[Run],
+    *,
+    levels: int = 48,
+    reading: Reading = "continuous",
+    method: Method = "joint",
+    smoothing: Smoothing | None = None,
+    bootstrap: int = 0,
+    seed: int = 0,
+    names: Sequence[str] = (),
+    progress: Progress = silent,
+) -> Model:
+    """Fit a Preisach model to one or several runs of one device.
 
-    runs: tuple[Path, ...]
-    output: Path
-    levels: int = 48
-    reading: Reading = "continuous"
-    method: Method = "joint"
-    smoothing: Smoothing | None = None  # None: "auto", or 0 for relays, as in the paper
-    bootstrap: int = 0  # refits to resampled blocks
-    seed: int = 0  # of the resampling
-    force: bool = False
+        minimise  sum_t (y_t - y0 - sum_k mu_k A_k r_k(u_0 .. u_t))^2   over mu >= 0 and y0
 
-
-@dataclass(frozen=True, slots=True)
-class Result:
-    """How the model came out."""
-
-    output: Path
-    levels: int
-    cells: int
-    offset: float
-    output_unit: str
-    fit_rms: float
-    fit_rms_percent: float
-    fit_max_percent: float
-    coverage_percent: float
-    smoothing: float  # share of the input's range
-    input_noise: float | None  # standard deviation, input unit; None where the records cannot tell
-    false_reversals: int  # taken out of the input before the fit
-    output_uncertainty: float | None  # mean half width of the 90 % band of the output; None without bootstrap
-    polarity: int
-    offsets: tuple[float, ...]  # of each run's output against their mean; zeros where one offset serves all
-    spacing: str  # of the levels: "even", or "crowded" where the loop is steep
-    stiffness: float  # t; 0: the density is free
-    warning: str  # that this kind of model is the wrong one; empty where it is not
-    iterations: int
-    seconds: float
-
-
-def run(options: Options, context: Context) -> Result:
-    """Fit the runs and store the model.
+    Parameters
+    ----------
+    runs
+        Measured input and output; all in the same units.
+    levels
+        Number of levels n_h; the model has n_h (n_h + 1) / 2 cells.
+    reading
+        How the weights are read: "continuous", a piecewise constant density, or "relay", as in the paper.
+    method
+        "joint", or "alternating" between offset and weights, as in the paper; both end at the same point.
+    smoothing
+        Length below which the density is smoothed, share of the input's range; "auto" by held-out blocks.
+        None: "auto", and 0 for relays.
+    bootstrap
+        Refits to resampled blocks, drawn from ``seed``: 90 % intervals of the weights and the output.
+    names
+        Names of the runs, for the notes.
 
     Raises
     ------
-    UsageError
-        The output exists.
     DataError
-        A file is no run, the runs differ in their units, or an input or output does not vary.
+        The runs differ in their units, or an input does not move.
+    ArgumentError
+        There are too few samples, an output does not vary, or a parameter is out of its range.
     ConvergenceError
         The fit did not settle.
+
+    Source: Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631, eq. 2 and section 3.
+
+    Examples
+    --------
+    >>> import numpy as np, pulsetrainer as pt
+    >>> u = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
+    >>> model = pt.identify(pt.Run(time_s=np.arange(400) / 100, input=u, output=2 * u), levels=8)
+    >>> model.fit.coverage_percent
+    100.0
     """
-    atomic_write.check_output(options.output, options.force)
-    begun = time.perf_counter()
-    runs = [store.read(path, Run) for path in options.runs]
-    _check_units(options.runs, runs)
-    for path, one in zip(options.runs, runs, strict=True):
-        if not one.complete:
-            context.note(f"{path} is incomplete; fitting the {one.input.size} samples it has")
-    cut = [parts_of(one) for one in runs]
-    names = [path.stem for path, parts in zip(options.runs, cut, strict=True) for _ in parts]
-    runs = [part for parts in cut for part in parts]
-    ranges = [input_range(one) for one in runs]
-    low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
-    _check_range(options.runs, low, high, runs[0].input_unit)
-    cleaned = [input_noise.clean(one.input) for one in runs]
-    _note_noise(cleaned, runs[0].input_unit, context)
-    runs = [replace(one, input=clean.input) for one, clean in zip(runs, cleaned, strict=True)]
-    context.progress(0.1)
-    records, found, shifts = _fitted(runs, names, (low, high), options, context)
-    plane = found.operator.plane
-    context.progress(0.4 if options.bootstrap else 0.8)
-    ensemble = None
-    if options.bootstrap:
-        ensemble = uncertainty.bootstrap(
-            records, found, rng=np.random.default_rng(options.seed), draws=options.bootstrap
-        )
-        context.progress(0.8)
-    if found.operator.polarity < 0:
-        context.note("the output falls when the input rises: fitted as a falling loop")
-    covered = coverage(plane, [one.input for one in runs])
-    gap = largest_gap(plane, covered)
-    if gap is not None and float(np.mean(covered)) < _WELL_COVERED:
-        context.note(gap.words(plane, runs[0].input_unit))
-    model = _model(runs, records, found, covered, ensemble)
-    warning = _warned(runs, records, found, context)
-    context.progress(0.9)
-    header = provenance.make_header(
-        f"Preisach model of {', '.join(path.stem for path in options.runs)}",
-        argv=context.argv,
-        now=context.now(),
-        parameters={k: v for k, v in asdict(options).items() if k not in ("runs", "output", "force")},
-        inputs=provenance.digests(options.runs),
-        ancestors=[store.read_header(path) for path in options.runs],
-        libraries=provenance.library_versions(),
-    )
-    store.write(options.output, model, header, overwrite=options.force)
-    context.progress(1.0)
-    assert model.fit is not None
-    return Result(
-        output=options.output,
-        levels=plane.n_h,
-        cells=plane.n_q,
-        offset=model.offset,
-        output_unit=model.output_unit,
-        fit_rms=model.fit.rms,
-        fit_rms_percent=model.fit.rms_percent,
-        fit_max_percent=100.0 * model.fit.max_abs / float(np.ptp(np.concatenate([r.output for r in runs]))),
-        coverage_percent=model.fit.coverage_percent,
-        smoothing=found.smoothing,
-        input_noise=_largest_noise(cleaned),
-        false_reversals=sum(clean.removed for clean in cleaned),
-        output_uncertainty=_half_width(model.fit),
-        polarity=model.polarity,
-        offsets=tuple(float(shift) for shift in shifts),
-        spacing="even" if _is_even(plane) else "crowded",
-        stiffness=found.stiffness,
-        warning=warning,
-        iterations=model.fit.iterations,
-        seconds=time.perf_counter() - begun,
-    )
-
-
-def _fitted(
-    runs: Sequence[Run],
-    names: Sequence[str],
-    reach: tuple[float, float],
-    options: Options,
-    context: Context,
-) -> tuple[list[Record], Identified, FloatArray]:
-    """Return the records as fitted, the operator, and the offset of each record against their mean."""
-    low, high = reach
-    records = [record_of(one, low, high) for one in runs]
-    plane = _plane(records, low, high, options)
-    shifts = offsets_between(records, plane, options.reading)
-    if np.any(shifts):
-        _note_shifts(names, shifts, runs, context)
-        records = [record_of(one, low, high, shift) for one, shift in zip(runs, shifts, strict=True)]
-    smoothing = options.smoothing
+    whole = [runs] if isinstance(runs, Run) else list(runs)
+    titles = list(names) or [f"run {number}" for number in range(1, len(whole) + 1)]
+    notes: list[str] = []
+    _check_units(titles, whole)
+    for title, run in zip(titles, whole, strict=True):
+        if not run.complete:
+            notes.append(f"{title} is incomplete; fitting the {run.input.size} samples it has")
+    cut = [run.parts(SHORTEST_PART) for run in whole]
+    titles = [title for title, parts in zip(titles, cut, strict=True) for _ in parts]
+    measured = [part for parts in cut for part in parts]
+    low, high = _reach(titles, measured)
+    cleaned = [input_noise.clean(part.input) for part in measured]
+    notes += _of_noise(cleaned, measured[0].input_unit)
+    measured = [replace(part, input=clean.input) for part, clean in zip(measured, cleaned, strict=True)]
+    progress(0.1)
     if smoothing is None:
-        smoothing = 0.0 if options.reading == "relay" else "auto"
-    found = identify(records, plane, reading=options.reading, method=options.method, smoothing=smoothing)
-    if not _is_even(plane) and _misfit(records, found) > _CROWDED_MISFIT:
-        # what is steep here is nothing that the operator can follow: closer levels would learn it by heart
-        plane = Plane.uniform(low, high, options.levels)
-        found = identify(records, plane, reading=options.reading, method=options.method, smoothing=smoothing)
-    if not _is_even(plane):
-        context.note("the loop is steep: the levels lie closer where the output changes")
-    return records, found, shifts
-
-
-def _warned(runs: Sequence[Run], records: Sequence[Record], found: Identified, context: Context) -> str:
-    """Say where the output follows the velocity of the input, not the input."""
-    compared = velocity.compare(records, [step_of(one) for one in runs], _residuals(records, found))
-    warning = velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
-    if warning:
-        context.note(warning)
-    return warning
-
-
-def _largest_noise(cleaned: Sequence[input_noise.Cleaned]) -> float | None:
-    """Noise of the noisiest input, as far as the records can tell."""
-    known = [clean.sigma for clean in cleaned if np.isfinite(clean.sigma)]
-    return max(known) if known else None
-
-
-def _note_noise(cleaned: Sequence[input_noise.Cleaned], unit: str, context: Context) -> None:
-    """Say how many reversals were noise."""
-    removed = sum(clean.removed for clean in cleaned)
-    unit = f" {unit}" if shown_unit(unit) else ""
-    if removed:
-        worst = max(cleaned, key=lambda clean: clean.removed)
-        context.note(
-            f"the measured input has noise of {worst.sigma:.2g}{unit}: {removed} false reversals below "
-            f"{worst.dead_band:.2g}{unit} taken out, {sum(clean.kept for clean in cleaned)} left"
+        smoothing = 0.0 if reading == "relay" else "auto"
+    fitted = fit(
+        [(part.input, part.output) for part in measured],
+        low,
+        high,
+        levels,
+        reading=reading,
+        method=method,
+        smoothing=smoothing,
+    )
+    notes += _of_offsets(titles, fitted, measured)
+    if not fitted.evenly_spaced:
+        notes.append("the loop is steep: the levels lie closer where the output changes")
+    progress(0.4 if bootstrap else 0.8)
+    ensemble = None
+    if bootstrap:
+        ensemble = uncertainty.bootstrap(
+            fitted.records, fitted.identified, rng=np.random.default_rng(seed), draws=bootstrap
         )
+    operator = fitted.identified.operator
+    if operator.polarity < 0:
+        notes.append("the output falls when the input rises: fitted as a falling loop")
+    covered = coverage(operator.plane, [part.input for part in measured])
+    notes += _of_gaps(operator.plane, covered, measured[0].input_unit)
+    warning = _warning(fitted, measured)
+    notes += [warning] if warning else []
+    progress(1.0)
+    return _model(fitted, measured, covered, ensemble, cleaned, tuple(notes), warning)
 
 
-def input_range(one: Run) -> tuple[float, float]:
+def input_range(run: Run) -> tuple[float, float]:
     """Range of the input of a run; what noise adds beyond the reference does not count."""
-    low, high = float(np.min(one.input)), float(np.max(one.input))
-    if one.reference is not None:
-        low, high = max(low, float(np.min(one.reference))), min(high, float(np.max(one.reference)))
+    low, high = float(np.min(run.input)), float(np.max(run.input))
+    if run.reference is not None:
+        low, high = max(low, float(np.min(run.reference))), min(high, float(np.max(run.reference)))
     return low, high
 
 
-def _check_units(paths: Sequence[Path], runs: Sequence[Run]) -> None:
+def _check_units(names: Sequence[str], runs: Sequence[Run]) -> None:
     """Raise DataError unless all runs measure in the same units."""
+    if not runs:
+        raise DataError("there is no run to identify a model from", hint="give at least one run")
     first = runs[0]
-    for path, one in zip(paths, runs, strict=True):
-        if (one.input_unit, one.output_unit) != (first.input_unit, first.output_unit):
+    for name, run in zip(names, runs, strict=True):
+        if (run.input_unit, run.output_unit) != (first.input_unit, first.output_unit):
             raise DataError(
-                f"{path} is in {one.input_unit} and {one.output_unit}, "
-                f"but {paths[0]} is in {first.input_unit} and {first.output_unit}",
+                f"{name} is in {run.input_unit} and {run.output_unit}, "
+                f"but {names[0]} is in {first.input_unit} and {first.output_unit}",
                 hint="import the runs again with the same --input-unit and --output-unit",
             )
 
 
-def _check_range(paths: Sequence[Path], low: float, high: float, unit: str) -> None:
-    """Raise DataError when the input does not move."""
+def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
+    """Range of the input over all runs, or DataError where it does not move."""
+    ranges = [input_range(run) for run in runs]
+    low, high = min(r[0] for r in ranges), max(r[1] for r in ranges)
     if not high > low:
-        names = ", ".join(str(path) for path in paths)
-        value = f"{low:g} {shown_unit(unit)}".rstrip()
+        listed = ", ".join(dict.fromkeys(names))
         raise DataError(
-            f"the input of {names} does not move: it is {value} in all samples",
+            f"the input of {listed} does not move: it is {with_unit(f'{low:g}', runs[0].input_unit)} "
+            "in all samples",
             hint="record a run that sweeps the range: pulsetrainer capture identification -o run.h5",
         )
+    return low, high
 
 
-def _half_width(fit: Fit) -> float | None:
-    """Mean half width of the band of the predicted output."""
-    if fit.predicted_lower is None or fit.predicted_upper is None:
-        return None
-    return 0.5 * float(np.mean(fit.predicted_upper - fit.predicted_lower))
+def _of_noise(cleaned: Sequence[input_noise.Cleaned], unit: str) -> list[str]:
+    """Say how many reversals of the input were noise."""
+    removed = sum(clean.removed for clean in cleaned)
+    if not removed:
+        return []
+    worst = max(cleaned, key=lambda clean: clean.removed)
+    sigma, band = with_unit(f"{worst.sigma:.2g}", unit), with_unit(f"{worst.dead_band:.2g}", unit)
+    kept = sum(clean.kept for clean in cleaned)
+    found = f"the measured input has noise of {sigma}"
+    return [f"{found}: {removed} false reversals below {band} taken out, {kept} left"]
 
 
-def _plane(records: Sequence[Record], low: float, high: float, options: Options) -> Plane:
-    """Return the levels: even for relays, as in the paper, else where the output changes."""
-    if options.reading == "relay":
-        return Plane.uniform(low, high, options.levels)
-    return plane_for(records, low, high, options.levels)
-
-
-def _is_even(plane: Plane) -> bool:
-    return bool(np.allclose(np.diff(plane.edges), np.diff(plane.edges)[0]))
-
-
-def _misfit(records: Sequence[Record], found: Identified) -> float:
-    """Rms error of the fit as a share of the output's span."""
-    left = [e[r.sample_weight > 0] for e, r in zip(_residuals(records, found), records, strict=True)]
-    span = float(np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in records])))
-    return metrics.root_mean_square(np.concatenate(left)) / span
-
-
-def _note_shifts(names: Sequence[str], shifts: FloatArray, runs: Sequence[Run], context: Context) -> None:
+def _of_offsets(names: Sequence[str], fitted: Fitted, runs: Sequence[Run]) -> list[str]:
     """Say how far the outputs of the runs are shifted against each other."""
-    span = float(np.ptp(np.concatenate([one.output for one in runs])))
-    listed = ", ".join(f"{name} {shift:+.3g}" for name, shift in zip(names, shifts, strict=True))
-    context.note(
-        f"the outputs of the runs are shifted against each other by up to {np.ptp(shifts):.3g} "
-        f"{shown_unit(runs[0].output_unit)} ({100 * np.ptp(shifts) / span:.2f} % of the span): each was "
-        f"fitted with an offset of its own ({listed}); the model has their mean"
-    )
+    if not np.any(fitted.offsets):
+        return []
+    span = float(np.ptp(np.concatenate([run.output for run in runs])))
+    apart = float(np.ptp(fitted.offsets))
+    listed = ", ".join(f"{name} {shift:+.3g}" for name, shift in zip(names, fitted.offsets, strict=True))
+    shift = f"{with_unit(f'{apart:.3g}', runs[0].output_unit)} ({100 * apart / span:.2f} % of the span)"
+    found = f"the outputs of the runs are shifted against each other by up to {shift}"
+    return [f"{found}: each was fitted with an offset of its own ({listed}); the model has their mean"]
 
 
-def _residuals(records: Sequence[Record], found: Identified) -> list[FloatArray]:
-    """Measured less fitted output (n,) of each record."""
-    return [r.output - found.operator(r.input, r.start) for r in records]
+def _of_gaps(plane: Plane, covered: BoolArray, unit: str) -> list[str]:
+    """Name the largest part of the plane that the runs never reached."""
+    gap = largest_gap(plane, covered)
+    return [] if gap is None or float(np.mean(covered)) >= WELL_COVERED else [gap.words(plane, unit)]
+
+
+def _warning(fitted: Fitted, runs: Sequence[Run]) -> str:
+    """Say where the output follows the velocity of the input, not the input; nothing elsewhere."""
+    compared = velocity.compare(fitted.records, [run.dt_s for run in runs], fitted.residuals)
+    return velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
 
 
 def _model(
+    fitted: Fitted,
     runs: Sequence[Run],
-    records: Sequence[Record],
-    found: Identified,
     covered: BoolArray,
     ensemble: uncertainty.Ensemble | None,
+    cleaned: Sequence[input_noise.Cleaned],
+    notes: tuple[str, ...],
+    warning: str,
 ) -> Model:
-    """Return the stored form of an identified operator, with its fit."""
-    operator, first = found.operator, runs[0]
+    """Return the model with its fit."""
+    found, first, record = fitted.identified, runs[0], fitted.records[0]
+    operator = found.operator
     plane = operator.plane
-    measured, predicted = [], []
-    for record in records:
-        known = record.sample_weight > 0
-        measured.append(record.output[known])
-        predicted.append(operator(record.input, record.start)[known])
-    errors = metrics.prediction(np.concatenate(measured), np.concatenate(predicted))
-    shown = slice(
-        known_from(first.input, plane.low, plane.high), None, max(1, first.input.size // _TRACE_SAMPLES)
+    counted = [r.sample_weight > 0 for r in fitted.records]
+    measured = np.concatenate([r.output[c] for r, c in zip(fitted.records, counted, strict=True)])
+    predicted = np.concatenate(
+        [operator(r.input, r.start)[c] for r, c in zip(fitted.records, counted, strict=True)]
+    )
+    errors = metrics.prediction(measured, predicted)
+    thinned = slice(
+        known_from(first.input, plane.low, plane.high), None, max(1, first.input.size // TRACE_SAMPLES)
     )
     band = None if ensemble is None else ensemble.output_band(first.input)
     weights = None if ensemble is None else ensemble.weight_interval()
-    fit = Fit(
-        rms=errors.rms,
-        max_abs=errors.max_abs,
-        rms_percent=errors.rms_percent,
-        coverage_percent=100.0 * float(np.mean(covered)),
-        input_unit=first.input_unit,
-        output_unit=first.output_unit,
-        samples=sum(part.size for part in measured),
-        iterations=found.iterations,
-        method=found.method,
-        time_s=None if first.time_s is None else first.time_s[shown],
-        input=first.input[shown],
-        output=records[0].output[shown],
-        predicted=operator(records[0].input, records[0].start)[shown],
-        smoothing=found.smoothing,
-        draws=0 if ensemble is None else len(ensemble.weights),
-        predicted_lower=None if band is None else band.lower[shown],
-        predicted_upper=None if band is None else band.upper[shown],
-    )
+    sigmas = [clean.sigma for clean in cleaned if np.isfinite(clean.sigma)]
     return Model(
         edges=plane.edges,
         weights=operator.weights,
@@ -343,5 +234,31 @@ def _model(
         polarity=operator.polarity,
         weights_lower=None if weights is None else weights.lower,
         weights_upper=None if weights is None else weights.upper,
-        fit=fit,
+        fit=Fit(
+            rms=errors.rms,
+            max_abs=errors.max_abs,
+            rms_percent=errors.rms_percent,
+            max_percent=100.0 * errors.max_abs / float(np.ptp(np.concatenate([r.output for r in runs]))),
+            coverage_percent=100.0 * float(np.mean(covered)),
+            input_unit=first.input_unit,
+            output_unit=first.output_unit,
+            samples=measured.size,
+            iterations=found.iterations,
+            method=found.method,
+            time_s=None if first.time_s is None else first.time_s[thinned],
+            input=first.input[thinned],
+            output=record.output[thinned],
+            predicted=operator(record.input, record.start)[thinned],
+            smoothing=found.smoothing,
+            draws=0 if ensemble is None else len(ensemble.weights),
+            predicted_lower=None if band is None else band.lower[thinned],
+            predicted_upper=None if band is None else band.upper[thinned],
+            input_noise=max(sigmas, default=float("nan")),
+            false_reversals=sum(clean.removed for clean in cleaned),
+            offsets=tuple(float(shift) for shift in fitted.offsets),
+            spacing="even" if fitted.evenly_spaced else "crowded",
+            stiffness=found.stiffness,
+            warning=warning,
+            notes=notes,
+        ),
     )

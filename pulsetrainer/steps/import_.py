@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pulsetrainer.artefacts.time_steps import steps_of
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.identification import CLEAR, correlation_of
@@ -159,7 +160,7 @@ def _store(target: Path, files: Sequence[Path], whole: Run, options: Options, co
 def report_of(whole: Run, files: Sequence[Path], *, resampled: bool = False) -> Report:
     """Return what a run holds, in numbers."""
     timed = whole.time_s is not None
-    steps = run_from_table.steps_of(whole.time_s) if whole.time_s is not None else None
+    steps = steps_of(whole.time_s) if whole.time_s is not None else None
     low, high = float(whole.input.min()), float(whole.input.max())
     every = -(-whole.input.size // _LOOKED_AT)
     u, y = whole.input[::every], whole.output[::every]

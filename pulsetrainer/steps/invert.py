@@ -1,26 +1,25 @@
-"""Invert: from a pulse shape and a model to the current that presses it."""
+"""Invert: from the shape of a pulse and a model to the drive that presses it."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from pulsetrainer.artefacts import Model, Waveform
+from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core import inversion, signals
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.waveforms import Shape, train
-from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files import atomic_write, provenance, run_from_table, store, table
-from pulsetrainer.steps import preflight
-from pulsetrainer.steps.modelling import extended_of, operator_of, predict
+from pulsetrainer.diagnosis.prediction import extended_of, operator_of, predict
+from pulsetrainer.errors import ArgumentError, DataError, UsageError
+from pulsetrainer.steps.asked import check_beat, check_force_range
+from pulsetrainer.steps.progress import Progress, silent
 
 if TYPE_CHECKING:
     from pulsetrainer.core.operator import Preisach
-    from pulsetrainer.steps.context import Context
 
 Inversion = Literal["continuous", "closest-match", "extended"]
 
@@ -30,269 +29,274 @@ EXTENDED_BAND_HZ = 30.0  # an arterial pulse holds little above
 RAMP_S = 0.4  # from rest to the first target, and back after the last
 
 
-@dataclass(frozen=True, slots=True)
-class Options:
-    """Which pulse, which model, and how."""
+def invert(
+    pulse: Shape,
+    model: Model,
+    *,
+    method: Inversion | None = None,
+    force_min: float | None = None,
+    force_max: float | None = None,
+    beat: str | int | None = None,
+    periods: int = 4,
+    slew_A_per_s: float = 30.0,
+    rate_Hz: float = 1000.0,
+    progress: Progress = silent,
+) -> Waveform:
+    """Find the drive that makes a device follow a pulse, and beside it the merely scaled one.
 
-    waveform: str  # a library name or a CSV file
-    model: Path
-    output: Path
-    beat: str | None = (
-        None  # of a record of several beats: its number from 1, or "mean"; None: all is one period
-    )
-    inversion: Inversion | None = None  # None: what suits the model's reading
-    force_min: float | None = None  # None: the lowest the model can reach
-    force_max: float | None = None
-    periods: int = 4  # the first one is not scored
-    slew_A_per_s: float = 30.0  # what the current loop follows within 1 % of its range
-    rate_Hz: float = 1000.0
-    force: bool = False
+        compensated = P^-1(target),    scaled = low + (high - low) (target - min) / (max - min)
 
+    Both have the same extremes. They begin with one major loop, which wipes out what came before, and end at
+    rest.
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What will be played."""
-
-    output: Path
-    name: str
-    inversion: str
-    samples: int
-    seconds: float
-    force_range: tuple[float, float]
-    current_range: tuple[float, float]
-    clipped_samples: int
-    predicted_max_error_percent: float
-    input_unit: str
-    output_unit: str
-
-
-def read_shape(waveform: str) -> tuple[Shape, Path]:
-    """Return a pulse shape from the library or a file, and the file it came from.
+    Parameters
+    ----------
+    pulse
+        One period of any height; or a recording of several beats together with ``beat``.
+    method
+        "continuous", "closest-match" as in the paper, or "extended". None: what suits the model.
+    force_min, force_max
+        Force at the foot and at the top of the pulse, output unit; None: the ends of the model's reach.
+    beat
+        Number of a beat from 1, or "mean"; None: the whole pulse is one period.
+    periods
+        Periods to play; the first one is not scored.
+    slew_A_per_s
+        Fastest the drive may move, input unit a second.
 
     Raises
     ------
     UsageError
-        It is neither in the library nor a file.
+        The method does not suit the model, ``beat`` is none, or the force range is empty.
     DataError
-        The file cannot be used.
+        The force range is beyond the model's reach, or the recording holds no such beat.
+
+    Source: Tan, Venkataraman, Krishnaprasad 2001 (closest match); docs/theory.md (the other inverses).
+
+    Examples
+    --------
+    >>> import numpy as np, pulsetrainer as pt
+    >>> u = np.concatenate([np.linspace(0, 1, 200), np.linspace(1, 0, 200)])
+    >>> model = pt.identify(pt.Run(time_s=np.arange(400) / 100, input=u, output=2 * u), levels=8)
+    >>> drive = pt.invert("normal", model)
+    >>> drive.inversion, bool(drive.predicted_max_error_percent < 0.1)
+    ('continuous', True)
     """
-    path = preflight.waveform_file(waveform)
-    columns = table.read_table(path)
-    if len(columns.names) < 2:
-        raise DataError(
-            f"{path} has {len(columns.names)} column; a waveform needs a time and a value",
-            hint="write two columns: t_s,p",
-        )
-    time_s, value = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
-    source = next((c.partition(":")[2].strip() for c in columns.comments if c.startswith("source:")), "")
-    return Shape(path.stem, time_s, value, source or path.name), path
-
-
-def _one_beat(record: Shape, beat: str | None, context: Context) -> Shape:
-    """Return the beat that is asked for, out of a record of several."""
-    if beat is None:
-        return record
-    found = find_beats(record)
-    lengths = found.periods_s
-    context.note(
-        f"{record.name} holds {found.count} whole beats of {lengths.min():.3f} to {lengths.max():.3f} s "
-        f"({60.0 / float(np.mean(lengths)):.0f} a minute)"
-    )
-    if beat == "mean":
-        return found.mean()
-    return found.single(int(beat))
-
-
-def run(options: Options, context: Context) -> Result:
-    """Compute the compensated and the scaled drive and store both.
-
-    Raises
-    ------
-    UsageError
-        The output exists, or the waveform is unknown.
-    DataError
-        The model or the waveform cannot be used, or the force range is beyond the model's reach.
-    """
-    atomic_write.check_output(options.output, options.force)
-    preflight.check_beat(options.beat)
-    model = store.read(options.model, Model)
-    shape, path = read_shape(options.waveform)
-    shape = _one_beat(shape, options.beat, context)
+    notes: list[str] = []
+    shape = _one_beat(pulse, beat, notes)
     operator = operator_of(model)
-    usual: Inversion = "closest-match" if operator.reading == "relay" else "continuous"
-    method = options.inversion or ("extended" if model.extensions else usual)
-    if method == "extended" and not model.extensions:
-        raise UsageError(
-            f"{options.model} has no extensions, so there is no extended inverse",
-            hint="pulsetrainer diagnose RUN.h5 --model model.h5 -o diagnosis.h5, then extend",
-        )
-    if method in ("continuous", "extended") and operator.reading == "relay":
-        raise UsageError(
-            f"{options.model} was identified with the relay reading, which has no continuous inverse",
-            hint="give --method closest-match, or identify with --reading continuous",
-        )
-    low, high = _force_range(options, operator, model.output_unit)
-    if method == "extended":
-        low, high = _within_beats(options, shape, model, (low, high))
-    context.progress(0.2)
-    waveform = _drives(shape, operator, model, method, (low, high), options, context)
-    header = provenance.make_header(
-        f"{shape.name} by {method} inversion",
-        argv=context.argv,
-        now=context.now(),
-        parameters={
-            key: value for key, value in asdict(options).items() if key not in ("model", "output", "force")
-        },
-        inputs=provenance.digests(
-            [options.model, path] if path.name == options.waveform else [options.model]
-        ),
-        ancestors=[store.read_header(options.model)],
-        libraries=provenance.library_versions(),
-    )
-    store.write(options.output, waveform, header, overwrite=options.force)
-    context.progress(1.0)
-    if waveform.clipped_samples:
-        context.note(f"{waveform.clipped_samples} samples of the target were out of reach and were clipped")
-    scored = waveform.scored
-    error = np.abs(waveform.predicted - waveform.target)[scored].max()
-    return Result(
-        output=options.output,
+    chosen = _method(method, model)
+    forces = _force_range(operator, model.output_unit, force_min, force_max)
+    if chosen == "extended":
+        forces = _within_beats(shape, model, forces, (force_min, force_max), rate_Hz)
+    progress(0.2)
+    layout = _laid_out(shape, operator, forces, periods, rate_Hz)
+    if chosen == "extended":
+        exact, clipped = _tracked(model, layout, notes)
+    else:
+        exact, clipped = _compensated(operator, chosen, layout)
+    if clipped:
+        notes.append(f"{clipped} samples of the target were out of reach and were clipped")
+    current = inversion.slew_limited(exact, rate_Hz, slew_A_per_s)
+    compensated = np.concatenate((layout.lead, current))
+    progress(0.9)
+    return Waveform(
+        time_s=np.arange(compensated.size) / rate_Hz,
+        target=np.concatenate((operator(layout.lead), layout.wanted)),
+        compensated=compensated,
+        scaled=_scaled(layout, current, operator, forces),
+        predicted=predict(model, compensated, 1.0 / rate_Hz),
+        scored=layout.scored(compensated.size, shape, periods),
         name=shape.name,
-        inversion=method,
-        samples=waveform.time_s.size,
-        seconds=waveform.time_s.size / options.rate_Hz,
-        force_range=(low, high),
-        current_range=(float(waveform.compensated.min()), float(waveform.compensated.max())),
-        clipped_samples=waveform.clipped_samples,
-        predicted_max_error_percent=100.0 * float(error) / max(abs(high), abs(low)),
+        source=shape.source,
+        inversion=chosen,
+        clipped_samples=clipped,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
+        model=model,
+        period_s=shape.period_s,
+        notes=tuple(notes),
     )
 
 
-def _force_range(options: Options, operator: Preisach, unit: str) -> tuple[float, float]:
-    """Return the forces that the ends of the normalised waveform stand for."""
+def shape_of(drive: Waveform) -> Shape:
+    """Return the pulse of a drive: one scored period of its target.
+
+    Raises
+    ------
+    DataError
+        The drive was made by a version that did not keep the length of its beats.
+    """
+    if not np.isfinite(drive.period_s):
+        raise DataError(
+            f"the drive {drive.name} does not say how long its beats are",
+            hint="make it again from the pulse",
+        )
+    first = int(np.flatnonzero(drive.scored)[0])
+    one = slice(first, first + round(drive.period_s * drive.rate_Hz))
+    return Shape(drive.name, drive.time_s[one], drive.target[one], drive.source)
+
+
+def _one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Shape:
+    """Return the beat that is asked for, out of a recording of several."""
+    check_beat(beat)
+    if beat is None:
+        return recording
+    found = find_beats(recording)
+    lengths = found.periods_s
+    notes.append(
+        f"{recording.name} holds {found.count} whole beat{'s' if found.count > 1 else ''} of "
+        f"{lengths.min():.3f} to {lengths.max():.3f} s ({60.0 / float(np.mean(lengths)):.0f} a minute)"
+    )
+    return found.mean() if beat == "mean" else found.single(int(beat))
+
+
+def _method(asked: Inversion | None, model: Model) -> Inversion:
+    """Return the method: the one asked for if it suits the model, or the one that suits it best."""
+    relay = model.reading == "relay"
+    if asked == "extended" and not model.extensions:
+        raise UsageError(
+            "this model has no extensions, so there is no extended inverse",
+            hint="diagnose a run with it and extend it first, or leave `method` out",
+        )
+    if asked in ("continuous", "extended") and relay:
+        raise UsageError(
+            "the weights of this model are read as relays, which have no continuous inverse",
+            hint="give `method` closest-match, or identify with `reading` continuous",
+        )
+    if asked is not None and asked not in ("continuous", "closest-match", "extended"):
+        raise ArgumentError(
+            f"method must be continuous, closest-match or extended, got {asked!r}", hint="leave it out"
+        )
+    if asked is not None:
+        return asked
+    return "extended" if model.extensions else "closest-match" if relay else "continuous"
+
+
+def _force_range(
+    operator: Preisach, unit: str, force_min: float | None, force_max: float | None
+) -> tuple[float, float]:
+    """Return the forces that the ends of the normalised pulse stand for."""
     reach = sorted(operator.saturation)
-    low = reach[0] if options.force_min is None else options.force_min
-    high = reach[1] if options.force_max is None else options.force_max
+    low = reach[0] if force_min is None else force_min
+    high = reach[1] if force_max is None else force_max
     slack = 1e-9 * (reach[1] - reach[0])
     if low < reach[0] - slack or high > reach[1] + slack:
         raise DataError(
-            f"forces from {low:g} to {high:g} {unit} are asked for, but the model in {options.model} reaches "
-            f"{reach[0]:.3f} to {reach[1]:.3f} {unit}",
-            hint=f"choose --force-min and --force-max inside, such as "
-            f"--force-min {np.ceil(reach[0] * 10) / 10:g} --force-max {np.floor(reach[1] * 10) / 10:g}",
+            f"forces from {low:g} to {with_unit(f'{high:g}', unit)} are asked for, but the model reaches "
+            f"{reach[0]:.3f} to {with_unit(f'{reach[1]:.3f}', unit)}",
+            hint=f"choose `force_min` and `force_max` inside, such as "
+            f"`force_min` {np.ceil(reach[0] * 10) / 10:g} `force_max` {np.floor(reach[1] * 10) / 10:g}",
         )
-    preflight.check_force_range(low, high)
+    check_force_range(low, high)
     return low, high
 
 
+def _major_loop(low: float, high: float, rate_Hz: float) -> FloatArray:
+    """Input (n,) that wipes out whatever came before."""
+    return signals.conditioning(
+        low, high, speed=(high - low) / CONDITIONING_TIME_S, rate_Hz=rate_Hz, rest_s=REST_S
+    )
+
+
 def _within_beats(
-    options: Options, shape: Shape, model: Model, forces: tuple[float, float]
+    shape: Shape,
+    model: Model,
+    forces: tuple[float, float],
+    asked: tuple[float | None, float | None],
+    rate_Hz: float,
 ) -> tuple[float, float]:
     """Return the force range, its free ends moved to what every beat reaches with the range of the input.
 
     A lag, a creep or heat keep a pulse from the ends that the hysteresis would reach in a long time.
     """
     low, high = float(model.edges[0]), float(model.edges[-1])
-    rate = options.rate_Hz
     rising = model.polarity > 0
-    inputs = train(shape, periods=4, rate_Hz=rate, low=low if rising else high, high=high if rising else low)
-    settle = np.full(round(rate), inputs[0])
-    lead = signals.conditioning(
-        low, high, speed=(high - low) / CONDITIONING_TIME_S, rate_Hz=rate, rest_s=REST_S
+    inputs = train(
+        shape, periods=4, rate_Hz=rate_Hz, low=low if rising else high, high=high if rising else low
     )
-    made = predict(model, np.concatenate((lead, settle, inputs)), 1.0 / rate)[lead.size + settle.size :]
-    period = round(shape.period_s * rate)
+    settle = np.full(round(rate_Hz), inputs[0])
+    lead = _major_loop(low, high, rate_Hz)
+    made = predict(model, np.concatenate((lead, settle, inputs)), 1.0 / rate_Hz)[lead.size + settle.size :]
+    period = round(shape.period_s * rate_Hz)
     beats = [made[k * period : (k + 1) * period] for k in range(1, made.size // period)]
     reached = max(float(b.min()) for b in beats), min(float(b.max()) for b in beats)
     return (
-        max(forces[0], reached[0]) if options.force_min is None else forces[0],
-        min(forces[1], reached[1]) if options.force_max is None else forces[1],
+        max(forces[0], reached[0]) if asked[0] is None else forces[0],
+        min(forces[1], reached[1]) if asked[1] is None else forces[1],
     )
 
 
-def _drives(
-    shape: Shape,
-    operator: Preisach,
-    model: Model,
-    method: Inversion,
-    forces: tuple[float, float],
-    options: Options,
-    context: Context,
-) -> Waveform:
-    """Lay out conditioning, ramp, beats and ramp back, and find the currents for them."""
-    rate = options.rate_Hz
-    plane = operator.plane
-    beats = train(shape, periods=options.periods, rate_Hz=rate, low=forces[0], high=forces[1])
-    lead = signals.conditioning(
-        plane.low,
-        plane.high,
-        speed=(plane.high - plane.low) / CONDITIONING_TIME_S,
-        rate_Hz=rate,
-        rest_s=REST_S,
-    )
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """What is to be played: the major loop as an input, then ramp, beats, ramp back and rest as an output."""
+
+    lead: FloatArray
+    ramp: FloatArray  # 0..1
+    beats: FloatArray
+    wanted: FloatArray
+    rate_Hz: float
+
+    @property
+    def body(self) -> slice:
+        """The beats within ``wanted``."""
+        return slice(self.ramp.size, self.ramp.size + self.beats.size)
+
+    def scored(self, size: int, shape: Shape, periods: int) -> np.ndarray:
+        """True (size,) in the beats after the first one, where there is more than one."""
+        period = round(shape.period_s * self.rate_Hz)
+        at = self.lead.size + self.ramp.size
+        scored = np.zeros(size, dtype=bool)
+        scored[at + (period if periods > 1 else 0) : at + self.beats.size] = True
+        return scored
+
+
+def _laid_out(
+    shape: Shape, operator: Preisach, forces: tuple[float, float], periods: int, rate_Hz: float
+) -> _Layout:
+    beats = train(shape, periods=periods, rate_Hz=rate_Hz, low=forces[0], high=forces[1])
+    lead = _major_loop(operator.plane.low, operator.plane.high, rate_Hz)
     rest = float(operator(lead)[-1])
-    ramp = np.linspace(0.0, 1.0, round(RAMP_S * rate), endpoint=False)
+    ramp = np.linspace(0.0, 1.0, round(RAMP_S * rate_Hz), endpoint=False)
     wanted = np.concatenate(
         (rest + (beats[0] - rest) * ramp, beats, beats[0] + (rest - beats[0]) * ramp, [rest])
     )
-    if method == "extended":
-        exact, clipped = _tracked(model, wanted, lead, rate, context)
-    else:
-        exact, clipped = _compensated(operator, method, wanted, rate)
-    current = inversion.slew_limited(exact, rate, options.slew_A_per_s)
-    body = slice(ramp.size, ramp.size + beats.size)
+    return _Layout(lead, ramp, beats, wanted, rate_Hz)
+
+
+def _scaled(
+    layout: _Layout, current: FloatArray, operator: Preisach, forces: tuple[float, float]
+) -> FloatArray:
+    """Drive (n,) that is the target itself, scaled to the extremes of the compensated one."""
+    body, ramp, low = layout.body, layout.ramp, operator.plane.low
     ends = sorted((float(current[body].min()), float(current[body].max())), reverse=operator.polarity < 0)
-    scaled_beats = ends[0] + (ends[1] - ends[0]) * (beats - forces[0]) / (forces[1] - forces[0])
-    up = plane.low + (scaled_beats[0] - plane.low) * ramp
-    down = scaled_beats[-1] + (plane.low - scaled_beats[-1]) * ramp
-    scaled = np.concatenate((lead, up, scaled_beats, down, [plane.low]))
-    compensated = np.concatenate((lead, current))
-    period = round(shape.period_s * rate)
-    scored = np.zeros(compensated.size, dtype=bool)
-    first = lead.size + ramp.size + (period if options.periods > 1 else 0)
-    scored[first : lead.size + ramp.size + beats.size] = True
-    return Waveform(
-        time_s=np.arange(compensated.size) / rate,
-        target=np.concatenate((operator(lead), wanted)),
-        compensated=compensated,
-        scaled=scaled,
-        predicted=predict(model, compensated, 1.0 / rate),
-        scored=scored,
-        name=shape.name,
-        source=shape.source,
-        inversion=method,
-        clipped_samples=clipped,
-        input_unit=model.input_unit,
-        output_unit=model.output_unit,
-        model=model,
-    )
+    beats = ends[0] + (ends[1] - ends[0]) * (layout.beats - forces[0]) / (forces[1] - forces[0])
+    up = low + (beats[0] - low) * ramp
+    down = beats[-1] + (low - beats[-1]) * ramp
+    return np.concatenate((layout.lead, up, beats, down, [low]))
 
 
-def _compensated(
-    operator: Preisach, method: Inversion, wanted: FloatArray, rate: float
-) -> tuple[FloatArray, int]:
-    """Return the input that gives ``wanted`` from the state the conditioning leaves, and what was clipped."""
+def _compensated(operator: Preisach, method: Inversion, layout: _Layout) -> tuple[FloatArray, int]:
+    """Return the input that gives what is wanted after the major loop, and what was clipped."""
     if method == "continuous":
-        exact = inversion.invert(operator, wanted)
+        exact = inversion.invert(operator, layout.wanted)
         return exact.input, exact.clipped
     plane = operator.plane
-    steps = inversion.closest_match(operator, wanted)
+    matched = inversion.closest_match(operator, layout.wanted)
     step = float(np.diff(plane.edges).mean())
-    time_s = np.arange(wanted.size) / rate
-    return inversion.smoothed(steps.input, time_s, step, plane.low, plane.high), steps.clipped
+    time_s = np.arange(layout.wanted.size) / layout.rate_Hz
+    return inversion.smoothed(matched.input, time_s, step, plane.low, plane.high), matched.clipped
 
 
-def _tracked(
-    model: Model, wanted: FloatArray, lead: FloatArray, rate: float, context: Context
-) -> tuple[FloatArray, int]:
-    """Return the input that makes the extended model give ``wanted`` after ``lead``, and what was clipped."""
-    found = extended_of(model).invert(wanted, 1.0 / rate, lead=lead, band_Hz=EXTENDED_BAND_HZ)
-    context.note(
-        f"by the extended model the rms tracking error is {found.rms:.3g} {model.output_unit} "
+def _tracked(model: Model, layout: _Layout, notes: list[str]) -> tuple[FloatArray, int]:
+    """Return the input that makes the extended model give what is wanted, and what was clipped."""
+    found = extended_of(model).invert(
+        layout.wanted, 1.0 / layout.rate_Hz, lead=layout.lead, band_Hz=EXTENDED_BAND_HZ
+    )
+    notes.append(
+        f"by the extended model the rms tracking error is {with_unit(f'{found.rms:.3g}', model.output_unit)} "
         f"after {found.steps} steps, {found.rms_static:.3g} with the static inverse"
     )
     if found.steps == 0:
-        context.note("no step improved on the static inverse, which is kept")
+        notes.append("no step improved on the static inverse, which is kept")
     return found.input, found.clipped

@@ -39,7 +39,7 @@ def test_every_command_has_help_with_an_example(run, command):
 
 def test_version(run):
     """The version of the package."""
-    from pulsetrainer import __version__
+    from pulsetrainer.version import __version__
 
     done = run("--version")
     assert (done.code, done.out.strip()) == (0, f"pulsetrainer {__version__}")

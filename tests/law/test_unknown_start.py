@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from worlds import pasts, planes, state_after, weights
 
+from pulsetrainer.core.initial_state import first_extreme, known_from, start_of
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.steps.modelling import first_extreme, known_from, start_of
 
 STEPS = 20  # inputs lie on so many steps of the range: one that is near an end is at it
 

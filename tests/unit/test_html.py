@@ -141,7 +141,7 @@ def test_published_figures_stand_beside(page):
     }
     rows = [text for a, text in page.of("tr") if a.get("class") == "published"]
     assert len(rows) == 2
-    without = render(Evaluation(waveforms=EVALUATION.waveforms[:1]), published=None)
+    without = render(Evaluation(waveforms=EVALUATION.waveforms[:1]), published={})
     assert "published" not in without.partition("</style>")[2]
 
 

@@ -16,20 +16,20 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import scipy  # its parts load when they are first used
 
-from pulsetrainer import __version__
+from pulsetrainer.api import open_device
 from pulsetrainer.core import signals
 from pulsetrainer.core.record import Record
-from pulsetrainer.device.device import DEFAULT_PORT, open_device
+from pulsetrainer.device.device import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.errors import PulsetrainerError
 from pulsetrainer.simulation import build
+from pulsetrainer.version import __version__
 
 if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
     from pulsetrainer.device.trace import Trace
-    from pulsetrainer.steps.context import Context
 
 State = Literal["ok", "warning", "problem"]
 
@@ -41,16 +41,6 @@ _LOOP_A_PER_S = 0.75
 _REST_S = 0.5
 _RATE_HZ = 1000.0
 _GRID_S = 1.0 / _RATE_HZ
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """Which device, and whether its coil may be driven."""
-
-    port: str | None = None
-    capture: bool = True
-    settings: str = ""  # what is in force, in words
-    folder: Path = Path()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,21 +65,31 @@ class Result:
         return sum(one.state == "problem" for one in self.findings)
 
 
-def run(options: Options, context: Context) -> Result:
-    """Look at versions, compiler, emulator, folder, ports, and the device with a short capture."""
+def examine(
+    port: str | None = None,
+    *,
+    capture: bool = True,
+    settings: str = "",
+    folder: Path = Path(),
+    progress: Callable[[float], None] = lambda _share: None,
+) -> Result:
+    """Look at versions, compiler, emulator, folder, ports and device; with ``capture`` its coil is driven.
+
+    ``settings`` says in words which are in force.
+    """
     looks: list[Callable[[], Iterator[Finding]]] = [
         _versions,
         _compiler,
         _emulator,
-        lambda: _folder(options.folder),
-        lambda: iter([Finding("settings", "ok", options.settings or "none: defaults")]),
+        lambda: _folder(folder),
+        lambda: iter([Finding("settings", "ok", settings or "none: defaults")]),
         _ports,
-        lambda: _device(options),
+        lambda: _device(port, capture=capture),
     ]
     found: list[Finding] = []
     for number, look in enumerate(looks):
         found += look()
-        context.progress((number + 1) / len(looks))
+        progress((number + 1) / len(looks))
     return Result(tuple(found))
 
 
@@ -188,12 +188,11 @@ def _ports() -> Iterator[Finding]:
 # --- the device -----------------------------------------------------------------------------------------
 
 
-def _device(options: Options) -> Iterator[Finding]:
-    port = redact(options.port or DEFAULT_PORT)
+def _device(port: str | None, *, capture: bool) -> Iterator[Finding]:
     try:
-        with open_device(options.port) as device:
-            yield from _identity(device, port)
-            if options.capture:
+        with open_device(port) as device:
+            yield from _identity(device, redact(port or DEFAULT_PORT))
+            if capture:
                 yield from _short_capture(device)
     except PulsetrainerError as error:
         yield Finding("device", "problem", error.message, error.hint)

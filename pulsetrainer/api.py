@@ -1,0 +1,110 @@
+"""The Python API: the verbs, and the few functions around them that know files, ports and the clock."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import pulsetrainer.simulation  # noqa: F401 - announces the ports bench: and qemu:
+from pulsetrainer.artefacts import Waveform
+from pulsetrainer.core.waveforms import Shape
+from pulsetrainer.device import device as _device
+from pulsetrainer.device.device import Device, Limits
+from pulsetrainer.files import provenance, pulses, store
+from pulsetrainer.steps.invert import invert as _invert
+from pulsetrainer.steps.invert import shape_of
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts import Model
+
+
+def load(path: Path | str) -> Any:
+    """Return the artefact in a file: a Run, Model, Waveform, Playback, Evaluation or Diagnosis.
+
+    Raises
+    ------
+    DataError
+        The file is absent, damaged, no artefact, or of a newer format.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> pt.load("tests/data/files-0.1/model.h5").levels
+    8
+    """
+    return store.read_any(path)
+
+
+def save(artefact: Any, path: Path | str, *, overwrite: bool = False, title: str = "") -> None:
+    """Write an artefact to a file: whole, or not at all.
+
+    Raises
+    ------
+    UsageError
+        The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
+    DataError
+        The disk is full or failed.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt, tempfile, pathlib
+    >>> model = pt.load("tests/data/files-0.1/model.h5")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     pt.save(model, pathlib.Path(folder) / "copy.h5")
+    """
+    header = provenance.make_header(
+        title or f"{artefact.kind} saved from Python",
+        argv=("python",),
+        now=datetime.now(UTC),
+        libraries=provenance.library_versions(),
+    )
+    store.write(path, artefact, header, overwrite=overwrite)
+
+
+def open_device(port: str | None = None, *, limits: Limits | None = None) -> Device:
+    """Open a device: ``bench:``, ``qemu:``, a serial port, ``socket://host:port``; None: the default.
+
+    Use it as a context manager: leaving it stops and disarms the device, always.
+
+    Raises
+    ------
+    UsageError
+        The text names no kind of port.
+    DeviceError
+        There is no such device, or it does not answer.
+    ArgumentError
+        A limit is not positive, or above the device's own.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> with pt.open_device("bench:") as device:
+    ...     device.info.current_limit_A
+    1.5
+    """
+    return _device.open_device(port, limits=limits)
+
+
+def invert(
+    pulse: str | Waveform | Shape | tuple[ArrayLike, ArrayLike], model: Model, **options: Any
+) -> Waveform:
+    """Find the drive for a pulse: its name in the library, a table, a drive, or times (s) and values.
+
+    Everything else is as in ``steps.invert.invert``, which this calls.
+    """
+    return _invert(_shape(pulse), model, **options)
+
+
+def _shape(pulse: str | Waveform | Shape | tuple[ArrayLike, ArrayLike]) -> Shape:
+    if isinstance(pulse, Shape):
+        return pulse
+    if isinstance(pulse, Waveform):
+        return shape_of(pulse)
+    if isinstance(pulse, str | Path):
+        return pulses.read_pulse(str(pulse))
+    time_s, value = pulse
+    return Shape("pulse", np.asarray(time_s, dtype=np.float64), np.asarray(value, dtype=np.float64))

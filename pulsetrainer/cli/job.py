@@ -1,0 +1,147 @@
+"""One command at work: files checked first, inputs loaded, the result saved with where it came from."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import typer
+
+from pulsetrainer.cli.console import Screen, plain
+from pulsetrainer.files.atomic_write import check_output
+from pulsetrainer.files.input_file import check_artefact, check_file
+
+if TYPE_CHECKING:
+    from pulsetrainer.files.provenance import Device, Header
+
+K = TypeVar("K")
+# what is no parameter of the work: files have digests, a port may hold what no file may know
+_NOT_PARAMETERS = {"json", "overwrite", "port", "dry_run", "resume", "out", "html"}
+
+
+class Job:
+    """What every command does besides its one verb.
+
+    Making it checks the outputs and, by their first bytes, the inputs: before anything heavy is loaded.
+
+    Raises
+    ------
+    UsageError
+        An output exists and ``overwrite`` is not set, or it cannot be written.
+    DataError
+        An input is not there or cannot be what it should be.
+    """
+
+    def __init__(
+        self,
+        context: typer.Context,
+        *,
+        inputs: Sequence[Path] = (),
+        tables: Sequence[Path | None] = (),
+        outputs: Sequence[Path | None] = (),
+        overwrite: bool = False,
+        as_json: bool = False,
+    ) -> None:
+        self.screen = Screen(str(context.info_name), as_json=as_json)
+        self._parameters = context.params
+        self._overwrite = overwrite
+        self._artefacts: list[Path] = []  # loaded, in their order
+        self._tables: list[Path] = []
+        for path in outputs:
+            if path is not None:
+                check_output(path, overwrite)
+        for path in inputs:
+            check_artefact(path)
+        for path in tables:
+            if path is not None:
+                check_file(path)
+        self.seconds = 0.0
+
+    @contextmanager
+    def working(self, label: str) -> Iterator[Any]:
+        """Give a callable that takes the share of the work done, and measure how long it takes."""
+        begun = time.perf_counter()
+        with self.screen.bar(label) as progress:
+            yield progress
+        self.seconds = time.perf_counter() - begun
+
+    def load(self, path: Path, kind: type[K]) -> K:
+        """Return the artefact of this kind in an input file.
+
+        Raises
+        ------
+        DataError
+            The file cannot be read, or holds another kind.
+        """
+        noun: K = self.load_any(path, kind)
+        return noun
+
+    def load_any(self, path: Path, *kinds: type) -> Any:
+        """Return the artefact in an input file, of any of these kinds; no kind named: of whatever kind.
+
+        Raises
+        ------
+        DataError
+            As ``load``.
+        """
+        from pulsetrainer.files import store
+
+        self._artefacts.append(path)
+        return store.read_one_of(path, *kinds) if kinds else store.read_any(path)
+
+    def uses(self, path: Path) -> None:
+        """Name a file that is no artefact, but that the result is made from."""
+        self._tables.append(path)
+
+    def header(self, title: str, *, device: Device | None = None, ancestors: Sequence[Header] = ()) -> Header:
+        """Return what the result says about itself: command, parameters, inputs and their history."""
+        from pulsetrainer.files import provenance, store
+
+        parameters = {
+            name: plain(value)
+            for name, value in self._parameters.items()
+            if name not in _NOT_PARAMETERS and not _is_path(value)
+        }
+        made_from = [store.read_header(path) for path in self._artefacts]
+        return provenance.make_header(
+            title,
+            argv=sys.argv[1:],
+            now=datetime.now(UTC),
+            parameters=parameters,
+            seed=parameters.get("seed"),
+            inputs=provenance.digests([*self._artefacts, *self._tables]),
+            ancestors=[*made_from, *ancestors],
+            device=device,
+            libraries=provenance.library_versions(),
+        )
+
+    def save(self, path: Path | None, noun: Any, title: str, *, device: Device | None = None) -> Header:
+        """Write an artefact, if there is a file to write it to, and return its header."""
+        from pulsetrainer.files import store
+
+        header = self.header(title, device=device)
+        if path is not None:
+            store.write(path, noun, header, overwrite=self._overwrite)
+        return header
+
+    def write(self, path: Path, content: bytes | str) -> None:
+        """Write a figure, a page or a table: whole, or not at all."""
+        from pulsetrainer.files.atomic_write import replacing
+
+        with replacing(path, overwrite=self._overwrite) as temporary:
+            temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+    def notes(self, lines: Sequence[str]) -> None:
+        """Say what a verb has to tell, a line each, on stderr."""
+        for line in lines:
+            self.screen.note(line)
+
+
+def _is_path(value: Any) -> bool:
+    several = isinstance(value, list | tuple) and len(value) > 0
+    return isinstance(value, Path) or (several and all(isinstance(one, Path) for one in value))

@@ -1,0 +1,63 @@
+"""The state before a record: from which sample on it does not matter, and which one is assumed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pulsetrainer.core.memory import State, positive_saturation
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.record import Record
+
+NEAR = 0.01  # of the range: a noisy record touches its extreme only once, late
+
+
+def known_from(inputs: FloatArray, low: float, high: float) -> int:
+    """First sample (n,) at which the memory is known, whatever came before the record.
+
+    Where the input reaches an end of [low, high], every remembered extreme is wiped out. Reached means within
+    ``NEAR`` of the range. An input that never gets there is known, up to a constant, from where it first
+    reaches an end of its own range: see ``start_of``.
+    """
+    near = NEAR * (high - low)
+    ends = np.flatnonzero((inputs <= low + near) | (inputs >= high - near))
+    return int(ends[0]) if ends.size else first_extreme(inputs)[0]
+
+
+def first_extreme(inputs: FloatArray) -> tuple[int, bool]:
+    """First sample (n,) that is ``NEAR`` an end of the input's own range, and whether that is the top."""
+    bottom, top = float(inputs.min()), float(inputs.max())
+    near = NEAR * (top - bottom)
+    at = int(np.flatnonzero((inputs <= bottom + near) | (inputs >= top - near))[0])
+    return at, bool(inputs[at] >= top - near)
+
+
+def reaches_an_end(inputs: FloatArray, low: float, high: float) -> bool:
+    """Tell whether an input (n,) comes ``NEAR`` an end of [low, high], so that its memory becomes known."""
+    near = NEAR * (high - low)
+    return bool(np.any((inputs <= low + near) | (inputs >= high - near)))
+
+
+def start_of(inputs: FloatArray, low: float, high: float) -> State | None:
+    """State from which a record is followed; None is negative saturation.
+
+    A record that swings within [low, high] and never reaches its ends leaves the relays outside its own
+    range as they were. Once it has visited both of its own extremes they add a constant, whatever they are
+    (congruency, Mayergoyz 2003, section 1.2). So that its first branch already is that of its closed loop,
+    it is started from the saturation opposite to the extreme it visits first.
+    """
+    if reaches_an_end(inputs, low, high) or first_extreme(inputs)[1]:
+        return None
+    return positive_saturation(low, high)
+
+
+def record_of(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> Record:
+    """Return measured input and output (n,) as a record to fit; it counts from where the memory is known.
+
+    Raises
+    ------
+    ArgumentError
+        There are too few samples, or NaN or infinity.
+    """
+    counts = np.ones(inputs.size)
+    counts[: known_from(inputs, low, high)] = 0.0
+    return Record(inputs, outputs, counts, start_of(inputs, low, high))

@@ -1,0 +1,62 @@
+"""Pulses: the library that ships with the package, and anybody's table of a time and a value."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.input_file import check_file
+from pulsetrainer.resources import waveforms_dir
+
+if TYPE_CHECKING:
+    from pulsetrainer.core.waveforms import Shape
+
+
+def library() -> dict[str, Path]:
+    """Names and files of the pulse library."""
+    return {path.stem: path for path in sorted(waveforms_dir().glob("*.csv"))}
+
+
+def pulse_file(name: str) -> Path:
+    """Return the file of a pulse: of the library, or the one that is named.
+
+    Raises
+    ------
+    UsageError
+        It is neither in the library nor a file.
+    DataError
+        It is a CSV file that cannot be read.
+    """
+    known = library()
+    path = known.get(name, Path(name))
+    if name not in known and path.suffix.lower() != ".csv" and not path.exists():
+        raise UsageError(
+            f"there is no pulse {name!r}; the library has {', '.join(known)}",
+            hint="name one of them, or a CSV file with the columns t_s and p",
+        )
+    check_file(path)
+    return path
+
+
+def read_pulse(name: str) -> Shape:
+    """Return a pulse of the library, or out of a table whose first two columns are time and value.
+
+    Raises
+    ------
+    UsageError, DataError
+        As ``pulse_file``; or the table cannot be used.
+    """
+    from pulsetrainer.core.waveforms import Shape  # noqa: PLC0415 - so that a mistyped name is answered at once
+    from pulsetrainer.files import run_from_table, table  # noqa: PLC0415
+
+    path = pulse_file(name)
+    columns = table.read_table(path)
+    if len(columns.names) < 2:
+        raise DataError(
+            f"{path} has {len(columns.names)} column; a pulse needs a time and a value",
+            hint="write two columns: t_s,p",
+        )
+    time_s, value = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
+    source = next((c.partition(":")[2].strip() for c in columns.comments if c.startswith("source:")), "")
+    return Shape(path.stem, time_s, value, source or path.name)

@@ -1,0 +1,116 @@
+"""Facts: the main figures of an artefact, by name, in the order in which a person would ask."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Parameter, Playback, Run, Waveform
+from pulsetrainer.artefacts.time_steps import steps_of
+from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.core.memory import turning_points
+from pulsetrainer.core.plane import FloatArray
+
+
+def facts(artefact: Any) -> dict[str, Any]:
+    """Return the main figures of an artefact."""
+    summaries: dict[type, Callable[[Any], dict[str, Any]]] = {
+        Run: run_facts,
+        Model: _model,
+        Waveform: _waveform,
+        Playback: _playback,
+        Evaluation: Evaluation.figures,
+        Diagnosis: _diagnosis,
+    }
+    return dict(summaries[type(artefact)](artefact))
+
+
+def _playback(played: Playback) -> dict[str, Any]:
+    return _waveform(played.waveform) | {
+        "repeats": played.compensated.output.shape[0],
+        "complete": played.complete,
+        "dropped_samples": played.dropped_samples,
+    }
+
+
+def _span(values: FloatArray, unit: str) -> str:
+    if values.size == 0:
+        return "no samples"
+    low, high = float(np.min(values)), float(np.max(values))
+    # a small swing about a large value needs more digits than four to be seen
+    share = (high - low) / max(abs(low), abs(high)) if high > low else 1.0
+    digits = min(4 + max(0, int(-np.log10(share))), 12)
+    return with_unit(f"{low:.{digits}g} .. {high:.{digits}g}", unit)
+
+
+def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
+    """Return the main figures of a run; its ``reversals`` are counted unless they are given."""
+    steps = steps_of(run.time_s) if run.time_s is not None and run.time_s.size > 1 else None
+    if reversals is None:
+        turns = turning_points(run.input if run.reference is None else run.reference)
+        reversals = max(turns.size - 1, 0)
+    parts = len(run.parts())
+    return {
+        "signal": run.signal,
+        "samples": run.input.size,
+        "seconds": float(run.time_s[-1] - run.time_s[0]) if run.time_s is not None and steps else None,
+        "rate_Hz": 1.0 / steps.median if steps else None,
+        "gaps": steps.gaps - (parts - 1) if steps else None,
+        **({"parts": parts} if parts > 1 else {}),
+        f"input ({run.input_quantity})": _span(run.input, run.input_unit),
+        f"output ({run.output_quantity})": _span(run.output, run.output_unit),
+        "reversals": reversals,
+        "complete": run.complete,
+        "dropped_samples": run.dropped_samples,
+    }
+
+
+def _model(model: Model) -> dict[str, Any]:
+    fit = model.fit
+    return {
+        "levels": model.levels,
+        "cells": model.weights.size,
+        "operator": model.reading,
+        "polarity": model.polarity,
+        f"input ({model.input_quantity})": _span(model.edges, model.input_unit),
+        "offset": with_unit(f"{model.offset:.4g}", model.output_unit),
+        "positive weights": int(np.sum(model.weights > 0)),
+        "fit_rms_percent": fit.rms_percent if fit else None,
+        "coverage_percent": fit.coverage_percent if fit else None,
+        "extensions": [extension.cause for extension in model.extensions],
+    }
+
+
+def _waveform(waveform: Waveform) -> dict[str, Any]:
+    return {
+        "waveform": waveform.name,
+        "inversion": waveform.inversion,
+        "samples": waveform.time_s.size,
+        "seconds": float(waveform.time_s[-1]),
+        "target": _span(waveform.target[waveform.scored], waveform.output_unit),
+        "compensated drive": _span(waveform.compensated, waveform.input_unit),
+        "clipped_samples": waveform.clipped_samples,
+        "source": waveform.source,
+    }
+
+
+def _parameter(one: Parameter) -> str:
+    return f"{one.name} {with_unit(f'{one.value:.4g}', one.unit)}"
+
+
+def _diagnosis(found: Diagnosis) -> dict[str, Any]:
+    return {
+        "verdict": found.verdict,
+        "quick": found.quick,
+        "found": [
+            f"{one.cause} ({', '.join(map(_parameter, one.parameters))})" for one in found.causes if one.found
+        ],
+        "rms_percent": found.rms_percent,
+        "noise_percent": found.noise_percent,
+        "static_percent": found.static_percent,
+        "extended_percent": found.extended_percent,
+        "floor_percent": found.floor_percent,
+        "next": found.next_experiment,
+    }

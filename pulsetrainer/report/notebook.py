@@ -1,0 +1,25 @@
+"""What a notebook shows of an artefact: its figure and its text."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.figure import Figure
+
+from pulsetrainer.report import figures, render, text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def html(artefact: Any) -> str:
+    """Return the text of an artefact, and its figure as SVG below it; no file, nothing fetched."""
+    picture = render.encode(figures.draw(artefact), "svg").decode()
+    return f"<pre>{escape(text.of(artefact))}</pre>{picture[picture.index('<svg') :]}"
+
+
+def plot(artefact: Any) -> Axes:
+    """Draw an artefact and return the first axes of its figure."""
+    figure: Figure = figures.draw(artefact)
+    return figure.axes[0]

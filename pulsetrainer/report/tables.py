@@ -1,0 +1,83 @@
+"""Tables and lines of text: what a screen, a pipe and a notebook's ``print`` show of figures."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
+_BROAD = 10_000  # as wide as the table needs: figures are never cut
+_NARROWEST = 24  # beside a lead; less, and the lines go on further left
+
+
+def folded(lead: str, text: str, width: int | None, indent: int | None = None) -> str:
+    """Return a line, folded between words to a width; None: not folded."""
+    if width is None or len(lead) + len(text) <= width:
+        return lead + text
+    if indent is None:
+        indent = len(lead) if width - len(lead) >= _NARROWEST else 4
+    return textwrap.fill(
+        text,
+        width,
+        initial_indent=lead,
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def drawn(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Return a table, no wider than its figures, without blanks at the ends of its lines."""
+    # half a tenth of a second, which a command without a table need not wait
+    from rich import box  # noqa: PLC0415
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1))
+    for number, name in enumerate(columns):
+        table.add_column(Text(name), justify="right" if number else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*(Text(text(cell)) for cell in row))
+    console = Console(width=_BROAD, markup=False, highlight=False)
+    with console.capture() as captured:
+        console.print(table)
+    lines = [line.rstrip() for line in captured.get().splitlines()]
+    while lines and not ESCAPE.sub("", lines[0]).strip():
+        lines.pop(0)
+    return "\n".join([title, *lines]) + "\n"
+
+
+def listed(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> Iterator[str]:
+    """Yield a table as a list: each row's name, below it its figures with the names of their columns."""
+    heads = [name.replace("-\n", "-").replace("\n", " ") for name in columns]
+    width = max((len(head) for head in heads[1:]), default=0)
+    yield title
+    for row in rows:
+        yield f"  {text(row[0])}"
+        for head, cell in zip(heads[1:], row[1:], strict=True):
+            if cell not in (None, ""):
+                yield f"    {head:<{width}}  {text(cell)}"
+
+
+def label(name: str) -> str:
+    """Return the name of a figure as a person writes it, its unit behind a comma."""
+    for ending, unit in (("_percent", "%"), ("_Hz", "Hz")):
+        if name.endswith(ending):
+            name = f"{name.removesuffix(ending)}, {unit}"
+    return name.replace("_", " ")
+
+
+def text(value: Any) -> str:
+    """Return a value as a cell of a table."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.2f}" if 0.1 <= abs(value) < 1e5 or value == 0 else f"{value:.3g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(text(item) for item in value) or "none"
+    return str(value)

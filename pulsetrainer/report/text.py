@@ -1,0 +1,97 @@
+"""An artefact as text: what ``print`` shows of it, and the tables of the commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from pulsetrainer.artefacts import Evaluation
+from pulsetrainer.artefacts.evaluation import PUBLISHED
+from pulsetrainer.report import tables
+from pulsetrainer.report.facts import facts
+
+_TITLED = {
+    "run": "signal", "model": "cells", "waveform": "waveform", "playback": "waveform", "diagnosis": "verdict",
+}  # fmt: skip
+_WIDTH = 110  # of a table, unless a screen says otherwise
+_LABEL_WIDTH, _COLUMN_WIDTH = 32, 13
+_FIGURES = (
+    ("mean error, scaled", "scaled.mean_abs_error_percent"),
+    ("mean error, compensated", "compensated.mean_abs_error_percent"),
+    ("reduction of the mean error", "mean_error_reduction_percent"),
+    ("max error, scaled", "scaled.max_abs_error_percent"),
+    ("max error, compensated", "compensated.max_abs_error_percent"),
+    ("loop area, scaled", "scaled.hysteresis_percent"),
+    ("loop area, compensated", "compensated.hysteresis_percent"),
+    ("current tracking, worst", "compensated.current_tracking_max_percent"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table: the first column is text, the others are numbers."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+
+
+def title(artefact: Any) -> str:
+    """Return one line: the kind, and what tells this one from others."""
+    if isinstance(artefact, Evaluation):
+        names = [*(f"{w.name} {w.inversion}" for w in artefact.waveforms), *(m.name for m in artefact.models)]
+        return f"<evaluation of {', '.join(names) or 'nothing'}>"
+    said = facts(artefact).get(_TITLED[artefact.kind])
+    return f"<{artefact.kind}: {tables.text(said)}{' cells' if artefact.kind == 'model' else ''}>"
+
+
+def of(artefact: Any) -> str:
+    """Return an artefact as text: its main figures, a line each, or its tables."""
+    if isinstance(artefact, Evaluation):
+        return "\n".join(tables.drawn(t.title, t.columns, t.rows) for t in tables_of(artefact)).rstrip("\n")
+    known = {tables.label(name): value for name, value in facts(artefact).items() if value is not None}
+    width = max(map(len, known))
+    lines = [
+        f"{artefact.kind}",
+        *(f"  {name:<{width}}  {tables.text(value)}" for name, value in known.items()),
+    ]
+    return "\n".join(lines)
+
+
+def tables_of(evaluation: Evaluation, width: int = _WIDTH) -> Iterator[Table]:
+    """Yield the figures of an evaluation, beside those of the published device."""
+    if evaluation.waveforms:
+        yield from _pulses(evaluation, width)
+    if evaluation.models:
+        yield Table(
+            "prediction error on the run",
+            ("model", "rms", "rms %", "max %", "gain %", "offset", "rms % with its own offset"),
+            tuple(
+                (m.name, m.rms, m.rms_percent, m.max_percent, m.gain_percent, m.offset, m.shape_rms_percent)
+                for m in evaluation.models
+            ),
+        )
+
+
+def _pulses(evaluation: Evaluation, width: int) -> Iterator[Table]:
+    """One table of all pulses where it fits the width, else one for each pulse."""
+    figures = evaluation.figures()
+    columns: dict[str, list[tuple[str, dict[str, float]]]] = {}  # by pulse: heading and figures
+    for w in evaluation.waveforms:
+        stem = f"{w.name}.{w.inversion}."
+        published = [("published", PUBLISHED[w.name])] if w.name in PUBLISHED else []
+        found = {name[len(stem) :]: value for name, value in figures.items() if name.startswith(stem)}
+        columns.setdefault(w.name, published).append((w.inversion, found))
+    needed = _LABEL_WIDTH + _COLUMN_WIDTH * sum(len(group) for group in columns.values())
+    for page in [list(columns)] if needed <= width else [[name] for name in columns]:
+        shown = [
+            (f"{name}\n{heading}".replace("-", "-\n"), found)
+            for name in page
+            for heading, found in columns[name]
+        ]
+        yield Table(
+            "force error, % of full force",
+            ("", *(heading for heading, _ in shown)),
+            tuple((label, *(found.get(metric) for _, found in shown)) for label, metric in _FIGURES),
+        )

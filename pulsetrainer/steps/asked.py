@@ -1,0 +1,49 @@
+"""What can be refused by a look at what was asked for; loads nothing, so that the answer comes at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pulsetrainer.errors import UsageError
+
+
+def check_beat(beat: str | int | None) -> None:
+    """Refuse what is neither the number of a beat nor the mean; None is no choice.
+
+    Raises
+    ------
+    UsageError
+        It is something else.
+    """
+    if beat is not None and beat != "mean" and not (str(beat).isdecimal() and int(beat) > 0):
+        raise UsageError(f"`beat` must be a number from 1, or mean, got {beat!r}", hint="give `beat` mean")
+
+
+def check_force_range(low: float | None, high: float | None) -> None:
+    """Refuse an empty range; None is an end that the model chooses.
+
+    Raises
+    ------
+    UsageError
+        The lower end is not below the upper one.
+    """
+    if low is not None and high is not None and not high > low:
+        raise UsageError(
+            f"the force range is empty: `force_min` {low:g} is not below `force_max` {high:g}",
+            hint="swap or change the two",
+        )
+
+
+def check_several(evaluations: Sequence[object]) -> None:
+    """Refuse to compare fewer than two.
+
+    Raises
+    ------
+    UsageError
+        There are fewer than two.
+    """
+    if len(evaluations) < 2:
+        raise UsageError(
+            f"compare needs at least two evaluations, got {len(evaluations)}",
+            hint="pulsetrainer compare before.h5 after.h5",
+        )
