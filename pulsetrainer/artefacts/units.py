@@ -1,8 +1,123 @@
-"""How a number is written with its unit."""
+"""Units: which texts are one, how a heading says one, how many seconds one is, and how one is printed.
+
+    unit   = "1" | factor { ("*" | "." | "·" | " " | "/") factor }
+    factor = [prefix] symbol [["^"] exponent] | "1"
+
+``A/m``, ``nA m^2``, ``N·m``, ``1/s``, ``m/s²`` and ``mmHg`` are units; ``Newtons per mm`` is not.
+"""
 
 from __future__ import annotations
+
+import difflib
+import re
+
+from pulsetrainer.errors import DataError
+
+_PREFIXES = ("da", *"YZEPTGMkhdcmunpfazyµμ")
+_PREFIXED_SYMBOLS = "A V N T m g s Pa Hz W J K C F H S rad bar ohm Ω Wb L l eV Oe G emu gf cd mol"
+_BARE_SYMBOLS = """
+    1 % percent ppm ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev atm
+    counts count ct LSB digit digits steps step px a.u. arb au norm dB
+"""
+# what may stand behind the last underscore of a heading: there most letters and short words are a name's
+_SUFFIXES = """
+    s ms us µs min h A mA uA kA V mV kV N mN kN Nm mNm T mT m mm um µm nm Pa kPa MPa bar mbar mmHg
+    deg rad C °C degC K Hz kHz W g kg A/m kA/m m/s mm/s rad/s N/A % percent
+"""
+_PREFIXED, _BARE = frozenset(_PREFIXED_SYMBOLS.split()), frozenset(_BARE_SYMBOLS.split())
+_BEHIND_A_NAME = frozenset(_SUFFIXES.split())
+# as oscilloscopes spell them
+_SPELLED = {
+    **dict.fromkeys(["second", "seconds", "sec"], "s"),
+    **dict.fromkeys(["volt", "volts"], "V"),
+    **dict.fromkeys(["amp", "amps", "ampere", "amperes"], "A"),
+    **dict.fromkeys(["newton", "newtons"], "N"),
+}
+SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
+
+_EXPONENT = re.compile(r"(?:\^|\*\*)?(?P<exponent>[-+]?\d)$|(?P<raised>[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹])$")
+_SEPARATOR = re.compile(r"\s*[*·/×]\s*|\s+|(?<=[A-Za-zΩµ])\.(?=[A-Za-zΩµ])")
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*$")
+_DIVIDED = re.compile(r"^(?P<name>.*\S)\s+/\s+(?P<unit>\S+)\s*$")
+_SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,6})$")
+_POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def is_unit(text: str) -> bool:
+    """Tell whether a text is a unit."""
+    text = text.strip().replace("**", "^")
+    if text in _BARE:
+        return True
+    bare = text.replace("(", " ").replace(")", " ").strip()
+    return bool(bare) and all(_is_factor(factor) for factor in _SEPARATOR.split(bare))
+
+
+def _is_factor(text: str) -> bool:
+    found = _EXPONENT.search(text)
+    return _is_symbol(text) or (found is not None and _is_symbol(text[: found.start()]))
+
+
+def _is_symbol(text: str) -> bool:
+    if text in _PREFIXED or text in _BARE:
+        return True
+    return any(text.startswith(p) and text[len(p) :] in _PREFIXED for p in _PREFIXES)
+
+
+def check_unit(text: str, what: str, where: str = "") -> str:
+    """Return a unit as it is written.
+
+    Parameters
+    ----------
+    what
+        Which unit this is: "input unit".
+    where
+        What it was read from, if anything: "the heading 'Force (measured)' of scope.csv".
+
+    Raises
+    ------
+    DataError
+        It is not a unit.
+    """
+    if is_unit(text):
+        return text.strip()
+    near = difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
+    meant = f"did you mean {' or '.join(repr(n) for n in near)}? " if near else ""
+    raise DataError(
+        f"the {what} {text!r}{where and ' in '}{where} is not a known unit",
+        hint=f"{meant}give the {what}, such as N or mm/s^2; 1 stands for a pure number",
+    )
+
+
+def symbol_of(text: str) -> str:
+    """Return the symbol of a unit that is spelled out, any other text as it is."""
+    return _SPELLED.get(text.lower(), text)
+
+
+def split_unit(heading: str) -> tuple[str, str]:
+    """Return name and unit of a column heading; no unit where it says none."""
+    for pattern in (_BRACKETED, _DIVIDED):
+        if (found := pattern.match(heading)) and found["name"]:
+            return found["name"].strip(), found["unit"].strip()
+    suffixed = _SUFFIXED.match(heading)
+    if suffixed and suffixed["unit"] in _BEHIND_A_NAME:
+        return suffixed["name"], suffixed["unit"]
+    return heading, ""
+
+
+def shown(unit: str) -> str:
+    """Return the unit as it is printed: ``N/A^2`` becomes N/A², ``percent`` %, ``1`` nothing."""
+    if unit in ("1", "", "dimensionless"):
+        return ""
+    if unit == "percent":
+        return "%"
+    # brackets around one word, as in N/(A)^2, are for machines
+    head, *powers = re.sub(r"\((\w+)\)", r"\1", unit).replace("**", "^").split("^")
+    for power in powers:
+        digits = len(power) - len(power.lstrip("-0123456789"))
+        head += power[:digits].translate(_POWERS) + power[digits:]
+    return head.replace("*", "·")
 
 
 def with_unit(number: str, unit: str) -> str:
     """Return ``1.5 A``; a pure number, whose unit is 1, stays alone."""
-    return number if unit in ("", "1") else f"{number} {unit}"
+    return f"{number} {shown(unit)}".rstrip()

@@ -115,7 +115,7 @@ def _found(one: Cause) -> str:
 def words_of(p: Parameter) -> str:
     """Return a parameter with its unit and its interval."""
     interval = f" [{p.lower:.4g}, {p.upper:.4g}]" if math.isfinite(p.lower) else ""
-    from pulsetrainer.steps.show import shown
+    from pulsetrainer.artefacts.units import shown
 
     return " ".join(f"{p.name} {p.value:.4g} {shown(p.unit)}".split()) + interval
 

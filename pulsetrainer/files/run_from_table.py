@@ -14,15 +14,14 @@ import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.time_steps import GAP, steps_of
+from pulsetrainer.artefacts.units import SECONDS, check_unit, split_unit
 from pulsetrainer.core.signals import MOST_SAMPLES
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.files.table import Table, read_table, split_unit
+from pulsetrainer.files.table import Table, read_table
 from pulsetrainer.files.timing import check_timing
-from pulsetrainer.files.units import check_unit
 
 Note = Callable[[str], None]
 
-_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 _TIME_NAMES = frozenset(
     ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
 )
@@ -84,23 +83,22 @@ def read_run(
         input=columns[input_column],
         output=columns[output_column],
         reference=None if reference_column is None else columns[reference_column],
-        input_unit=_unit(table, input_column, input_unit, "--input-unit"),
-        output_unit=_unit(table, output_column, output_unit, "--output-unit"),
+        input_unit=_unit(table, input_column, input_unit, "input unit"),
+        output_unit=_unit(table, output_column, output_unit, "output unit"),
         input_quantity=split_unit(table.names[table.index(input_column)])[0],
         output_quantity=split_unit(table.names[table.index(output_column)])[0],
         signal=table.path.name,
     )
 
 
-def _unit(table: Table, column: str, given: str | None, option: str) -> str:
+def _unit(table: Table, column: str, given: str | None, what: str) -> str:
     """Return the unit that was given, or that of the heading; 1 where there is none."""
     if given is not None:
-        return check_unit(given, f"the option {option}", option)
+        return check_unit(given, what)
     own = table.unit(column)
     if not own:
         return "1"
-    heading = table.names[table.index(column)]
-    return check_unit(own, f"the heading {heading!r} of {table.path}", option)
+    return check_unit(own, what, f"the heading {table.names[table.index(column)]!r} of {table.path}")
 
 
 def _needed(table: Table, wanted: Sequence[str], time_column: str | None, *, automatic: bool) -> set[int]:
@@ -160,14 +158,14 @@ def seconds(table: Table, name: str) -> FloatArray:
         Its unit is none of time, a value is not finite, or it does not increase: the line is named.
     """
     unit = table.unit(name)
-    if unit not in _SECONDS:
+    if unit not in SECONDS:
         raise DataError(
             f"{table.path} gives the time {name} in {unit!r}, which is not one of s, ms, us, min, h",
             hint="give it in one of these; import also takes another --time column, or --rate",
         )
     time_s = table.check_finite(name)
-    if _SECONDS[unit] != 1.0:
-        time_s = time_s * _SECONDS[unit]
+    if SECONDS[unit] != 1.0:
+        time_s = time_s * SECONDS[unit]
     back = np.flatnonzero(time_s[1:] <= time_s[:-1])
     if back.size:
         row = int(back[0]) + 1

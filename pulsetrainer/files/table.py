@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import difflib
 import io
-import re
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,26 +20,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, beyond_all_quantities
+from pulsetrainer.artefacts.units import split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
 from pulsetrainer.files.csv_dialect import Dialect, detect
 from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
-from pulsetrainer.files.units import symbol_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*$")
-_DIVIDED = re.compile(r"^(?P<name>.*\S)\s+/\s+(?P<unit>\S+)\s*$")
-_SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,6})$")
-# a suffix is a unit only if it is one: "coil_current" is a name
-_UNIT_NAMES = """
-    s ms us µs min h A mA uA kA V mV kV N mN kN Nm mNm T mT m mm um µm nm Pa kPa MPa bar mbar mmHg
-    deg rad C °C degC K Hz kHz W g kg A/m kA/m m/s mm/s rad/s N/A % percent
-"""
-_UNITS = frozenset(_UNIT_NAMES.split())
 _WRITTEN_ROWS = 1 << 14
 
 
@@ -145,17 +135,6 @@ class Table:
         return k
 
 
-def split_unit(heading: str) -> tuple[str, str]:
-    """Return name and unit of a column heading; no unit where it says none."""
-    for pattern in (_BRACKETED, _DIVIDED):
-        if (found := pattern.match(heading)) and found["name"]:
-            return found["name"].strip(), found["unit"].strip()
-    suffixed = _SUFFIXED.match(heading)
-    if suffixed and suffixed["unit"] in _UNITS:
-        return suffixed["name"], suffixed["unit"]
-    return heading, ""
-
-
 def numbered(names: Sequence[str]) -> tuple[str, ...]:
     """Return headings with a number behind the name wherever several columns have one heading.
 
@@ -234,7 +213,7 @@ def _only(table: Table, keep: Callable[[Table], Collection[int]] | None) -> Tabl
 def _of_arrays(path: Path, columns: Columns) -> Table:
     """Return the table of a file that is no text."""
     names = tuple(columns.values)
-    units = {name: columns.units.get(name) or split_unit(name)[1] for name in names}
+    units = {name: symbol_of(columns.units.get(name) or split_unit(name)[1]) for name in names}
     named = {name: unit for name, unit in units.items() if unit}
     return Table(path, names, columns.values, named, (), shifts=(), rate_Hz=columns.rate_Hz)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pulsetrainer.report.style import pretty_unit
+from pulsetrainer.artefacts.units import shown
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +18,7 @@ def _range(values: NDArray[np.float64], unit: str) -> str:
     known = values[np.isfinite(values)]
     if known.size == 0:
         return "without a single value"
-    return f"from {known.min():.3g} to {known.max():.3g} {pretty_unit(unit)}".rstrip()
+    return f"from {known.min():.3g} to {known.max():.3g} {shown(unit)}".rstrip()
 
 
 def density(model: Model) -> str:
@@ -37,15 +37,15 @@ def density(model: Model) -> str:
         beta, alpha = model.edges[j[k] : j[k] + 2].mean(), model.edges[i[k] : i[k] + 2].mean()
         text += (
             " Off the diagonal the density is greatest, "
-            f"{off_diagonal[k]:.3g} {pretty_unit(model.weights_unit)}, for relays that switch up "
-            f"at {alpha:.3g} and down at {beta:.3g} {pretty_unit(model.input_unit)}."
+            f"{off_diagonal[k]:.3g} {shown(model.weights_unit)}, for relays that switch up "
+            f"at {alpha:.3g} and down at {beta:.3g} {shown(model.input_unit)}."
         )
     return text
 
 
 def identification(fit: Fit) -> str:
     """Say what was measured and how far the model is from it."""
-    unit = pretty_unit(fit.output_unit)
+    unit = shown(fit.output_unit)
     return (
         f"Above: loops of the measured output, {_range(fit.output, fit.output_unit)}, over the input, "
         f"{_range(fit.input, fit.input_unit)}, with the output of the model laid on them. "
@@ -77,5 +77,5 @@ def prediction(model: ModelEvaluation) -> str:
     return (
         f"Above: measured output, {_range(model.output, model.output_unit)}, with the prediction of "
         f"{model.name} laid on it. Below: the residual, rms {model.rms:.3g} "
-        f"{pretty_unit(model.output_unit)}, at most {model.max_percent:.2f} % of the span."
+        f"{shown(model.output_unit)}, at most {model.max_percent:.2f} % of the span."
     )

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import diagnosis_figures as figures
 from pulsetrainer.report.html import environment, indented
 from pulsetrainer.report.render import inline_svg
-from pulsetrainer.report.style import pretty_unit
 from pulsetrainer.report.views import Number, Picture, number
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def headline(found: Diagnosis) -> str:
 
 def _words(one: Cause) -> dict[str, str]:
     parameters = ", ".join(
-        f"{p.name} {p.value:.3g} {pretty_unit(p.unit)}".rstrip()
+        f"{p.name} {p.value:.3g} {shown(p.unit)}".rstrip()
         + (f" (95 %: {p.lower:.3g} to {p.upper:.3g})" if math.isfinite(p.lower) and p.lower < p.upper else "")
         for p in one.parameters
     )

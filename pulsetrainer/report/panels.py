@@ -10,6 +10,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import PowerNorm
 from matplotlib.patches import Polygon
 
+from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report.style import (
     COMPENSATED,
     ERROR,
@@ -22,7 +23,6 @@ from pulsetrainer.report.style import (
     TARGET,
     VERMILION,
     label,
-    pretty_unit,
 )
 from pulsetrainer.report.thin import extremes
 
@@ -145,7 +145,7 @@ def _facts(model: Model) -> str:
     lines = [
         f"{model.edges.size - 1} levels, {model.weights.size} cells",
         f"{covered} covered" + (", the rest hatched" if covered < model.weights.size else ""),
-        f"offset {model.offset:.4g} {pretty_unit(model.output_unit)}".rstrip().replace("-", "−"),
+        f"offset {model.offset:.4g} {shown(model.output_unit)}".rstrip().replace("-", "−"),
     ]
     if model.polarity < 0:
         lines.append("output falls as input rises")

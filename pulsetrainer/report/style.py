@@ -7,11 +7,12 @@ reader lose nothing. The hues are of Okabe and Ito's palette (2008). Each colour
 
 from __future__ import annotations
 
-import re
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Final, ParamSpec, TypeVar
 
 from matplotlib import rc_context
+
+from pulsetrainer.artefacts.units import shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -104,24 +105,7 @@ def styled(drawing: Callable[P, R]) -> Callable[P, R]:
     return in_style
 
 
-_POWERS: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
-
-def pretty_unit(unit: str) -> str:
-    """Return the unit as it is printed: ``N/A^2`` becomes N/A², ``percent`` %, ``1`` nothing."""
-    if unit in ("1", "", "dimensionless"):
-        return ""
-    if unit == "percent":
-        return "%"
-    # brackets around one word, as in N/(A)^2, are for machines
-    head, *powers = re.sub(r"\((\w+)\)", r"\1", unit).replace("**", "^").split("^")
-    for power in powers:
-        digits = len(power) - len(power.lstrip("-0123456789"))
-        head += power[:digits].translate(_POWERS) + power[digits:]
-    return head.replace("*", "·")
-
-
 def label(quantity: str, unit: str) -> str:
     """Return an axis label: the quantity, and the unit in brackets where there is one."""
-    shown = pretty_unit(unit)
-    return f"{quantity} [{shown}]" if shown else quantity
+    printed = shown(unit)
+    return f"{quantity} [{printed}]" if printed else quantity

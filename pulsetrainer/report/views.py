@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Final
 
 from markupsafe import Markup
 
+from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import alternatives, figures
 from pulsetrainer.report.panels import largest_residual
 from pulsetrainer.report.render import inline_svg
-from pulsetrainer.report.style import label, pretty_unit
+from pulsetrainer.report.style import label
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -242,7 +243,7 @@ def model_section(model: Model) -> Section:
     rows = tuple(
         Row(
             f"{extension.cause}: {parameter.name}",
-            pretty_unit(parameter.unit),
+            shown(parameter.unit),
             tuple(
                 number(value, f"model.{extension.cause}.{parameter.name}{suffix}", ".4g")
                 for value, suffix in (
@@ -270,7 +271,7 @@ def prediction_section(models: Sequence[ModelEvaluation]) -> Section:
             number(model.max_percent, f"{stem}.max_percent"),
             number(model.gain_percent, f"{stem}.gain_percent", ".1f"),
         )
-        rows.append(Row(model.name, pretty_unit(model.output_unit), cells))
+        rows.append(Row(model.name, shown(model.output_unit), cells))
         pictures.append(
             _picture(
                 figures.prediction(model, reach),

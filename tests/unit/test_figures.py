@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from matplotlib import rcParams
 from matplotlib.collections import PolyCollection, QuadMesh
 
-from pulsetrainer.artefacts import Evaluation, Run
+from pulsetrainer.artefacts import Evaluation, Run, units
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.report import figures
 from pulsetrainer.report.render import encode, inline_svg
-from pulsetrainer.report.style import THEME, VERMILION, label, pretty_unit
+from pulsetrainer.report.style import THEME, VERMILION, label
 from pulsetrainer.report.thin import MOST_POINTS, extremes
 
 
@@ -287,7 +287,7 @@ def test_error_panel_is_in_percent_of_full_force():
 )
 def test_units_are_printed_as_people_write_them(unit, shown):
     """Powers are raised, percent is a sign, a pure number has none."""
-    assert pretty_unit(unit) == shown
+    assert units.shown(unit) == shown
 
 
 def test_label_of_a_pure_number_has_no_brackets():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pint
 import pytest
 
+from pulsetrainer.artefacts.units import check_unit, is_unit
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.units import check_unit, is_unit
 
 SI = ["A", "mA", "N", "kN", "A/m", "T", "mT", "nm", "V", "Pa", "bar", "mbar", "N*m", "m/s", "m/s^2", "nA*m^2"]
 SI += ["1/s", "Hz", "deg", "rad", "K", "ms", "kg", "J/kg", "rad/s", "ohm", "eV", "N·m", "m/s²", "s^-1"]
@@ -31,6 +31,6 @@ def test_pint_knows_them_too(text):
 def test_no_units(text):
     """Words, and what does not parse."""
     assert not is_unit(text)
-    with pytest.raises(DataError, match="which is none") as caught:
-        check_unit(text, "the heading 'x' of a.csv", "--input-unit")
-    assert "--input-unit" in caught.value.hint
+    with pytest.raises(DataError, match=r"input unit .* the heading 'x'") as caught:
+        check_unit(text, "input unit", "the heading 'x' of a.csv")
+    assert "input unit" in caught.value.hint
