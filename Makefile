@@ -17,13 +17,13 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo test test-slow lint faults bench mutate blind docs bounds firmware-mps2 firmware-cost clean help
+.PHONY: demo ideal test test-slow lint faults bench mutate blind docs bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
 
 # act one: the paper's method and the continuous inverse; act two: what the model gets wrong, extended, played again
-demo: $(D)/report.html $(D)/diagnosis.html $(D)/unseen.h5 $(D)/model-extended.h5  ## the whole chain, twice: as identified, and extended by what a diagnosis finds
+demo: $(D)/report.html $(D)/diagnosis.html $(D)/prediction.h5  ## the whole chain, twice: as identified, and extended by what a diagnosis finds
 	@$(PT) evaluate $(PLAYED)
 	@$(PT) evaluate $(D)/unseen.h5 --model $(D)/model-continuous.h5 --model $(D)/model-extended.h5
 	@echo "reports: $(D)/report.html $(D)/diagnosis.html"
@@ -73,6 +73,13 @@ $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(eval $(call PULSE_RULES,$(p),$(m)
 $(D)/evaluation.h5 $(D)/report.html &: $(PLAYED) $(REPORT)
 	$(PT) evaluate $(PLAYED) -o $(D)/evaluation.h5 --html $(D)/report.html --overwrite > /dev/null
 
+$(D)/prediction.h5: $(D)/unseen.h5 $(D)/model-continuous.h5 $(D)/model-extended.h5
+	$(PT) evaluate $< --model $(D)/model-continuous.h5 --model $(D)/model-extended.h5 -o $@ --overwrite > /dev/null
+
+# static hysteresis and sensor noise only: what the continuous inverse itself leaves
+ideal: $(VENV)/installed
+	$(MAKE) D=build/ideal PORT='bench:?ideal' METHODS=continuous build/ideal/evaluation.h5
+
 bounds: $(D)/report.html tests/regression/bounds.toml  ## hold the demo's figures against their bounds
 	$(PT) evaluate $(PLAYED) --bounds tests/regression/bounds.toml
 
@@ -113,7 +120,8 @@ arm-tools:
 	@for tool in $(ARM_TOOLS); do command -v $$tool > /dev/null || { echo "$$tool is not there; on Debian:" \
 	"sudo apt-get install -y --no-install-recommends gcc-arm-none-eabi qemu-system-arm" >&2; exit 1; }; done
 
-docs: $(VENV)/installed  ## the reference pages, off the code; the figures of the theory
+docs: $(VENV)/installed-test $(D)/evaluation.h5 $(D)/prediction.h5 ideal  ## the reference pages, off the code; the README's figures, off the demo
+	$(BIN)/python docs/demo.py $(D)/evaluation.h5 $(D)/prediction.h5 build/ideal/evaluation.h5
 	$(BIN)/python docs/make.py
 	$(BIN)/python docs/figures.py
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 from architecture import architecture_page
+from demo import readme
 
 from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.app import app
@@ -371,6 +372,7 @@ PAGES = {
     "format.md": format_page,
     "decisions/README.md": decisions_page,
     "../ARCHITECTURE.md": lambda: architecture_page(MARK),
+    "../README.md": readme,
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import shutil
 import subprocess
@@ -137,6 +138,33 @@ def test_figures_of_the_readme_are_those_that_are_held():
         for column, stem in COLUMNS.items():
             low, high = bounds[f"{stem}.{ROWS[name]}"]
             assert low <= float(cells[column - 1]) <= high, (name, stem)
+
+
+def test_figures_of_the_demo_are_within_their_bounds():
+    """Those that `make docs` kept: the same bounds, every inversion; on the ideal bench what is promised."""
+    kept = json.loads((ROOT / "docs" / "demo.json").read_text())
+    bounds = _flat(BOUNDS)
+    held = 0
+    for name, figures in kept["played"].items():
+        for metric, value in figures.items():
+            low, high = bounds[f"{name}.{metric}"]
+            assert low <= value <= high, (name, metric)
+            held += 1
+    assert held == len(ROWS) * len(COLUMNS)
+    for figures in kept["ideal"].values():
+        assert figures["mean_error_reduction_percent"] >= 88.0
+        assert figures["compensated.max_abs_error_percent"] <= 2.5
+    assert kept["gain_percent"] > 50.0
+
+
+def test_a_figure_of_the_readme_is_the_one_that_was_kept():
+    """A digit changed by hand, in the page or in what is kept, is found."""
+    demo = script("demo")
+    kept = json.loads(demo.KEPT.read_text())
+    page = (ROOT / "README.md").read_text()
+    assert demo.block(kept) in page
+    kept["played"]["normal.extended"]["compensated.max_abs_error_percent"] += 0.1
+    assert demo.block(kept) not in page
 
 
 def test_figures_of_the_theory_are_drawn_by_the_code(tmp_path):
