@@ -15,7 +15,7 @@ from prandtl_ishlinskii import PrandtlIshlinskii
 
 from pulsetrainer.artefacts import Run
 from pulsetrainer.core.initial_state import known_from
-from pulsetrainer.files.run_from_table import read_run
+from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.steps.evaluate import evaluate
 from pulsetrainer.steps.identify import identify
 
@@ -56,7 +56,7 @@ ALSO = [Case("davinci_f0p1_torque10", f"davinci_f0p{k}_torque10") for k in (3, 5
 
 def imported(path: Path) -> Run:
     """Read a record as it is."""
-    return read_run(path, input_column="u", output_column="y")
+    return run_from_table(path, input="u", output="y").run
 
 
 def files_of(case: Case, folder: Path) -> tuple[Path, Path]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from pulsetrainer.version import __version__
 
 if TYPE_CHECKING:
-    from pulsetrainer.api import invert, load, open_device, save
+    from pulsetrainer.api import invert, load, open_device, read_table, save
     from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Waveform
     from pulsetrainer.steps.compare import compare
     from pulsetrainer.steps.evaluate import evaluate
@@ -39,13 +39,14 @@ __all__ = [
     "load",
     "open_device",
     "play",
+    "read_table",
     "save",
 ]
 
 _NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Waveform")
 _HOME = {
     **dict.fromkeys(_NOUNS, "artefacts"),
-    **dict.fromkeys(("invert", "load", "open_device", "save"), "api"),
+    **dict.fromkeys(("invert", "load", "open_device", "read_table", "save"), "api"),
     **{verb: f"steps.{verb}" for verb in ("compare", "evaluate", "identify", "play")},
 }
 

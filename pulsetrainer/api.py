@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,11 +16,13 @@ from pulsetrainer.core.waveforms import Shape
 from pulsetrainer.device import device as _device
 from pulsetrainer.device.device import Device, Limits
 from pulsetrainer.files import provenance, pulses, store
+from pulsetrainer.files.run_from_table import run_from_table
+from pulsetrainer.steps.import_ import import_parts
 from pulsetrainer.steps.invert import invert as _invert
 from pulsetrainer.steps.invert import shape_of
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Model
+    from pulsetrainer.artefacts import Model, Run
 
 
 def load(path: Path | str) -> Any:
@@ -97,6 +100,38 @@ def invert(
     Everything else is as in ``steps.invert.invert``, which this calls.
     """
     return _invert(_shape(pulse), model, **options)
+
+
+def read_table(
+    paths: Path | str | Sequence[Path | str],
+    *,
+    resample: float | Literal["even"] | None = None,
+    **columns: Any,
+) -> Run:
+    """Return the run in a table from any bench: CSV and its relatives, .npz, .npy, .mat or .wav.
+
+    Several files are parts of one run. ``columns`` are those of ``files.run_from_table.run_from_table``:
+    ``input`` and ``output`` (names of columns), and ``time``, ``reference``, ``input_unit``, ``output_unit``,
+    ``rate`` (Hz) or ``no_time`` where the file does not say it. ``resample`` makes the time steps even.
+
+    Raises
+    ------
+    UsageError
+        Two options contradict each other, or there is no time to resample.
+    DataError
+        A file cannot be read, a column is missing or not finite, a unit is not known, or time does not
+        increase: file, line and column are named.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> run = pt.read_table("tests/data/pneu_oring_3bar.csv", input="u", output="y", output_unit="N")
+    >>> run.output.size, run.output_unit
+    (7833, 'N')
+    """
+    several = [paths] if isinstance(paths, str | Path) else paths
+    parts = [run_from_table(path, **columns).run for path in several]
+    return import_parts(parts, resample=resample).run
 
 
 def _shape(pulse: str | Waveform | Shape | tuple[ArrayLike, ArrayLike]) -> Shape:

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, Force
+from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, Overwrite
+from pulsetrainer.errors import UsageError
+
+if TYPE_CHECKING:
+    from pulsetrainer.steps.import_ import Imported
+
+_NAME = "{name}"  # in the output: one run for each file
 
 
 def import_(
+    context: typer.Context,
     files: Annotated[
         list[Path],
         typer.Argument(
@@ -46,7 +54,9 @@ def import_(
     rate: Annotated[
         float | None, typer.Option(help="Samples a second, instead of a time column.", show_default=False)
     ] = None,
-    no_time: Annotated[bool, typer.Option("--no-time", help="Only the order of the samples counts.")] = False,
+    no_time: Annotated[
+        bool, typer.Option("--no-time", help="Ignore time: only the order of the samples counts.")
+    ] = False,
     resample: Annotated[
         str | None,
         typer.Option(
@@ -55,48 +65,113 @@ def import_(
             show_default=False,
         ),
     ] = None,
-    force: Force = False,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Make a run of a record measured elsewhere.
 
     Example: pulsetrainer import scope.csv --input current_A --output force_N -o run.h5
     """
-    from pulsetrainer.steps import preflight
+    from pulsetrainer.files.timing import check_timing
 
-    outputs = preflight.import_groups(files, out)
-    preflight.check_files(outputs=outputs, force=force, others=files)
-    preflight.check_timing(time_column, rate, no_time=no_time, resampled=resample is not None)
-    even_rate = _rate(resample)
-    from pulsetrainer.steps import import_ as flow
+    groups, even = _groups(files, out), _rate(resample)
+    jobs = [
+        Job(context, tables=group, outputs=(target,), overwrite=overwrite, as_json=json)
+        for target, group in groups.items()
+    ]
+    check_timing(time_column, rate, no_time=no_time, resampled=even is not None)
+    from pulsetrainer.files.run_from_table import run_from_table
+    from pulsetrainer.steps.import_ import import_parts
 
-    screen = Screen("import", as_json=json)
-    options = flow.Options(
-        files=tuple(files),
-        output=out,
-        input_column=input_column,
-        output_column=output_column,
-        time_column=time_column,
-        reference_column=reference_column,
-        input_unit=input_unit,
-        output_unit=output_unit,
-        rate_Hz=rate,
-        no_time=no_time,
-        resample=even_rate,
-        force=force,
-    )
-    with screen.working(f"reading {', '.join(path.name for path in files)}") as context:
-        result = flow.run(options, context)
-    screen.result(result)
-    for one in result.runs:
-        known = {name: value for name, value in one.facts.items() if value is not None}
-        screen.facts(f"{one.output}: {', '.join(Path(name).name for name in one.report.files)}", known)
+    read: list[Imported] = []
+    with jobs[0].working(f"reading {', '.join(path.name for path in files)}") as progress:
+        for group in groups.values():
+            parts = [
+                run_from_table(
+                    path,
+                    input=input_column,
+                    output=output_column,
+                    time=time_column,
+                    reference=reference_column,
+                    input_unit=input_unit,
+                    output_unit=output_unit,
+                    rate=rate,
+                    no_time=no_time,
+                )
+                for path in group
+            ]
+            jobs[0].notes([note for part in parts for note in part.notes])
+            read.append(import_parts([part.run for part in parts], resample=even))
+            del parts
+            progress(0.7 * len(read) / len(groups))
+        # nothing is written before all of them have been read
+        for job, (target, group), one in zip(jobs, groups.items(), read, strict=True):
+            job.notes(one.notes)
+            for path in group:
+                job.uses(path)
+            job.save(target, one.run, f"{', '.join(path.name for path in group)}, imported")
+        progress(1.0)
+    _show(jobs[0], groups, read)
 
 
-def _rate(text: str | None) -> float | None:
-    """Read --resample: 0 for even, a rate, or nothing."""
+def _show(job: Job, groups: dict[Path, tuple[Path, ...]], read: list[Imported]) -> None:
+    facts = [_facts(one) for one in read]
+    runs = [
+        {"output": target, "report": {"files": group} | plain(one.report), "facts": figures}
+        for (target, group), one, figures in zip(groups.items(), read, facts, strict=True)
+    ]
+    job.screen.result({"output": runs[0]["output"], "facts": facts[0], "runs": runs})
+    for (target, group), figures in zip(groups.items(), facts, strict=True):
+        known = {name: value for name, value in figures.items() if value is not None}
+        job.screen.facts(f"{target}: {', '.join(path.name for path in group)}", known)
+
+
+def _facts(imported: Imported) -> dict[str, Any]:
+    """Return the main figures in the order in which a person would ask."""
+    from pulsetrainer.artefacts.units import with_unit
+    from pulsetrainer.report.facts import run_facts
+
+    report = imported.report
+    shown = run_facts(imported.run, report.reversals)
+    if report.false_reversals:
+        noise = with_unit(f"{report.input_noise:.2g}", report.input_unit)
+        shown["noise in the input"] = f"{noise}; {report.false_reversals} more reversals are noise"
+    direction = "unclear, identify tries both" if report.polarity == "unclear" else report.polarity
+    shown["loop"] = f"{direction} (correlation {report.correlation:+.2f})"
+    shown["coverage_percent"] = report.coverage_percent
+    stamps = {True: "even", False: "uneven", None: "none: only the order counts"}[report.even]
+    shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps
+    for name in ("signal", "complete", "dropped_samples"):  # the title; of a device, not of a file
+        shown.pop(name, None)
+    return shown
+
+
+def _groups(files: list[Path], out: Path) -> dict[Path, tuple[Path, ...]]:
+    """Return the files that are imported into each output: all into one, or each into its own.
+
+    Raises
+    ------
+    UsageError
+        Two files would be written to one output.
+    """
+    if _NAME not in str(out):
+        return {out: tuple(files)}
+    groups: dict[Path, tuple[Path, ...]] = {}
+    for path in files:
+        target = Path(str(out).replace(_NAME, path.stem))
+        if target in groups:
+            raise UsageError(
+                f"{groups[target][0]} and {path} would both be written to {target}",
+                hint="import them one by one, under other names",
+            )
+        groups[target] = (path,)
+    return groups
+
+
+def _rate(text: str | None) -> float | Literal["even"] | None:
+    """Read --resample: even, a rate, or nothing."""
     if text is None or text == "even":
-        return None if text is None else 0.0
+        return "even" if text else None
     try:
         value = float(text)
     except ValueError:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import typer
 
 from pulsetrainer.cli.console import Screen, plain
+from pulsetrainer.cli.next_step import as_options
 from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
 
@@ -139,7 +140,7 @@ class Job:
     def notes(self, lines: Sequence[str]) -> None:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
-            self.screen.note(line)
+            self.screen.note(as_options(line))
 
 
 def _is_path(value: Any) -> bool:

@@ -1,55 +1,31 @@
-"""Import: records measured on any bench become runs, with a report of what was read."""
+"""Import: the parts of a record, read from tables, become one run, with a report of what was read."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from pulsetrainer.artefacts.time_steps import steps_of
+from pulsetrainer.artefacts import FloatArray, Run
+from pulsetrainer.artefacts.time_steps import GAP, steps_of
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.files import provenance, run_from_table, store
-from pulsetrainer.steps import preflight
-from pulsetrainer.steps.show import run_facts
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Run
-    from pulsetrainer.steps.context import Context
+from pulsetrainer.core.signals import MOST_SAMPLES
+from pulsetrainer.errors import DataError, UsageError
 
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range
 _LOOKED_AT = 1_000_000  # samples; of a longer record every so many are looked at
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
-    """Which files, and which of their columns mean what."""
-
-    files: tuple[Path, ...]
-    output: Path  # with {name} in it: one run for each file; else all files are parts of one run
-    input_column: str
-    output_column: str
-    time_column: str | None = None
-    reference_column: str | None = None
-    input_unit: str | None = None
-    output_unit: str | None = None
-    rate_Hz: float | None = None
-    no_time: bool = False
-    resample: float | None = None  # Hz; 0: at the median step; None: time stamps stay as they are
-    force: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class Report:
     """What was read, in numbers: the record as it was, before any resampling."""
 
-    files: tuple[str, ...]
     samples: int
     seconds: float | None  # None: no time, as below
     rate_Hz: float | None  # of the median step
@@ -74,90 +50,40 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """One run that was written."""
+    """A run, what there is to say about its making, and the record as it was."""
 
-    output: Path
+    run: Run
     report: Report
-    facts: dict[str, Any]
+    notes: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What was read; ``output`` and ``facts`` are those of the first run."""
+def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | None = None) -> Imported:
+    """Join the parts of a record, and make its time steps even if ``resample`` says so.
 
-    output: Path
-    facts: dict[str, Any]
-    runs: tuple[Imported, ...]
-
-
-def run(options: Options, context: Context) -> Result:
-    """Read the files and store the runs; nothing is written before all of them have been read.
+    Parameters
+    ----------
+    parts
+        One or more, in their order.
+    resample
+        Rate in Hz, ``"even"`` for that of the median step, None to leave the time stamps as they are.
 
     Raises
     ------
     UsageError
-        An output exists, or two files would be written to one; the options contradict each other.
+        The run has no time to resample, or the rate would make too many samples.
     DataError
-        A file cannot be read, lacks a column, or holds what is not a number; a unit is none; time does not
-        increase.
+        The parts differ in units, or only some have a time or a reference.
     """
-    groups = preflight.import_groups(options.files, options.output)
-    resampled = options.resample is not None
-    preflight.check_timing(options.time_column, options.rate_Hz, no_time=options.no_time, resampled=resampled)
-    preflight.check_files(outputs=groups, force=options.force, others=options.files)
-    read: list[tuple[Path, tuple[Path, ...], Report, Run]] = []
-    for k, (target, files) in enumerate(groups.items()):
-        read.append((target, files, *_read_group(files, options, context)))
-        context.progress(0.7 * (k + 1) / len(groups))
-    written = []
-    for target, files, report, kept in read:
-        _note_time(report, context)
-        _store(target, files, kept, options, context)
-        written.append(Imported(target, report, _facts(kept, report)))
-    context.progress(1.0)
-    return Result(written[0].output, written[0].facts, tuple(written))
+    run, notes = joined(parts)
+    report = report_of(run, resampled=resample is not None)
+    if resample is not None:
+        del run
+        rate_Hz = None if resample == "even" else float(resample)
+        run, _ = joined([resampled(part, rate_Hz) for part in parts])
+    return Imported(run, report, (*notes, *_notes_on_time(run.signal, report)))
 
 
-def _read_group(files: Sequence[Path], options: Options, context: Context) -> tuple[Report, Run]:
-    """Return what the files of one run hold, and the run that is kept: no other copy stays in memory."""
-    parts = [_read(path, options, context) for path in files]
-    whole = parts[0] if len(parts) == 1 else run_from_table.joined(parts, context.note)
-    report = report_of(whole, files, resampled=options.resample is not None)
-    if options.resample is None:
-        return report, whole
-    del whole
-    evened = [run_from_table.resampled(part, options.resample or None) for part in parts]
-    return report, evened[0] if len(evened) == 1 else run_from_table.joined(evened)
-
-
-def _read(path: Path, options: Options, context: Context) -> Run:
-    return run_from_table.read_run(
-        path,
-        input_column=options.input_column,
-        output_column=options.output_column,
-        time_column=options.time_column,
-        reference_column=options.reference_column,
-        input_unit=options.input_unit,
-        output_unit=options.output_unit,
-        rate_Hz=options.rate_Hz,
-        no_time=options.no_time,
-        note=context.note,
-    )
-
-
-def _store(target: Path, files: Sequence[Path], whole: Run, options: Options, context: Context) -> None:
-    header = provenance.make_header(
-        f"{', '.join(path.name for path in files)}, imported",
-        argv=context.argv,
-        now=context.now(),
-        parameters={k: v for k, v in asdict(options).items() if k not in ("files", "output", "force")},
-        inputs=provenance.digests(files),
-        libraries=provenance.library_versions(),
-    )
-    store.write(target, whole, header, overwrite=options.force)
-
-
-def report_of(whole: Run, files: Sequence[Path], *, resampled: bool = False) -> Report:
+def report_of(whole: Run, *, resampled: bool = False) -> Report:
     """Return what a run holds, in numbers."""
     timed = whole.time_s is not None
     steps = steps_of(whole.time_s) if whole.time_s is not None else None
@@ -169,7 +95,6 @@ def report_of(whole: Run, files: Sequence[Path], *, resampled: bool = False) -> 
     direction = "rising" if correlation > 0 else "falling"
     covered = coverage(Plane.uniform(low, high, LEVELS), [cleaned.input]) if high > low else np.zeros(1)
     return Report(
-        files=tuple(str(path) for path in files),
         samples=whole.input.size,
         seconds=float(whole.time_s[-1] - whole.time_s[0]) if whole.time_s is not None else None,
         rate_Hz=1.0 / steps.median if steps else None,
@@ -193,38 +118,120 @@ def report_of(whole: Run, files: Sequence[Path], *, resampled: bool = False) -> 
     )
 
 
-def _note_time(report: Report, context: Context) -> None:
+def _notes_on_time(name: str, report: Report) -> list[str]:
     """Say what is wrong with the time stamps."""
-    names = ", ".join(report.files)
+    notes = []
     if report.gaps:
         filled = ", filled with straight lines" if report.resampled else ""
-        context.note(f"{names} has {report.gaps} gaps, the longest of {report.longest_gap_s:.3g} s{filled}")
+        notes.append(f"{name} has {report.gaps} gaps, the longest of {report.longest_gap_s:.3g} s{filled}")
     if (
         report.even is False
         and not report.resampled
         and report.shortest_step_s is not None
         and report.longest_step_s is not None
     ):
-        context.note(
-            f"the time stamps of {names} are uneven, steps of {1e3 * report.shortest_step_s:.3g} to "
-            f"{1e3 * report.longest_step_s:.3g} ms; kept as they are (--resample even makes them even)"
+        notes.append(
+            f"the time stamps of {name} are uneven, steps of {1e3 * report.shortest_step_s:.3g} to "
+            f"{1e3 * report.longest_step_s:.3g} ms; kept as they are (`resample` even makes them even)"
         )
+    return notes
 
 
-def _facts(whole: Run, report: Report) -> dict[str, Any]:
-    """Return the main figures in the order in which a person would ask."""
-    shown = run_facts(whole, report.reversals)
-    unit = "" if report.input_unit == "1" else f" {report.input_unit}"
-    if report.false_reversals:
-        shown["noise in the input"] = (
-            f"{report.input_noise:.2g}{unit}, {report.false_reversals} more reversals are noise"
+def resampled(run: Run, rate_Hz: float | None) -> Run:
+    """Return a run on even time steps, straight between samples; None: at its median step.
+
+    Raises
+    ------
+    UsageError
+        The run has no time, or the rate is not positive or would make too many samples.
+    """
+    if run.time_s is None:
+        raise UsageError("a run without time cannot be resampled", hint="give `time` or `rate`")
+    if rate_Hz is not None and not 0 < rate_Hz < np.inf:
+        raise UsageError(
+            f"the rate must be positive, got {rate_Hz:g} Hz", hint="for instance `resample` 1000"
         )
-    words = {"unclear": "unclear, identify tries both", "rising": "rising", "falling": "falling"}
-    shown["loop"] = f"{words[report.polarity]} (correlation {report.correlation:+.2f})"
-    shown["coverage_percent"] = report.coverage_percent
-    stamps = {True: "even", False: "uneven", None: "none: only the order counts"}[report.even]
-    shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps
-    del shown["signal"]  # it is the title
-    for name in ("complete", "dropped_samples"):  # of a device, not of a file
-        shown.pop(name, None)
-    return shown
+    step = steps_of(run.time_s).median if rate_Hz is None else 1.0 / rate_Hz
+    count = int(np.floor((run.time_s[-1] - run.time_s[0]) / step + 1e-9)) + 1
+    if not 2 <= count <= MOST_SAMPLES:
+        raise UsageError(
+            f"resampling to steps of {step:.3g} s would make {count} samples of {run.input.size}",
+            hint="choose another rate",
+        )
+    even = run.time_s[0] + np.arange(count) * step
+    return replace(
+        run,
+        time_s=even,
+        input=np.interp(even, run.time_s, run.input),
+        output=np.interp(even, run.time_s, run.output),
+        reference=None if run.reference is None else np.interp(even, run.time_s, run.reference),
+    )
+
+
+def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
+    """Return the parts as one run, with a seam wherever one does not continue the part before; and notes.
+
+    Raises
+    ------
+    DataError
+        Some parts have a time or a reference and others have none, or their units differ.
+    """
+    first = parts[0]
+    if len(parts) == 1:
+        return first, ()
+    for part in parts[1:]:
+        if (part.input_unit, part.output_unit) != (first.input_unit, first.output_unit):
+            raise DataError(
+                f"{part.signal} is in {part.input_unit} and {part.output_unit}, but {first.signal} is in "
+                f"{first.input_unit} and {first.output_unit}",
+                hint="give `input_unit` and `output_unit`, or import them one by one",
+            )
+        for name in ("time_s", "reference"):
+            if (getattr(part, name) is None) != (getattr(first, name) is None):
+                raise DataError(
+                    f"of {first.signal} and {part.signal} only one has a {name.removesuffix('_s')}",
+                    hint="give `rate` or `no_time` for all, or import them one by one",
+                )
+    times, seams, notes = _joined_time(parts)
+    starts = np.cumsum([part.input.size for part in parts])[:-1]
+    seam = np.zeros(sum(part.input.size for part in parts), dtype=bool)
+    seam[starts] = seams
+    whole = replace(
+        first,
+        seam=seam if seam.any() else None,
+        time_s=times,
+        input=np.concatenate([part.input for part in parts]),
+        output=np.concatenate([part.output for part in parts]),
+        reference=None
+        if first.reference is None
+        else np.concatenate([part.reference for part in parts if part.reference is not None]),
+        signal=", ".join(part.signal for part in parts),
+    )
+    return whole, notes
+
+
+def _joined_time(parts: Sequence[Run]) -> tuple[FloatArray | None, list[bool], tuple[str, ...]]:
+    """Return the time stamps of all parts, strictly increasing; where there was a pause; notes.
+
+    A part whose clock goes on, one step or less than a gap after the part before, is its continuation.
+    After a pause, or where nobody can tell, the memory is another: a seam.
+    """
+    times: list[FloatArray] = []
+    seams: list[bool] = []
+    notes: list[str] = []
+    for part in parts:
+        time_s = part.time_s
+        if time_s is None:
+            return None, [True] * (len(parts) - 1), ()
+        if times:
+            step, end = steps_of(times[-1]).median, float(times[-1][-1])
+            goes_on = 0 < time_s[0] - end <= GAP * step
+            seams.append(not goes_on)
+            if time_s[0] <= end:
+                notes.append(
+                    f"the clock starts again in {part.signal}: its first sample is set {step:.3g} s after "
+                    "the end of the part before"
+                )
+                time_s = time_s + (end + step - float(time_s[0]))
+        times.append(time_s)
+    return np.concatenate(times), seams, tuple(notes)

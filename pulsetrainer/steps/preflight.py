@@ -12,7 +12,6 @@ from pathlib import Path
 from pulsetrainer.errors import UsageError
 from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
-from pulsetrainer.files.timing import check_timing
 from pulsetrainer.report.forms import FORMATS
 from pulsetrainer.resources import waveforms_dir
 from pulsetrainer.simulation.options import check_port
@@ -23,16 +22,13 @@ __all__ = [
     "check_force_range",
     "check_port",
     "check_resumable",
-    "check_timing",
     "comparison_form",
     "figure_form",
-    "import_groups",
     "signal_file",
     "waveform_file",
 ]
 
 EXCITATIONS = ("identification", "diagnostic")
-_NAME = "{name}"  # in the output of an import: one run for each file
 
 
 def check_files(
@@ -183,25 +179,3 @@ def comparison_form(files: Sequence[Path], out: Path | None) -> str:
             hint="pulsetrainer compare before.h5 after.h5",
         )
     return figure_form(out, "a comparison", "csv") if out is not None else ""
-
-
-def import_groups(files: Sequence[Path], out: Path) -> dict[Path, tuple[Path, ...]]:
-    """Return the files that are imported into each output: all into one, or each into its own.
-
-    Raises
-    ------
-    UsageError
-        Two files would be written to one output.
-    """
-    if _NAME not in str(out):
-        return {out: tuple(files)}
-    groups: dict[Path, tuple[Path, ...]] = {}
-    for path in files:
-        target = Path(str(out).replace(_NAME, path.stem))
-        if target in groups:
-            raise UsageError(
-                f"{groups[target][0]} and {path} would both be written to {target}",
-                hint="import them one by one, under other names",
-            )
-        groups[target] = (path,)
-    return groups

@@ -10,6 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
+import pulsetrainer as pt
+
 DATA = Path(__file__).resolve().parents[1] / "data"
 
 
@@ -144,6 +146,20 @@ def test_every_format_gives_the_same_run(run, tmp_path, columns):
                 np.testing.assert_array_equal(file[there], own)
 
 
+@pytest.mark.parametrize("resample", [None, "even", 50.0])
+def test_the_function_gives_the_bits_of_the_command(run, tmp_path, resample):
+    """``read_table`` and ``import``, of a real record with gaps and uneven time stamps."""
+    more = [] if resample is None else ["--resample", str(resample)]
+    assert run(*_words("pneu_oring_3bar", "--output-unit", "N", *more, "-o", "run.h5")).code == 0
+    columns = {"input": "u", "output": "y", "output_unit": "N"}
+    made = pt.read_table(DATA / "pneu_oring_3bar.csv", **columns, resample=resample)
+    stored = pt.load(tmp_path / "run.h5")
+    for name in ("time_s", "input", "output"):
+        np.testing.assert_array_equal(getattr(made, name), getattr(stored, name))
+    for name in ("input_unit", "output_unit", "input_quantity", "signal"):
+        assert getattr(made, name) == getattr(stored, name)
+
+
 def test_a_recording_of_sound_needs_no_time_column(run, tmp_path):
     """Two channels of a sound card: the rate is in the file."""
     from scipy.io import wavfile
@@ -169,7 +185,7 @@ def test_several_files_are_parts_of_one_run_or_runs_of_their_own(run, tmp_path, 
     files = [f"p{k}.csv" for k in range(3)]
     done = run("import", *files, "--input", "u", "--output", "y", "-o", "run.h5", "--json")
     assert done.code == 0, done
-    assert "p2.csv starts anew" in done.err
+    assert "starts again in p2.csv" in done.err
     assert done.json["facts"]["samples"] == t.size
     with h5py.File(tmp_path / "run.h5") as file:
         np.testing.assert_array_equal(file["input"], u)
@@ -183,7 +199,7 @@ def test_several_files_are_parts_of_one_run_or_runs_of_their_own(run, tmp_path, 
 def test_rows_that_are_merely_counted_are_no_time(run, tmp_path):
     """A magnetic loop is indexed 0, 1, 2: that is said, and only its order counts, unless --time insists."""
     done = run(*_words("bh_steel_m130_27s_1", "-o", "run.h5", "--json"))
-    assert "merely counts the rows" in done.err
+    assert "just counts the rows" in done.err
     assert done.json["facts"]["rate_Hz"] is None
     with h5py.File(tmp_path / "run.h5") as file:
         assert "time" not in file
@@ -230,9 +246,10 @@ def test_units_far_from_one(run, tmp_path):
         ("", [], ["empty"]),
         ("t_s,current_A,force_N\n", [], ["empty below its header"]),
         (GOOD.replace("force_N", "forse_N"), [], ["no column 'force_N'", "did you mean 'forse_N'"]),
-        (GOOD, ["--output-unit", "Newtonss"], ["'Newtonss'", "none", "--output-unit"]),
-        (GOOD, ["--time", "current_A"], ["in 'A'", "not one of s, ms"]),
-        (GOOD.replace("force_N", "force (as measured)"), ["--output", "force"], ["'as measured'", "none"]),
+        (GOOD, ["--output-unit", "Newtonss"], ["'Newtonss'", "not a known unit", "--output-unit"]),
+        (GOOD, ["--time", "current_A"], ["in 'A'", "expected s, ms"]),
+        (GOOD.replace("force_N", "force (as measured)"), ["--output", "force"],
+         ["'as measured'", "not a known unit"]),
     ],
     ids=["text", "decimals", "duplicate", "backward", "all NaN", "empty", "header only", "column", "unit",
          "time unit", "unit in header"],

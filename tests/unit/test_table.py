@@ -12,11 +12,17 @@ from hypothesis import strategies as st
 from pulsetrainer.errors import ArgumentError, DataError, ExistsError, UsageError
 from pulsetrainer.files.csv_dialect import detect
 from pulsetrainer.files.csv_rows import PIECE, parse
-from pulsetrainer.files.run_from_table import read_run
+from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.table import read_table, write_table
 
+
+def read_run(path, **columns):
+    """Return the run in a table."""
+    return run_from_table(path, **columns).run
+
+
 DATA = Path(__file__).resolve().parents[1] / "data"
-COLUMNS = {"input_column": "u", "output_column": "y"}
+COLUMNS = {"input": "u", "output": "y"}
 
 
 @pytest.fixture
@@ -198,7 +204,7 @@ def test_an_oscilloscope_that_writes_its_step_beside_the_names(table, end):
     read = table(f"X,CH1,CH2,Start,Increment{end}\nSequence,Volt,Volt,-1.0,2.0e-3\n{rows}")
     assert read.names == ("X", "CH1", "CH2")
     assert read.unit("CH1") == "V"
-    run = read_run(read.path, input_column="CH1", output_column="CH2")
+    run = read_run(read.path, input="CH1", output="CH2")
     np.testing.assert_allclose(run.time_s, 2e-3 * np.arange(20), rtol=1e-12)
 
 
@@ -416,9 +422,9 @@ def test_a_run_with_units_of_any_bench(table):
     """Names, units and quantities come from the header; time in ms becomes seconds."""
     run = read_run(
         table("time [ms],H (A/m),B (T),set (A/m)\n0,1,2,1.1\n2,3,4,3.1\n").path,
-        input_column="H",
-        output_column="B",
-        reference_column="set",
+        input="H",
+        output="B",
+        reference="set",
     )
     np.testing.assert_array_equal(run.time_s, [0, 2e-3])
     np.testing.assert_array_equal(run.reference, [1.1, 3.1])
@@ -437,8 +443,8 @@ def test_units_given_win(table):
 def test_a_rate_instead_of_a_time(table):
     """Samples a second; both a rate and a time column are too much, a rate of nothing too little."""
     read = table("t,u,y\n9,1,2\n8,2,3\n")
-    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, rate_Hz=4).time_s, [0, 0.25])
-    for bad in ({"rate_Hz": 4, "time_column": "t"}, {"rate_Hz": 0}, {"rate_Hz": np.nan}, {"rate_Hz": np.inf}):
+    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, rate=4).time_s, [0, 0.25])
+    for bad in ({"rate": 4, "time": "t"}, {"rate": 0}, {"rate": np.nan}, {"rate": np.inf}):
         with pytest.raises(UsageError, match="rate"):
             read_run(read.path, **COLUMNS, **bad)
 
@@ -447,7 +453,7 @@ def test_without_time_only_the_order_counts(table):
     """Where the first column is the input there is no time; another column may be named."""
     read = table("u,y,t\n1,2,0\n2,3,1\n")
     assert read_run(read.path, **COLUMNS).time_s is None
-    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, time_column="t").time_s, [0, 1])
+    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, time="t").time_s, [0, 1])
 
 
 def test_time_that_does_not_increase_names_the_line(table):
@@ -486,8 +492,8 @@ def test_what_is_wrong_far_from_the_start_is_named(tmp_path, row, said):
 
 def test_time_in_an_unknown_unit(table):
     """Samples are no time."""
-    with pytest.raises(DataError, match="time t in 'samples'"):
-        read_run(table("t (samples),u,y\n0,1,2\n1,2,3\n").path, **COLUMNS, time_column="t")
+    with pytest.raises(DataError, match=r"column t .* in 'samples'"):
+        read_run(table("t (samples),u,y\n0,1,2\n1,2,3\n").path, **COLUMNS, time="t")
 
 
 def test_one_row_is_no_run(table):
@@ -500,7 +506,7 @@ def test_one_row_is_no_run(table):
 def test_measured_records(name, rows):
     """Real records read whole: their first and last rows are those of the file."""
     read, units = read_table(DATA / name), {"input_unit": "A/m", "output_unit": "T"}
-    run = read_run(read.path, **COLUMNS, **units, time_column="t_s")
+    run = read_run(read.path, **COLUMNS, **units, time="t_s")
     lines = (DATA / name).read_text().splitlines()
     assert len(run.input) == rows == len(lines) - 1
     for k in (0, -1):

@@ -8,8 +8,14 @@ import pytest
 from scipy.io import savemat, wavfile
 
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.run_from_table import read_run
+from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.table import read_table
+
+
+def read_run(path, **columns):
+    """Return the run in a table."""
+    return run_from_table(path, **columns).run
+
 
 N = 500
 T = np.arange(N) / 250.0
@@ -18,7 +24,7 @@ Y = U**3 + 0.1
 
 
 def _same(path, u, y, **options):
-    run = read_run(path, input_column=u, output_column=y, **options)
+    run = read_run(path, input=u, output=y, **options)
     np.testing.assert_array_equal(run.input, U)
     np.testing.assert_array_equal(run.output, Y)
     np.testing.assert_allclose(run.time_s, T, rtol=0, atol=1e-12)
