@@ -106,6 +106,23 @@ MESSAGES = {
 }
 
 
+# what a command notes besides its result, and what speaks for a diagnosis: pieces of the sentence
+NOTES = {
+    "false reversals": ("false reversals",),
+    "cells never switched": ("never switched", "% of the plane"),
+    "follows the velocity": ("velocity of u", "wrong model"),
+    "zeros differ": ("shifted against each other",),
+    "no time": ("no time",),
+    "beats found": ("6 whole beats", "0.644 to 0.653 s"),
+}
+
+
+def tells(text: str, name: str) -> None:
+    """Hold that a note, or a piece of evidence, says what its row has."""
+    for part in NOTES[name]:
+        assert part in text, (name, part, text)
+
+
 def refusal(done: Ran, code: int, name: str, **names: object) -> None:
     """Hold what every refusal is, and what this one says.
 

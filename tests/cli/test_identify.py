@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wording import refusal
+from wording import refusal, tells
 
 ROWS = 4000
 
@@ -86,11 +86,11 @@ def test_false_reversals_are_counted(run, record):
     done = run("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--json")
     assert done.json["input_noise"] == pytest.approx(0.005, rel=0.1)
     assert done.json["false_reversals"] > 500
-    assert "false reversals" in done.err
+    tells(done.err, "false reversals")
     record()
     done = run("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--overwrite", "--json")
     assert done.json["false_reversals"] == 0
-    assert "false reversals" not in done.err
+    assert "note: " not in done.err
 
 
 def test_the_missing_part_of_the_plane_is_named(run, record):
@@ -98,8 +98,7 @@ def test_the_missing_part_of_the_plane_is_named(run, record):
     record(low=0.3, high=0.8)
     done = run("identify", "run.h5", "--levels", "20", "-o", "model.h5", "--json")
     assert done.json["coverage_percent"] < 99
-    assert "never switched: relays with" in done.err
-    assert "% of the plane" in done.err
+    tells(done.err, "cells never switched")
 
 
 def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path):
