@@ -34,12 +34,12 @@ void heat_tick(struct heat *h, int16_t current)
     h->average += (h->sum - h->average) >> 10;
     h->ticks = 0;
     h->sum = 0;
-    keep(h, heat_is_assumed(h));
 }
 
-bool heat_is_too_much(const struct heat *h)
+void heat_keep(struct heat *h)
 {
-    return h->average > HEAT_LIMIT;
+    if (h->kept->heat != (uint32_t)h->average)
+        keep(h, heat_is_assumed(h));
 }
 
 bool heat_is_assumed(const struct heat *h)

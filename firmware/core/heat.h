@@ -16,15 +16,19 @@
 #define HEAT_MOST_PER_MILLE 2000u /* more than the current trip for ever: (1.65 / 1.25)^2 = 1742 per mille */
 
 struct heat {
-    int32_t average;       /* tick; main only in a critical section */
+    int32_t average;       /* shared: the tick, and a host that tells */
     int32_t sum;           /* tick only: of the present 1024 ticks */
     uint16_t ticks;        /* tick only: how many of them there were */
-    struct hal_kept *kept; /* tick; main only in a critical section */
+    struct hal_kept *kept; /* main only */
 };
 
 void heat_init(struct heat *h, struct hal_kept *kept, bool power_on);
 void heat_tick(struct heat *h, int16_t current);
-bool heat_is_too_much(const struct heat *h);
+static inline bool heat_is_too_much(const struct heat *h)
+{
+    return h->average > HEAT_LIMIT;
+}
+void heat_keep(struct heat *h); /* main loop, in a critical section: over the next reset */
 bool heat_is_assumed(const struct heat *h);
 uint16_t heat_per_mille(const struct heat *h); /* of the limit, rounded up */
 

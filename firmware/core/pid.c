@@ -19,10 +19,10 @@ uint16_t pid_step(struct pid *p, int16_t reference, int16_t measured, uint16_t f
     int32_t change = (int32_t)reference - p->last_reference;
     p->last_reference = reference;
 
-    int32_t out = ((p->kp * error) >> 12) + (p->integral >> 16) + ((p->feed_resistance * reference) >> 16) +
-                  ((p->feed_inductance * change) >> 8) + (reference > 0 ? p->feed_offset : 0);
+    int32_t out = ((p->gains.kp * error) >> 12) + (p->integral >> 16) + ((p->gains.feed_resistance * reference) >> 16) +
+                  ((p->gains.feed_inductance * change) >> 8) + (reference > 0 ? p->gains.feed_offset : 0);
     int32_t high = (int32_t)full;
     if (!((out >= high && error > 0) || (out <= 0 && error < 0)))
-        p->integral = clamp(p->integral + p->ki * error, -(high << 16), high << 16);
+        p->integral = clamp(p->integral + p->gains.ki * error, -(high << 16), high << 16);
     return (uint16_t)clamp(out, 0, high);
 }

@@ -18,16 +18,16 @@ struct telemetry_sample {
 };
 
 struct telemetry {
-    struct telemetry_sample ring[TELEMETRY_RING];
-    volatile uint16_t head;
-    volatile uint16_t tail;
-    volatile bool ended; /* the session's last sample is in the ring, its LAST block not yet sent */
-    uint16_t decimation;
-    uint16_t countdown;
-    bool slewed;
-    uint8_t session;
-    uint32_t produced; /* samples due since the session began, lost ones included */
-    uint32_t dropped;
+    struct telemetry_sample ring[TELEMETRY_RING]; /* tick: the main loop reads what lies between tail and head */
+    volatile uint16_t head; /* tick */
+    volatile uint16_t tail; /* main */
+    volatile bool ended;    /* shared: the session's last sample is in the ring, its LAST block not yet sent */
+    uint16_t decimation;    /* main, not in RUNNING */
+    uint16_t countdown;     /* tick only */
+    bool slewed;            /* tick only */
+    uint8_t session;        /* main, at START */
+    uint32_t produced;      /* tick: samples due since the session began, lost ones included */
+    uint32_t dropped;       /* tick */
 };
 
 void telemetry_init(struct telemetry *t);

@@ -89,6 +89,12 @@ static bool pop(struct wave *w, int16_t *sample)
     return true;
 }
 
+void wave_forget(struct wave *w)
+{
+    w->begun = false;
+    w->committed = false;
+}
+
 void wave_start(struct wave *w)
 {
     w->index = 0;

@@ -9,19 +9,20 @@
 
 enum wave_result { WAVE_OK, WAVE_LAST, WAVE_UNDERRUN };
 
+/* Samples in 100 uA. "Main": written by the main loop, while a run reads it in critical sections only. */
 struct wave {
-    int16_t ring[PT_WAVE_BUFFER_SAMPLES];
-    volatile uint16_t head; /* written by the main loop only, runs freely */
-    volatile uint16_t tail; /* written by the tick only, runs freely */
-    uint32_t total;
-    uint32_t received;
-    uint32_t crc_announced;
-    uint32_t crc;
-    uint16_t ticks_per_sample;
-    bool begun;
-    bool committed;
-    volatile bool corrupt; /* all samples are there and their CRC is not the announced one */
-    /* Of the tick: the segment from `from` to `to`, sample `index` being `from`. */
+    int16_t ring[PT_WAVE_BUFFER_SAMPLES]; /* main: the tick reads what lies between tail and head */
+    volatile uint16_t head; /* main; runs freely */
+    volatile uint16_t tail; /* tick, and main before the run; runs freely */
+    uint32_t total;         /* main */
+    uint32_t received;      /* main */
+    uint32_t crc_announced; /* main */
+    uint32_t crc;           /* main only */
+    uint16_t ticks_per_sample; /* main */
+    volatile bool begun;    /* shared: the end of a run takes both away */
+    volatile bool committed;
+    volatile bool corrupt;  /* main: all samples are there and their CRC is not the announced one */
+    /* Tick only: the segment from `from` to `to`, sample `index` being `from`. */
     uint32_t index;
     uint16_t phase;
     int16_t from;
@@ -42,6 +43,7 @@ void wave_publish(struct wave *w, uint8_t count);
 /* Ticks until the ring runs dry; UINT32_MAX when all samples are there. */
 uint32_t wave_ticks_left(const struct wave *w);
 
+void wave_forget(struct wave *w); /* nothing is committed any more */
 void wave_start(struct wave *w);
 
 /* The reference of this tick. WAVE_LAST: it is the last sample. WAVE_UNDERRUN: it is good, but what

@@ -18,10 +18,15 @@ struct hal_adc {
 };
 
 /* Interrupt context. */
-void hal_adc_read(struct hal_adc *out);
-void hal_pwm_set(uint16_t on);   /* counts of HAL_PWM_PERIOD; also enables the output */
-void hal_pwm_kill(void);         /* output off by the shortest way, stays off until hal_pwm_set */
-bool hal_tick_overrun(void);     /* true once for each missed tick */
+bool hal_adc_read(struct hal_adc *out); /* valid from app_init on; false: not a new pair since the last tick */
+void hal_pwm_set(uint16_t on_counts);   /* of HAL_PWM_PERIOD; does not switch the output on */
+void hal_pwm_kill(void);                /* output off by the shortest way, stays off until hal_pwm_enable */
+bool hal_tick_overrun(void);            /* true once for each missed tick */
+bool hal_comparator(void);              /* the hardware has cut the current since the last call */
+
+/* Both contexts. */
+void hal_pwm_enable(void);
+bool hal_tick_lost(void); /* true once when no tick came in time and the port has switched off by itself */
 
 /* Main loop. */
 bool hal_uart_rx(uint8_t *byte);                         /* false: nothing there */

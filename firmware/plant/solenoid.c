@@ -52,13 +52,3 @@ void solenoid_step(struct solenoid *s, uint16_t pwm_on, uint16_t pwm_period)
     real duty = pwm_on < pwm_period ? (real)pwm_on / (real)pwm_period : R(1);
     plant_step_current(s, coil(s, duty));
 }
-
-uint16_t solenoid_adc_current(const struct solenoid *s)
-{
-    return s->electronics.adc_current;
-}
-
-uint16_t solenoid_adc_force(const struct solenoid *s)
-{
-    return s->electronics.adc_force;
-}

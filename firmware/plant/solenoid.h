@@ -30,7 +30,14 @@ void solenoid_init(struct solenoid *s, const struct solenoid_params *p);
 void solenoid_step(struct solenoid *s, uint16_t pwm_on, uint16_t pwm_period);
 
 /* 12-bit conversions of the shunt amplifier (0..2 A) and the force amplifier (-1..17 N over 0..4095). */
-uint16_t solenoid_adc_current(const struct solenoid *s);
-uint16_t solenoid_adc_force(const struct solenoid *s);
+static inline uint16_t solenoid_adc_current(const struct solenoid *s)
+{
+    return s->electronics.adc_current;
+}
+
+static inline uint16_t solenoid_adc_force(const struct solenoid *s)
+{
+    return s->electronics.adc_force;
+}
 
 #endif

@@ -4,6 +4,8 @@
  * The tick is called, not interrupted; run with -icount shift=10, where an instruction lasts 1024 ns, that
  * is 25.6 counts of the timer, so that each one is seen. */
 #include "app.h"
+#include "commands.h"
+#include "control.h"
 #include "board.h"
 #include "semihost.h"
 #include "units.h"
@@ -35,17 +37,17 @@ static uint32_t instructions(uint32_t from, uint32_t to)
 
 static void feed(uint32_t samples)
 {
-    for (; samples_sent < samples && wave_free(&app.wave) > 0; samples_sent++) {
+    for (; samples_sent < samples && wave_free(&control.wave) > 0; samples_sent++) {
         uint8_t bytes[2];
         put_i16(bytes, sample(samples_sent));
-        (void)app_wave_data(samples_sent, bytes, 1);
+        (void)commands_wave_data(samples_sent, bytes, 1);
     }
-    safety_alive(&app.safety);
+    safety_alive(&control.safety);
 }
 
 static void tick(uint32_t empty)
 {
-    uint8_t state = app.state;
+    uint8_t state = control.state;
     uint32_t before = board_cycles();
     app_tick();
     uint32_t after = board_cycles();
@@ -89,19 +91,19 @@ int main(void)
     uint32_t empty = instructions(before, board_cycles());
 
     uint32_t samples = TICKS / 10u;
-    app.greeted = true;
-    (void)heat_tell(&app.safety.heat, 0);
-    (void)app_stream(1);
-    (void)app_wave_begin(samples, 10, 0);
+    commands.greeted = true;
+    (void)heat_tell(&control.safety.heat, 0);
+    (void)commands_stream(1);
+    (void)commands_wave_begin(samples, 10, 0);
     feed(samples);
-    (void)app_wave_commit(app.wave.received, app.wave.crc);
+    (void)control_wave_commit(control.wave.received, control.wave.crc);
     for (uint32_t k = 0; k < 100u; k++)
         tick(empty);
-    (void)app_arm(app.nonce);
+    (void)commands_arm(commands.nonce);
     for (uint32_t k = 0; k < 100u; k++)
         tick(empty);
-    (void)app_start();
-    while (app.state == PT_STATE_RUNNING || app.state == PT_STATE_RAMPING) {
+    (void)control_start();
+    while (control.state == PT_STATE_RUNNING || control.state == PT_STATE_RAMPING) {
         feed(samples - 1u); /* the last sample never comes: the play ends by an underrun and a ramp */
         tick(empty);
         app_poll();

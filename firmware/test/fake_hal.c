@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "app.h"
+#include "control.h"
 #include "hal.h"
 #include "units.h"
 
@@ -31,7 +32,7 @@ void fake_reset(void)
     frame_decoder_init(&host);
     beats = 0;
     app_init();
-    (void)heat_tell(&app.safety.heat, 0);
+    (void)heat_tell(&control.safety.heat, 0);
 }
 
 static void coil_step(void)
@@ -94,7 +95,7 @@ struct frame fake_beat(void)
 
 struct frame fake_clear_fault(void)
 {
-    const uint8_t p[PT_CLEAR_FAULT_LEN] = {app.fault, app.worst};
+    const uint8_t p[PT_CLEAR_FAULT_LEN] = {control.fault, control.worst};
     return fake_command(PT_CLEAR_FAULT, p, sizeof p);
 }
 
@@ -107,20 +108,45 @@ uint16_t fake_telemetry(uint8_t *payload)
     return length;
 }
 
-void hal_adc_read(struct hal_adc *out)
+/* 14 N from 1.5 A on and 2 N at 0.5 A, straight between and to zero; a count is 4.4 mN. */
+static int32_t force_counts(int32_t current_counts)
+{
+    if (current_counts > 3072)
+        current_counts = 3072;
+    return current_counts < 1024 ? current_counts * 455 / 1024 : 455 + (current_counts - 1024) * 4 / 3;
+}
+
+bool hal_adc_read(struct hal_adc *out)
 {
     static uint16_t dither;
     dither ^= 1u;
     int32_t counts = fake.current / 256 * 4095 / 20000;
     out->current = (uint16_t)(fake.force_current >= 0 ? fake.force_current : counts);
-    /* About 9 N at full current; never two equal readings, like a living converter. */
-    out->force = (uint16_t)(fake.force_force >= 0 ? fake.force_force : 228 + counts * 2 / 3 + dither);
+    /* The force of the as-built device at the first rise, about; never two equal readings, like a living converter. */
+    out->force = (uint16_t)(fake.force_force >= 0 ? fake.force_force : 228 + force_counts(counts) + dither);
+    return !fake.stale;
 }
 
-void hal_pwm_set(uint16_t on)
+void hal_pwm_enable(void)
 {
     fake.pwm_enabled = true;
-    fake.pwm = on;
+}
+
+void hal_pwm_set(uint16_t on_counts)
+{
+    fake.pwm = on_counts;
+}
+
+bool hal_comparator(void)
+{
+    return fake.comparator;
+}
+
+bool hal_tick_lost(void)
+{
+    bool was = fake.tick_lost;
+    fake.tick_lost = false;
+    return was;
 }
 
 void hal_pwm_kill(void)

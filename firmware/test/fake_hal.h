@@ -16,6 +16,9 @@ struct fake {
     uint32_t kills;
     uint32_t fed;
     bool overrun;
+    bool comparator; /* has cut the current in each tick */
+    bool tick_lost;
+    bool stale;      /* no new readings */
     uint16_t tx_space;
     uint8_t reset_cause;
     uint32_t nonce;

@@ -9,6 +9,8 @@
 #include <string.h>
 
 #include "app.h"
+#include "commands.h"
+#include "control.h"
 #include "fake_hal.h"
 #include "hal.h"
 #include "units.h"
@@ -16,7 +18,7 @@
 #define REQUIRE(condition)                                                        \
     do {                                                                          \
         if (!(condition)) {                                                       \
-            printf("%s:%d: %s (state %u)\n", __FILE__, __LINE__, #condition, app.state); \
+            printf("%s:%d: %s (state %u)\n", __FILE__, __LINE__, #condition, control.state); \
             abort();                                                              \
         }                                                                         \
     } while (0)
@@ -45,21 +47,21 @@ static uint16_t next16(struct tape *t)
 /* Whatever was said to it, this holds. */
 static void check(void)
 {
-    REQUIRE(app.state <= PT_STATE_FAULT);
-    REQUIRE(app.fault <= PT_FAULT_CONVERTER);
-    bool may_drive = app.state == PT_STATE_RUNNING || app.state == PT_STATE_RAMPING;
+    REQUIRE(control.state <= PT_STATE_FAULT);
+    REQUIRE(control.fault <= PT_FAULT_CONVERTER);
+    bool may_drive = control.state == PT_STATE_RUNNING || control.state == PT_STATE_RAMPING;
     REQUIRE(may_drive || !fake.pwm_enabled);
     REQUIRE(fake.pwm <= HAL_PWM_PERIOD);
-    REQUIRE(app.reference >= 0 && app.reference <= app_param_maximum(PT_PARAM_CURRENT_LIMIT));
-    REQUIRE(app.state != PT_STATE_RUNNING || app.fault == PT_FAULT_NONE);
-    REQUIRE((app.state != PT_STATE_ARMED && app.state != PT_STATE_RUNNING) || (app.wave.committed && app.greeted));
-    REQUIRE((uint16_t)(app.wave.head - app.wave.tail) <= PT_WAVE_BUFFER_SAMPLES);
-    REQUIRE(app.wave.received <= app.wave.total);
-    REQUIRE(telemetry_waiting(&app.telemetry) <= TELEMETRY_RING);
+    REQUIRE(control.now.reference_100uA >= 0 && control.now.reference_100uA <= commands_param_maximum(PT_PARAM_CURRENT_LIMIT));
+    REQUIRE(control.state != PT_STATE_RUNNING || control.fault == PT_FAULT_NONE);
+    REQUIRE((control.state != PT_STATE_ARMED && control.state != PT_STATE_RUNNING) || (control.wave.committed && commands.greeted));
+    REQUIRE((uint16_t)(control.wave.head - control.wave.tail) <= PT_WAVE_BUFFER_SAMPLES);
+    REQUIRE(control.wave.received <= control.wave.total);
+    REQUIRE(telemetry_waiting(&control.telemetry) <= TELEMETRY_RING);
     for (uint8_t id = 0; id < PT_PARAM_COUNT; id++)
-        REQUIRE(app.param[id] >= app_param_minimum(id) && app.param[id] <= app_param_maximum(id));
-    REQUIRE(app.safety.current_trip <= 16500 && app.safety.force_trip <= 15000);
-    REQUIRE(app.safety.heartbeat_ticks <= 2000);
+        REQUIRE(commands.param[id] >= commands_param_minimum(id) && commands.param[id] <= commands_param_maximum(id));
+    REQUIRE(control.safety.limits.current_trip_100uA <= 16500 && control.safety.limits.force_trip_mN <= 15000);
+    REQUIRE(control.safety.limits.heartbeat_ticks <= 2000);
 }
 
 static void wild_command(struct tape *t)
@@ -76,17 +78,17 @@ static void wild_command(struct tape *t)
 /* What brings the device on from where it is, by its place in sensible_command(). */
 static uint8_t step(void)
 {
-    if (app.fault != PT_FAULT_NONE || app.state == PT_STATE_RAMPING)
+    if (control.fault != PT_FAULT_NONE || control.state == PT_STATE_RAMPING)
         return 8;
-    if (!app.greeted)
+    if (!commands.greeted)
         return 0;
-    if (app.state == PT_STATE_ARMED)
+    if (control.state == PT_STATE_ARMED)
         return 6;
-    if (!app.wave.begun)
+    if (!control.wave.begun)
         return 1;
-    if (app.wave.received < app.wave.total && (app.wave.received < 100u || app.state == PT_STATE_RUNNING))
+    if (control.wave.received < control.wave.total && (control.wave.received < 100u || control.state == PT_STATE_RUNNING))
         return 2;
-    return app.state == PT_STATE_RUNNING ? 8 : app.wave.committed ? 5 : 4;
+    return control.state == PT_STATE_RUNNING ? 8 : control.wave.committed ? 5 : 4;
 }
 
 /* The right thing to say next, so that the deep states are reached, with a value that may be wrong. */
@@ -115,11 +117,11 @@ static void sensible_command(struct tape *t)
     }
     case 2:
     case 3: {
-        uint32_t missing = app.wave.total - app.wave.received;
+        uint32_t missing = control.wave.total - control.wave.received;
         uint8_t count = (uint8_t)(1u + next(t) % PT_WAVE_DATA_MAX_ITEMS);
         if (count > missing && missing > 0)
             count = (uint8_t)missing;
-        put_u32(p + PT_WAVE_DATA_OFFSET, app.wave.received + (choice < 230u ? 0u : choice));
+        put_u32(p + PT_WAVE_DATA_OFFSET, control.wave.received + (choice < 230u ? 0u : choice));
         p[PT_WAVE_DATA_COUNT] = count;
         if (choice >= 200u) /* not what was announced */
             for (uint8_t k = 0; k < count; k++)
@@ -128,12 +130,12 @@ static void sensible_command(struct tape *t)
         break;
     }
     case 4:
-        put_u32(p + PT_WAVE_COMMIT_COUNT, app.wave.received);
-        put_u32(p + PT_WAVE_COMMIT_CRC32, app.wave.crc);
+        put_u32(p + PT_WAVE_COMMIT_COUNT, control.wave.received);
+        put_u32(p + PT_WAVE_COMMIT_CRC32, control.wave.crc);
         (void)fake_command(PT_WAVE_COMMIT, p, PT_WAVE_COMMIT_LEN);
         break;
     case 5:
-        put_u32(p, app.nonce);
+        put_u32(p, commands.nonce);
         (void)fake_command(PT_ARM, p, PT_ARM_LEN);
         break;
     case 6:
@@ -144,7 +146,7 @@ static void sensible_command(struct tape *t)
         (void)fake_command(PT_STREAM, p, PT_STREAM_LEN);
         break;
     default:
-        (void)(app.fault == PT_FAULT_NONE ? fake_beat() : fake_clear_fault());
+        (void)(control.fault == PT_FAULT_NONE ? fake_beat() : fake_clear_fault());
         break;
     }
 }
@@ -365,8 +367,8 @@ int main(int argc, char **argv)
         for (size_t j = 0; j < n; j++)
             bytes[j] = (uint8_t)draw(256);
         sequence(bytes, n);
-        runs += app.session != 0;
-        faults += app.fault != PT_FAULT_NONE;
+        runs += control.session != 0;
+        faults += control.fault != PT_FAULT_NONE;
     }
     printf("sequences %u that ran %u that ended in a fault %u\n", sequence_count, runs, faults);
     return 0;

@@ -2,6 +2,8 @@
 #include <string.h>
 
 #include "app.h"
+#include "commands.h"
+#include "control.h"
 #include "check.h"
 #include "fake_hal.h"
 #include "hal.h"
@@ -156,11 +158,11 @@ static void a_run_ends_disarmed_and_has_every_sample(void)
     bool last = false;
     running(8000, 10);
     alive_ticks(10u * (SAMPLES - 1u) + 1u);
-    CHECK_EQUAL(app.state, PT_STATE_RAMPING);
+    CHECK_EQUAL(control.state, PT_STATE_RAMPING);
     alive_ticks(2000);
-    CHECK_EQUAL(app.state, PT_STATE_IDLE);
+    CHECK_EQUAL(control.state, PT_STATE_IDLE);
     CHECK(!fake.pwm_enabled);
-    CHECK_EQUAL(app.fault, PT_FAULT_NONE);
+    CHECK_EQUAL(control.fault, PT_FAULT_NONE);
     while (fake_telemetry(p) != 0) {
         CHECK(!last);
         CHECK_EQUAL(get_u32(p + PT_TELEMETRY_FIRST_TICK), next);
@@ -192,12 +194,12 @@ static void a_silent_host_means_off_within_300_ms(void)
     running(15000, 1000);
     alive_ticks(3000);
     fake_ticks(2000);
-    CHECK_EQUAL(app.state, PT_STATE_RUNNING);
+    CHECK_EQUAL(control.state, PT_STATE_RUNNING);
     fake_ticks(1);
-    CHECK_EQUAL(app.state, PT_STATE_RAMPING);
-    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
-    CHECK(off_after(2000) <= APP_RAMP_TICKS);
-    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    CHECK_EQUAL(control.state, PT_STATE_RAMPING);
+    CHECK_EQUAL(control.fault, PT_FAULT_HEARTBEAT);
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
     CHECK_EQUAL(nak_of(begin(10, 10, 0)), PT_NAK_CODE_FAULT);
     CHECK_EQUAL(state_of(fake_clear_fault()), PT_STATE_IDLE);
     CHECK_EQUAL(nak_of(begin(10, 10, 0)), 0);
@@ -212,7 +214,7 @@ static void garbage_is_no_sign_of_life(void)
         (void)fake_command(0x7F, junk, 3);      /* unknown */
         (void)fake_command(PT_START, junk, 3);  /* wrong length */
     }
-    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+    CHECK_EQUAL(control.fault, PT_FAULT_HEARTBEAT);
 }
 
 /* Frames that a stuck wire repeats, and questions that any program may ask, keep nothing alive. */
@@ -228,8 +230,8 @@ static void only_what_is_new_is_a_sign_of_life(void)
         CHECK_EQUAL(plain(PT_START).type, k < 20 ? PT_ACK : PT_NAK);
         CHECK_EQUAL(data(0, 5000, SAMPLES).type, k < 20 ? PT_ACK : PT_NAK); /* refused once it ramps */
     }
-    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
-    CHECK_EQUAL(app.snapshot.tick, 3000);
+    CHECK_EQUAL(control.fault, PT_FAULT_HEARTBEAT);
+    CHECK_EQUAL(control.snapshot.tick, 3000);
 }
 
 /* While it ramps down the host is not waited for: it could not do more by being silent. */
@@ -240,8 +242,8 @@ static void the_ramp_needs_no_heartbeat(void)
     fake_ticks(1950);
     CHECK_EQUAL(state_of(plain(PT_STOP)), PT_STATE_RAMPING);
     fake_ticks(2000);
-    CHECK_EQUAL(app.fault, PT_FAULT_NONE);
-    CHECK_EQUAL(app.state, PT_STATE_IDLE);
+    CHECK_EQUAL(control.fault, PT_FAULT_NONE);
+    CHECK_EQUAL(control.state, PT_STATE_IDLE);
 }
 
 static void what_a_host_has_not_seen_it_cannot_clear(void)
@@ -254,12 +256,12 @@ static void what_a_host_has_not_seen_it_cannot_clear(void)
     CHECK_EQUAL(nak_of(fake_command(PT_CLEAR_FAULT, first, 2)), PT_NAK_CODE_STATE); /* still ramping */
     fake.force_current = 3400;
     fake_ticks(1);
-    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
     CHECK_EQUAL(nak_of(fake_command(PT_CLEAR_FAULT, first, 2)), PT_NAK_CODE_FAULT);
-    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+    CHECK_EQUAL(control.fault, PT_FAULT_HEARTBEAT);
     fake.force_current = -1;
     CHECK_EQUAL(state_of(fake_command(PT_CLEAR_FAULT, both, 2)), PT_STATE_IDLE);
-    CHECK_EQUAL(app.fault, PT_FAULT_NONE);
+    CHECK_EQUAL(control.fault, PT_FAULT_NONE);
     CHECK_EQUAL(state_of(fake_command(PT_CLEAR_FAULT, both, 2)), PT_STATE_IDLE); /* once more: nothing to do */
 }
 
@@ -268,13 +270,13 @@ static void a_greeting_restores_every_parameter(void)
     fake_reset();
     (void)hello(PT_PROTOCOL_MAJOR);
     for (uint8_t id = 0; id < PT_PARAM_COUNT; id++)
-        CHECK_EQUAL(set_param(id, app_param_minimum(id)).type, PT_PARAM_REPLY);
+        CHECK_EQUAL(set_param(id, commands_param_minimum(id)).type, PT_PARAM_REPLY);
     struct frame f = hello(PT_PROTOCOL_MAJOR);
     CHECK_EQUAL(get_i16(f.payload + PT_HELLO_REPLY_FORCE_TRIP), 15000);
     ready(15000, 1000, SAMPLES);
     (void)arm(fake.nonce);
-    CHECK_EQUAL(app.safety.force_trip, 15000);
-    CHECK_EQUAL(app.pid.kp, 7680);
+    CHECK_EQUAL(control.safety.limits.force_trip_mN, 15000);
+    CHECK_EQUAL(control.pid.gains.kp, 7680);
 }
 
 static struct frame coil_heat(uint16_t per_mille)
@@ -319,13 +321,13 @@ static void the_coil_is_hot_until_told_and_over_any_reset_but_power_on(void)
 static void a_hot_coil_stays_hot_over_a_reset(void)
 {
     running(15000, 1000);
-    app.safety.heat.average = HEAT_LIMIT - 100000;
-    for (uint32_t k = 0; k < 200 && app.fault == PT_FAULT_NONE; k++)
+    control.safety.heat.average = HEAT_LIMIT - 100000;
+    for (uint32_t k = 0; k < 200 && control.fault == PT_FAULT_NONE; k++)
         alive_ticks(100);
-    CHECK_EQUAL(app.fault, PT_FAULT_COIL_HEAT);
+    CHECK_EQUAL(control.fault, PT_FAULT_COIL_HEAT);
     fake.reset_cause = PT_RESET_WATCHDOG;
     app_init();
-    CHECK(app.safety.heat.average > HEAT_LIMIT - 200000);
+    CHECK(control.safety.heat.average > HEAT_LIMIT - 200000);
 }
 
 static void over_current_kills_in_the_same_tick(void)
@@ -334,8 +336,8 @@ static void over_current_kills_in_the_same_tick(void)
     alive_ticks(1000);
     fake.force_current = 3400; /* 1.66 A */
     CHECK_EQUAL(off_after(10), 1);
-    CHECK_EQUAL(app.fault, PT_FAULT_OVER_CURRENT);
-    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    CHECK_EQUAL(control.fault, PT_FAULT_OVER_CURRENT);
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
 }
 
 static void over_force_kills_at_the_third_sample(void)
@@ -344,14 +346,14 @@ static void over_force_kills_at_the_third_sample(void)
     alive_ticks(1000);
     fake.force_force = 3700; /* 15.3 N */
     CHECK_EQUAL(off_after(10), 3);
-    CHECK_EQUAL(app.fault, PT_FAULT_OVER_FORCE);
+    CHECK_EQUAL(control.fault, PT_FAULT_OVER_FORCE);
 }
 
 /* Off, latched, told, refused until cleared: the same for every fault. */
 static void is_off_latched_and_told(uint8_t fault)
 {
     CHECK(!fake.pwm_enabled);
-    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
     struct frame f = plain(PT_STATUS);
     CHECK_EQUAL(f.type, PT_STATUS_REPLY);
     CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT], fault);
@@ -359,7 +361,7 @@ static void is_off_latched_and_told(uint8_t fault)
     CHECK_EQUAL(fake_beat().payload[PT_ACK_FAULT], fault);
     fake.force_current = fake.force_force = -1;
     fake_ticks(3000); /* the cause is gone, the fault is not */
-    CHECK_EQUAL(app.fault, fault);
+    CHECK_EQUAL(control.fault, fault);
     CHECK_EQUAL(nak_of(begin(10, 10, 0)), PT_NAK_CODE_FAULT);
     CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_FAULT);
     CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE);
@@ -384,7 +386,7 @@ static void a_broken_sensor_is_off_within_its_time_and_told(void)
         fake.force_current = rows[k].current;
         fake.force_force = rows[k].force;
         uint32_t ticks = 0;
-        while (ticks < 1000 && app.fault == PT_FAULT_NONE) {
+        while (ticks < 1000 && control.fault == PT_FAULT_NONE) {
             fake_ticks(1);
             ticks++;
         }
@@ -397,7 +399,7 @@ static void full_current_without_any_force_is_off_within_600_ms(void)
 {
     running(14000, 1000);
     uint32_t ticks = 0;
-    for (; ticks < 10000 && app.fault == PT_FAULT_NONE; ticks++) {
+    for (; ticks < 10000 && control.fault == PT_FAULT_NONE; ticks++) {
         fake.force_force = 228 + (int32_t)(ticks & 1u); /* nothing, but alive */
         fake_ticks(1);
         if (ticks % 500 == 0)
@@ -411,29 +413,29 @@ static void every_ramping_fault_is_off_within_100_ms_and_told(void)
 {
     running(15000, 1000); /* silence */
     alive_ticks(1000);
-    CHECK(off_after(2001u + APP_RAMP_TICKS) <= 2001u + APP_RAMP_TICKS);
+    CHECK(off_after(2001u + CONTROL_RAMP_TICKS) <= 2001u + CONTROL_RAMP_TICKS);
     is_off_latched_and_told(PT_FAULT_HEARTBEAT);
 
     ready(15000, 10, 2u * SAMPLES); /* underrun */
     (void)arm(fake.nonce);
     (void)plain(PT_START);
     alive_ticks(10u * (SAMPLES - 1u) + 1u);
-    CHECK(off_after(2000) <= APP_RAMP_TICKS);
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
     is_off_latched_and_told(PT_FAULT_UNDERRUN);
 
     running(15000, 1000); /* on-time */
     alive_ticks(1000);
-    app.safety.on_ticks_limit = 1500;
+    control.safety.limits.on_ticks = 1500;
     alive_ticks(501);
-    CHECK(off_after(2000) <= APP_RAMP_TICKS);
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
     is_off_latched_and_told(PT_FAULT_ON_TIME);
 
     running(15000, 1000); /* heat */
     alive_ticks(1000);
-    app.safety.heat.average = HEAT_LIMIT + 1000000;
+    control.safety.heat.average = HEAT_LIMIT + 1000000;
     fake_ticks(1);
-    CHECK(off_after(2000) <= APP_RAMP_TICKS);
-    app.safety.heat.average = 0;
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
+    control.safety.heat.average = 0;
     is_off_latched_and_told(PT_FAULT_COIL_HEAT);
 }
 
@@ -443,8 +445,8 @@ static void a_force_while_only_armed_trips_too(void)
     (void)arm(fake.nonce);
     fake.force_force = 3700;
     fake_ticks(5);
-    CHECK_EQUAL(app.fault, PT_FAULT_OVER_FORCE);
-    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    CHECK_EQUAL(control.fault, PT_FAULT_OVER_FORCE);
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
 }
 
 static void a_missed_tick_is_a_fault(void)
@@ -453,7 +455,7 @@ static void a_missed_tick_is_a_fault(void)
     alive_ticks(1000);
     fake.overrun = true;
     CHECK_EQUAL(off_after(10), 1);
-    CHECK_EQUAL(app.fault, PT_FAULT_TICK_OVERRUN);
+    CHECK_EQUAL(control.fault, PT_FAULT_TICK_OVERRUN);
 }
 
 static void an_underrun_ramps_down_and_faults(void)
@@ -462,12 +464,12 @@ static void an_underrun_ramps_down_and_faults(void)
     (void)arm(fake.nonce);
     (void)plain(PT_START);
     alive_ticks(10u * (SAMPLES - 1u));
-    CHECK_EQUAL(app.state, PT_STATE_RUNNING);
+    CHECK_EQUAL(control.state, PT_STATE_RUNNING);
     alive_ticks(1);
-    CHECK_EQUAL(app.fault, PT_FAULT_UNDERRUN);
-    CHECK_EQUAL(app.state, PT_STATE_RAMPING);
-    CHECK(off_after(2000) <= APP_RAMP_TICKS);
-    CHECK_EQUAL(app.state, PT_STATE_FAULT);
+    CHECK_EQUAL(control.fault, PT_FAULT_UNDERRUN);
+    CHECK_EQUAL(control.state, PT_STATE_RAMPING);
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
 }
 
 static void a_wave_with_a_wrong_checksum_is_stopped(void)
@@ -478,7 +480,7 @@ static void a_wave_with_a_wrong_checksum_is_stopped(void)
     alive_ticks(100);
     (void)data(SAMPLES, 9001, SAMPLES);
     fake_ticks(1);
-    CHECK_EQUAL(app.fault, PT_FAULT_WAVE_CRC);
+    CHECK_EQUAL(control.fault, PT_FAULT_WAVE_CRC);
 }
 
 static void the_first_cause_stays_with_its_snapshot(void)
@@ -488,7 +490,7 @@ static void the_first_cause_stays_with_its_snapshot(void)
     fake_ticks(2001); /* silence, then over-current during the ramp */
     fake.force_current = 3400;
     CHECK_EQUAL(off_after(10), 1);
-    CHECK_EQUAL(app.fault, PT_FAULT_HEARTBEAT);
+    CHECK_EQUAL(control.fault, PT_FAULT_HEARTBEAT);
     struct frame f = plain(PT_STATUS);
     CHECK_EQUAL(f.type, PT_STATUS_REPLY);
     CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT], PT_FAULT_HEARTBEAT);
@@ -502,9 +504,9 @@ static void stop_ramps_and_disarms(void)
     running(15000, 1000);
     alive_ticks(1000);
     CHECK_EQUAL(state_of(plain(PT_STOP)), PT_STATE_RAMPING);
-    CHECK(off_after(2000) <= APP_RAMP_TICKS);
-    CHECK_EQUAL(app.state, PT_STATE_IDLE);
-    CHECK_EQUAL(app.fault, PT_FAULT_NONE);
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
+    CHECK_EQUAL(control.state, PT_STATE_IDLE);
+    CHECK_EQUAL(control.fault, PT_FAULT_NONE);
     CHECK_EQUAL(nak_of(plain(PT_START)), PT_NAK_CODE_STATE);
 }
 
@@ -513,7 +515,7 @@ static void a_new_hello_stops_what_an_earlier_host_left_running(void)
     running(15000, 1000);
     alive_ticks(1000);
     (void)hello(PT_PROTOCOL_MAJOR);
-    CHECK_EQUAL(app.state, PT_STATE_RAMPING);
+    CHECK_EQUAL(control.state, PT_STATE_RAMPING);
 }
 
 static void parameters_only_lower_the_compiled_limits(void)
@@ -559,12 +561,12 @@ static void a_repeated_command_is_answered_from_memory(void)
     ready(5000, 10, SAMPLES);
     (void)arm(fake.nonce);
     CHECK_EQUAL(fake_command_seq(PT_START, 200, NULL, 0).type, PT_ACK);
-    uint8_t session = app.session;
+    uint8_t session = control.session;
     fake_ticks(10);
     struct frame f = fake_command_seq(PT_START, 200, NULL, 0);
     CHECK_EQUAL(f.type, PT_ACK);
     CHECK_EQUAL(f.payload[PT_ACK_SESSION], session);
-    CHECK_EQUAL(app.session, session);
+    CHECK_EQUAL(control.session, session);
 }
 
 /* The wire repeats ARM and START together: neither is the last command any more when it comes again. */
@@ -577,18 +579,18 @@ static void an_older_repetition_changes_nothing_and_is_no_refusal(void)
     CHECK_EQUAL(fake_command_seq(PT_STREAM, 201, (const uint8_t[]){10, 0}, PT_STREAM_LEN).type, PT_ACK);
     CHECK_EQUAL(state_of(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN)), PT_STATE_ARMED);
     CHECK_EQUAL(fake_command_seq(PT_START, 202, NULL, 0).type, PT_ACK);
-    uint8_t session = app.session;
+    uint8_t session = control.session;
     alive_ticks(100);
     CHECK_EQUAL(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN).type, PT_NAK);
     struct frame f = fake_command_seq(PT_START, 202, NULL, 0);
     CHECK_EQUAL(state_of(f), PT_STATE_RUNNING);
-    CHECK_EQUAL(app.session, session);
-    CHECK_EQUAL(app.tick, 100);
+    CHECK_EQUAL(control.session, session);
+    CHECK_EQUAL(control.tick, 100);
     (void)plain(PT_STOP);
     fake_ticks(1500);
     CHECK_EQUAL(fake_command_seq(PT_START, 202, NULL, 0).type, PT_NAK); /* the run is over: no second one */
     CHECK_EQUAL(fake_command_seq(PT_ARM, 200, nonce, PT_ARM_LEN).type, PT_NAK);
-    CHECK_EQUAL(app.state, PT_STATE_IDLE);
+    CHECK_EQUAL(control.state, PT_STATE_IDLE);
 }
 
 static void a_host_that_does_not_read_costs_samples_not_replies(void)
@@ -608,7 +610,7 @@ static void a_host_that_does_not_read_costs_samples_not_replies(void)
         received += p[PT_TELEMETRY_COUNT];
         dropped = get_u16(p + PT_TELEMETRY_DROPPED);
     }
-    CHECK_EQUAL(received + dropped, app.telemetry.produced);
+    CHECK_EQUAL(received + dropped, control.telemetry.produced);
     CHECK(dropped > 1000);
 }
 

@@ -3,8 +3,10 @@
 #include <string.h>
 
 #include "app.h"
+#include "control.h"
 #include "board.h"
 #include "check.h"
+#include "frame.h"
 #include "hal.h"
 #include "units.h"
 #include "xc_shim.h"
@@ -193,7 +195,7 @@ static void run_at(int16_t value)
 static void ticks(uint32_t n, uint16_t current)
 {
     for (uint32_t k = 0; k < n; k++) {
-        xc_shim_tick((uint16_t)(current + (k & 1u)), (uint16_t)(REST + 300u + (k & 1u)));
+        xc_shim_tick((uint16_t)(current + (k & 1u)), (uint16_t)(REST + 450u + (k & 1u)));
         app_poll();
         (void)answer();
         xc_shim_forget();
@@ -203,17 +205,19 @@ static void ticks(uint32_t n, uint16_t current)
 static void a_run_drives_the_gate_and_ends_with_the_pin_released(void)
 {
     run_at(5000);
-    CHECK_EQUAL(IOCON1 & 0x8000u, 0); /* not before the first tick */
+    CHECK_EQUAL(IOCON1, 0x8D00u); /* switched on by START, with no duty yet */
+    CHECK_EQUAL(PDC1, 0);
     ticks(100, 1023);
-    CHECK_EQUAL(app.state, PT_STATE_RUNNING);
+    CHECK_EQUAL(control.state, PT_STATE_RUNNING);
     CHECK_EQUAL(IOCON1, 0x8D00u);
     CHECK(PDC1 > 500 && PDC1 < 4000);
     xc_shim_forget();
     xc_shim_tick(1023, REST + 300);
-    BEFORE(place("PDC1", 0), place("IOCON1", 0)); /* first how long, then on */
+    CHECK(place("PDC1", 0) >= 0);
+    CHECK_EQUAL(place("IOCON1", 0), -1); /* a tick sets how long, it never switches on */
     CHECK_EQUAL(ask(PT_STOP, NULL, 0), PT_ACK);
     ticks(2000, 200);
-    CHECK_EQUAL(app.state, PT_STATE_IDLE);
+    CHECK_EQUAL(control.state, PT_STATE_IDLE);
     CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
 }
 
@@ -222,7 +226,7 @@ static void over_current_releases_the_pin_in_the_same_interrupt(void)
     run_at(5000);
     ticks(100, 1023);
     xc_shim_tick(3400, REST + 300); /* 1.66 A */
-    CHECK_EQUAL(app.fault, PT_FAULT_OVER_CURRENT);
+    CHECK_EQUAL(control.fault, PT_FAULT_OVER_CURRENT);
     CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
     CHECK_EQUAL(ask(PT_STATUS, NULL, 0), PT_STATUS_REPLY);
     CHECK_EQUAL(payload[PT_STATUS_REPLY_FAULT], PT_FAULT_OVER_CURRENT);
@@ -235,18 +239,100 @@ static void a_tick_that_takes_too_long_is_found(void)
     xc_shim_next_conversion_early();
     xc_shim_tick(1023, REST + 300); /* found at its end, told by the next one */
     xc_shim_tick(1022, REST + 301);
-    CHECK_EQUAL(app.fault, PT_FAULT_TICK_OVERRUN);
+    CHECK_EQUAL(control.fault, PT_FAULT_TICK_OVERRUN);
     CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
 }
 
-static void a_tick_that_never_came_is_found(void)
+static void a_tick_that_came_late_is_found(void)
 {
     run_at(5000);
     ticks(100, 1023);
-    _T1IF = 1;
+    xc_shim_no_tick();
     xc_shim_tick(1022, REST + 300);
-    CHECK_EQUAL(app.fault, PT_FAULT_TICK_OVERRUN);
+    CHECK_EQUAL(control.fault, PT_FAULT_TICK_OVERRUN);
     CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
+}
+
+static void a_tick_that_stays_away_is_off_by_its_own_timer(void)
+{
+    run_at(5000);
+    ticks(100, 1023);
+    CHECK_EQUAL(_T1IE, 1);
+    CHECK(_T1IP == 7 && _T1IP > _ADCAN2IP && _T1IP > _U1RXIP);
+    xc_shim_forget();
+    xc_shim_no_tick(); /* one and a half ticks: no main loop, no tick needed */
+    CHECK_EQUAL(place("IOCON1", 0), 0);
+    CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
+    app_poll();
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
+    CHECK_EQUAL(control.fault, PT_FAULT_TICK_LOST);
+    xc_shim_forget();
+    ticks(10, 0); /* it comes again: that changes nothing */
+    CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
+}
+
+/* In the middle of a critical section, where the tick itself is held off. */
+static void nothing_holds_off_the_timer_that_watches_the_tick(void)
+{
+    run_at(5000);
+    ticks(100, 1023);
+    hal_critical_enter();
+    xc_shim_no_tick();
+    CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
+    hal_critical_exit();
+}
+
+static void a_converter_that_is_not_ready_is_found(void)
+{
+    run_at(5000);
+    ticks(100, 1023);
+    xc_shim_unready();
+    xc_shim_tick(1022, REST + 300);
+    CHECK_EQUAL(control.fault, PT_FAULT_CONVERTER);
+    CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
+}
+
+static void the_comparator_is_read_and_its_flag_cleared(void)
+{
+    run_at(5000);
+    ticks(100, 1023);
+    for (int k = 0; k < 3; k++) {
+        CHECK_EQUAL(control.fault, PT_FAULT_NONE);
+        _AC1IF = 1;
+        xc_shim_tick((uint16_t)(1022 + k), (uint16_t)(REST + 300 + k));
+        CHECK_EQUAL(_AC1IF, 0);
+    }
+    CHECK_EQUAL(control.fault, PT_FAULT_COMPARATOR);
+    CHECK_EQUAL(IOCON1 & 0xC300u, 0x0300u);
+}
+
+static void a_clock_that_lost_its_lock_is_off_and_starts_anew(void)
+{
+    volatile uint16_t *const locks[] = {&_LOCK, &_APLLCK};
+    for (int k = 0; k < 2; k++) {
+        run_at(5000);
+        ticks(10, 1023);
+        xc_shim_forget();
+        *locks[k] = 0;
+        xc_shim_tick(1022, REST + 300);
+        BEFORE(place_of("IOCON1", 0x0F00u), place("RESET", 0));
+        start(0x0040u); /* the reset instruction */
+        CHECK_EQUAL(hal_reset_cause(), PT_RESET_CLOCK);
+        start(0x0040u);
+        CHECK_EQUAL(hal_reset_cause(), PT_RESET_SOFTWARE); /* told once */
+    }
+}
+
+static void the_heat_outlives_a_reset_but_not_power_on(void)
+{
+    const uint8_t told[PT_COIL_HEAT_LEN] = {200, 0};
+    start(POWER_ON);
+    CHECK(heat_is_assumed(&control.safety.heat));
+    CHECK_EQUAL(ask(PT_COIL_HEAT, told, sizeof told), PT_ACK);
+    start(WATCHDOG_RESET);
+    CHECK_EQUAL(heat_per_mille(&control.safety.heat), 200);
+    start(POWER_ON);
+    CHECK_EQUAL(heat_per_mille(&control.safety.heat), 1000);
 }
 
 static void duty_at_the_ends_of_its_range(void)
@@ -360,7 +446,13 @@ int main(int argc, char **argv)
     RUN(a_run_drives_the_gate_and_ends_with_the_pin_released);
     RUN(over_current_releases_the_pin_in_the_same_interrupt);
     RUN(a_tick_that_takes_too_long_is_found);
-    RUN(a_tick_that_never_came_is_found);
+    RUN(a_tick_that_came_late_is_found);
+    RUN(a_tick_that_stays_away_is_off_by_its_own_timer);
+    RUN(nothing_holds_off_the_timer_that_watches_the_tick);
+    RUN(a_converter_that_is_not_ready_is_found);
+    RUN(the_comparator_is_read_and_its_flag_cleared);
+    RUN(a_clock_that_lost_its_lock_is_off_and_starts_anew);
+    RUN(the_heat_outlives_a_reset_but_not_power_on);
     RUN(duty_at_the_ends_of_its_range);
     RUN(an_overrun_of_the_receiver_does_not_silence_it);
     RUN(a_flood_is_dropped_and_the_next_command_read);

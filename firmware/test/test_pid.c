@@ -17,11 +17,11 @@ static const int32_t largest[PT_PARAM_COUNT] = {
 
 static void set(struct pid *p, const int32_t *gains)
 {
-    p->kp = gains[PT_PARAM_PID_KP];
-    p->ki = gains[PT_PARAM_PID_KI];
-    p->feed_resistance = gains[PT_PARAM_FEED_RESISTANCE];
-    p->feed_inductance = gains[PT_PARAM_FEED_INDUCTANCE];
-    p->feed_offset = gains[PT_PARAM_FEED_OFFSET];
+    p->gains.kp = gains[PT_PARAM_PID_KP];
+    p->gains.ki = gains[PT_PARAM_PID_KI];
+    p->gains.feed_resistance = gains[PT_PARAM_FEED_RESISTANCE];
+    p->gains.feed_inductance = gains[PT_PARAM_FEED_INDUCTANCE];
+    p->gains.feed_offset = gains[PT_PARAM_FEED_OFFSET];
     pid_reset(p);
 }
 

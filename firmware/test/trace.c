@@ -41,11 +41,11 @@ static uint32_t trace(void)
     struct pid pid;
     uint32_t total = TICKS / 10u + 1u;
     uint32_t sent = 0;
-    pid.kp = initial[PT_PARAM_PID_KP];
-    pid.ki = initial[PT_PARAM_PID_KI];
-    pid.feed_resistance = initial[PT_PARAM_FEED_RESISTANCE];
-    pid.feed_inductance = initial[PT_PARAM_FEED_INDUCTANCE];
-    pid.feed_offset = initial[PT_PARAM_FEED_OFFSET];
+    pid.gains.kp = initial[PT_PARAM_PID_KP];
+    pid.gains.ki = initial[PT_PARAM_PID_KI];
+    pid.gains.feed_resistance = initial[PT_PARAM_FEED_RESISTANCE];
+    pid.gains.feed_inductance = initial[PT_PARAM_FEED_INDUCTANCE];
+    pid.gains.feed_offset = initial[PT_PARAM_FEED_OFFSET];
     pid_reset(&pid);
     solenoid_as_built(&params);
     solenoid_init(&plant, &params);

@@ -50,7 +50,6 @@ class Fault(IntEnum):
     UNDERRUN = 4
     COIL_HEAT = 5
     ON_TIME = 6
-    CURRENT_RAIL = 7
     FORCE_RAIL = 8
     CURRENT_FROZEN = 9
     FORCE_FROZEN = 10
@@ -76,7 +75,6 @@ FAULT_TEXT: dict[Fault, str] = {
     Fault.UNDERRUN: "the reference did not arrive in time (buffer underrun)",
     Fault.COIL_HEAT: "the coil's heat model (I2t) reached its limit",
     Fault.ON_TIME: "longest permitted on-time reached",
-    Fault.CURRENT_RAIL: "current sensor at the end of its range",
     Fault.FORCE_RAIL: "force sensor at the end of its range",
     Fault.CURRENT_FROZEN: "current reading frozen while the reference moved",
     Fault.FORCE_FROZEN: "force reading frozen while the current moved",
@@ -89,7 +87,7 @@ FAULT_TEXT: dict[Fault, str] = {
     Fault.FORCE_IMPLAUSIBLE: "the force reading does not fit the current",
     Fault.FORCE_ZERO: "the force sensor does not read zero before the play",
     Fault.COMPARATOR: "the hardware's own over-current limit was reached",
-    Fault.OUTPUT_NOT_OFF: "CURRENT FLOWS ON ALTHOUGH THE OUTPUT WAS SWITCHED OFF: cut the supply now",
+    Fault.OUTPUT_NOT_OFF: "current is still read although the output was switched off: CUT THE SUPPLY NOW",
     Fault.TICK_LOST: "the control interrupt stayed away; a timer of its own switched off",
     Fault.CONVERTER: "a sensor's converter gave no new reading",
 }

@@ -81,6 +81,7 @@ def c_header() -> str:
     ]
     lines += ["#define PT_PARAMETERS(X) \\", " \\\n".join(rows)]
     lines += [f"#define PT_PARAM_{p.name.upper()} {p.id}u" for p in codes.PARAMETERS]
+    lines += [f"#define PT_DEFAULT_{p.name.upper()} {p.default}" for p in codes.PARAMETERS]
     lines.append(f"#define PT_PARAM_COUNT {len(codes.PARAMETERS)}u")
     lines += ["", "/* messages: type id, offset of each field, length of the fixed part */"]
     for message in (*m.COMMANDS, *m.REPLIES):

@@ -47,7 +47,7 @@ def test_a_broken_sensor_or_clock_trips_at_once(what, says):
     ("what", "says"),
     [
         ("current-frozen", "current reading frozen"),
-        ("force-frozen", "force reading frozen"),
+        ("force-frozen", "no force"),  # it stands where there was none
         ("force-zero", "no force"),
     ],
 )

@@ -74,7 +74,7 @@ def test_limits_are_the_compiled_ones():
         f"The buffer holds {codes.WAVE_BUFFER_SAMPLES}.",
         f"at {m.Telemetry.MAX_ITEMS} samples or every 50 ms",
         f"at `ticks per sample` ticks of {1e6 / codes.TICK_RATE_HZ:.0f} us",
-        f"no command for {codes.HEARTBEAT_MAX_MS} ms",
+        f"no sign of life for {codes.HEARTBEAT_MAX_MS} ms",
         f"one sample above {codes.PARAMETERS[1].maximum * codes.CURRENT_UNIT_A:g} A",
         f"three samples above {codes.PARAMETERS[2].maximum * codes.FORCE_UNIT_N:g} N",
         f"a run longer than {codes.PARAMETERS[4].maximum} s",
@@ -96,7 +96,7 @@ def test_what_the_safety_unit_counts_is_what_is_told():
     core = firmware_dir() / "core"
     header = "".join((core / name).read_text(encoding="utf-8") for name in ("safety.h", "heat.h"))
     number = {
-        name: int(value) for name, value in re.findall(r"#define (?:SAFETY_)?(\w+) (\d+)[uL]?\b", header)
+        name: int(value) for name, value in re.findall(r"#define (?:SAFETY_)?(\w+) \(?-?(\d+)[uL]*\b", header)
     }
     told = {name: row[1] for row in rows("fault") for name in row[0].split(", ")}
 
@@ -106,24 +106,43 @@ def test_what_the_safety_unit_counts_is_what_is_told():
     def milli(name: str, unit: str) -> str:
         return f"{number[name] * 0.1:g} {unit}"
 
-    assert number["FORCE_DEBOUNCE"] == number["RAIL_DEBOUNCE"] == 3
+    assert number["RAIL_DEBOUNCE"] * number["FORCE_UP"] == number["FORCE_FULL"] == 6  # three in a row
     assert told["OVER_FORCE"].startswith("three")
     assert told["FORCE_RAIL"].startswith("three")
+    turns = number["TURNS"]
     for fault, words in {
-        "CURRENT_FROZEN": [milli("FROZEN_CURRENT_SPAN", "mA"), milli("FROZEN_CURRENT_TICKS", "ms")],
-        "FORCE_FROZEN": [amperes("FROZEN_FORCE_SPAN"), milli("FROZEN_FORCE_TICKS", "ms")],
+        "CURRENT_FROZEN": [
+            milli("FROZEN_REFERENCE_100UA", "mA"),
+            milli("FROZEN_TICKS", "ms"),
+            f"{number['FROZEN_DUTY_COUNTS']} counts",
+        ],
+        "FORCE_FROZEN": [
+            amperes("FROZEN_FORCE_BASE_100UA"),
+            f"{number['FROZEN_FORCE_PER_5_MN'] * 200 * codes.CURRENT_UNIT_A:g} A more",
+        ],
         "NO_CURRENT": [
-            milli("NO_CURRENT_LEVEL", "mA"),
+            milli("NO_CURRENT_100UA", "mA"),
             milli("NO_CURRENT_TICKS", "ms"),
             milli("WEAK_TICKS", "ms"),
         ],
-        "NO_FORCE": [
-            amperes("NO_FORCE_CURRENT"),
-            f"{number['NO_FORCE_LEVEL'] / 1000:g} N",
-            milli("NO_FORCE_TICKS", "ms"),
+        "CURRENT_IMPLAUSIBLE": [
+            f"{turns * 2 ** number['VOLTAGE_SHIFT'] / 10:g} ms",
+            f"{number['VOLTAGE_HIGH_OHMS'] / codes.PARAMETERS[8].default:.2f}",
+            f"{number['VOLTAGE_LOW_OHMS'] / codes.PARAMETERS[8].default:.1f} times",
+            f"{number['VOLTAGE_SPAN_COUNTS']} counts",
         ],
-        "STRAY_CURRENT": [milli("STRAY_CURRENT", "mA"), milli("STRAY_TICKS", "ms")],
+        "NO_FORCE": [
+            f"{turns * number['PLAUSIBLE_FULL'] / number['PLAUSIBLE_UP'] / 10:g} ms",
+            f"{number['NO_FORCE_MN'] / 1000:g} N",
+            f"a {number['FLOOR_MARGIN_PER_TRIP']}th",
+            f"{number['CEILING_MARGIN_MN'] / 1000:g} N",
+        ],
+        "FORCE_ZERO": [f"-{number['ZERO_LOW_MN'] / 1000:g} to {number['ZERO_HIGH_MN'] / 1000:g} N"],
+        "STRAY_CURRENT": [milli("STRAY_100UA", "mA"), milli("STRAY_TICKS", "ms")],
+        "OUTPUT_NOT_OFF": [milli("STRAY_100UA", "mA"), milli("OFF_TICKS", "ms")],
         "COIL_HEAT": [f"({(number['HEAT_LIMIT'] ** 0.5) * codes.CURRENT_UNIT_A:g} A)^2"],
     }.items():
         for word in words:
             assert word in told[fault], (fault, word)
+    assert number["COMPARATOR_TICKS"] == 3
+    assert told["COMPARATOR"].endswith("three ticks in a row")

@@ -13,7 +13,15 @@ import numpy as np
 import pytest
 
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.codes import FLAG_LAST, PARAMETERS, Fault, NakCode, ResetCause, State
+from pulsetrainer.device.codes import (
+    FLAG_LAST,
+    PARAMETERS,
+    STATUS_OUTPUT_NOT_OFF,
+    Fault,
+    NakCode,
+    ResetCause,
+    State,
+)
 from pulsetrainer.device.session import RefusedError
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES
 
@@ -32,6 +40,8 @@ everywhere = pytest.mark.parametrize("port", ["bench:", QEMU])
 
 STROKES = (7500 - 7500 * np.cos(2 * np.pi * 2 * np.arange(1000) / 1000)).astype(np.int16)  # two a second
 HELD = np.full(1000, 14_500, dtype=np.int16)
+PLATEAU = np.full(1000, 5_000, dtype=np.int16)
+WEAK = np.full(1000, 1_000, dtype=np.int16)
 BREAK_TICK = 3000
 
 
@@ -68,8 +78,16 @@ def stays_off(one, status: m.StatusReply) -> None:
         ("force-rail", STROKES, Fault.FORCE_RAIL, 2),
         ("current-zero", STROKES, Fault.NO_CURRENT, 60),
         ("current-frozen", STROKES, Fault.CURRENT_FROZEN, 200),
-        ("force-frozen", STROKES, Fault.FORCE_FROZEN, 2000),  # once the current has moved 1.3 A
-        ("force-zero", HELD, Fault.NO_FORCE, 5010),
+        ("force-frozen", STROKES, Fault.FORCE_FROZEN, 2000),  # once the current has moved 0.9 A
+        ("force-zero", HELD, Fault.NO_FORCE, 510),
+        ("force-zero", STROKES, Fault.NO_FORCE, 3000),  # counted across strokes
+        ("force-half", HELD, Fault.FORCE_IMPLAUSIBLE, 510),
+        ("current-low", PLATEAU, Fault.CURRENT_FROZEN, 1500),  # as the integral winds up
+        ("current-stuck", WEAK, Fault.CURRENT_FROZEN, 110),
+        ("shunt-half", PLATEAU, Fault.CURRENT_IMPLAUSIBLE, 4100),
+        ("stuck-on", PLATEAU, Fault.OVER_CURRENT, 40),
+        ("comparator", PLATEAU, Fault.COMPARATOR, 3),
+        ("converter", PLATEAU, Fault.CONVERTER, 1),
         ("tick-overrun", STROKES, Fault.TICK_OVERRUN, 2),
     ],
 )
@@ -146,6 +164,60 @@ def test_a_restart_in_mid_play(wire, port, what, cause):
     one.session.hello()
     assert refusal(one, m.Arm(hello.boot_nonce)) == NakCode.NONCE
     assert one.telemetry[-1].first_tick < BREAK_TICK
+
+
+@everywhere
+def test_a_tick_that_stays_away(wire, port):
+    """A timer of its own has switched off; the main loop says so, and the watchdog starts the device anew."""
+    one = wire(f"{port}?break=tick-lost@{BREAK_TICK / 10_000}")
+    hello = one.start(STROKES)
+    deadline = time.monotonic() + 10
+    status = one.status()
+    while status.state == State.RUNNING:
+        assert time.monotonic() < deadline
+        one.beat()
+        status = one.status()
+    if status.boot_nonce == hello.boot_nonce:
+        assert (Fault(status.fault), status.fault_tick) == (Fault.TICK_LOST, BREAK_TICK)
+    else:  # a busy computer: the watchdog was quicker than the question
+        assert ResetCause(status.reset_cause) == ResetCause.WATCHDOG
+        assert status.state == State.IDLE
+
+
+@everywhere
+def test_the_first_cause_does_not_hide_the_worst(wire, port):
+    """A shorted transistor: over-current first, and then the device says that it could not switch off."""
+    one = wire(
+        f"{port.replace('bench:', 'bench:?speed=real')}{'&' if port == 'bench:' else '?'}break=stuck-on@0.3"
+    )
+    one.start(PLATEAU)
+    status = one.wait_for(State.FAULT)
+    deadline = time.monotonic() + 10
+    while status.worst != Fault.OUTPUT_NOT_OFF:
+        assert time.monotonic() < deadline
+        status = one.status()
+    assert Fault(status.fault) == Fault.OVER_CURRENT
+    assert status.flags & STATUS_OUTPUT_NOT_OFF
+    assert status.current > 16_500  # live, not the snapshot
+    assert status.fault_current < status.current
+    assert refusal(one, m.ClearFault(status.fault, status.fault)) == NakCode.FAULT
+    one.clear_fault()
+    hello = one.session.hello()
+    assert refusal(one, m.Arm(hello.boot_nonce)) in {NakCode.FAULT, NakCode.STATE}
+
+
+@pytest.mark.parametrize("offset", [-0.9, 2.0])
+def test_a_force_sensor_that_does_not_read_zero(wire, offset):
+    """Before the play, at ARM: refused, latched, the reading in the snapshot."""
+    one = wire(f"bench:?speed=real&condition-offset={offset}")
+    one.session.hello()
+    time.sleep(0.1)
+    with pytest.raises(RefusedError) as caught:
+        one.start(WEAK)
+    assert (caught.value.nak.command, caught.value.nak.fault) == (m.Arm.TYPE, Fault.FORCE_ZERO)
+    status = one.status()
+    assert status.state == State.FAULT
+    assert abs(status.fault_force - 1000 * offset) < 250
 
 
 @everywhere

@@ -14,6 +14,7 @@
                         * one gives no tick at all: the watchdog is not fed, the output stays off. */
 
 static struct hal_adc latest;
+static bool fresh; /* both converters had a new value */
 static volatile bool missed;
 
 #define POWER_AND_CALIBRATE(core)               \
@@ -56,12 +57,16 @@ void board_adc(void)
     REG_WRITE(ADTRIG0H, SOURCE_SOFTWARE);
 }
 
+/* Also the first readings that the core sees. */
 uint16_t board_adc_noise(void)
 {
     REG_WRITE(_SWCTRG, 1);
-    while (REG_READ(_AN2RDY) == 0) {
+    while (REG_READ(_AN0RDY) == 0 || REG_READ(_AN2RDY) == 0) {
     }
-    return (uint16_t)((REG_READ(ADCBUF0) << 2) ^ REG_READ(ADCBUF2));
+    latest.current = REG_READ(ADCBUF0);
+    latest.force = REG_READ(ADCBUF2);
+    fresh = true;
+    return (uint16_t)((latest.current << 2) ^ latest.force);
 }
 
 void board_adc_follow_pwm(void)
@@ -73,21 +78,22 @@ void board_adc_follow_pwm(void)
 
 INTERRUPT(_ADCAN2Interrupt)
 {
+    /* This interrupt is AN2's; AN0, triggered with it and set up like it, has to be ready as well. */
+    fresh = REG_READ(_AN0RDY) != 0 && REG_READ(_AN2RDY) != 0;
     latest.current = REG_READ(ADCBUF0);
     latest.force = REG_READ(ADCBUF2);
     REG_WRITE(_ADCAN2IF, 0);
-    if (REG_READ(_T1IF) != 0)
-        missed = true; /* nothing came for one and a half ticks */
-    REG_WRITE(TMR1, 0);
-    REG_WRITE(_T1IF, 0);
+    REG_WRITE(TMR1, 0); /* timer 1 switches off where no tick comes for one and a half */
+    board_check_clock();
     app_tick();
     if (REG_READ(_ADCAN2IF) != 0)
         missed = true; /* the next conversion ended before this tick did */
 }
 
-void hal_adc_read(struct hal_adc *out)
+bool hal_adc_read(struct hal_adc *out)
 {
     *out = latest;
+    return fresh;
 }
 
 bool hal_tick_overrun(void)

@@ -21,6 +21,8 @@
 #define RCON_EXTR 0x0080u
 
 static uint8_t cause;
+#define CLOCK_FAILED 0xC10Cu
+static PERSISTENT uint16_t gave_up; /* CLOCK_FAILED: why the device reset itself */
 static PERSISTENT uint32_t nonce;
 static PERSISTENT struct hal_kept kept;
 
@@ -53,8 +55,9 @@ void board_note_reset(void)
         cause = PT_RESET_WATCHDOG;
     else if (rcon & RCON_EXTR)
         cause = PT_RESET_EXTERNAL;
-    else
-        cause = PT_RESET_SOFTWARE; /* the reset instruction, a trap, an illegal opcode */
+    else /* the reset instruction, a trap, an illegal opcode */
+        cause = gave_up == CLOCK_FAILED ? PT_RESET_CLOCK : PT_RESET_SOFTWARE;
+    gave_up = 0;
     REG_WRITE(RCON, 0);
 }
 
@@ -81,6 +84,7 @@ void board_start(void)
     board_comparator();
     board_pwm();
     board_adc();
+    (void)board_adc_noise();
     next_nonce();
     board_uart();
     app_init();
@@ -141,8 +145,20 @@ static void give_up(void)
     RESET_DEVICE();
 }
 
+/* The fail-safe clock monitor (FCKSM = CSECME) and a system PLL that loses its lock end in this trap, on the FRC, which
+ * goes on running. CHECK against the data sheet: that loss of lock traps on this family. */
 INTERRUPT(_OscillatorFail)
 {
+    gave_up = CLOCK_FAILED;
+    give_up();
+}
+
+/* Both locks by hand as well: the auxiliary PLL, which clocks the PWM and with it the tick, has no trap. */
+void board_check_clock(void)
+{
+    if (REG_READ(_LOCK) != 0 && REG_READ(_APLLCK) != 0)
+        return;
+    gave_up = CLOCK_FAILED;
     give_up();
 }
 

@@ -64,6 +64,7 @@ void board_adc_follow_pwm(void);
 void board_tick_start(void);
 
 void board_start(void);
+void board_check_clock(void); /* in every tick: off and a restart where a PLL has lost its lock */
 uint16_t board_adc_noise(void); /* low bits of a software-triggered conversion of both converters */
 
 #endif

@@ -24,6 +24,7 @@
 #define CMP_HYSTERESIS_LEAST 0x0800u /* 5 or 15 mV: the public examples disagree */
 #define CMP_FILTER 0x0400u
 #define CMP_INPUT_B 0x0040u
+#define CMP_STATUS 0x0008u
 #define CMP_RANGE_AVDD 0x0001u
 
 /* The duty register takes no pulse below 16 counts and none within 8 of the period. */
@@ -75,6 +76,10 @@ void hal_pwm_set(uint16_t on)
     else if (on > HAL_PWM_PERIOD - SHORTEST_GAP)
         duty = HAL_PWM_PERIOD; /* as long as the period: always on */
     REG_WRITE(PDC1, duty);
+}
+
+void hal_pwm_enable(void)
+{
     REG_WRITE(IOCON1, IOCON_ON);
 }
 
@@ -85,13 +90,41 @@ void hal_pwm_kill(void)
     REG_WRITE(PDC1, 0);
 }
 
+/* The comparator chops by itself; its interrupt, which is not enabled, remembers that it did.
+ * CHECK against the data sheet: the name of the flag, and CMPSTAT in bit 3. */
+bool hal_comparator(void)
+{
+    bool cut = REG_READ(_AC1IF) != 0 || (REG_READ(CMP1CON) & CMP_STATUS) != 0;
+    REG_WRITE(_AC1IF, 0);
+    return cut;
+}
+
+/* Timer 1 runs out when no tick has come for one and a half. Priority 7 is above every other interrupt and
+ * beyond what a disable instruction holds off. */
+static volatile bool lost;
+
+INTERRUPT(_T1Interrupt)
+{
+    hal_pwm_kill();
+    REG_WRITE(_T1IF, 0);
+    lost = true;
+}
+
+bool hal_tick_lost(void)
+{
+    bool was = lost;
+    lost = false;
+    return was;
+}
+
 void board_tick_start(void)
 {
-    /* Timer 1 only watches: it runs out when no tick has come for one and a half. */
     REG_WRITE(T1CON, 0);
     REG_WRITE(TMR1, 0);
     REG_WRITE(PR1, BOARD_LATE_CYCLES - 1u);
     REG_WRITE(_T1IF, 0);
+    REG_WRITE(_T1IP, 7);
+    REG_WRITE(_T1IE, 1);
     REG_WRITE(T1CON, 0x8000u);
     REG_WRITE(_ADCAN2IP, 5);
     REG_WRITE(_ADCAN2IF, 0);

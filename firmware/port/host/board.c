@@ -8,6 +8,8 @@
 
 #include "app.h"
 #include "breaks.h"
+#include "control.h"
+#include "driver.h"
 #include "hal.h"
 #include "port.h"
 
@@ -27,7 +29,6 @@ struct ring {
 static struct solenoid plant;
 static struct ring rx;
 static struct ring tx;
-static uint16_t duty;
 static uint8_t cause;
 static uint32_t nonce;
 static uint64_t ticks;
@@ -37,6 +38,8 @@ static struct hal_kept kept;
 /* --- provoked faults -------------------------------------------------------------------------- */
 
 static bool overrun_pending;
+static bool tick_lost;
+static bool tick_lost_told;
 static bool hanging;
 
 bool board_break(const char *what_at)
@@ -67,7 +70,7 @@ void board_list_breaks(void)
 
 static void tell_breaks(void)
 {
-    breaks_play(app.state == PT_STATE_RUNNING, app.tick);
+    breaks_play(control.state == PT_STATE_RUNNING, control.tick);
 }
 
 bool board_main_loop_runs(void)
@@ -93,6 +96,9 @@ static void start_firmware(uint8_t reset_cause)
     nonce = ((uint32_t)t.tv_nsec * 2654435761u) ^ (uint32_t)t.tv_sec ^ ((uint32_t)getpid() << 16) ^ (nonce + 1u);
     hanging = false;
     overrun_pending = false;
+    tick_lost = false;
+    tick_lost_told = false;
+    driver_reset();
     fed_at = ticks;
     rx.head = rx.tail = 0;
     tx.head = tx.tail = 0;
@@ -103,6 +109,11 @@ void board_init(const struct solenoid_params *p, uint8_t reset_cause)
 {
     solenoid_init(&plant, p);
     start_firmware(reset_cause);
+}
+
+const struct solenoid *board_world(void)
+{
+    return &plant;
 }
 
 uint64_t board_ticks(void)
@@ -117,8 +128,14 @@ void board_tick(void)
         start_firmware(PT_RESET_EXTERNAL);
     if (breaks_once(BREAKS_TICK_OVERRUN))
         overrun_pending = true;
-    app_tick();
-    solenoid_step(&plant, duty, HAL_PWM_PERIOD);
+    if (!breaks_is(BREAKS_TICK_LOST))
+        app_tick();
+    else if (!tick_lost_told) { /* a timer of its own has run out */
+        driver_off();
+        tick_lost_told = true;
+        tick_lost = true;
+    }
+    driver_step(&plant, HAL_PWM_PERIOD);
     ticks++;
     if (ticks - fed_at > WATCHDOG_TICKS)
         start_firmware(PT_RESET_WATCHDOG);
@@ -126,21 +143,38 @@ void board_tick(void)
 
 /* --- the HAL ---------------------------------------------------------------------------------- */
 
-void hal_adc_read(struct hal_adc *out)
+bool hal_adc_read(struct hal_adc *out)
 {
     out->current = solenoid_adc_current(&plant);
     out->force = solenoid_adc_force(&plant);
-    breaks_sensors(&out->current, &out->force);
+    return breaks_sensors(&out->current, &out->force);
 }
 
-void hal_pwm_set(uint16_t on)
+void hal_pwm_enable(void)
 {
-    duty = on;
+    driver_enable();
+}
+
+void hal_pwm_set(uint16_t on_counts)
+{
+    driver_set(on_counts);
 }
 
 void hal_pwm_kill(void)
 {
-    duty = 0;
+    driver_off();
+}
+
+bool hal_comparator(void)
+{
+    return driver_cut();
+}
+
+bool hal_tick_lost(void)
+{
+    bool was = tick_lost;
+    tick_lost = false;
+    return was;
 }
 
 bool hal_tick_overrun(void)

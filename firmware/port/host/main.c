@@ -19,6 +19,7 @@
 #include "app.h"
 #include "plant.h"
 #include "port.h"
+#include "protocol.h"
 
 static int master = -1;
 static int slave = -1; /* ours until the host has spoken: without any slave open the pty reports a hang-up */

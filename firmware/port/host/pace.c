@@ -10,7 +10,7 @@
  *     for at most half a second of wall time; after that it goes on at the wall clock, so that a
  *     host that is really gone trips the 200 ms heartbeat like on a real device.
  * A coil that has tripped its heat model cools only while time runs: open a new bench instead of waiting. */
-#include "app.h"
+#include "control.h"
 #include "port.h"
 
 #define NS_PER_TICK 100000
@@ -37,7 +37,7 @@ void pace_init(enum pace_speed chosen, int64_t now_ns)
 
 static bool output_off(void)
 {
-    return app.state == PT_STATE_IDLE || app.state == PT_STATE_FAULT;
+    return control.state == PT_STATE_IDLE || control.state == PT_STATE_FAULT;
 }
 
 /* Ticks that the wall clock has made due since epoch_ns. */
@@ -61,13 +61,13 @@ static int32_t real_ticks(int64_t now_ns)
 
 static bool must_wait(void)
 {
-    switch (app.state) {
+    switch (control.state) {
     case PT_STATE_RUNNING:
         if (board_hangs()) /* nobody to wait for: the watchdog has to see time pass */
             return false;
         /* By commands, not by bytes: a damaged one must not let the rest of the heartbeat run off. */
-        return app.safety.silent_ticks >= app.safety.heartbeat_ticks / 2 || wave_ticks_left(&app.wave) < 2 * BATCH ||
-               telemetry_waiting(&app.telemetry) >= TELEMETRY_HIGH;
+        return control.safety.silent_ticks >= control.safety.limits.heartbeat_ticks / 2 || wave_ticks_left(&control.wave) < 2 * BATCH ||
+               telemetry_waiting(&control.telemetry) >= TELEMETRY_HIGH;
     case PT_STATE_ARMED:
         return true;
     default:

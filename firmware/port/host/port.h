@@ -20,6 +20,7 @@ void board_list_breaks(void);
 bool board_main_loop_runs(void);                /* false once "hang" has struck */
 bool board_hangs(void);
 uint64_t board_ticks(void);                     /* since power-on */
+const struct solenoid *board_world(void);       /* the truth, which the firmware cannot see */
 
 /* pace.c: how many ticks may run now. */
 enum pace_speed { PACE_REAL, PACE_MAX };

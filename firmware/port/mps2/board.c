@@ -4,6 +4,8 @@
 
 #include "app.h"
 #include "breaks.h"
+#include "control.h"
+#include "driver.h"
 #include "hal.h"
 #include "registers.h"
 #include "solenoid.h"
@@ -14,6 +16,8 @@
 #define FEED_TICKS 100u                        /* a write to a peripheral costs the emulator dear */
 #define WATCHDOG_CYCLES (CLOCK_HZ / 1000u * 128u) /* NMI after 128 ms, reset after 256 ms */
 #define POWERED 0x50545231u
+#define TICK_PRIORITY 0x40u
+#define LATE_CYCLES (BOARD_TICK_CYCLES + BOARD_TICK_CYCLES / 2u) /* no tick for so long: the output goes off */
 
 #ifndef PT_BUILD_HASH
 #define PT_BUILD_HASH 0u
@@ -32,12 +36,12 @@ typedef char retained_fits_its_place[sizeof(struct retained) <= 256u ? 1 : -1];
 
 static struct solenoid plant;
 static struct solenoid_params params;
-static volatile uint16_t duty;
 static uint8_t cause;
 static uint32_t next_tick; /* board_cycles() at which it is due */
 static volatile uint32_t missed;
 static volatile uint32_t ticks;
 static uint32_t missed_told;
+static volatile bool lost;
 static uint32_t fed_at;
 
 static uint8_t rx_ring[RX_RING];
@@ -49,6 +53,7 @@ static uint16_t tx_tail;
 
 void timer0_handler(void);
 void uart0_rx_handler(void);
+void dual_timer_handler(void);
 void nmi_handler(void);
 void fault_handler(void);
 
@@ -104,8 +109,9 @@ void board_init(void)
     TIMER1->reload = UINT32_MAX;
     TIMER1->value = UINT32_MAX;
     TIMER1->control = TIMER_RUN;
-    NVIC_PRIORITY[IRQ_UART0_RX] = 0x00u; /* a byte lasts 11 us, the tick may take longer */
-    NVIC_PRIORITY[IRQ_TIMER0] = 0x40u;
+    NVIC_PRIORITY[IRQ_DUAL_TIMER] = 0x00u; /* nothing holds this one off */
+    NVIC_PRIORITY[IRQ_UART0_RX] = 0x20u;   /* a byte lasts 11 us, the tick may take longer */
+    NVIC_PRIORITY[IRQ_TIMER0] = TICK_PRIORITY;
     NVIC_ENABLE = 1u << IRQ_UART0_RX;
 }
 
@@ -119,7 +125,9 @@ void board_start_tick(void)
     TIMER0->value = BOARD_TICK_CYCLES - 1u;
     next_tick = board_cycles() + BOARD_TICK_CYCLES;
     TIMER0->control = TIMER_RUN | TIMER_INTERRUPT;
-    NVIC_ENABLE = 1u << IRQ_TIMER0;
+    DUAL_TIMER->load = LATE_CYCLES;
+    DUAL_TIMER->control = DUAL_TIMER_RUN | DUAL_TIMER_INTERRUPT | DUAL_TIMER_32_BITS | DUAL_TIMER_PERIODIC;
+    NVIC_ENABLE = 1u << IRQ_TIMER0 | 1u << IRQ_DUAL_TIMER;
 }
 
 /* --- the tick ----------------------------------------------------------------------------------- */
@@ -136,12 +144,12 @@ uint32_t board_missed(void)
 
 void board_world(void)
 {
-    solenoid_step(&plant, duty, HAL_PWM_PERIOD);
+    driver_step(&plant, HAL_PWM_PERIOD);
 }
 
 static void tell_breaks(void)
 {
-    breaks_play(app.state == PT_STATE_RUNNING, app.tick);
+    breaks_play(control.state == PT_STATE_RUNNING, control.tick);
 }
 
 /* Really, not in name: the tick stays away, the chip resets, the main loop stands still. */
@@ -166,9 +174,20 @@ void board_main_loop(void)
 void board_tick(void)
 {
     break_tick();
-    app_tick();
+    if (!breaks_is(BREAKS_TICK_LOST)) {
+        DUAL_TIMER->load = LATE_CYCLES;
+        app_tick();
+    }
     board_world();
     ticks++;
+}
+
+/* No tick for one and a half: off, whatever the tick would have said. */
+void dual_timer_handler(void)
+{
+    DUAL_TIMER->clear = 1u;
+    hal_pwm_kill();
+    lost = true;
 }
 
 void timer0_handler(void)
@@ -184,21 +203,31 @@ void timer0_handler(void)
     board_tick();
 }
 
-void hal_adc_read(struct hal_adc *out)
+bool hal_adc_read(struct hal_adc *out)
 {
     out->current = solenoid_adc_current(&plant);
     out->force = solenoid_adc_force(&plant);
-    breaks_sensors(&out->current, &out->force);
+    return breaks_sensors(&out->current, &out->force);
 }
 
-void hal_pwm_set(uint16_t on)
+void hal_pwm_enable(void)
 {
-    duty = on;
+    driver_enable();
+}
+
+void hal_pwm_set(uint16_t on_counts)
+{
+    driver_set(on_counts);
 }
 
 void hal_pwm_kill(void)
 {
-    duty = 0;
+    driver_off();
+}
+
+bool hal_comparator(void)
+{
+    return driver_cut();
 }
 
 bool hal_tick_overrun(void)
@@ -209,14 +238,22 @@ bool hal_tick_overrun(void)
     return true;
 }
 
+bool hal_tick_lost(void)
+{
+    bool was = lost;
+    lost = false;
+    return was;
+}
+
+/* The tick is held off; receiving and the timer that watches the tick go on. */
 void hal_critical_enter(void)
 {
-    __asm__ volatile("cpsid i" ::: "memory");
+    __asm__ volatile("msr basepri, %0" ::"r"(TICK_PRIORITY) : "memory");
 }
 
 void hal_critical_exit(void)
 {
-    __asm__ volatile("cpsie i" ::: "memory");
+    __asm__ volatile("msr basepri, %0" ::"r"(0u) : "memory");
 }
 
 void hal_watchdog_feed(void)

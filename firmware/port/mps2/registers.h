@@ -45,8 +45,22 @@ struct cmsdk_watchdog {
 #define WATCHDOG ((struct cmsdk_watchdog *)0x40008000u)
 #define WATCHDOG_LOCK (*(volatile uint32_t *)0x40008C00u)
 
+/* Its first half. */
+struct cmsdk_dual_timer {
+    volatile uint32_t load; /* writing it starts the count anew */
+    volatile uint32_t value;
+    volatile uint32_t control;
+    volatile uint32_t clear;
+};
+#define DUAL_TIMER_32_BITS 0x02u
+#define DUAL_TIMER_INTERRUPT 0x20u
+#define DUAL_TIMER_PERIODIC 0x40u
+#define DUAL_TIMER_RUN 0x80u
+#define DUAL_TIMER ((struct cmsdk_dual_timer *)0x40002000u)
+
 #define IRQ_UART0_RX 0u
 #define IRQ_TIMER0 8u
+#define IRQ_DUAL_TIMER 10u
 #define NVIC_ENABLE (*(volatile uint32_t *)0xE000E100u)
 #define NVIC_PRIORITY ((volatile uint8_t *)0xE000E400u)
 #define SCB_RESET (*(volatile uint32_t *)0xE000ED0Cu)

@@ -15,7 +15,9 @@
     .word fault_handler
     .endr
     .word timer0_handler /* interrupt 8 */
-    .rept 23
+    .word fault_handler
+    .word dual_timer_handler /* interrupt 10 */
+    .rept 21
     .word fault_handler
     .endr
 

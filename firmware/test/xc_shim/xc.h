@@ -22,9 +22,9 @@
     X(_C0PWR, 0) X(_C0RDY, 0) X(_C0EN, 0) X(_C2PWR, 0) X(_C2RDY, 0) X(_C2EN, 0)                           \
     X(_CAL0EN, 0) X(_CAL0DIFF, 0) X(_CAL0RUN, 0) X(_CAL0RDY, 0)                                           \
     X(_CAL2EN, 0) X(_CAL2DIFF, 0) X(_CAL2RUN, 0) X(_CAL2RDY, 0)                                           \
-    X(_SWCTRG, 0) X(_AN2RDY, 0) X(ADCBUF0, 0) X(ADCBUF2, 0)                                               \
+    X(_SWCTRG, 0) X(_AN0RDY, 0) X(_AN2RDY, 0) X(ADCBUF0, 0) X(ADCBUF2, 0)                                               \
     X(_ADCAN2IP, 4) X(_ADCAN2IF, 0) X(_ADCAN2IE, 0)                                                       \
-    X(T1CON, 0) X(TMR1, 0) X(PR1, 0xFFFF) X(_T1IF, 0)                                                     \
+    X(T1CON, 0) X(TMR1, 0) X(PR1, 0xFFFF) X(_T1IF, 0) X(_T1IP, 4) X(_T1IE, 0) X(_AC1IF, 0)                                                     \
     X(U1MODE, 0) X(U1STA, 0x0110) X(U1BRG, 0) X(U1RXREG, 0) X(U1TXREG, 0)                                 \
     X(_U1RXIP, 4) X(_U1RXIF, 0) X(_U1RXIE, 0) X(_U1TXIP, 4) X(_U1TXIF, 0) X(_U1TXIE, 0)                   \
     X(WATCHDOG, 0) X(RESET, 0)

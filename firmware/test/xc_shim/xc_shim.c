@@ -20,12 +20,14 @@ static uint8_t sent[4096];
 static uint16_t sent_count;
 static uint16_t in_fifo;
 static int early;
+static int unready;
 static int locked;
 static uint32_t noise = 1;
 
 void _U1RXInterrupt(void);
 void _U1TXInterrupt(void);
 void _ADCAN2Interrupt(void);
+void _T1Interrupt(void);
 
 void xc_shim_reset(uint16_t rcon)
 {
@@ -39,6 +41,7 @@ void xc_shim_reset(uint16_t rcon)
     sent_count = 0;
     in_fifo = 0;
     early = 0;
+    unready = 0;
     locked = 0;
 }
 
@@ -99,6 +102,7 @@ static void react(volatile uint16_t *reg, uint16_t value)
         noise = noise * 1664525u + 1013904223u;
         ADCBUF0 = (uint16_t)(noise >> 30);
         ADCBUF2 = (uint16_t)(0x200u + (noise >> 28 & 3u));
+        _AN0RDY = 1;
         _AN2RDY = 1;
     } else if (reg == &U1TXREG) {
         if (sent_count < sizeof sent)
@@ -137,12 +141,11 @@ uint16_t xc_shim_read(volatile uint16_t *reg)
             U1STA &= 0xFFFEu;
         return byte;
     }
-    if (reg == &ADCBUF2) {
-        uint16_t value = ADCBUF2;
+    if (reg == &ADCBUF0)
+        _AN0RDY = 0;
+    if (reg == &ADCBUF2)
         _AN2RDY = 0;
-        return value;
-    }
-    if (early && reg == &_T1IF) { /* between clearing the tick's flag and the end of the tick */
+    if (early && reg == &_LOCK) { /* between clearing the tick's flag and the end of the tick */
         early = 0;
         _ADCAN2IF = 1;
     }
@@ -189,9 +192,23 @@ void xc_shim_tick(uint16_t current, uint16_t force)
 {
     ADCBUF0 = current;
     ADCBUF2 = force;
+    _AN0RDY = (uint16_t)!unready;
+    _AN2RDY = 1;
     _ADCAN2IF = 1;
     if (_ADCAN2IE)
         _ADCAN2Interrupt();
+}
+
+void xc_shim_no_tick(void)
+{
+    _T1IF = 1;
+    if (_T1IE)
+        _T1Interrupt();
+}
+
+void xc_shim_unready(void)
+{
+    unready = 1;
 }
 
 void xc_shim_next_conversion_early(void)

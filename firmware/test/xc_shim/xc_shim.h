@@ -22,6 +22,8 @@ void xc_shim_receive(const uint8_t *bytes, uint16_t count); /* into the receiver
 uint16_t xc_shim_sent(uint8_t *bytes, uint16_t most);       /* runs the sender's interrupt while enabled */
 void xc_shim_overrun(void);
 void xc_shim_tick(uint16_t current, uint16_t force);        /* a pair of conversions, then its interrupt */
+void xc_shim_no_tick(void);                 /* one and a half ticks without a conversion */
+void xc_shim_unready(void);                 /* the current's converter has no new value any more */
 void xc_shim_next_conversion_early(void); /* the next one ends while the tick is still at work */
 
 #endif
