@@ -20,6 +20,7 @@ static struct {
     uint8_t reply_type;
     uint8_t reply_length;
     uint8_t reply[PT_MAX_PAYLOAD];
+    uint8_t wire[FRAME_MAX_ENCODED]; /* what goes out next: not on the stack twice */
 } link_state;
 
 void link_init(void)
@@ -30,7 +31,7 @@ void link_init(void)
 
 static void send_reply(uint8_t seq)
 {
-    uint8_t out[FRAME_MAX_ENCODED];
+    uint8_t *out = link_state.wire;
     uint16_t n = frame_encode(out, link_state.reply_type, seq, link_state.reply, link_state.reply_length, hal_uart_tx_idle());
     /* No room although it is reserved: the host does not read. It will ask again. */
     if (hal_uart_tx_space() >= n)
@@ -259,7 +260,7 @@ static void handle(const struct frame *f)
 static void send_telemetry(void)
 {
     uint8_t payload[PT_MAX_PAYLOAD];
-    uint8_t out[FRAME_MAX_ENCODED];
+    uint8_t *out = link_state.wire;
     while (hal_uart_tx_space() >= FRAME_MAX_ENCODED + REPLY_RESERVE) {
         hal_critical_enter();
         uint32_t now = control.tick;

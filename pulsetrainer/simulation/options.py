@@ -15,8 +15,9 @@ from pulsetrainer.errors import UsageError
 # In the order of the enum in firmware/plant/breaks.h; a test compares them with what the firmware lists.
 BREAKS = (
     "current-rail", "current-zero", "current-frozen", "force-high", "force-rail",
-    "force-zero", "force-frozen", "tick-overrun", "reset", "hang", "current-low", "current-stuck", "shunt-half",
-    "force-half", "stuck-on", "comparator", "tick-lost", "converter",
+    "force-zero", "force-frozen", "tick-overrun", "reset", "hang",
+    "current-low", "current-stuck", "shunt-half", "force-half", "stuck-on",
+    "comparator", "tick-lost", "converter",
 )  # fmt: skip
 LONGEST_S = 1e5
 MAX_RATE = 0.1  # of damaged bytes: beyond that no frame comes through

@@ -48,10 +48,10 @@ def test_a_program_killed_in_mid_upload_leaves_nothing_behind(wire):
 def test_the_whole_firmware_under_the_sanitizers(wire):
     """Garbage, a play, a fault and a stop: neither address nor undefined-behaviour sanitizer has a word."""
     sanitized = firmware_executable(("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"))
-    one = wire("bench:?break=force-high@0.2", sanitized)
+    one = wire("bench:?break=tick-overrun@0.2", sanitized)
     one.transport.write(np.random.default_rng(4).bytes(3000))
     one.start((5000 - 5000 * np.cos(np.arange(900) / 50)).astype(np.int16), decimation=1)
-    assert one.wait_for(State.FAULT).fault == Fault.OVER_FORCE
+    assert one.wait_for(State.FAULT).fault == Fault.TICK_OVERRUN
     one.clear_fault()
     one.start(np.full(300, 3000, dtype=np.int16))
     one.ask(m.Stop())

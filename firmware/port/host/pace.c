@@ -16,7 +16,7 @@
 #define NS_PER_TICK 100000
 #define BATCH 10                    /* ticks between two looks at the pty */
 #define TELEMETRY_HIGH 48           /* waiting samples: the reader is behind */
-#define SETTLE_TICKS 2000           /* after the output went off */
+#define SETTLE_TICKS 2000           /* after the output went off; less than the watchdog waits */
 #define GRACE_NS 500000000          /* wall time that a stalled device waits for its host */
 #define CATCH_UP_NS 250000000       /* a computer that slept: do not run the lost time all at once */
 
@@ -79,10 +79,9 @@ static int32_t max_ticks(int64_t now_ns)
 {
     if (output_off()) {
         stalled = false;
-        if (settle_ticks <= 0)
-            return 0;
-        settle_ticks -= BATCH;
-        return BATCH;
+        int32_t rest = settle_ticks; /* at once: the next command finds the coil settled, however soon it comes */
+        settle_ticks = 0;
+        return rest;
     }
     settle_ticks = SETTLE_TICKS;
     if (!must_wait()) {
