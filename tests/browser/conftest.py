@@ -48,7 +48,11 @@ def folder(made_once) -> Path:
     return made_once("reports", fill)
 
 
-@pytest.fixture(scope="session", params=["evaluation", "prediction", "diagnosis"])
+SLOW = pytest.mark.slow  # a browser takes its time; the first page has every part of a page
+REPORTS = ("evaluation", pytest.param("prediction", marks=SLOW), pytest.param("diagnosis", marks=SLOW))
+
+
+@pytest.fixture(scope="session", params=REPORTS)
 def report(request, folder) -> Report:
     """Each report in turn."""
     kind = request.param

@@ -144,6 +144,7 @@ def test_other_units_are_refused(bench):
         assert "A and N" in message
 
 
+@pytest.mark.slow
 def test_gaps_are_left_out_and_a_record_of_gaps_is_refused(bench):
     """Three holes in the middle of a record change no verdict; a tenth of the samples is no record."""
     u = signals.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value

@@ -273,6 +273,7 @@ def test_one_bad_file_of_many_writes_none(run, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "b.csv"]
 
 
+@pytest.mark.slow
 def test_a_large_file_is_streamed(tmp_path):
     """Memory grows by the numbers kept, 24 bytes of each row of 28, and a fifth: there is no second copy."""
 

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from program import PROGRAM, pulsetrainer
 from pulsetrainer.artefacts import Run
@@ -69,6 +70,7 @@ def killed(folder: Path, words: tuple[str, ...], after_samples: int) -> None:
     process.wait()
 
 
+@pytest.mark.slow
 def test_resumed_after_two_kills_it_is_the_whole_course(tmp_path):
     """Every sample of the course once and in order, seams where it was cut, no file left over."""
     rng = random.Random(SEED)
@@ -186,6 +188,7 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_length(tmp_path):
     """Half an hour takes no more memory than a quarter of one: the most that is held is one part."""
 

@@ -55,6 +55,7 @@ def test_the_current_loop_follows_within_one_percent(as_built):
                 assert tracking < 1.0, (reading, name, drive, tracking)
 
 
+@pytest.mark.slow
 def test_on_the_ideal_bench_almost_nothing_is_left(tmp_path):
     """Static hysteresis only: at least 88 % less mean error and at most 2.5 % of full force."""
     document = chain(tmp_path, "bench:?ideal", reading="continuous", waveforms=("normal", "bifid"))

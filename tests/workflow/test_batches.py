@@ -97,6 +97,7 @@ def test_snakemake_makes_what_the_commands_make(batch, hand):
     assert "<svg" in (batch / "out/left/report.html").read_text()
 
 
+@pytest.mark.slow
 def test_make_makes_what_the_commands_make(tmp_path, hand):
     """The same commands by pattern rules, side by side."""
     (tmp_path / "two.tsv").write_text(DEVICES)
