@@ -23,12 +23,14 @@ from pulsetrainer.core.memory import State, demagnetised, negative_saturation, p
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, QualityError, UsageError
+from pulsetrainer.steps.one_thread import one_thread
 
 TRACE_SAMPLES = 6000  # of a prediction, kept for the figures
 SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
 BEYOND = 0.005  # of the model's range: an input further out than this was never identified
 
 
+@one_thread
 def evaluate(
     measured: Playback | Run | Sequence[Playback | Run],
     models: Model | Sequence[Model] = (),

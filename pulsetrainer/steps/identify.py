@@ -17,6 +17,7 @@ from pulsetrainer.core.initial_state import known_from
 from pulsetrainer.core.plane import Plane, Reading
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
+from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
 TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
@@ -24,6 +25,7 @@ SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
 WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
 
+@one_thread
 def identify(
     runs: Run | Sequence[Run],
     *,

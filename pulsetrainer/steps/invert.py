@@ -16,6 +16,7 @@ from pulsetrainer.core.waveforms import Shape, train
 from pulsetrainer.diagnosis.prediction import extended_of, operator_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 from pulsetrainer.steps.asked import check_beat, check_force_range
+from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ EXTENDED_BAND_HZ = 30.0  # an arterial pulse holds little above
 RAMP_S = 0.4  # from rest to the first target, and back after the last
 
 
+@one_thread
 def invert(
     pulse: Shape,
     model: Model,
