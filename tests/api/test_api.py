@@ -1,0 +1,87 @@
+"""The Python API: its names, what it costs to import, how artefacts show themselves, what it refuses."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+import pulsetrainer as pt
+from pulsetrainer.errors import DataError, NotAnArtefactError, UsageError
+
+KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
+NOUNS = {"Run", "Model", "Waveform", "Playback", "Evaluation", "Diagnosis"}
+VERBS = {
+    "load", "save", "read_table", "open_device", "capture", "identify", "invert", "play", "evaluate", "compare",
+    "diagnose", "extend",
+}  # fmt: skip
+
+
+def test_the_names_are_those_of_the_contract():
+    """All are there, and every one has a docstring with an example that runs as a doctest."""
+    assert set(pt.__all__) == NOUNS | VERBS | {"__version__"}
+    for name in VERBS:
+        text = inspect.getdoc(getattr(pt, name))
+        assert text, name
+        assert ">>>" in text, name
+    assert set(dir(pt)) >= NOUNS | VERBS
+    with pytest.raises(AttributeError, match="no attribute 'identfy'"):
+        _ = pt.identfy
+
+
+def test_the_import_loads_nothing():
+    """Neither numpy nor any module of the package but the version."""
+    job = "import sys, pulsetrainer; print(sorted(m for m in sys.modules if m.split('.')[0] in ('numpy', 'pulsetrainer')))"
+    done = subprocess.run([sys.executable, "-c", job], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "['pulsetrainer', 'pulsetrainer.version']"
+
+
+@pytest.mark.parametrize("path", sorted(KEPT.glob("*.h5")), ids=lambda path: path.stem)
+def test_every_artefact_shows_itself(path):
+    """As one line, as text, as HTML with its figure, as axes; and quietly."""
+    artefact = pt.load(path)
+    assert repr(artefact).startswith(f"<{artefact.kind}")
+    assert "\n" not in repr(artefact)
+    assert len(str(artefact).splitlines()) > 3
+    page = artefact._repr_html_()
+    assert page.startswith("<pre>")
+    assert page.rstrip().endswith("</svg>")
+    assert isinstance(artefact.plot(), Axes)
+
+
+def test_errors_are_python_exceptions(tmp_path, capfd):
+    """Nothing exits, nothing is printed; a ValueError where a caller expects one."""
+    model = pt.load(KEPT / "model.h5")
+    with pytest.raises(ValueError, match="levels"):
+        pt.identify(pt.load(KEPT / "run.h5"), levels=1)
+    with pytest.raises(UsageError):
+        pt.invert("normel", model)
+    with pytest.raises(UsageError):
+        pt.invert("normal", model, method="extended")
+    with pytest.raises(DataError):
+        pt.invert("normal", model, force_min=-99.0)
+    with pytest.raises(UsageError):
+        pt.evaluate(pt.load(KEPT / "run.h5"))
+    (tmp_path / "table.csv").write_text("t_s,u,y\n0,0,0\n")
+    with pytest.raises(NotAnArtefactError):
+        pt.load(tmp_path / "table.csv")
+    pt.save(model, tmp_path / "m.h5")
+    with pytest.raises(UsageError):
+        pt.save(model, tmp_path / "m.h5")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_pulse_may_be_given_as_arrays_a_name_or_a_drive():
+    """All three give the same drive."""
+    model = pt.load(KEPT / "model.h5")
+    named = pt.invert("normal", model)
+    one = named.time_s[: round(named.period_s * named.rate_Hz)]
+    shape = named.target[np.flatnonzero(named.scored)[0] :][: one.size]
+    for pulse in ((one, shape), named):
+        again = pt.invert(pulse, model)
+        assert np.allclose(again.target[again.scored], named.target[named.scored], atol=1e-3)

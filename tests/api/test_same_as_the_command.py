@@ -1,0 +1,112 @@
+"""Command and function give the same bits: each verb by both ways on the same files."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from program import pulsetrainer
+
+import pulsetrainer as pt
+
+DATA = Path(__file__).resolve().parents[1] / "data"
+KEPT = DATA / "files-0.1"
+MEASURED = ("bh_ferrite_mnzn_1.csv", "davinci_f0p5_torque10.csv")
+
+
+def same(one: object, other: object, where: str = "") -> None:
+    """Compare two artefacts field by field, arrays bit by bit."""
+    assert type(one) is type(other), where
+    if is_dataclass(one):
+        for field in fields(one):
+            same(getattr(one, field.name), getattr(other, field.name), f"{where}.{field.name}")
+    elif isinstance(one, np.ndarray):
+        assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), where
+    elif isinstance(one, tuple):
+        assert len(one) == len(other), where
+        for number, pair in enumerate(zip(one, other, strict=True)):
+            same(*pair, f"{where}[{number}]")
+    else:
+        assert one == other or (one != one and other != other), where
+
+
+def stored(noun: object, folder: Path) -> object:
+    """Return an artefact as its file holds it, where lists of arrays and texts have their stored form."""
+    path = folder / "by-function.h5"
+    pt.save(noun, path, overwrite=True)
+    return pt.load(path)
+
+
+def by_command(folder: Path, *words: object) -> object:
+    """Run a command that writes one file and return what is in it."""
+    done = pulsetrainer(folder, *words, "-o", "by-command.h5", "--overwrite")
+    assert done.code == 0, done.err
+    return pt.load(folder / "by-command.h5")
+
+
+def test_identify(tmp_path):
+    """A run that a device recorded, with intervals."""
+    run, words = KEPT / "run.h5", ("--levels", 12, "--bootstrap", 4, "--seed", 3)
+    model = pt.identify(pt.load(run), levels=12, bootstrap=4, seed=3, names=["run"])
+    same(by_command(tmp_path, "identify", run, *words), stored(model, tmp_path))
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_records_of_other_laboratories(tmp_path, name):
+    """Imported, identified, evaluated: a magnetic loop and a tendon."""
+    run = pt.read_table(DATA / name, input="u", output="y")
+    words = ("import", DATA / name, "--input", "u", "--output", "y")
+    same(by_command(tmp_path, *words), stored(run, tmp_path))
+    pt.save(run, tmp_path / "run.h5")
+    model = pt.identify(run, levels=16, names=["run"])
+    same(by_command(tmp_path, "identify", "run.h5", "--levels", 16), stored(model, tmp_path))
+    pt.save(model, tmp_path / "model.h5")
+    errors = pt.evaluate(run, model, names=["run.h5"], model_names=["model.h5"])
+    same(by_command(tmp_path, "evaluate", "run.h5", "--model", "model.h5"), stored(errors, tmp_path))
+
+
+@pytest.mark.parametrize("pulse", ["normal", "bifid"])
+def test_invert(tmp_path, pulse):
+    """A pulse of the library by a static and by an extended model."""
+    for name in ("model.h5", "model-extended.h5"):
+        drive = pt.invert(pulse, pt.load(KEPT / name), periods=2)
+        words = ("invert", pulse, "--model", KEPT / name, "--periods", 2)
+        same(by_command(tmp_path, *words), stored(drive, tmp_path))
+
+
+def test_play_and_evaluate(tmp_path):
+    """On two benches that are alike in every bit."""
+    drive = pt.load(KEPT / "drive.h5")
+    with pt.open_device("bench:?seed=5") as device:
+        played = pt.play(drive, device, repeats=1)
+    words = ("play", KEPT / "drive.h5", "--repeats", 1, "--port", "bench:?seed=5")
+    same(by_command(tmp_path, *words), stored(played, tmp_path))
+    pt.save(played, tmp_path / "played.h5")
+    errors = pt.evaluate(played, names=["played.h5"])
+    same(by_command(tmp_path, "evaluate", "played.h5"), stored(errors, tmp_path))
+
+
+def test_capture(tmp_path):
+    """An excitation, faster than usual."""
+    with pt.open_device("bench:?seed=5") as device:
+        run = pt.capture("identification", device, levels=6, speed_A_per_s=6.0)
+    words = ("capture", "identification", "--levels", 6, "--speed", 6, "--port", "bench:?seed=5")
+    same(by_command(tmp_path, *words), stored(run, tmp_path))
+
+
+def test_diagnose_and_extend(tmp_path):
+    """What a quick screen finds, and what a model becomes by a whole diagnosis."""
+    run, model = KEPT / "run.h5", KEPT / "model.h5"
+    found = pt.diagnose([pt.load(run)], pt.load(model), quick=True, names=["run", "model"])
+    same(by_command(tmp_path, "diagnose", run, "--model", model, "--quick"), stored(found, tmp_path))
+
+
+def test_compare(tmp_path):
+    """The same figures, and the same words for what became better."""
+    evaluation = pt.load(KEPT / "evaluation.h5")
+    metrics = pt.compare([evaluation, evaluation])
+    done = pulsetrainer(tmp_path, "compare", KEPT / "evaluation.h5", KEPT / "evaluation.h5", "--json")
+    assert [m["name"] for m in done.json["metrics"]] == [m.name for m in metrics]
+    assert [m["values"] for m in done.json["metrics"]] == [list(m.values) for m in metrics]
