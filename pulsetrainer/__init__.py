@@ -19,6 +19,7 @@ from pulsetrainer.version import __version__
 if TYPE_CHECKING:
     from pulsetrainer.api import invert, load, open_device, read_table, save
     from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Waveform
+    from pulsetrainer.steps.capture import capture
     from pulsetrainer.steps.compare import compare
     from pulsetrainer.steps.evaluate import evaluate
     from pulsetrainer.steps.identify import identify
@@ -32,6 +33,7 @@ __all__ = [
     "Run",
     "Waveform",
     "__version__",
+    "capture",
     "compare",
     "evaluate",
     "identify",
@@ -47,7 +49,7 @@ _NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Waveform")
 _HOME = {
     **dict.fromkeys(_NOUNS, "artefacts"),
     **dict.fromkeys(("invert", "load", "open_device", "read_table", "save"), "api"),
-    **{verb: f"steps.{verb}" for verb in ("compare", "evaluate", "identify", "play")},
+    **{verb: f"steps.{verb}" for verb in ("capture", "compare", "evaluate", "identify", "play")},
 }
 
 

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.options import AsJson, DryRun, Force, LimitCurrent, LimitForce, Out, Port, positive
+from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import (
+    AsJson,
+    DryRun,
+    LimitCurrent,
+    LimitForce,
+    Out,
+    Overwrite,
+    Port,
+    positive,
+)
 from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
+    from pulsetrainer.core.course import Course
+    from pulsetrainer.device.device import Device, DeviceInfo
+    from pulsetrainer.files.resume import Earlier
     from pulsetrainer.steps.capture import Plan
 
 
 def capture(
+    context: typer.Context,
     signal: Annotated[
         str,
         typer.Argument(help="identification, diagnostic, or a CSV file with the columns t_s and current_A."),
@@ -42,76 +58,196 @@ def capture(
     condition: Annotated[bool, typer.Option(help="Go around the major loop once before recording.")] = True,
     repeats: Annotated[int, typer.Option(min=1, help="How often the signal is played, without a pause.")] = 1,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the recording into this output that was cut off.")
+        bool, typer.Option("--resume", help="Continue an interrupted recording into this output.")
     ] = False,
     limit_current: LimitCurrent = None,
     limit_force: LimitForce = None,
     dry_run: DryRun = False,
-    force: Force = False,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Play a signal on the device and record current and force.
 
     Example: pulsetrainer capture identification -o run.h5
     """
-    from pulsetrainer.steps import preflight
+    from pulsetrainer.files.input_file import check_resumable
+    from pulsetrainer.files.signal_table import read_signal, signal_file
+    from pulsetrainer.simulation.options import check_port
+    from pulsetrainer.steps.asked import EXCITATIONS
 
-    preflight.signal_file(signal)
-    preflight.check_port(port)
-    preflight.check_files(outputs=() if resume else (out,), force=force)
+    table = signal_file(signal, EXCITATIONS)
+    check_port(port)
+    job = Job(context, outputs=() if resume else (out,), overwrite=overwrite, as_json=json)
     if resume:
-        preflight.check_resumable(out)
+        check_resumable(out)
+    from pulsetrainer.api import open_device
+    from pulsetrainer.core.course import Course
     from pulsetrainer.device.device import Limits
-    from pulsetrainer.steps import capture as flow
+    from pulsetrainer.files.resume import earlier_of
+    from pulsetrainer.steps.capture import excitation, plan
 
-    screen = Screen("capture", as_json=json)
-    limits = Limits(limit_current, limit_force)
-    options = flow.Options(
-        signal,
-        out,
-        port,
-        levels,
-        current_max,
-        speed,
-        rate,
-        condition,
-        repeats,
-        resume,
-        limits,
-        dry_run,
-        force,
+    played = excitation(
+        signal if table is None else read_signal(table, rate),
+        levels=levels,
+        current_max_A=current_max,
+        speed_A_per_s=speed,
+        rate_Hz=rate,
     )
+    if table is not None:
+        job.uses(table)
     if dry_run:
-        _show(screen, flow.plan(options))
+        _show_plan(job, out, port, plan(played, levels=levels, condition=condition, repeats=repeats))
         return
-    with screen.working(f"capturing {signal}") as context:
-        result = flow.run(options, context)
-    if result.dropped_samples:
-        screen.note(f"{result.dropped_samples} samples were lost on the wire; the rest is right")
-    screen.result(result)
-    current, force_range = result.current_range_A, result.force_range_N
-    screen.facts(
-        f"{result.output}: {result.signal} on {result.serial}, firmware {result.firmware}",
+    course, earlier = Course(played, repeats), None
+    if resume:
+        asked = {name: context.params[name] for name in _SAME}
+        earlier = earlier_of(out, asked, overwrite=overwrite)
+    else:
+        _note_leftovers(job, out)
+    try:
+        with (
+            job.working(f"capturing {signal}") as progress,
+            open_device(port, limits=Limits(limit_current, limit_force)) as device,
+        ):
+            payload = _record(
+                job, out, course, device, earlier, condition=condition, levels=levels, progress=progress
+            )
+    finally:
+        if earlier is not None:
+            earlier.lease.end()
+    _show(job, payload)
+
+
+# what must be the same when a capture is resumed
+_SAME = ("signal", "levels", "current_max", "speed", "rate", "condition", "repeats")
+
+
+def _record(
+    job: Job,
+    out: Path,
+    course: Course,
+    device: Device,
+    earlier: Earlier | None,
+    *,
+    condition: bool,
+    levels: int,
+    progress: Callable[[float], None],
+) -> dict[str, Any]:
+    """Record into the file, or go on with one that was cut off, and return the figures."""
+    from pulsetrainer.errors import DeviceError, Interrupted
+    from pulsetrainer.files.recorder import RunRecorder
+    from pulsetrainer.steps.capture import tally_of
+    from pulsetrainer.steps.recording import decimation_for, record, samples_played
+    from pulsetrainer.steps.stopped import raise_if_stopped
+
+    info, signal = device.info, course.signal
+    decimation_for(info.tick_rate_Hz, signal.rate_Hz)  # before anything is written
+    tally, at = tally_of(signal, levels), 0
+    if earlier is not None:
+        _check_device(earlier, info)
+        at = samples_played(earlier.run, course)
+        job.uses(earlier.path)
+        share = 100.0 * at / course.size
+        job.notes(
+            [f"continuing {earlier.path} after {earlier.run.input.size} samples, {share:.0f} % of the signal"]
+        )
+        tally.take_over(earlier.run)
+    header = job.header(
+        f"{signal.name} on {info.serial}",
+        device=job.device(info),
+        ancestors=[] if earlier is None else [earlier.header],
+    )
+    recorder = RunRecorder(
+        out,
+        header,
+        signal=signal.name,
+        overwrite=job.overwrite or (earlier is not None and earlier.contains_final),
+        earlier=None if earlier is None else (earlier.path, earlier.run),
+    )
+    try:
+        with recorder:
+            ending = record(
+                course, device, recorder, tally, at=at, condition_first=condition, progress=progress
+            )
+            recorder.finish(complete=ending.complete)
+        raise_if_stopped(ending.fault, ending.remedy, "the capture")
+    except (DeviceError, Interrupted) as error:
+        if recorder.samples:
+            error.message += f"; {recorder.samples} samples were kept in {out} (complete=false)"
+        raise
+    return {
+        "output": out,
+        "signal": signal.name,
+        "samples": recorder.samples,
+        "seconds": recorder.end_s,
+        "rate_Hz": signal.rate_Hz,
+        "reversals": course.reversals,
+        "parts": ending.parts + (0 if earlier is None else len(earlier.run.parts())),
+        "coverage_percent": tally.coverage_percent,
+        "current_range_A": tally.current_A,
+        "force_range_N": tally.force_N,
+        "dropped_samples": recorder.dropped_samples,
+        "complete": ending.complete,
+        "serial": info.serial,
+        "firmware": info.firmware,
+    }
+
+
+def _check_device(earlier: Earlier, info: DeviceInfo) -> None:
+    """Refuse to go on with a recording on another device."""
+    from pulsetrainer.errors import DeviceError
+
+    recorded = earlier.header.provenance.device
+    if recorded is not None and recorded.serial != info.serial:
+        raise DeviceError(
+            f"{earlier.path} was recorded on {recorded.serial}, this is {info.serial}",
+            hint="connect that device, or leave --resume out and name another output",
+        )
+
+
+def _note_leftovers(job: Job, out: Path) -> None:
+    from pulsetrainer.files.recorder import interrupted
+
+    job.notes(
+        [
+            f"{left} holds {samples} samples of a capture that was cut off: "
+            "continue it with --resume, or delete it"
+            for left, samples in interrupted(out)
+        ]
+    )
+
+
+def _show(job: Job, got: dict[str, Any]) -> None:
+    if got["dropped_samples"]:
+        job.notes([f"{got['dropped_samples']} samples were lost on the wire; the rest is right"])
+    job.screen.result(got)
+    current, force = got["current_range_A"], got["force_range_N"]
+    job.screen.facts(
+        f"{got['output']}: {got['signal']} on {got['serial']}, firmware {got['firmware']}",
         {
-            "samples": f"{result.samples} in {result.seconds:.1f} s, {result.rate_Hz:g} a second",
+            "samples": f"{got['samples']} in {got['seconds']:.1f} s, {got['rate_Hz']:g} a second",
             "current": f"{current[0]:.3f} .. {current[1]:.3f} A",
-            "force": f"{force_range[0]:.3f} .. {force_range[1]:.3f} N",
-            "reversals": result.reversals,
-            **({"parts": result.parts} if result.parts > 1 else {}),
-            "cells switched": f"{result.coverage_percent:.1f} %",
+            "force": f"{force[0]:.3f} .. {force[1]:.3f} N",
+            "reversals": got["reversals"],
+            **({"parts": got["parts"]} if got["parts"] > 1 else {}),
+            "cells switched": f"{got['coverage_percent']:.1f} %",
         },
     )
 
 
-def _show(screen: Screen, plan: Plan) -> None:
+def _show_plan(job: Job, out: Path, port: str | None, planned: Plan) -> None:
     """Say what would be played."""
-    screen.result(plan)
-    screen.facts(
-        f"would play {plan.signal} on {plan.port} and write {plan.output}; nothing was done",
+    from pulsetrainer.device.device import DEFAULT_PORT
+    from pulsetrainer.device.schemes import redact
+
+    where = redact(port or DEFAULT_PORT)
+    job.screen.result(plain(planned) | {"port": where, "output": out, "dry_run": True})
+    job.screen.facts(
+        f"would play {planned.signal} on {where} and write {out}; nothing was done",
         {
-            "length": f"{plan.seconds:.1f} s, {plan.samples} samples, {plan.rate_Hz:g} a second",
-            "current": f"{plan.peak_current_A:.3f} A at most, {plan.rms_current_A:.3f} A rms",
-            "reversals": plan.reversals,
-            "cells switched": f"{plan.coverage_percent:.1f} %",
+            "length": f"{planned.seconds:.1f} s, {planned.samples} samples, {planned.rate_Hz:g} a second",
+            "current": f"{planned.peak_current_A:.3f} A at most, {planned.rms_current_A:.3f} A rms",
+            "reversals": planned.reversals,
+            "cells switched": f"{planned.coverage_percent:.1f} %",
         },
     )

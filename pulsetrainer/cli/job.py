@@ -18,6 +18,7 @@ from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
 
 if TYPE_CHECKING:
+    from pulsetrainer.device.device import DeviceInfo
     from pulsetrainer.files.provenance import Device, Header
 
 K = TypeVar("K")
@@ -50,7 +51,7 @@ class Job:
     ) -> None:
         self.screen = Screen(str(context.info_name), as_json=as_json)
         self._parameters = context.params
-        self._overwrite = overwrite
+        self.overwrite = overwrite
         self._artefacts: list[Path] = []  # loaded, in their order
         self._tables: list[Path] = []
         for path in outputs:
@@ -121,20 +122,27 @@ class Job:
             libraries=provenance.library_versions(),
         )
 
+    def device(self, info: DeviceInfo) -> Device:
+        """Return who measured, and on which port, as a header names it."""
+        from pulsetrainer.device.schemes import redact
+        from pulsetrainer.files.provenance import Device
+
+        return Device(info.serial, info.firmware, redact(self._parameters.get("port") or ""))
+
     def save(self, path: Path | None, noun: Any, title: str, *, device: Device | None = None) -> Header:
         """Write an artefact, if there is a file to write it to, and return its header."""
         from pulsetrainer.files import store
 
         header = self.header(title, device=device)
         if path is not None:
-            store.write(path, noun, header, overwrite=self._overwrite)
+            store.write(path, noun, header, overwrite=self.overwrite)
         return header
 
     def write(self, path: Path, content: bytes | str) -> None:
         """Write a figure, a page or a table: whole, or not at all."""
         from pulsetrainer.files.atomic_write import replacing
 
-        with replacing(path, overwrite=self._overwrite) as temporary:
+        with replacing(path, overwrite=self.overwrite) as temporary:
             temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
     def notes(self, lines: Sequence[str]) -> None:

@@ -45,9 +45,7 @@ def play(
     from pulsetrainer.api import open_device
     from pulsetrainer.artefacts import Playback, Waveform
     from pulsetrainer.device.device import Limits
-    from pulsetrainer.device.schemes import redact
     from pulsetrainer.errors import PulsetrainerError
-    from pulsetrainer.files.provenance import Device
     from pulsetrainer.steps.play import play as press
 
     waveform, limits = job.load(drive, Waveform), Limits(limit_current, limit_force)
@@ -68,7 +66,7 @@ def play(
         out,
         played,
         f"{waveform.name} by {waveform.inversion} inversion, played on {info.serial}",
-        device=Device(info.serial, info.firmware, redact(port or "")),
+        device=job.device(info),
     )
     if stopped is not None:
         stopped.message += f"; {whole} of {repeats} repeats were kept in {out}"

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError
+from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, UsageError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 JOURNAL = b"pulsetrainer journal 1\n"  # what a recording under way begins with
@@ -82,3 +82,18 @@ def _names_in(folder: Path, path: Path) -> str:
     near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
     near = near or [name for name in names if name.endswith(path.suffix or ".h5")][:5]
     return f"in that folder there is: {', '.join(near)}" if near else f"nothing like it is in {folder}"
+
+
+def check_resumable(path: Path) -> None:
+    """Refuse to go on with a recording into ``path`` of which nothing is there.
+
+    Raises
+    ------
+    UsageError
+        Neither the output nor what a killed program leaves beside it is there.
+    """
+    if not path.exists() and not any(path.parent.glob(f"{path.name}.partial*")):
+        raise UsageError(
+            f"there is nothing to resume: neither {path} nor {path.name}.partial is there",
+            hint="leave --resume out to record from the beginning",
+        )

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 from pulsetrainer.errors import UsageError
 
+EXCITATIONS = ("identification", "diagnostic")
+
 
 def check_beat(beat: str | int | None) -> None:
     """Refuse what is neither the number of a beat nor the mean; None is no choice.

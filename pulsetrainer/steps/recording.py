@@ -1,4 +1,4 @@
-"""Recording: play a course on the device, part by part, into a file that grows; or go on with one cut off.
+"""Recording: play a course on the device, part by part, into whatever keeps it.
 
 Only the part that is being played is held in memory. The device stays on for some minutes at most, so a
 long course is played in parts; each begins with the major loop (not recorded) and with the extremes that the
@@ -9,10 +9,8 @@ with a known memory, and the run says where each begins: ``Run.seam``.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -23,12 +21,9 @@ from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.device.codes import MAX_DECIMATION
-from pulsetrainer.errors import ArgumentError, DataError, DeviceError, ExistsError, Interrupted, UsageError
-from pulsetrainer.files import atomic_write, store
-from pulsetrainer.files.file_lock import Lease, is_abandoned
-from pulsetrainer.files.provenance import Header
-from pulsetrainer.files.recorder import RunRecorder, interrupted
-from pulsetrainer.steps import preflight
+from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.steps.progress import Progress, silent
+from pulsetrainer.steps.stopped import raise_if_stopped
 
 if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
@@ -42,16 +37,78 @@ _MATCH_A = 1.5e-4  # the device tells the reference in steps of 0.1 mA
 _MOST_TURNS = 20_000  # of the reference, kept until the part ends
 
 
-@dataclass(frozen=True, slots=True)
-class Earlier:
-    """An interrupted recording and where in its course it stopped."""
+class Sink(Protocol):
+    """Where a recording goes while it is made."""
 
-    path: Path
-    run: Run
-    header: Header
-    at: int  # samples of the course that were played
-    lease: Lease  # so that nobody else goes on with it meanwhile
-    contains_final: bool  # what has the final name is the beginning of this recording
+    dropped_samples: int
+
+    @property
+    def samples(self) -> int:
+        """How many samples it holds."""
+        ...
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last sample."""
+        ...
+
+    def append(
+        self, time_s: FloatArray, reference_A: FloatArray, current_A: FloatArray, force_N: FloatArray, /
+    ) -> None:
+        """Take samples in, arrays (n,) in s, A, A and N."""
+        ...
+
+    def begin_part(self) -> None:
+        """Say that the device was off since the last sample."""
+        ...
+
+
+class Memory:
+    """A sink that keeps the recording in memory."""
+
+    def __init__(self) -> None:
+        self.dropped_samples = 0
+        self._blocks: list[FloatArray] = []
+        self._seams: list[int] = []
+
+    @property
+    def samples(self) -> int:
+        """How many samples it holds."""
+        return sum(block.shape[1] for block in self._blocks)
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last sample."""
+        return float(self._blocks[-1][0, -1])
+
+    def append(
+        self, time_s: FloatArray, reference_A: FloatArray, current_A: FloatArray, force_N: FloatArray, /
+    ) -> None:
+        """Take samples in, arrays (n,) in s, A, A and N."""
+        if np.size(time_s):
+            self._blocks.append(np.stack((time_s, reference_A, current_A, force_N)))
+
+    def begin_part(self) -> None:
+        """Say that the device was off since the last sample."""
+        self._seams.append(self.samples)
+
+    def run(self, signal: str, *, complete: bool) -> Run | None:
+        """Return what was recorded; None where that is nothing."""
+        if not self._blocks:
+            return None
+        time_s, reference, current, force = np.concatenate(self._blocks, axis=1)
+        seam = np.zeros(time_s.size, dtype=np.bool_)
+        seam[[start for start in self._seams if start < time_s.size]] = True
+        return Run(
+            time_s=time_s,
+            input=current,
+            output=force,
+            reference=reference,
+            seam=seam if seam.any() else None,
+            signal=signal,
+            complete=complete,
+            dropped_samples=self.dropped_samples,
+        )
 
 
 class Tally:
@@ -71,6 +128,13 @@ class Tally:
         path = np.concatenate((self._turns, reference_A))
         self._turns = path[np.append(0, turning_points(path))]
         if self._turns.size > _MOST_TURNS:
+            self.end_part()
+
+    def take_over(self, run: Run) -> None:
+        """Take in what was recorded before."""
+        for part in run.parts():
+            assert part.reference is not None
+            self.add(part.reference, part.input, part.output)
             self.end_part()
 
     def end_part(self) -> None:
@@ -104,12 +168,12 @@ class Ending:
 def record(
     course: Course,
     device: Device,
-    recorder: RunRecorder,
+    sink: Sink,
     tally: Tally,
     *,
-    at: int,
-    condition_first: bool,
-    progress: Callable[[float], None],
+    at: int = 0,
+    condition_first: bool = True,
+    progress: Progress = silent,
 ) -> Ending:
     """Play a course from sample ``at`` to its end, or until the device or the user stops it.
 
@@ -128,9 +192,8 @@ def record(
     high, parts, step = float(course.signal.value.max()), 0, info.tick_rate_Hz
     while at < course.size:
         if condition_first:
-            kept = f"; the {recorder.samples} samples recorded before were kept" if recorder.samples else ""
             _LOG.info("conditioning: once around the major loop")
-            condition(device, high, rate_Hz, kept)
+            condition(device, high, rate_Hz)
         lead = course.lead_in(at, speed=CONDITIONING_SPEED_A_PER_S, rest_s=CONDITIONING_REST_S)
         if lead.size >= longest:
             raise ArgumentError(
@@ -139,18 +202,18 @@ def record(
                 hint="raise the device's on-time limit",
             )
         end = course.part_end(at, longest - lead.size)
-        begun_s = recorder.end_s + PAUSE_S if recorder.samples else 0.0
-        if recorder.samples:
-            recorder.begin_part()
+        begun_s = sink.end_s + PAUSE_S if sink.samples else 0.0
+        if sink.samples:
+            sink.begin_part()
 
         def keep(block: Block, begun_s: float = begun_s, done: int = at, lead: int = lead.size) -> None:
-            recorder.append(begun_s + block.tick / step, block.reference_A, block.current_A, block.force_N)
+            sink.append(begun_s + block.tick / step, block.reference_A, block.current_A, block.force_N)
             tally.add(block.reference_A, block.current_A, block.force_N)
             played = int(block.tick[-1]) // decimation + 1 - lead
             progress((done + max(played, 0)) / course.size)
 
         _LOG.info("playing samples %d to %d of %d at %g Hz", at, end, course.size, rate_Hz)
-        before = recorder.samples
+        before = sink.samples
         played = device.play(
             np.concatenate((lead, course.values(at, end))) if lead.size else course.values(at, end),
             rate_Hz,
@@ -161,7 +224,7 @@ def record(
         tally.end_part()
         parts += 1
         # a Ctrl-C in the middle of writing costs what was being written: it is counted, not passed over
-        recorder.dropped_samples += played.dropped_samples + played.samples - (recorder.samples - before)
+        sink.dropped_samples += played.dropped_samples + played.samples - (sink.samples - before)
         if played.fault or not played.complete:
             return Ending(complete=False, fault=played.fault, remedy=played.remedy, parts=parts)
         at = end
@@ -186,7 +249,7 @@ def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:
     return decimation
 
 
-def condition(device: Device, high_A: float, rate_Hz: float, kept: str = "") -> None:
+def condition(device: Device, high_A: float, rate_Hz: float) -> None:
     """Take the actuator once around its major loop, so that what came before is forgotten.
 
     Raises
@@ -198,7 +261,7 @@ def condition(device: Device, high_A: float, rate_Hz: float, kept: str = "") -> 
     if loop.size == 0:
         return
     recording = device.play(loop, rate_Hz)
-    check_ended(recording.fault, "conditioning", kept, recording.remedy)
+    raise_if_stopped(recording.fault, recording.remedy, "conditioning")
 
 
 def conditioning_loop(high_A: float, rate_Hz: float) -> FloatArray:
@@ -210,109 +273,20 @@ def conditioning_loop(high_A: float, rate_Hz: float) -> FloatArray:
     )
 
 
-def check_ended(fault: str, what: str, kept: str, remedy: str) -> None:
-    """Raise what a play that did not reach its end has to say.
-
-    Raises
-    ------
-    DeviceError, Interrupted
-        ``fault`` is not empty.
-    """
-    if fault == "interrupted":
-        raise Interrupted(f"stopped by you during {what}; the output was switched off first{kept}")
-    if fault:
-        raise DeviceError(
-            f"the device stopped during {what}: {fault}{kept}",
-            hint=remedy or "remove the cause; the next command clears the fault",
-        )
-
-
-# --- going on with an interrupted recording -------------------------------------------------------------
-
-
-def earlier_of(path: Path, course: Course, asked: Mapping[str, Any], force: bool) -> Earlier:
-    """Find the recording into ``path`` that was interrupted, and where in its course it stopped.
-
-    That is the longest of the files that killed programs left beside it, or ``path`` itself if it is not
-    complete.
-
-    Raises
-    ------
-    UsageError
-        There is nothing to go on with, it is being written, or it was recorded with other options.
-    DataError
-        What is there cannot be read, or is no recording of this signal.
-    """
-    atomic_write.check_output(path, overwrite=True)
-    preflight.check_resumable(path)
-    found = interrupted(path)
-    source = found[0][0] if found else None
-    final = None
-    if path.exists():
-        final = _unfinished(path, must_read=source is None)
-        if final is None and source is not None and not force:
-            raise ExistsError(path, f"{source} can be continued, but {path} already exists")
-        if final is None and source is None:
-            raise UsageError(f"there is nothing to resume: {path} is complete", hint="leave --resume out")
-        if final is not None and (not found or final.input.size >= found[0][1]):
-            source = path
-    if source is None:
-        cut_off = f"{path.name}.partial"
-        beside = min((entry.name for entry in path.parent.glob(f"{cut_off}*")), default=cut_off)
-        raise UsageError(
-            f"{beside} is being written by another program, or cannot be read",
-            hint=f"wait for it, or look: pulsetrainer show {beside}",
-        )
-    lease = Lease(source)
-    run, header = store.read(source, Run), store.read_header(source)
-    _check_same(source, header.provenance.parameters, asked)
-    contains = final is not None and _begins_with(run, final)
-    return Earlier(source, run, header, _played(source, run, course), lease, contains)
-
-
-def _begins_with(run: Run, earlier: Run) -> bool:
-    size = earlier.input.size
-    return np.array_equal(run.input[:size], earlier.input, equal_nan=True) and np.array_equal(
-        run.output[:size], earlier.output, equal_nan=True
-    )
-
-
-def _unfinished(path: Path, *, must_read: bool) -> Run | None:
-    """Read a recording that a fault or Ctrl-C ended early; None for what will have to make room."""
-    try:
-        run = store.read(path, Run)
-    except DataError:
-        if must_read:
-            raise
-        return None
-    if run.complete:
-        return None
-    if not is_abandoned(path):
-        raise UsageError(f"{path} is being continued by another program", hint="wait for it")
-    return run
-
-
-def _check_same(source: Path, before: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
-    """Raise UsageError where the recording was begun with other options."""
-    differ = [
-        f"{name} was {before[name]}, now it is {value}"
-        for name, value in asked.items()
-        if name in before and before[name] != value
-    ]
-    if differ:
-        raise UsageError(
-            f"{source} was recorded with other options: {'; '.join(differ)}",
-            hint="resume with the same options, or leave --resume out and name another output",
-        )
-
-
-def _played(source: Path, run: Run, course: Course) -> int:
+def samples_played(run: Run, course: Course) -> int:
     """Return how many samples of the course are in a recording: as far as its reference follows it.
 
     What follows the course no more is the way down after a fault.
+
+    Raises
+    ------
+    DataError
+        The recording has no time or no reference, or it is one of another signal.
     """
     if run.time_s is None or run.reference is None:
-        raise DataError(f"{source} has no time or no reference", hint="resume what `capture` recorded")
+        raise DataError(
+            "the earlier recording has no time or no reference", hint="resume what `capture` recorded"
+        )
     at, begun_s, rate_Hz = 0, 0.0, course.signal.rate_Hz
     for number, part in enumerate(run.parts()):
         assert part.time_s is not None
@@ -326,7 +300,7 @@ def _played(source: Path, run: Run, course: Course) -> int:
         reached = int(index[off[0]]) if off.size else min(int(index[-1]) + 1, expected.size)
         if number == 0 and reached == 0:
             raise DataError(
-                f"the reference in {source} is not that of this signal",
+                "the reference of the earlier recording is not that of this signal",
                 hint="resume with the signal and options that it was recorded with: pulsetrainer show FILE",
             )
         at += max(reached - lead.size, 0)

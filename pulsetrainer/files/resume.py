@@ -1,0 +1,105 @@
+"""Going on with a recording that was cut off: which file holds it, and whether it is this recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pulsetrainer.artefacts import Run
+from pulsetrainer.errors import DataError, ExistsError, UsageError
+from pulsetrainer.files import atomic_write, store
+from pulsetrainer.files.file_lock import Lease, is_abandoned
+from pulsetrainer.files.input_file import check_resumable
+from pulsetrainer.files.provenance import Header
+from pulsetrainer.files.recorder import interrupted
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier:
+    """An interrupted recording."""
+
+    path: Path
+    run: Run
+    header: Header
+    lease: Lease  # so that nobody else goes on with it meanwhile
+    contains_final: bool  # what has the final name is the beginning of this recording
+
+
+def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earlier:
+    """Find the recording into ``path`` that was interrupted.
+
+    That is the longest of the files that killed programs left beside it, or ``path`` itself if it is not
+    complete.
+
+    Raises
+    ------
+    UsageError
+        There is nothing to go on with, it is being written, or it was recorded with other options.
+    DataError
+        What is there cannot be read.
+    """
+    atomic_write.check_output(path, overwrite=True)
+    check_resumable(path)
+    found = interrupted(path)
+    source = found[0][0] if found else None
+    final = None
+    if path.exists():
+        final = _unfinished(path, must_read=source is None)
+        if final is None and source is not None and not overwrite:
+            raise ExistsError(path, f"{source} can be continued, but {path} already exists")
+        if final is None and source is None:
+            raise UsageError(f"there is nothing to resume: {path} is complete", hint="leave --resume out")
+        if final is not None and (not found or final.input.size >= found[0][1]):
+            source = path
+    if source is None:
+        cut_off = f"{path.name}.partial"
+        beside = min((entry.name for entry in path.parent.glob(f"{cut_off}*")), default=cut_off)
+        raise UsageError(
+            f"{beside} is being written by another program, or cannot be read",
+            hint=f"wait for it, or look: pulsetrainer show {beside}",
+        )
+    lease = Lease(source)
+    run, header = store.read(source, Run), store.read_header(source)
+    _check_same(source, header.provenance.parameters, asked)
+    contains = final is not None and _begins_with(run, final)
+    return Earlier(source, run, header, lease, contains)
+
+
+def _begins_with(run: Run, earlier: Run) -> bool:
+    size = earlier.input.size
+    return np.array_equal(run.input[:size], earlier.input, equal_nan=True) and np.array_equal(
+        run.output[:size], earlier.output, equal_nan=True
+    )
+
+
+def _unfinished(path: Path, *, must_read: bool) -> Run | None:
+    """Read a recording that a fault or Ctrl-C ended early; None for what will have to make room."""
+    try:
+        run = store.read(path, Run)
+    except DataError:
+        if must_read:
+            raise
+        return None
+    if run.complete:
+        return None
+    if not is_abandoned(path):
+        raise UsageError(f"{path} is being continued by another program", hint="wait for it")
+    return run
+
+
+def _check_same(source: Path, before: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+    """Raise UsageError where the recording was begun with other options."""
+    differ = [
+        f"{name} was {before[name]}, now it is {value}"
+        for name, value in asked.items()
+        if name in before and before[name] != value
+    ]
+    if differ:
+        raise UsageError(
+            f"{source} was recorded with other options: {'; '.join(differ)}",
+            hint="resume with the same options, or leave --resume out and name another output",
+        )

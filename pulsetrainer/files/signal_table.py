@@ -1,0 +1,69 @@
+"""A signal of one's own: a table of time and current, to be played on the device."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.input_file import check_file
+
+if TYPE_CHECKING:
+    from pulsetrainer.core.signals import Signal
+
+
+def signal_file(signal: str, known: Sequence[str]) -> Path | None:
+    """Return the file that a signal is read from; None where it is one of the ``known`` excitations.
+
+    Raises
+    ------
+    UsageError
+        The signal is neither an excitation nor a file.
+    DataError
+        It is a CSV file that cannot be read.
+    """
+    if signal in known:
+        return None
+    path = Path(signal)
+    if path.suffix.lower() != ".csv" and not path.exists():
+        raise UsageError(
+            f"there is no signal {signal!r}; known signals: {', '.join(known)}, or a CSV file",
+            hint="pulsetrainer capture identification -o run.h5",
+        )
+    check_file(path)
+    return path
+
+
+def read_signal(path: Path, rate_Hz: float) -> Signal:
+    """Return a signal out of a table whose first two columns are time and current, at even steps.
+
+    Raises
+    ------
+    DataError
+        The table cannot be used.
+    """
+    # so that a mistyped name is answered at once
+    import numpy as np  # noqa: PLC0415
+
+    from pulsetrainer.core import signals  # noqa: PLC0415
+    from pulsetrainer.files import run_from_table, table  # noqa: PLC0415
+
+    columns = table.read_table(path)
+    if len(columns.names) < 2:
+        raise DataError(
+            f"{path} has {len(columns.names)} column; a reference needs a time and a current",
+            hint="write two columns: t_s,current_A",
+        )
+    time, current = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
+    seconds = float(time[-1]) - float(time[0])
+    lasts = seconds * rate_Hz
+    if not lasts <= signals.MOST_SAMPLES:
+        raise DataError(
+            f"{path} lasts {seconds:g} s, {lasts:.3g} samples at {rate_Hz:g} Hz; "
+            f"{signals.MOST_SAMPLES} are the most",
+            hint="give its time in s, a lower --rate, or a shorter signal with --repeats",
+        )
+    count = int(np.floor(lasts + 1e-9)) + 1
+    value = np.interp(time[0] + np.arange(count) / rate_Hz, time, current)
+    return signals.Signal(value, rate_Hz, path.name)
