@@ -74,17 +74,18 @@ def _entry(name: str, verb: Any, level: int = 3) -> Iterator[str]:
     for block in (inspect.getdoc(verb) or "").split("\n\n"):
         head, _, rest = block.partition("\n")
         if head in _SECTIONS:
-            section, block = head, rest.partition("\n")[2]
+            section = head
             yield f"**{head}**\n"
+        said = rest.partition("\n")[2] if head in _SECTIONS else block
         if section == "Examples":
-            yield f"```pycon\n{block}\n```\n"
-        elif section in ("Parameters", "Raises") and not block.startswith("Source:"):
-            yield from _items(block)
-        elif block.startswith("    "):
-            yield f"```text\n{inspect.cleandoc(block)}\n```\n"
+            yield f"```pycon\n{said}\n```\n"
+        elif section in ("Parameters", "Raises") and not said.startswith("Source:"):
+            yield from _items(said)
+        elif said.startswith("    "):
+            yield f"```text\n{inspect.cleandoc(said)}\n```\n"
         else:
             section = ""
-            yield f"{_code(' '.join(block.split()))}\n"
+            yield f"{_code(' '.join(said.split()))}\n"
 
 
 def _signature(verb: Any) -> str:

@@ -41,19 +41,24 @@ def capture(
         int,
         typer.Option(min=2, help="Levels whose cells the signal shall switch.", envvar=variable("levels")),
     ] = 48,
-    current_max: Annotated[
-        float, typer.Option(callback=positive, help="Top of the range, A.", envvar=variable("current_max_A"))
-    ] = 1.5,
-    speed: Annotated[
+    current_max_A: Annotated[
         float,
         typer.Option(
+            "--current-max", callback=positive, help="Top of the range, A.", envvar=variable("current_max_A")
+        ),
+    ] = 1.5,
+    speed_A_per_s: Annotated[
+        float,
+        typer.Option(
+            "--speed",
             callback=positive,
             help="Speed of the identification signal, A/s.",
             envvar=variable("speed_A_per_s"),
         ),
     ] = 0.75,
-    rate: Annotated[
-        float, typer.Option(callback=positive, help="Samples a second, Hz.", envvar=variable("rate_Hz"))
+    rate_Hz: Annotated[
+        float,
+        typer.Option("--rate", callback=positive, help="Samples a second, Hz.", envvar=variable("rate_Hz")),
     ] = 1000.0,
     condition: Annotated[bool, typer.Option(help="Go around the major loop once before recording.")] = True,
     repeats: Annotated[int, typer.Option(min=1, help="How often the signal is played, without a pause.")] = 1,
@@ -87,11 +92,11 @@ def capture(
     from pulsetrainer.steps.capture import excitation, plan
 
     played = excitation(
-        signal if table is None else read_signal(table, rate),
+        signal if table is None else read_signal(table, rate_Hz),
         levels=levels,
-        current_max_A=current_max,
-        speed_A_per_s=speed,
-        rate_Hz=rate,
+        current_max_A=current_max_A,
+        speed_A_per_s=speed_A_per_s,
+        rate_Hz=rate_Hz,
     )
     if table is not None:
         job.uses(table)
@@ -119,7 +124,7 @@ def capture(
 
 
 # what must be the same when a capture is resumed
-_SAME = ("signal", "levels", "current_max", "speed", "rate", "condition", "repeats")
+_SAME = ("signal", "levels", "current_max_A", "speed_A_per_s", "rate_Hz", "condition", "repeats")
 
 
 def _record(

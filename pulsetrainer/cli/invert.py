@@ -56,10 +56,13 @@ def invert(
     periods: Annotated[
         int, typer.Option(min=1, help="Periods to play; the first is not scored.", envvar=variable("periods"))
     ] = 4,
-    slew: Annotated[
+    slew_A_per_s: Annotated[
         float,
         typer.Option(
-            callback=positive, help="Fastest the drive may move, A/s.", envvar=variable("slew_A_per_s")
+            "--slew",
+            callback=positive,
+            help="Fastest the drive may move, A/s.",
+            envvar=variable("slew_A_per_s"),
         ),
     ] = 30.0,
     overwrite: Overwrite = False,
@@ -91,7 +94,8 @@ def invert(
             force_max=force_max,
             beat=beat,
             periods=periods,
-            slew_A_per_s=slew,
+            slew_A_per_s=slew_A_per_s,
+            name=str(model),
             progress=progress,
         )
         if pulse.name == waveform:

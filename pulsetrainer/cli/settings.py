@@ -43,10 +43,12 @@ def variable(key: str) -> str:
 SETTINGS = (
     Setting("port", str, "", "the device", (("capture", "port"), ("play", "port"), ("doctor", "port"))),
     Setting("levels", int, "", "levels of the plane", (("capture", "levels"), ("identify", "levels"))),
-    Setting("current_max_A", float, "A", "top of the range of a capture", (("capture", "current_max"),)),
-    Setting("speed_A_per_s", float, "A/s", "speed of the identification signal", (("capture", "speed"),)),
-    Setting("rate_Hz", float, "Hz", "samples a second", (("capture", "rate"),)),
-    Setting("slew_A_per_s", float, "A/s", "fastest a drive may move", (("invert", "slew"),)),
+    Setting("current_max_A", float, "A", "top of the range of a capture", (("capture", "current_max_A"),)),
+    Setting(
+        "speed_A_per_s", float, "A/s", "speed of the identification signal", (("capture", "speed_A_per_s"),)
+    ),
+    Setting("rate_Hz", float, "Hz", "samples a second", (("capture", "rate_Hz"),)),
+    Setting("slew_A_per_s", float, "A/s", "fastest a drive may move", (("invert", "slew_A_per_s"),)),
     Setting("periods", int, "", "periods of a pulse", (("invert", "periods"),)),
     Setting("repeats", int, "", "how often a drive is played", (("play", "repeats"),)),
     Setting(

@@ -42,6 +42,7 @@ def invert(
     periods: int = 4,
     slew_A_per_s: float = 30.0,
     rate_Hz: float = 1000.0,
+    name: str = "the model",
     progress: Progress = silent,
 ) -> Waveform:
     """Find the drive that makes a device follow a pulse, and beside it the merely scaled one.
@@ -65,6 +66,8 @@ def invert(
         Periods to play; the first one is not scored.
     slew_A_per_s
         Fastest the drive may move, input unit a second.
+    name
+        Name of the model, for messages.
 
     Raises
     ------
@@ -87,8 +90,8 @@ def invert(
     notes: list[str] = []
     shape = _one_beat(pulse, beat, notes)
     operator = operator_of(model)
-    chosen = _method(method, model)
-    forces = _force_range(operator, model.output_unit, force_min, force_max)
+    chosen = _method(method, model, name)
+    forces = _force_range(operator, model.output_unit, force_min, force_max, name)
     if chosen == "extended":
         forces = _within_beats(shape, model, forces, (force_min, force_max), rate_Hz)
     progress(0.2)
@@ -153,17 +156,17 @@ def _one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Sha
     return found.mean() if beat == "mean" else found.single(int(beat))
 
 
-def _method(asked: Inversion | None, model: Model) -> Inversion:
+def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
     """Return the method: the one asked for if it suits the model, or the one that suits it best."""
     relay = model.reading == "relay"
     if asked == "extended" and not model.extensions:
         raise UsageError(
-            "this model has no extensions, so there is no extended inverse",
+            f"{name} has no extensions, so there is no extended inverse",
             hint="diagnose a run with it and extend it first, or leave `method` out",
         )
     if asked in ("continuous", "extended") and relay:
         raise UsageError(
-            "the weights of this model are read as relays, which have no continuous inverse",
+            f"the weights of {name} are read as relays, which have no continuous inverse",
             hint="give `method` closest-match, or identify with `reading` continuous",
         )
     if asked is not None and asked not in ("continuous", "closest-match", "extended"):
@@ -176,7 +179,7 @@ def _method(asked: Inversion | None, model: Model) -> Inversion:
 
 
 def _force_range(
-    operator: Preisach, unit: str, force_min: float | None, force_max: float | None
+    operator: Preisach, unit: str, force_min: float | None, force_max: float | None, name: str
 ) -> tuple[float, float]:
     """Return the forces that the ends of the normalised pulse stand for."""
     reach = sorted(operator.saturation)
@@ -185,7 +188,7 @@ def _force_range(
     slack = 1e-9 * (reach[1] - reach[0])
     if low < reach[0] - slack or high > reach[1] + slack:
         raise DataError(
-            f"forces from {low:g} to {with_unit(f'{high:g}', unit)} are asked for, but the model reaches "
+            f"forces from {low:g} to {with_unit(f'{high:g}', unit)} are asked for, but {name} reaches "
             f"{reach[0]:.3f} to {with_unit(f'{reach[1]:.3f}', unit)}",
             hint=f"choose `force_min` and `force_max` inside, such as "
             f"`force_min` {np.ceil(reach[0] * 10) / 10:g} `force_max` {np.floor(reach[1] * 10) / 10:g}",
