@@ -65,8 +65,8 @@ def capture(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue an interrupted recording into this output.")
     ] = False,
-    limit_current: LimitCurrent = None,
-    limit_force: LimitForce = None,
+    limit_current_A: LimitCurrent = None,
+    limit_force_N: LimitForce = None,
     dry_run: DryRun = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
@@ -112,7 +112,7 @@ def capture(
     try:
         with (
             job.working(f"capturing {signal}") as progress,
-            open_device(port, limits=Limits(limit_current, limit_force)) as device,
+            open_device(port, limits=Limits(limit_current_A, limit_force_N)) as device,
         ):
             payload = _record(
                 job, out, course, device, earlier, condition=condition, levels=levels, progress=progress

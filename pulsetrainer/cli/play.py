@@ -26,8 +26,8 @@ def play(
         int,
         typer.Option(min=1, help="How often each of the two drives is played.", envvar=variable("repeats")),
     ] = 5,
-    limit_current: LimitCurrent = None,
-    limit_force: LimitForce = None,
+    limit_current_A: LimitCurrent = None,
+    limit_force_N: LimitForce = None,
     dry_run: DryRun = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
@@ -48,7 +48,7 @@ def play(
     from pulsetrainer.errors import PulsetrainerError
     from pulsetrainer.steps.play import play as press
 
-    waveform, limits = job.load(drive, Waveform), Limits(limit_current, limit_force)
+    waveform, limits = job.load(drive, Waveform), Limits(limit_current_A, limit_force_N)
     if dry_run:
         _plan(job, out, port, waveform, repeats)
         return

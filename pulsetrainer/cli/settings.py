@@ -44,9 +44,7 @@ SETTINGS = (
     Setting("port", str, "", "the device", (("capture", "port"), ("play", "port"), ("doctor", "port"))),
     Setting("levels", int, "", "levels of the plane", (("capture", "levels"), ("identify", "levels"))),
     Setting("current_max_A", float, "A", "top of the range of a capture", (("capture", "current_max_A"),)),
-    Setting(
-        "speed_A_per_s", float, "A/s", "speed of the identification signal", (("capture", "speed_A_per_s"),)
-    ),
+    Setting("speed_A_per_s", float, "A/s", "speed of identification", (("capture", "speed_A_per_s"),)),
     Setting("rate_Hz", float, "Hz", "samples a second", (("capture", "rate_Hz"),)),
     Setting("slew_A_per_s", float, "A/s", "fastest a drive may move", (("invert", "slew_A_per_s"),)),
     Setting("periods", int, "", "periods of a pulse", (("invert", "periods"),)),
@@ -56,14 +54,14 @@ SETTINGS = (
         float,
         "A",
         "the device refuses more",
-        (("capture", "limit_current"), ("play", "limit_current")),
+        (("capture", "limit_current_A"), ("play", "limit_current_A")),
     ),
     Setting(
         "limits.force_N",
         float,
         "N",
         "the device switches off above",
-        (("capture", "limit_force"), ("play", "limit_force")),
+        (("capture", "limit_force_N"), ("play", "limit_force_N")),
     ),
 )
 

@@ -84,7 +84,7 @@ def test_resumed_after_two_kills_it_is_the_whole_course(tmp_path):
     assert done.code == 0, done
     assert done.json["parts"] == 3
     assert done.json["complete"] is True
-    assert "going on with run.h5.partial" in done.err
+    assert "continuing run.h5.partial" in done.err
     assert [path.name for path in tmp_path.iterdir()] == ["run.h5"]
     run = read(tmp_path / "run.h5", Run)
     assert np.array_equal(run.output[: first.output.size], first.output)

@@ -65,7 +65,7 @@ def test_effective_values_are_in_the_provenance(run, tmp_path):
         captured = json.loads(file.attrs["provenance"])["parameters"]
     assert captured["levels"] == 6
     assert captured["current_max_A"] == 0.5
-    assert captured["limits"]["current_A"] == 0.6
+    assert captured["limit_current_A"] == 0.6
     with h5py.File(tmp_path / "model.h5") as file:
         identified = json.loads(file.attrs["provenance"])["parameters"]
     assert identified["levels"] == 6
