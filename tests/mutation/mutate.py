@@ -36,6 +36,8 @@ import scipy.sparse.linalg
 
 from faults import Fault, faults_in
 
+Runs = dict[str, dict[str, list[str]]]  # file, line, the tests that run it: "file::test (call)", or "(setup)"
+Times = dict[str, float]  # test, seconds
 WARM = (hypothesis, np, scipy)  # loaded once: every fork has them
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,6 +69,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--tests", nargs="+", help="files or folders instead of the package's own")
+    parser.add_argument("--budget", type=float, default=300.0, help="seconds of tests for one fault")
     parser.add_argument("--only", default="", help="files whose path holds this text")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="mutate-") as folder:
@@ -82,23 +85,17 @@ def main() -> int:
         ]
         drawn = random.Random(options.seed).sample(faults, min(options.count, len(faults)))
         print(f"{options.package}, seed {options.seed}: {len(drawn)} of {len(faults)} faults", flush=True)
-        return _table(tree, Path(folder), drawn, runs, times)
+        return _table(tree, Path(folder), drawn, runs, times, options.budget)
 
 
-def _table(
-    tree: Path,
-    folder: Path,
-    drawn: list[Fault],
-    runs: dict[str, dict[str, list[str]]],
-    times: dict[str, float],
-) -> int:
+def _table(tree: Path, folder: Path, drawn: list[Fault], runs: Runs, times: Times, budget_s: float) -> int:
     """Try the faults one by one and print what came of each; 1 where one went unnoticed."""
     equal = {(e["file"], e["line"], e["change"]): e["why"] for e in _equivalent()}
     tally: defaultdict[str, int] = defaultdict(int)
     for fault in sorted(drawn, key=lambda one: (one.path, one.line)):
         why = equal.get((fault.path, fault.text, fault.change))
         begun = time.monotonic()
-        tests = _order(fault, runs.get(fault.path, {}), times)
+        tests = _order(fault, runs.get(fault.path, {}), times, budget_s)
         result = f"equal: {why}" if why else _tried(tree, folder, fault, tests, times)
         tally[result.split(":", maxsplit=1)[0]] += 1
         took = f"{time.monotonic() - begun:.0f} s, {len(tests)} tests"
@@ -126,8 +123,10 @@ def _copied(tree: Path) -> Path:
 
 
 def _tests(tree: Path, patterns: Iterable[str]) -> list[str]:
-    """The test files and folders that there are."""
-    return sorted({str(path.relative_to(tree)) for one in patterns for path in tree.glob(one)})
+    """The test files that there are."""
+    found = [path for one in patterns for path in tree.glob(one)]
+    files = [file for path in found for file in (path.rglob("test_*.py") if path.is_dir() else [path])]
+    return sorted({str(file.relative_to(tree)) for file in files})
 
 
 def _pytest(tree: Path, *words: str, limit_s: float | None = None, **env: str) -> int:
@@ -155,47 +154,54 @@ def _child(tree: Path, words: tuple[str, ...], env: dict[str, str]) -> None:
     sys.exit(pytest.main(["-q", "-p", "chosen", "-p", "no:cacheprovider", *words]))
 
 
-def _recorded(
-    tree: Path, folder: Path, source: str, tests: list[str]
-) -> tuple[dict[str, dict[str, list[str]]], dict[str, float]]:
-    """Which tests run each line of each file of ``source``, and how long each test takes; kept in build/."""
-    digest = hashlib.sha256("".join(tests).encode())
-    for path in sorted(path for top in (source, "tests") for path in (tree / top).rglob("*.py")):
-        digest.update(path.read_bytes())
-    kept = ROOT / "build" / "mutation" / f"{digest.hexdigest()[:16]}.json"
-    if not kept.exists():
-        data, rc = folder / "coverage", folder / "rc"
-        rc.write_text(
-            f"[run]\nparallel = true\nsource = {tree / source}\ndata_file = {data}\n"
-            "context = ${PYTEST_CURRENT_TEST-}\n"
-        )
-        (folder / "sitecustomize.py").write_text("import coverage\ncoverage.process_startup()\n")
-        env = {
-            "COVERAGE_PROCESS_START": str(rc),
-            "MUTATION_TIMES": str(folder / "times"),
-            "PYTHONPATH": str(folder),
-        }
-        if _pytest(tree, *tests, "--timeout=0", **env) != 0:
-            raise SystemExit(
-                f"the tests fail without any fault:\n{(tree / 'pytest.log').read_text()[-3000:]}"
-            )
-        combined = coverage.Coverage(config_file=str(rc))
-        combined.combine()
-        found = combined.get_data()
-        runs = {
-            str(Path(path).relative_to(tree)): {
-                str(line): sorted(filter(None, contexts))
-                for line, contexts in found.contexts_by_lineno(path).items()
-            }
-            for path in found.measured_files()
-        }
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text(json.dumps({"runs": runs, "times": json.loads((folder / "times").read_text())}))
-    known = json.loads(kept.read_text())
-    return known["runs"], known["times"]
+def _recorded(tree: Path, folder: Path, source: str, tests: list[str]) -> tuple[Runs, Times]:
+    """Which tests run each line of ``source``, and how long they take; kept in build/ for each test file."""
+    runs: Runs = defaultdict(lambda: defaultdict(list))
+    times: Times = {}
+    for test in tests:
+        code = sorted((tree / source).rglob("*.py"))
+        beside = [path for path in (tree / test).parent.glob("*.py") if not path.name.startswith("test_")]
+        digest = hashlib.sha256(test.encode())
+        for path in (*code, *sorted((tree / "tests").glob("*.py")), *sorted(beside), tree / test):
+            digest.update(path.read_bytes())
+        kept = ROOT / "build" / "mutation" / f"{digest.hexdigest()[:16]}.json"
+        if not kept.exists():
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            kept.write_text(json.dumps(_record(tree, folder, source, test)))
+        known = json.loads(kept.read_text())
+        times |= known["times"]
+        for path, lines in known["runs"].items():
+            for line, contexts in lines.items():
+                runs[path][line] += contexts
+    return runs, times
 
 
-def _order(fault: Fault, lines: dict[str, list[str]], times: dict[str, float]) -> list[str]:
+def _record(tree: Path, folder: Path, source: str, test: str) -> dict[str, object]:
+    """Run one test file under coverage, the programs that it starts too."""
+    print(f"recording {test}", file=sys.stderr, flush=True)
+    data, rc = folder / "coverage", folder / "rc"
+    rc.write_text(
+        f"[run]\nparallel = true\nsource = {tree / source}\ndata_file = {data}\n"
+        "context = ${PYTEST_CURRENT_TEST-}\n"
+    )
+    (folder / "sitecustomize.py").write_text("import coverage\ncoverage.process_startup()\n")
+    env = {"COVERAGE_PROCESS_START": str(rc), "MUTATION_TIMES": f"{folder}/times", "PYTHONPATH": str(folder)}
+    if _pytest(tree, test, "--timeout=0", **env) not in (0, 5):
+        raise SystemExit(f"{test} fails without any fault:\n{(tree / 'pytest.log').read_text()[-3000:]}")
+    combined = coverage.Coverage(config_file=str(rc))
+    combined.combine()
+    found = combined.get_data()
+    runs = {
+        str(Path(path).relative_to(tree)): {
+            line: sorted(filter(None, contexts)) for line, contexts in found.contexts_by_lineno(path).items()
+        }
+        for path in found.measured_files()
+    }
+    data.unlink()
+    return {"runs": runs, "times": json.loads((folder / "times").read_text())}
+
+
+def _order(fault: Fault, lines: dict[str, list[str]], times: Times, budget_s: float) -> list[str]:
     """The tests that may notice a fault: those that run its statement, the quickest first.
 
     What no single test runs (a constant) concerns all tests that run anything in the file. What is run while
@@ -211,7 +217,7 @@ def _order(fault: Fault, lines: dict[str, list[str]], times: dict[str, float]) -
     ]
 
 
-def _tried(tree: Path, folder: Path, fault: Fault, tests: list[str], times: dict[str, float]) -> str:
+def _tried(tree: Path, folder: Path, fault: Fault, tests: list[str], times: Times) -> str:
     """Put a fault in, run the tests, take it out again."""
     if not tests:
         return "unnoticed"
