@@ -77,7 +77,9 @@ def plane_for(records: Sequence[Record], low: float, high: float, n_h: int) -> P
 
 
 def thinned(plane: Plane, n_h: int) -> Plane:
-    """Return a plane of ``n_h`` levels, their edges crowded where those of ``plane`` do."""
+    """Return a plane of at most ``n_h`` levels whose edges crowd where those of ``plane`` do."""
+    if plane.n_h <= n_h:
+        return plane
     at = np.linspace(0.0, plane.n_h, n_h + 1)
     edges = np.interp(at, np.arange(plane.n_h + 1), plane.edges)
     edges[0], edges[-1] = plane.low, plane.high

@@ -23,7 +23,7 @@ from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NormalEquations, node_sums, normal_equations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.record import Record, levelled
 from pulsetrainer.core.smoothing import choose, smoothed
 from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
 from pulsetrainer.errors import ArgumentError, ConvergenceError
@@ -101,8 +101,8 @@ def polarity_of(
     correlation = correlation_of(records)
     if plane is None or abs(correlation) >= CLEAR:
         return -1 if correlation < 0 else 1
-    coarse = plane if plane.n_h <= _SIGN_LEVELS else thinned(plane, _SIGN_LEVELS)
-    equations = normal_equations(coarse, records, reading)
+    coarse = thinned(plane, _SIGN_LEVELS)
+    equations = normal_equations(coarse, levelled(records)[0], reading)
     gram, rhs = smoothed(equations, _SIGN_SMOOTHING)
     gains = {sign: float(sign * rhs @ nnls.solve(gram, sign * rhs).x) for sign in (1, -1)}
     return max(gains, key=gains.__getitem__)
@@ -150,7 +150,7 @@ def identify(
     """
     samples = _check(records, plane, method, smoothing)
     sign = polarity_of(records, plane, reading) if polarity is None else polarity
-    turned = [r.turned(sign) for r in records]
+    turned, zero = levelled(records, sign)
     tried: tuple[tuple[float, float], ...] = ()
     if smoothing == "auto":
         choice = choose(turned, plane, reading)
@@ -166,7 +166,7 @@ def identify(
         if stiffness:
             smoothing = 0.0  # a density that is alike along the diagonal needs no other smoothing
             masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, stiffness)
-    operator = Preisach(plane, masses / plane.areas, sign * offset, reading, polarity=sign)
+    operator = Preisach(plane, masses / plane.areas, sign * (offset + zero), reading, polarity=sign)
     return Identified(operator, method, iterations, kkt, smoothing, tried, stiffness, samples)
 
 
@@ -189,9 +189,9 @@ def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = 
     """
     if len(records) < 2:
         return np.zeros(len(records))
-    coarse = plane if plane.n_h <= _SIGN_LEVELS else thinned(plane, _SIGN_LEVELS)
+    coarse = thinned(plane, _SIGN_LEVELS)
     sign = polarity_of(records, plane, reading)
-    turned = [r.turned(sign) for r in records]
+    turned, _ = levelled(records, sign)
     single = [normal_equations(coarse, [record], reading) for record in turned]
     whole = normal_equations(coarse, turned, reading)
     shared_gram, shared_rhs = smoothed(whole, _SIGN_SMOOTHING)

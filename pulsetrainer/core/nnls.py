@@ -119,8 +119,11 @@ class _Problem:
     def gradient(self, x: FloatArray) -> FloatArray:
         return self.gram @ x - self.rhs
 
-    def objective(self, x: FloatArray) -> float:
-        return float(x @ (0.5 * (self.gram @ x) - self.rhs))
+    def is_lower(self, there: FloatArray, here: FloatArray) -> bool:
+        """Whether the quadratic is lower there than here; not as a difference of two large numbers."""
+        step = there - here
+        change = float(step @ (self.gradient(here) + 0.5 * (self.gram @ step)))
+        return change < -_ROUNDING * float(np.abs(self.rhs) @ here)
 
     def negative(self, x: FloatArray) -> NDArray[np.bool_]:
         return x < -_ROUNDING * np.abs(x).max(initial=0.0)
@@ -131,30 +134,35 @@ class _Problem:
 
 
 def _descend(problem: _Problem, x: FloatArray, used: int, max_iterations: int) -> NonNegative:
-    """Projected Newton steps from a feasible ``x`` until the optimality conditions hold."""
-    value = problem.objective(x)
+    """Newton steps from a feasible ``x`` that never climb, until the optimality conditions hold.
+
+    What a step pushes below zero is put to zero where that is lower than ``x``; else the step ends where the
+    first variable reaches zero, and that one stays there.
+    """
+    free = problem.usable & ((x > 0) | problem.descends(x))
+    gained = True  # since variables were last freed
     for iteration in range(used + 1, max_iterations + 1):
-        free = problem.usable & ((x > 0) | problem.descends(x))
         newton = problem.minimise_over(free)
-        if not np.any(problem.negative(newton)):
-            x, value = np.maximum(newton, 0.0), problem.objective(newton)
-            if not np.any(problem.usable & ~free & problem.descends(x)):
+        falling = free & problem.negative(newton)
+        put = np.maximum(newton, 0.0)
+        lower = problem.is_lower(put, x)
+        gained = gained or lower
+        if not np.any(falling):
+            x = put
+            more = problem.usable & ~free & problem.descends(x)
+            if not np.any(more) or not gained:  # what was freed and gained nothing descends by rounding only
                 return NonNegative(x, free, iteration)
-            continue
-        # variables at zero that the Newton step pushes below it would block the step: leave them out
-        blocked = free & (x == 0) & (newton < 0)
-        while np.any(blocked):
-            free &= ~blocked
-            newton = problem.minimise_over(free)
-            blocked = free & (x == 0) & (newton < 0)
-        step, trial = 1.0, x
-        while step > 1e-12:
-            trial = np.maximum(x + step * (newton - x), 0.0)
-            trial_value = problem.objective(trial)
-            if trial_value < value:
-                break
-            step *= 0.5
-        x, value = trial, trial_value
+            free, gained = free | more, False
+        elif lower:
+            x = put
+            free = problem.usable & ((x > 0) | problem.descends(x))
+        else:
+            share = x[falling] / (x[falling] - newton[falling])
+            first = float(share.min())
+            x = np.maximum(x + first * (newton - x), 0.0)
+            ends = np.flatnonzero(falling)[share <= first]
+            x[ends], free[ends] = 0.0, False
+            gained = gained or first > 0
     raise _unsettled(max_iterations)
 
 

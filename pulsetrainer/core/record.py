@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -57,10 +58,6 @@ class Record:
         object.__setattr__(self, "output", y)
         object.__setattr__(self, "sample_weight", v)
 
-    def turned(self, sign: int) -> Record:
-        """The record with its output times ``sign``, 1 or -1."""
-        return self if sign == 1 else replace(self, output=sign * self.output)
-
     @property
     def timed(self) -> bool:
         """Whether the time step is known."""
@@ -75,3 +72,14 @@ class Record:
     def fitted_output(self) -> FloatArray:
         """The output (n,), zero where the sample weight is: what is left out may be anything, NaN too."""
         return np.where(self.sample_weight > 0, self.output, 0.0)
+
+
+def levelled(records: Sequence[Record], sign: int = 1) -> tuple[list[Record], float]:
+    """Records whose outputs are ``sign`` y - z, and z, the mean of sign y over all samples that count.
+
+    Sums of squares far from zero have no digits left for what the output does: a force of 1000 N that moves
+    by 1 mN is fitted as well as one around zero only after its mean is taken off.
+    """
+    counted = np.concatenate([r.output[r.sample_weight > 0] for r in records])
+    zero = sign * float(np.mean(counted)) if counted.size else 0.0
+    return [replace(r, output=sign * r.output - zero) for r in records], zero

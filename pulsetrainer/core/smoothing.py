@@ -186,7 +186,7 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> Choice:
     ArgumentError
         Too few samples with weight to hold any out.
     """
-    coarse = plane if plane.n_h <= CHOICE_LEVELS else thinned(plane, CHOICE_LEVELS)
+    coarse = thinned(plane, CHOICE_LEVELS)
     folds = [blocks(r.input, plane.low, plane.high) % FOLDS for r in records]
     sums = parted_sums(coarse, records, reading, folds, FOLDS)
     held_out = [part for part in sums if part.weight_sum > 0]

@@ -63,7 +63,7 @@ def stiffness_penalty(plane: Plane, diagonal: FloatArray, strength: float) -> sc
 
 def choose_stiffness(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
     """Return t by the error on the second half of each record: 0, or one of ``STRENGTHS``."""
-    coarse = plane if plane.n_h <= _LEVELS else thinned(plane, _LEVELS)
+    coarse = thinned(plane, _LEVELS)
     parts = []
     for record in records:
         known = np.cumsum(record.sample_weight > 0)

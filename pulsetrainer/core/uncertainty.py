@@ -25,7 +25,7 @@ from pulsetrainer.core.identification import Identified, fits_dense, penalised
 from pulsetrainer.core.memory import State
 from pulsetrainer.core.operator import Preisach, outputs
 from pulsetrainer.core.plane import FloatArray, IntArray
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.record import Record, levelled
 from pulsetrainer.errors import ArgumentError
 
 # More blocks cost memory and time, and do not change the intervals any more.
@@ -142,7 +142,7 @@ def bootstrap(
         raise ArgumentError(
             f"the bootstrap needs dense matrices, too large for {plane.n_h} levels", hint="use 48 levels"
         )
-    turned = [r.turned(sign) for r in records]
+    turned, zero = levelled(records, sign)
     length = block or block_length([_residual(operator, record) for record in records])
     parts, count = _blocks(records, length)
     if count < 2:
@@ -158,7 +158,7 @@ def bootstrap(
         equations = stack.weighted(drawn).dense()
         gram, rhs = penalised(equations, fit.smoothing, fit.stiffness)
         found = nnls.solve(gram, rhs, passive=passive)
-        weights[k], offsets[k] = found.x / plane.areas, sign * equations.offset(found.x)
+        weights[k], offsets[k] = found.x / plane.areas, sign * (equations.offset(found.x) + zero)
     return Ensemble(operator, weights, offsets, length)
 
 

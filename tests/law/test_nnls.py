@@ -93,3 +93,22 @@ def test_kkt_violation_tells_right_from_wrong(problem):
     at_work = found + 1.0
     expected = np.abs(gram @ at_work - rhs).max() / max(np.abs(rhs).max(), np.finfo(float).tiny)
     assert nnls.kkt_violation(gram, rhs, at_work) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", [10047, 10069, 10125, 10250, 10417, 10505, 10627])
+def test_cells_that_hardly_differ_settle(seed):
+    """Twice cumulated columns, fewer samples than cells: descent that only puts to zero what falls stalls.
+
+    A ridge would settle it at another point: the conditions hold to rounding, after few systems.
+    """
+    rng = np.random.default_rng(seed)
+    rows, columns = int(rng.integers(20, 60)), int(rng.integers(20, 60))
+    matrix = np.cumsum(np.cumsum(rng.normal(size=(rows, columns)), axis=1), axis=0)
+    matrix *= 10.0 ** rng.uniform(-3, 0, columns)
+    right = matrix @ np.maximum(rng.normal(size=columns), 0.0) + 1e-3 * rng.normal(size=rows)
+    gram, rhs = matrix.T @ matrix, matrix.T @ right
+    found = nnls.solve(gram, rhs, max_iterations=columns)
+    assert nnls.kkt_violation(gram, rhs, found.x) < 1e-12
+    _, norm = optimize.nnls(matrix, right, maxiter=10_000)
+    left = np.sum((matrix @ found.x - right) ** 2)
+    assert left <= norm**2 + 1e-12 * (right @ right)

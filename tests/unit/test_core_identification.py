@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from core_jobs import curves, plant, random_reversals
+from core_jobs import curves, job, plant, random_reversals
 from scipy.optimize import nnls as reference
 
 from oracle import cells
 from pulsetrainer.core import equations, identification, nnls
 from pulsetrainer.core.coverage import Gap, coverage, largest_gap
-from pulsetrainer.core.identification import identify
+from pulsetrainer.core.identification import identify, offsets_between, polarity_of
 from pulsetrainer.core.operator import follow, rows
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
+from pulsetrainer.core.uncertainty import bootstrap
 from pulsetrainer.errors import ArgumentError
 
 PLANE = Plane.uniform(-1.0, 1.0, 12)
@@ -111,6 +112,52 @@ def test_masked_samples_do_not_count():
     assert np.allclose(twice.operator.masses, double.operator.masses, atol=1e-9)
 
 
+@pytest.mark.parametrize("far", [1e4, 1e8])
+def test_an_output_far_from_zero_is_fitted_as_well(far):
+    """Smoothing is chosen alike, and the fit is the same, also between records and for a falling loop."""
+    near = job(4, n=1200, levels=60, count=12)
+    plane = Plane.uniform(-1.0, 1.0, 10)
+    slack = 1e-7 + 1e-14 * far
+    here = identify([Record(near.input, near.output)], plane, smoothing="auto")
+    for sign in (1, -1):
+        there = identify([Record(near.input, sign * near.output + far)], plane, smoothing="auto")
+        assert there.smoothing == here.smoothing
+        assert there.operator.weights == pytest.approx(here.operator.weights, abs=100 * slack)
+        assert there.operator.offset == pytest.approx(sign * here.operator.offset + far, abs=slack)
+    records = [Record(near.input, near.output + far + shift) for shift in (0.0, 0.5)]
+    assert offsets_between(records, plane) == pytest.approx([-0.25, 0.25], abs=1e-3)
+    ensemble = bootstrap(records[:1], here, rng=np.random.default_rng(1), draws=3)
+    assert ensemble.offsets == pytest.approx(far + here.operator.offset, abs=0.05)
+
+
+def test_records_share_an_offset_unless_they_differ():
+    """Against their mean, weighted by their samples; zeros where one offset serves all, and for one."""
+    record, _ = noisy(10)
+    assert offsets_between([record], PLANE).tolist() == [0.0]
+    assert offsets_between([record, record], PLANE).tolist() == [0.0, 0.0]
+    half = Record(record.input, record.output - 0.9, (np.arange(record.input.size) % 2) * 1.0)
+    for sign in (1, -1):
+        turned = [Record(r.input, sign * r.output, r.sample_weight) for r in (record, half)]
+        assert offsets_between(turned, PLANE) == pytest.approx([sign * 0.3, -sign * 0.6], abs=0.01)
+
+
+def test_polarity_by_trial():
+    """Where the correlation is weak both signs are fitted; without a plane the correlation decides."""
+    device = plant(12)
+    u = np.concatenate((curves(300, 4, 4), np.tile([0.3, -0.3], 40)))
+    loop = device(u) - 0.9 * np.polyval(np.polyfit(u, device(u), 1), u)  # the trend nearly gone
+    record = Record(u, loop)
+    assert abs(identification.correlation_of([record])) < identification.CLEAR
+    for sign in (1, -1):
+        assert polarity_of([Record(u, sign * loop)], PLANE) == sign
+    assert polarity_of([Record(u, -u)]) == -1
+    assert identification.correlation_of([Record(u, 1e-200 * u)]) == pytest.approx(1.0)
+    spoilt, mask = u.copy(), np.ones(u.size)
+    spoilt[::2], mask[::2] = -5.0 * u[::2], 0.0
+    assert identification.correlation_of([Record(u, spoilt, mask)]) == pytest.approx(1.0)
+    assert identification.correlation_of([Record(u, np.ones(u.size))]) == 0.0
+
+
 def test_falling_loops_are_detected():
     """A falling loop is the mirror image of a rising one."""
     record, _ = noisy(8)
@@ -139,6 +186,10 @@ RAMP = np.linspace(-1.0, 1.0, 40)
         (lambda: identify([Record(RAMP, RAMP, np.zeros(40))], PLANE), ["counts"]),
         (lambda: identify([Record(RAMP, np.ones(40))], PLANE), ["output", "does not vary", "1"]),
         (lambda: identify([Record(np.ones(40), RAMP)], PLANE), ["input", "does not vary"]),
+        (
+            lambda: identify([Record(RAMP, RAMP > 0.9, 1.0 * (RAMP < 0.9))], PLANE),
+            ["output", "does not vary"],
+        ),
         (lambda: identify([Record(RAMP[:5], RAMP[:5])], PLANE), ["12 levels", "got 5"]),
         (lambda: identify([Record(RAMP, RAMP)], PLANE, method="guess"), ["method", "'guess'"]),
         (lambda: identify([Record(RAMP, RAMP)], PLANE, smoothing="much"), ["smoothing", "'much'"]),

@@ -72,6 +72,31 @@ def test_bending_is_zero_for_a_straight_density():
     assert not np.any((abs(rows) @ (i == j)) * (abs(rows) @ (i != j)))
 
 
+@pytest.mark.parametrize("n_h", [12, 24])
+def test_bending_of_a_parabola(n_h):
+    """The integrals themselves: (d2 mu)^2 is 4 x^2-coefficient^2 wherever three cells lie in a row."""
+    plane = Plane.uniform(0.0, 7.0, n_h)  # the ends do not matter: x goes from 0 to 1
+    i, j = plane.cell_indices
+    x, cell = (np.arange(n_h) + 0.5) / n_h, 1.0 / n_h**2
+    rows = smoothing.bending(plane, np.ones(plane.n_q, dtype=bool))
+    along_alpha, along_beta, diagonal = (
+        float(np.sum((rows @ masses) ** 2))
+        for masses in (
+            np.where(i == j, 0.0, x[i] ** 2 * cell),
+            np.where(i == j, 0.0, 3.0 * x[j] ** 2 * cell),
+            np.where(i == j, x[i] ** 2 / n_h, 0.0),
+        )
+    )
+    triples = (n_h - 2) * (n_h - 3) / 2  # off the diagonal, along one axis
+    assert along_alpha == pytest.approx(4.0 * triples * cell)
+    assert along_beta == pytest.approx(36.0 * triples * cell)
+    assert diagonal == pytest.approx(10.0 * 4.0 * (n_h - 2) / n_h)
+    diagonal_of_gram = np.random.default_rng(n_h).uniform(1.0, 2.0, plane.n_q)
+    masses = np.where(i == j, 0.0, x[i] ** 2 * cell)
+    cost = masses @ (smoothing.penalty(plane, diagonal_of_gram, 0.5) @ masses)
+    assert cost == pytest.approx(0.5**8 * diagonal_of_gram.mean() * along_alpha)
+
+
 def test_cells_without_data_stay_empty():
     """No mass is invented where the signal never was."""
     device = plant(16)

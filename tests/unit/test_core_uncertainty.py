@@ -98,6 +98,18 @@ def test_blocks_grow_with_the_memory_of_the_residual():
     assert uncertainty.block_length([np.zeros(4000)]) == 10
 
 
+def test_blocks_are_as_long_as_asked():
+    """Counted over the samples that count, on through all records; the last of a record may be shorter."""
+    mask = np.ones(INPUT.size)
+    mask[3:10] = 0.0
+    parts, count = uncertainty._blocks(
+        [Record(INPUT[:25], CLEAN[:25], mask[:25]), Record(INPUT[:6], CLEAN[:6])], 4
+    )
+    assert parts[0].tolist() == [0, 0, 0, *[-1] * 7, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3, 4, 4]
+    assert parts[1].tolist() == [5, 5, 5, 5, 6, 6]
+    assert count == 7
+
+
 def test_masked_samples_are_in_no_block():
     """A record whose first half has no weight is resampled from its second half."""
     weight = np.where(np.arange(INPUT.size) < 1000, 0.0, 1.0)
