@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
+from pulsetrainer.device.plausibility import FORCE_REMEDY, ForceWatch
 from pulsetrainer.device.player import Player
 from pulsetrainer.device.ports import find_device_port
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
@@ -267,10 +268,10 @@ class Device:
                     "the device is playing already", hint="wait for the play to end, or stop() it"
                 )
             self._player = player
-        interrupted = False
+        watch, interrupted = ForceWatch(), False
         try:
             thread.start()
-            interrupted = self._follow(player, on_block, should_stop, keep=keep)
+            interrupted = self._follow(player, watch, on_block, should_stop, keep=keep)
         finally:
             player.stop(_STOPPED)
             while thread.is_alive():  # it is stopping the device: not to be interrupted, and soon over
@@ -282,11 +283,12 @@ class Device:
                 self._player = None
         if player.error is not None:
             raise player.error
-        return self._trace(player, interrupted)
+        return self._trace(player, watch.finish(), interrupted)
 
     def _follow(
         self,
         player: Player,
+        watch: ForceWatch,
         on_block: Callable[[Block], None] | None,
         should_stop: Callable[[], bool] | None,
         *,
@@ -301,8 +303,13 @@ class Device:
                 count = len(player.received)
                 fresh, passed = player.received[passed:count], count
                 player.taken_at_s = self._monotonic()
-                if on_block is not None and any(b.count for b in fresh):
-                    on_block(Block.from_wire(fresh, player.decimation))
+                if any(b.count for b in fresh):
+                    block = Block.from_wire(fresh, player.decimation)
+                    watch.add(block.time_s(self.info.tick_rate_Hz), block.current_A, block.force_N)
+                    if watch.fault:
+                        player.stop(watch.fault, FORCE_REMEDY)
+                    if on_block is not None:
+                        on_block(block)
                 if not keep:
                     player.forget(forgotten, passed)
                     forgotten = passed
@@ -315,7 +322,7 @@ class Device:
                 player.stop(_INTERRUPTED)
         return interrupted
 
-    def _trace(self, player: Player, interrupted: bool) -> Trace:
+    def _trace(self, player: Player, implausible: str, interrupted: bool) -> Trace:
         outcome = player.outcome
         block = Block.from_wire(player.received, player.decimation)
         assert outcome is not None
@@ -332,10 +339,10 @@ class Device:
             tick_rate_Hz=self.info.tick_rate_Hz,
             dropped_samples=dropped,
             # Interrupted even if it came during the last ramp: the user wants out.
-            complete=outcome.played_to_end and not interrupted,
-            fault=outcome.fault or (_INTERRUPTED if interrupted else ""),
+            complete=outcome.played_to_end and not interrupted and not implausible,
+            fault=outcome.fault or (_INTERRUPTED if interrupted else implausible),
             samples=received,
-            remedy=outcome.remedy,
+            remedy=outcome.remedy or (FORCE_REMEDY if implausible else ""),
         )
 
 

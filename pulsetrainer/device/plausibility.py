@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float64]
 
+FORCE_REMEDY = "check the force sensor, its plug, and that it rests on the finger; then: pulsetrainer doctor"
+
 WINDOW_S = 5.0  # looked at together: some beats of a slow pulse
-OVERLAP_S = 0.2  # carried into the next window, for what a force owes to the current just before
+STEP_S = 0.5  # looked at again after so long
 _LEAST_S = 0.5  # less says nothing
 
 # Major loop: the least force at a current held or exceeded, the most at a current held or fallen below.
@@ -32,13 +34,24 @@ _RISING_N = (0.0, 0.6, 1.9, 6.1, 10.4, 11.9, 12.7)
 _FALLING_N = (1.1, 2.6, 8.2, 10.8, 12.2, 13.2, 13.9)
 _LEAST_GAIN, _MOST_GAIN = 0.4, 1.6  # of what is plausible; drawn devices lie within 0.9 and 1.1
 _OFFSET_N = 0.5  # noise of three times the usual, a drifted zero
-_SETTLES_S = 0.1  # delays and lags are below that: the force may still belong to a current of so long ago
-_SHARE = 0.5  # of the samples of 0.2 s that lie outside: single wild samples are none of this
+_SETTLES_S = 0.05  # delays and lags are below that: the force may still belong to a current of so long ago
+_OUTSIDE_S = 0.1  # at least half of so long outside: single wild samples are none of this
 
-_MOVES_A = 0.05  # rms of a current that moves enough for a slope
-_LEAST_SLOPE_N_PER_A = 0.3  # drawn devices: 1.9 at least over 5 s
-_STUCK_PATH_A = 1.0  # travelled by the current under a reading without one count of change
+# The slope of the force over the current, cov(i, F) / var(i), over so long and at so much rms of the current.
+# The drawn devices have 1.8 N/A at least over 1 s, 1.4 N/A over 3 s and more.
+_SLOPES = ((1.0, 0.1), (WINDOW_S, 0.05))
+_LEAST_SLOPE_N_PER_A = 0.5
+
+_MODEL_FACTOR, _MODEL_OFFSET_N = 2.0, 1.5
+
+# A reading that does not change by one count: under a current that went a long way, or of a sensor whose
+# noise otherwise shows in every other sample.
+_STUCK_PATH_A = 1.0
 _STUCK_SPAN_A = 0.1
+_STUCK_S = 0.1
+_NOISY = 0.4  # share of the samples that are turning points: 2/3 in white noise
+_RAIL_N = 5.0  # from here on the amplifier may be at its end: a flat top is a matter for `diagnose`
+_FLAT = 0.05  # share of the samples at the very top that make it flat
 
 
 def judge_force(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> str:
@@ -48,81 +61,143 @@ def judge_force(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) 
     """
     if time_s.size < 2 or time_s[-1] - time_s[0] < _LEAST_S:
         return ""
-    return _stuck(current_A, force_N) or _dead(current_A, force_N) or _outside(time_s, current_A, force_N)
+    return (
+        _stuck(time_s, current_A, force_N)
+        or _dead(time_s, current_A, force_N)
+        or _outside(time_s, current_A, force_N)
+    )
 
 
-def _stuck(current_A: FloatArray, force_N: FloatArray) -> str:
-    """Not one count of change while the current went a long way."""
-    borders = np.flatnonzero(np.diff(force_N)) + 1
-    starts, ends = np.append(0, borders), np.append(borders, force_N.size)
+def _stuck(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> str:
+    """Not one count of change where there should be some."""
+    changes = np.flatnonzero(np.diff(force_N)) + 1
+    starts, ends = np.append(0, changes), np.append(changes, force_N.size)
     longest = int(np.argmax(ends - starts))
-    still = current_A[starts[longest] : ends[longest]]
-    if np.abs(np.diff(still)).sum() < _STUCK_PATH_A or np.ptp(still) < _STUCK_SPAN_A:
+    start, end = int(starts[longest]), int(ends[longest])
+    held_N, still = float(force_N[start]), current_A[start:end]
+    if held_N >= _RAIL_N and held_N >= force_N.max() and end - start < force_N.size:
+        return ""
+    noisy = _turns(np.delete(force_N, np.s_[start:end])) > _NOISY
+    too_long = noisy and time_s[end - 1] - time_s[start] >= _STUCK_S
+    too_far = np.abs(np.diff(still)).sum() >= _STUCK_PATH_A and np.ptp(still) >= _STUCK_SPAN_A
+    if not (too_long or too_far):
         return ""
     return (
-        f"the force reading is stuck at {force_N[starts[longest]]:.2f} N "
-        f"while the current moves between {still.min():.2f} and {still.max():.2f} A"
+        f"the force reading is stuck at {held_N:.2f} N while the current moves between {still.min():.2f} "
+        f"and {still.max():.2f} A"
     )
 
 
-def _dead(current_A: FloatArray, force_N: FloatArray) -> str:
-    """The force does not go with the current: cov(i, F) / var(i)."""
-    moved = float(np.var(current_A))
-    if moved < _MOVES_A**2:
-        return ""
-    slope = float(np.mean((current_A - current_A.mean()) * force_N)) / moved
-    if slope >= _LEAST_SLOPE_N_PER_A:
-        return ""
-    return (
-        f"the force reading does not follow the current: {slope:.2f} N/A while the current moves between "
-        f"{current_A.min():.2f} and {current_A.max():.2f} A"
-    )
+def _turns(values: FloatArray) -> float:
+    """Share of the samples above or below both neighbours: 2/3 for noise, near 0 for what is smooth."""
+    steps = np.diff(values)
+    return float(np.mean(steps[1:] * steps[:-1] < 0)) if steps.size > 1 else 0.0
+
+
+def _dead(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> str:
+    """The force does not go with the current."""
+    for seconds, moves_A in _SLOPES:
+        begin = int(np.searchsorted(time_s, time_s[-1] - seconds))
+        current, force = current_A[begin:], force_N[begin:]
+        at_rail = force >= max(float(force.max()), _RAIL_N)
+        if np.mean(at_rail) > _FLAT:
+            current, force = current[~at_rail], force[~at_rail]
+        if force.size < 2:
+            continue
+        moved = float(np.var(current))
+        if moved < moves_A**2:
+            continue
+        slope = float(np.mean((current - current.mean()) * force)) / moved
+        if slope < _LEAST_SLOPE_N_PER_A:
+            return (
+                f"the force reading does not follow the current: {slope:.2f} N/A while it moves between "
+                f"{current.min():.2f} and {current.max():.2f} A"
+            )
+    return ""
 
 
 def _outside(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> str:
     """The force lies outside what the currents of the last moments can leave."""
-    step = float(np.median(np.diff(time_s)))
-    width = max(1, round(_SETTLES_S / step))
-    back = (width - 1) // 2  # the filter's window then ends at the sample itself
-    least = minimum_filter1d(current_A, width, mode="nearest", origin=back)
-    most = maximum_filter1d(current_A, width, mode="nearest", origin=back)
+    least, most = _recent(time_s, current_A)
     low = _LEAST_GAIN * np.interp(least, _CURRENT_A, _RISING_N) - _OFFSET_N
     high = _MOST_GAIN * np.interp(most, _CURRENT_A, _FALLING_N) + _OFFSET_N
-    out = (force_N < low) | (force_N > high)
-    out[: width - 1] = False  # of the currents before nothing is known
-    run = max(1, round(OVERLAP_S / step))
-    shares = np.convolve(out, np.full(run, 1.0 / run), "valid") if out.size >= run else np.zeros(1)
-    worst = int(np.argmax(shares))
-    if shares[worst] < _SHARE:
+    at = _first_outside(time_s, force_N, low, high)
+    if at is None:
         return ""
-    at = slice(worst, worst + run)
     return (
-        f"the force reading of {np.median(force_N[at]):.2f} N is implausible at {np.median(current_A[at]):.2f} A: "
-        f"between {np.median(low[at]):.1f} and {np.median(high[at]):.1f} N could be"
+        f"the force reading of {np.median(force_N[at]):.2f} N is implausible at "
+        f"{np.median(current_A[at]):.2f} A: between {np.median(low[at]):.1f} and {np.median(high[at]):.1f} N "
+        "could be"
     )
 
 
+def judge_against(time_s: FloatArray, expected_N: FloatArray, force_N: FloatArray) -> str:
+    """Return what is wrong with a force, shapes (n,), that a model has foretold; empty if it is plausible.
+
+    A force within a factor of two of what was expected, and 1.5 N, is plausible: a tenth of the sensor's
+    range, more than a compensated drive ever leaves. NaN marks samples that were lost.
+    """
+    there = np.isfinite(force_N)
+    if np.count_nonzero(there) < 2:
+        return ""
+    time, force = time_s[there], force_N[there]
+    least, most = _recent(time, expected_N[there])
+    low = np.minimum(least / _MODEL_FACTOR, least * _MODEL_FACTOR) - _MODEL_OFFSET_N
+    high = np.maximum(most / _MODEL_FACTOR, most * _MODEL_FACTOR) + _MODEL_OFFSET_N
+    at = _first_outside(time, force, low, high)
+    if at is None:
+        return ""
+    return (
+        f"the force reading of {np.median(force[at]):.2f} N at {time[at][0]:.2f} s is far from the "
+        f"{np.median(expected_N[there][at]):.2f} N that the model foretells"
+    )
+
+
+def _recent(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the most of what a lagging force may still belong to, at each sample."""
+    width = max(1, round(_SETTLES_S / float(np.median(np.diff(time_s)))))
+    back = (width - 1) // 2  # the filter's window then ends at the sample itself
+    return (
+        minimum_filter1d(values, width, mode="nearest", origin=back),
+        maximum_filter1d(values, width, mode="nearest", origin=back),
+    )
+
+
+def _first_outside(
+    time_s: FloatArray, force_N: FloatArray, low_N: FloatArray, high_N: FloatArray
+) -> slice | None:
+    """Return the first stretch of 0.1 s of which at least half lies outside."""
+    out = (force_N < low_N) | (force_N > high_N)
+    out &= time_s >= time_s[0] + _SETTLES_S  # of what came before nothing is known
+    run = max(1, round(_OUTSIDE_S / float(np.median(np.diff(time_s)))))
+    if out.size < run:
+        return None
+    counts = np.convolve(out, np.ones(run), "valid")
+    first = int(np.argmax(2 * counts >= run))
+    return slice(first, first + run) if 2 * counts[first] >= run else None
+
+
 class ForceWatch:
-    """Judges the force while it comes in, window by window; ``fault`` is the first that was found."""
+    """Judges the force while it comes in; ``fault`` is the first that was found."""
 
     def __init__(self) -> None:
         self.fault = ""
-        self._rows = np.empty((3, 0))
-        self._fresh_s = 0.0  # time up to which all has been judged
+        self._window = np.empty((3, 0))
+        self._judge_at_s = WINDOW_S / 2  # the start of a play has too little before it to be judged alone
 
     def add(self, time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> None:
-        """Take in samples, shapes (n,); a window is judged when it is full."""
-        self._rows = np.concatenate((self._rows, np.stack((time_s, current_A, force_N))), axis=1)
-        while self._rows.shape[1] and self._rows[0, -1] >= self._rows[0, 0] + WINDOW_S:
-            end = int(np.searchsorted(self._rows[0], self._rows[0, 0] + WINDOW_S))
-            self._judge(self._rows[:, :end])
-            # The rest of a play may be short: it is judged together with the end of this window.
-            self._rows = self._rows[:, int(np.searchsorted(self._rows[0], self._rows[0, end - 1] - OVERLAP_S)) :]
+        """Take in samples, shapes (n,), time rising from one call to the next."""
+        fresh = np.stack((time_s, current_A, force_N))
+        while fresh.shape[1]:
+            count = int(np.searchsorted(fresh[0], self._judge_at_s))
+            begin = int(np.searchsorted(self._window[0], self._judge_at_s - WINDOW_S))
+            self._window = np.concatenate((self._window[:, begin:], fresh[:, :count]), axis=1)
+            fresh = fresh[:, count:]
+            if fresh.shape[1]:
+                self.finish()
+                self._judge_at_s += STEP_S
 
     def finish(self) -> str:
-        """Judge what is left; return the fault."""
-        self._judge(self._rows)
+        """Judge the last of what came; return the fault."""
+        self.fault = self.fault or judge_force(*self._window)
         return self.fault
-
-    def _judge(self, rows: FloatArray) -> None:
-        self.fault = self.fault or judge_force(*rows)

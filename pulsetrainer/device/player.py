@@ -97,9 +97,10 @@ class Player:
         for number in range(start, stop):
             self.received[number] = NOTHING
 
-    def stop(self, reason: str) -> None:
+    def stop(self, reason: str, remedy: str = "") -> None:
         """Ask for the output to be stopped at once; the first reason counts."""
-        self._stop_reason = self._stop_reason or reason
+        if not self._stop_reason:
+            self._stop_reason, self._stop_remedy = reason, remedy
         self._stop.set()
 
     def run(self) -> None:
@@ -199,8 +200,10 @@ class Player:
         self._short = int(min(m.WaveData.MAX_ITEMS, max(1, in_piece)))
         while self._ack.state == codes.State.RUNNING and not self._last_block:
             if self._monotonic() - self.taken_at_s > _TAKER_S:
-                self._stop_remedy = "the disk is too slow: write elsewhere, close other programs"
-                self.stop(f"the program did not take its data for {_TAKER_S:g} s")
+                self.stop(
+                    f"the program did not take its data for {_TAKER_S:g} s",
+                    "the disk is too slow: write elsewhere, close other programs",
+                )
             if self._stop.is_set():
                 return
             if self._send_chunk(self._credit()):

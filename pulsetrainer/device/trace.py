@@ -43,6 +43,10 @@ class Block:
             force_N=scaled[:, 2].copy(),
         )
 
+    def time_s(self, tick_rate_Hz: float) -> FloatArray:
+        """Time since the first sample of the reference, s."""
+        return self.tick / tick_rate_Hz
+
 
 @dataclass(frozen=True, slots=True)
 class Trace:
