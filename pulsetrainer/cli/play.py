@@ -14,7 +14,7 @@ from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import Playback, Waveform
-    from pulsetrainer.device.device import DeviceInfo
+    from pulsetrainer.device.identity import DeviceInfo
 
 
 def play(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import os
 import threading
 import time
@@ -12,15 +13,17 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
+from pulsetrainer.device.heat import HeatMemory, added, in_words, wait_s
+from pulsetrainer.device.identity import DeviceInfo
 from pulsetrainer.device.plausibility import FORCE_REMEDY, ForceWatch
 from pulsetrainer.device.player import Player
 from pulsetrainer.device.ports import find_device_port
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
 from pulsetrainer.device.schemes import OpenPort, find_opener, redact
 from pulsetrainer.device.session import Session
-from pulsetrainer.device.trace import Block, Trace
+from pulsetrainer.device.trace import Block, FloatArray, Trace
 from pulsetrainer.device.transport import SerialTransport
-from pulsetrainer.device.wording import describe_fault, reset_text, serial_text
+from pulsetrainer.device.wording import NOT_OFF_REMEDY, describe_fault, describe_not_off, flows_A
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 
 if TYPE_CHECKING:
@@ -33,6 +36,7 @@ PORT_VARIABLE = "PULSETRAINER_PORT"
 DEFAULT_PORT = "bench:"
 _INTERRUPTED = "interrupted"
 _STOPPED = "stopped"
+_REST_S = 0.5  # for a run that an earlier program left to come to rest
 _RAMP_S = 0.11  # the device counts its way back to zero as on-time
 # The limits that the greeting tells, by their parameters' names.
 _GREETED = {
@@ -41,42 +45,6 @@ _GREETED = {
     "heartbeat": "heartbeat_ms",
 }
 _TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceInfo:
-    """Who the device is and its limits, as it reports them."""
-
-    serial: str
-    firmware: str
-    protocol: str
-    build: str
-    tick_rate_Hz: float
-    current_limit_A: float
-    force_limit_N: float
-    on_time_limit_s: float
-    heartbeat_s: float
-    wave_buffer_samples: int
-    reset_cause: str
-    latched_fault: str  # what an earlier play ended with; the next play clears it
-
-    @classmethod
-    def from_wire(cls, hello: m.HelloReply, latched_fault: str) -> DeviceInfo:
-        """Return what a greeting says."""
-        return cls(
-            serial=serial_text(hello.serial),
-            firmware=f"{hello.firmware_major}.{hello.firmware_minor}.{hello.firmware_patch}",
-            protocol=f"{hello.major}.{hello.minor}",
-            build=f"{hello.build_hash:08x}",
-            tick_rate_Hz=float(hello.tick_rate_Hz),
-            current_limit_A=hello.current_limit / 10_000,
-            force_limit_N=hello.force_trip / 1_000,
-            on_time_limit_s=float(hello.on_time_s),
-            heartbeat_s=hello.heartbeat_ms / 1_000,
-            wave_buffer_samples=hello.wave_buffer,
-            reset_cause=reset_text(hello.reset_cause),
-            latched_fault=latched_fault,
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +64,13 @@ class Device:
         *,
         monotonic: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        now: Callable[[], float] = time.time,
+        memory: HeatMemory | None = None,
     ) -> None:
         self._port = port
+        self._now = now
+        self._memory = memory or HeatMemory()
+        self._seen = (0, 0)  # first and worst fault that whoever opened the device can know of
         self._session = Session(port.transport, port.name, monotonic=monotonic, timeouts_s=port.timeouts_s)
         self._monotonic = monotonic
         self._sleep = sleep
@@ -108,11 +81,53 @@ class Device:
     def _greet(self) -> None:
         with self._turn:
             self._hello = self._session.hello()
-        status = self._status()
-        if self._port.starts_cold and status.flags & codes.STATUS_HEAT_ASSUMED:
-            self._ask(m.CoilHeat(0))
+        status = self._rest()
+        if flows_A(status):
+            raise DeviceError(describe_not_off(status), hint=NOT_OFF_REMEDY)
+        self._seen = (status.fault, status.worst)
         latched = describe_fault(status, self._hello.tick_rate_Hz)
         self.info = DeviceInfo.from_wire(self._hello, latched)
+        if status.flags & codes.STATUS_HEAT_ASSUMED:
+            self._tell_heat()
+
+    def _rest(self) -> m.StatusReply:
+        """Return the state once a greeting has brought down whatever ran."""
+        deadline = self._monotonic() + _REST_S
+        status = self._status()
+        while (status.state == codes.State.RAMPING or flows_A(status)) and self._monotonic() < deadline:
+            self._sleep(_TAKE_EVERY_S)
+            status = self._status()
+        return status
+
+    def _tell_heat(self) -> None:
+        """Tell a device that has been without power what its coil has left of the heat of its last play."""
+        heat = 0.0 if self._port.starts_cold else self._memory.recall(self.info.serial, self._now())
+        if heat is not None:
+            self._ask(m.CoilHeat(math.ceil(min(heat, 1.0) / codes.HEAT_UNIT)))
+
+    def _remember_heat(self, heat: float, in_s: float = 0.0) -> None:
+        if not self._port.starts_cold:
+            self._memory.remember(self.info.serial, heat, self._now() + in_s)
+
+    def _check_heat(self, reference_A: FloatArray, rate_Hz: float) -> None:
+        """Refuse what would be cut off in mid-play by the heat of the coil, and say how long to wait."""
+        status = self._status()
+        heat = status.heat * codes.HEAT_UNIT
+        seconds = wait_s(heat, reference_A, rate_Hz)
+        if math.isinf(seconds):
+            raise ArgumentError(
+                "this reference heats the coil beyond its limit, however cold it is at the start",
+                hint="play less of it at a time, or at a lower current",
+            )
+        if seconds > 0:
+            assumed = status.flags & codes.STATUS_HEAT_ASSUMED
+            raise DeviceError(
+                f"the coil is too hot for this: it is at {100 * heat:.0f} % of its limit"
+                + (", as far as is known: nobody has seen this device cool" if assumed else ""),
+                hint=f"wait {in_words(seconds)}, then run the command again",
+            )
+        # Should nobody be left to ask afterwards, as if it had been played to its end.
+        self._remember_heat(max(heat, float(added(reference_A, rate_Hz).max())), reference_A.size / rate_Hz)
 
     def __enter__(self) -> Self:
         return self
@@ -252,12 +267,14 @@ class Device:
                 f"decimation {decimation} is outside 1..{codes.MAX_DECIMATION}",
                 hint="10 gives 1000 samples a second",
             )
+        self._check_heat(codes.CURRENT_UNIT_A * wire.astype(float), rate_Hz)
         player = Player(
             self._session,
             wire,
             step,
             decimation,
             hello=self._hello,
+            seen=self._seen,
             monotonic=self._monotonic,
             piece_s=self._port.piece_s,
         )
@@ -281,6 +298,9 @@ class Device:
                     interrupted = True
             with self._turn:
                 self._player = None
+                self._seen = player.seen
+            if player.heat >= 0:
+                self._remember_heat(player.heat * codes.HEAT_UNIT)
         if player.error is not None:
             raise player.error
         return self._trace(player, watch.finish(), interrupted)

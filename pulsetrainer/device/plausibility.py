@@ -49,6 +49,7 @@ _MODEL_FACTOR, _MODEL_OFFSET_N = 2.0, 1.5
 _STUCK_PATH_A = 1.0
 _STUCK_SPAN_A = 0.1
 _STUCK_S = 0.1
+_FEW = 20  # samples, at low rates: neither noise nor a wild sample is that persistent
 _NOISY = 0.4  # share of the samples that are turning points: 2/3 in white noise
 _RAIL_N = 5.0  # from here on the amplifier may be at its end: a flat top is a matter for `diagnose`
 _FLAT = 0.05  # share of the samples at the very top that make it flat
@@ -78,7 +79,7 @@ def _stuck(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> st
     if held_N >= _RAIL_N and held_N >= force_N.max() and end - start < force_N.size:
         return ""
     noisy = _turns(np.delete(force_N, np.s_[start:end])) > _NOISY
-    too_long = noisy and time_s[end - 1] - time_s[start] >= _STUCK_S
+    too_long = noisy and end - start >= _FEW and time_s[end - 1] - time_s[start] >= _STUCK_S
     too_far = np.abs(np.diff(still)).sum() >= _STUCK_PATH_A and np.ptp(still) >= _STUCK_SPAN_A
     if not (too_long or too_far):
         return ""
@@ -137,7 +138,7 @@ def judge_against(time_s: FloatArray, expected_N: FloatArray, force_N: FloatArra
     A force within a factor of two of what was expected, and 1.5 N, is plausible: a tenth of the sensor's
     range, more than a compensated drive ever leaves. NaN marks samples that were lost.
     """
-    there = np.isfinite(force_N)
+    there = np.isfinite(force_N) & np.isfinite(expected_N)
     if np.count_nonzero(there) < 2:
         return ""
     time, force = time_s[there], force_N[there]
@@ -169,7 +170,7 @@ def _first_outside(
     """Return the first stretch of 0.1 s of which at least half lies outside."""
     out = (force_N < low_N) | (force_N > high_N)
     out &= time_s >= time_s[0] + _SETTLES_S  # of what came before nothing is known
-    run = max(1, round(_OUTSIDE_S / float(np.median(np.diff(time_s)))))
+    run = max(_FEW, round(_OUTSIDE_S / float(np.median(np.diff(time_s)))))
     if out.size < run:
         return None
     counts = np.convolve(out, np.ones(run), "valid")

@@ -19,7 +19,15 @@ from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.session import AbandonedError, NoAnswerError, RefusedError, Session
 from pulsetrainer.device.transport import PortLostError
-from pulsetrainer.device.wording import describe_fault, remedy_of, reset_text, state_text
+from pulsetrainer.device.wording import (
+    NOT_OFF_REMEDY,
+    describe_fault,
+    describe_not_off,
+    flows_A,
+    remedy_of,
+    reset_text,
+    state_text,
+)
 from pulsetrainer.errors import DeviceError, PulsetrainerError
 
 if TYPE_CHECKING:
@@ -46,6 +54,10 @@ class Outcome:
 NOTHING = m.Telemetry(0, 0, 0, 0, 0, b"")  # in the place of a block that nobody needs any more
 
 
+def _drives(status: m.StatusReply) -> bool:
+    return status.state in {codes.State.RUNNING, codes.State.RAMPING}
+
+
 class Player:
     """Plays one reference [100 uA, int16]; ``received`` grows by wire blocks until ``ended`` is set."""
 
@@ -57,10 +69,12 @@ class Player:
         decimation: int,
         *,
         hello: m.HelloReply,
+        seen: tuple[int, int],
         monotonic: Callable[[], float],
         piece_s: float = np.inf,
     ) -> None:
         self._session = session
+        self.seen = seen  # first and worst fault that whoever plays has been told of
         self._samples = reference
         self._wire = reference.astype("<i2").tobytes()
         self._ticks_per_sample = ticks_per_sample
@@ -84,6 +98,7 @@ class Player:
         self._stop_reason = ""
         self._stop_remedy = ""
         self.taken_at_s = monotonic()
+        self.heat = -1  # of the coil after the play, -1: it could not be asked
         self.outcome: Outcome | None = None
         self.error: BaseException | None = None
 
@@ -162,13 +177,23 @@ class Player:
             self._session.receive()
             self._request(m.Stop())
         if self._ack.fault:
-            status = self._status()
-            self._request(m.ClearFault(status.fault, status.worst))
+            self._clear(self._status())
         self._request(m.Stream(self.decimation))
         self._request(m.WaveBegin(n, self._ticks_per_sample, zlib.crc32(self._wire)))
         while self._sent < n and self._send_chunk(self._ack.credit):
             pass
         self._request(m.WaveCommit(self._sent, zlib.crc32(self._wire[: 2 * self._sent])))
+
+    def _clear(self, status: m.StatusReply) -> None:
+        """Clear the fault that has been told; one that nobody was told of is told now, and stays."""
+        before, self.seen = self.seen, (status.fault, status.worst)
+        if self.seen != before:
+            raise DeviceError(
+                "the device has switched off by itself since it was last asked: "
+                f"{describe_fault(status, self._hello.tick_rate_Hz)}",
+                hint=remedy_of(status.fault) or "remove the cause; the next command clears the fault",
+            )
+        self._request(m.ClearFault(*self.seen))
 
     def _send_chunk(self, credit: int) -> bool:
         """Send the next samples if the device has room for a whole frame of them."""
@@ -218,12 +243,14 @@ class Player:
         self._request(m.Stop())
         deadline = self._monotonic() + _RAMP_S
         status = self._status()
-        while status.state in {codes.State.RUNNING, codes.State.RAMPING} and self._monotonic() < deadline:
+        while (_drives(status) or flows_A(status)) and self._monotonic() < deadline:
             self._session.receive()
             status = self._status()
         deadline = self._monotonic() + _DRAIN_S
         while not self._last_block and self._monotonic() < deadline:
             self._session.receive()
+        self.seen = (status.fault, status.worst)
+        self.heat = status.heat
         return status
 
     def _play(self) -> Outcome:
@@ -266,6 +293,9 @@ class Player:
             )
         last_tick = (len(self._samples) - 1) * self._ticks_per_sample
         fault = describe_fault(status, self._hello.tick_rate_Hz) or self._stop_reason
+        not_off = describe_not_off(status)
+        if not_off:  # above everything else
+            fault = f"{not_off} (first: {fault})" if fault else not_off
         if not fault and status.state != codes.State.IDLE:
             fault = f"the device did not come to rest after the play (state: {state_text(status.state)})"
         # Refused before it started: the numbers in the status are those of an earlier play.
@@ -274,4 +304,5 @@ class Player:
         if not fault and not to_end:
             fault = refused or "the device ended the play early"
         produced = status.produced if started else 0
-        return Outcome(produced, to_end, fault, remedy_of(status.fault) or self._stop_remedy)
+        remedy = NOT_OFF_REMEDY if not_off else remedy_of(status.fault) or self._stop_remedy
+        return Outcome(produced, to_end, fault, remedy)

@@ -17,6 +17,10 @@ _REMEDY: dict[int, str] = {
     codes.Fault.WAVE_CRC: "check the cable, then run the command again",
 }
 
+NOT_OFF_REMEDY = "pull the supply's plug, then have the device's output transistor and current sensor checked"
+# Above the noise and the zero of the current sensor; the firmware calls it stray current, too.
+_FLOWS_A = 0.1
+
 
 def _told(number: int, known: Mapping[int, str], kind: str) -> str:
     return known.get(number, f"{kind} {number}, which this program does not know")
@@ -67,3 +71,20 @@ def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:
         f"current {status.fault_current * codes.CURRENT_UNIT_A:.4f} A, "
         f"force {status.fault_force * codes.FORCE_UNIT_N:.3f} N)"
     )
+
+
+def flows_A(status: m.StatusReply) -> float:
+    """Return the current that flows although the output is off, A; 0 if none does, or while it is on."""
+    current_A = status.current * codes.CURRENT_UNIT_A
+    driven = status.state in {codes.State.RUNNING, codes.State.RAMPING}
+    return 0.0 if driven or current_A < _FLOWS_A else current_A
+
+
+def describe_not_off(status: m.StatusReply) -> str:
+    """Return that the output could not be switched off, empty if it could."""
+    current_A = flows_A(status)
+    if current_A:
+        return f"the output could not be switched off: {current_A:.1f} A still flow"
+    if status.flags & codes.STATUS_OUTPUT_NOT_OFF:
+        return "the output could not be switched off: current flowed on for a while"
+    return ""

@@ -12,6 +12,7 @@ from pulsetrainer.artefacts import DrivePlayback, Playback, Waveform
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.signals import check_size
+from pulsetrainer.device.plausibility import FORCE_REMEDY, judge_against
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
@@ -89,7 +90,12 @@ def play(drive: Waveform, device: Device, *, repeats: int = 5, progress: Progres
         fault, remedy = recording.fault, recording.remedy
         if fault:
             break
-        kept[name].append(_on_grid(recording, drive.time_s.size, decimation))
+        grid = _on_grid(recording, drive.time_s.size, decimation)
+        if name == "compensated":  # the one whose force the model foretells
+            fault, remedy = judge_against(drive.time_s, drive.predicted, grid[2]), FORCE_REMEDY
+        if fault:
+            break
+        kept[name].append(grid)
         progress((number + 1) / (repeats * len(DRIVES)))
     whole = min(len(rows) for rows in kept.values())
     model = drive.model
