@@ -25,6 +25,12 @@ settings.register_profile("ci", parent=settings.get_profile("quick"), max_exampl
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _no_trace_of_tests(tmp_path_factory) -> None:
+    """Keep what is remembered of devices out of the user's own folder."""
+    os.environ["XDG_STATE_HOME"] = str(tmp_path_factory.mktemp("state"))
+
+
 @pytest.fixture(scope="session")
 def made_once(tmp_path_factory) -> Callable[[str, Callable[[Path], None]], Path]:
     """Return a folder by its name, filled by the first worker that asks; the others wait and share it."""

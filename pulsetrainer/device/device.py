@@ -95,7 +95,8 @@ class Device:
         deadline = self._monotonic() + _REST_S
         status = self._status()
         while (status.state == codes.State.RAMPING or flows_A(status)) and self._monotonic() < deadline:
-            self._sleep(_TAKE_EVERY_S)
+            with self._turn:
+                self._session.receive()
             status = self._status()
         return status
 

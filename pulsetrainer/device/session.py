@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 _HELLO_S = 3.0
 _HELLO_TRY_S = 0.2
+_GREETING_AT_LEAST = 9  # bytes: magic, protocol and firmware version, which no version moves
 _NAMES = {c.TYPE: c.__name__ for c in COMMANDS}
 
 
@@ -120,7 +121,7 @@ class Session:
                 if frame.seq != self._seq or kind is None:
                     continue
                 try:
-                    reply = kind.parse(frame.payload)
+                    reply = _parsed(kind, frame.payload)
                 except ValueError:
                     self.rejected += 1
                     continue
@@ -229,6 +230,22 @@ class Session:
             "program": "update this program: pip install --upgrade pulsetrainer",
         }[older]
         raise DeviceError(f"{name} {said}: the {older} is older", hint=remedy)
+
+
+def _parsed(kind: type[Message], payload: bytes) -> Message:
+    """Return the message; a greeting of another major version by its first fields, whatever follows them.
+
+    Raises
+    ------
+    ValueError
+        if the payload has not the length of its kind.
+    """
+    size = kind.layout().size
+    if kind is HelloReply and len(payload) >= _GREETING_AT_LEAST and len(payload) != size:
+        greeting = HelloReply.parse(payload[:size].ljust(size, b"\0"))
+        if greeting.magic == MAGIC and greeting.major != PROTOCOL_MAJOR:
+            return greeting
+    return kind.parse(payload)
 
 
 def _dotted(version: tuple[int, ...]) -> str:
