@@ -84,7 +84,7 @@ def _stuck(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> st
     if not (too_long or too_far):
         return ""
     return (
-        f"the force reading is stuck at {held_N:.2f} N while the current moves between {still.min():.2f} "
+        f"force reading frozen at {held_N:.2f} N while the current moves between {still.min():.2f} "
         f"and {still.max():.2f} A"
     )
 

@@ -22,7 +22,7 @@ def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> No
     if fault == INTERRUPTED:
         raise Interrupted(f"stopped by you during {what}; the output was switched off first", kept=kept)
     raise DeviceError(
-        f"{fault}; {what} ended there",  # what is wrong first: it may be that current flows on
+        f"{fault}, during {what}",  # what is wrong first: it may be that current flows on
         hint=remedy or "remove the cause; the next command clears the fault",
         kept=kept,
     )
