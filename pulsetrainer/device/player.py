@@ -292,7 +292,9 @@ class Player:
                 remedy="check its power supply and cable; nothing was started again",
             )
         last_tick = (len(self._samples) - 1) * self._ticks_per_sample
-        fault = describe_fault(status, self._hello.tick_rate_Hz) or self._stop_reason
+        fault = describe_fault(status, self._hello.tick_rate_Hz)
+        if not fault or self._stop_remedy:  # with a remedy it is a finding of the host, which came first
+            fault = f"{self._stop_reason} (then: {fault})" if fault else self._stop_reason
         not_off = describe_not_off(status)
         if not_off:  # above everything else
             fault = f"{not_off} (first: {fault})" if fault else not_off
@@ -304,5 +306,5 @@ class Player:
         if not fault and not to_end:
             fault = refused or "the device ended the play early"
         produced = status.produced if started else 0
-        remedy = NOT_OFF_REMEDY if not_off else remedy_of(status.fault) or self._stop_remedy
+        remedy = NOT_OFF_REMEDY if not_off else self._stop_remedy or remedy_of(status.fault)
         return Outcome(produced, to_end, fault, remedy)
