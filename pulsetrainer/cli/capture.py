@@ -24,7 +24,8 @@ from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
     from pulsetrainer.core.course import Course
-    from pulsetrainer.device.device import Device, DeviceInfo
+    from pulsetrainer.device.device import Device
+    from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.files.resume import Earlier
     from pulsetrainer.steps.capture import Plan
 

@@ -18,7 +18,7 @@ from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
 
 if TYPE_CHECKING:
-    from pulsetrainer.device.device import DeviceInfo
+    from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.files.provenance import Device, Header
 
 K = TypeVar("K")
