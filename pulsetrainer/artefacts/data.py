@@ -68,7 +68,11 @@ def beyond_all_quantities(values: NDArray[Any]) -> str:
     if values.dtype.kind != "f":
         return ""
     low, high = np.fmin.reduce(values, None, initial=0.0), np.fmax.reduce(values, None, initial=0.0)
-    return "" if max(-low, high) <= LARGEST else f"goes from {low:g} to {high:g}; the limit is {LARGEST:g}"
+    return (
+        ""
+        if max(-low, high) <= LARGEST
+        else f"goes from {low:g} to {high:g}, beyond the limit of {LARGEST:g}"
+    )
 
 
 def check_equal_length(artefact: Any, names: tuple[str, ...]) -> None:
@@ -78,7 +82,7 @@ def check_equal_length(artefact: Any, names: tuple[str, ...]) -> None:
         listed = ", ".join(f"{n} has {k}" for n, k in sizes.items())
         raise DataError(
             f"a {artefact.kind} needs arrays of one length along time: {listed}",
-            hint="write the artefact again with the command that made it",
+            hint="make the artefact again",
         )
 
 
@@ -90,7 +94,7 @@ def check_time(artefact: Any) -> None:
     if not np.all(np.isfinite(t)):
         where = int(np.flatnonzero(~np.isfinite(t))[0])
         raise DataError(
-            f"time of this {artefact.kind} is not a number at sample {where}", hint="mend the time column"
+            f"time of this {artefact.kind} is not a number at sample {where}", hint="correct the time column"
         )
     back = np.flatnonzero(t[1:] <= t[:-1])  # no array of differences: the record may be long
     if back.size:
@@ -98,5 +102,5 @@ def check_time(artefact: Any) -> None:
         raise DataError(
             f"time of this {artefact.kind} does not increase: sample {k + 1} is at {t[k + 1]:g} s, "
             f"the one before it at {t[k]:g} s",
-            hint="sort the record, drop repeated rows, or give --rate instead of a time column",
+            hint="sort the record, drop repeated rows, or give `rate` instead of a time column",
         )

@@ -216,7 +216,7 @@ def _note_leftovers(job: Job, out: Path) -> None:
 
     job.notes(
         [
-            f"{left} holds {samples} samples of a capture that was cut off: "
+            f"{left} holds {samples} samples of an interrupted capture: "
             "continue it with --resume, or delete it"
             for left, samples in interrupted(out)
         ]

@@ -39,7 +39,7 @@ LimitCurrent = Annotated[
     typer.Option(
         "--limit-current",
         callback=positive,
-        help="Current that the device shall refuse to exceed, A; its own limit can only be lowered.",
+        help="Highest current the device may drive, A; this can only lower the device's own limit.",
         envvar=variable("limits.current_A"),
         show_default=False,
     ),
@@ -49,7 +49,7 @@ LimitForce = Annotated[
     typer.Option(
         "--limit-force",
         callback=positive,
-        help="Force above which the device shall switch off, N; its own limit can only be lowered.",
+        help="Force above which the device switches off, N; this can only lower the device's own limit.",
         envvar=variable("limits.force_N"),
         show_default=False,
     ),

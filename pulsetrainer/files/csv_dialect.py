@@ -115,13 +115,13 @@ def detect(path: Path) -> Dialect:
             if len(lines) == _SAMPLE_LINES:
                 break
     if not lines:
-        raise DataError(f"{path} is empty", hint="export the record again")
+        raise DataError(f"{path} is empty", hint="export the recording again")
     delimiter = declared or _delimiter([line for _, line in lines])
     remarks = _REMARKS if delimiter == ";" else (*_REMARKS, ";")
     comments += [(count, _remark(line)) for count, line in lines if line.startswith(remarks)]
     lines = [(count, line) for count, line in lines if not line.startswith(remarks)]
     if not lines:
-        raise DataError(f"{path} is empty", hint="export the record again")
+        raise DataError(f"{path} is empty", hint="export the recording again")
     above = _above([split(line, delimiter) for _, line in lines])
     comments += [(count, line.strip()) for count, line in lines[:above]]
     dialect = _with_header(path, encoding, delimiter, lines[above:], sorted(comments))
@@ -141,7 +141,7 @@ def _encoding(path: Path) -> str:
         ours = start.startswith(b"\x89HDF")
         raise DataError(
             f"{path} is not a text file",
-            hint="it is HDF5: see `pulsetrainer show`" if ours else "export the record as CSV",
+            hint="it is an HDF5 file, perhaps a run already" if ours else "export the recording as CSV",
         )
     return "utf-8-sig"
 
@@ -212,7 +212,7 @@ def _with_header(
     text = [[number(cell) is None for cell in row] for row in rows]
     heads = _heading_lines(text)
     if heads == len(rows):
-        raise DataError(f"{path} is empty below its header", hint="export the record again")
+        raise DataError(f"{path} has no rows below its header", hint="export the recording again")
     first = rows[heads]
     comments = tuple(comment for count, comment in commented if count < lines[heads][0])
     names = rows[0] if heads else _commented_names(comments, delimiter, len(first))
@@ -220,12 +220,12 @@ def _with_header(
     if len(names) != len(first):
         raise DataError(
             f"{path} has {len(names)} column names, but {len(first)} columns in line {lines[heads][0]}",
-            hint="mend the header; decimal commas need another delimiter, such as a semicolon",
+            hint="correct the header; decimal commas need another delimiter, such as a semicolon",
         )
     if all(text[heads][: len(first)]):
         raise DataError(
             f"{path} has no column of numbers: line {lines[heads][0]} is {lines[heads][1][:60]!r}",
-            hint="export the record as CSV, one column a quantity",
+            hint="export the recording as CSV, one column per quantity",
         )
     units = [cell.strip("()[] ") for cell in rows[1]] if heads == 2 else []
     return Dialect(

@@ -180,7 +180,7 @@ class _Reader:
                 raise DataError(
                     f"{self.path} has {len(cells)} columns in line {count}, expected {len(dialect.names)}: "
                     f"{', '.join(dialect.names)}",
-                    hint="mend or remove that line, or export the record again",
+                    hint="correct or remove that line, or export the recording again",
                 )
             for k, cell in enumerate(cells):
                 if k in dialect.text_columns or cell.lower() in MISSING:
@@ -191,7 +191,7 @@ class _Reader:
                 if value is None:
                     raise DataError(
                         f"{self.path} has {self._place(cell, k, count)}: not a number",
-                        hint="mend or remove that line",
+                        hint="correct or remove that line",
                     )
                 values[row, k] = value
             self._look_for_signs(count, cells)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 INDEX_AXIS = "sample"  # the axis of records without time: a dataset "time" always is a time in seconds
 _CHUNK = 16384
 _COMPRESS_ABOVE_BYTES = 4096
-_WRITE_AGAIN = "write the artefact again with the command that makes it"
+_WRITE_AGAIN = "make the artefact again"
 
 Axes = dict[str, h5py.Dataset]
 
@@ -142,10 +142,10 @@ def _checked(plan: FieldPlan, array: np.ndarray[Any, Any]) -> np.ndarray[Any, An
         raise DataError(f"{plan.name!r} holds {array.dtype}, expected numbers", hint=_WRITE_AGAIN)
     if plan.data is not None and plan.data.finite and not np.all(np.isfinite(array)):
         raise DataError(
-            f"{plan.name!r} holds a value that is not finite and must not", hint="mend the data it came from"
+            f"{plan.name!r} holds a value that is not finite", hint="correct the data it was made from"
         )
     if said := beyond_all_quantities(array):
-        raise DataError(f"{plan.name!r} {said}", hint="mend the data it came from")
+        raise DataError(f"{plan.name!r} {said}", hint="correct the data it was made from")
     return array
 
 
@@ -175,9 +175,11 @@ def _put_number(group: h5py.Group, plan: FieldPlan, value: Any, values: Mapping[
     """Write one number with its units."""
     number = np.asarray(plan.type(value))
     if plan.data is not None and plan.data.finite and not np.isfinite(number):
-        raise DataError(f"{plan.name!r} is {value} and must be finite", hint="mend the data it came from")
+        raise DataError(
+            f"{plan.name!r} is {value} and must be finite", hint="correct the data it was made from"
+        )
     if np.isfinite(number) and (said := beyond_all_quantities(number)):
-        raise DataError(f"{plan.name!r} {said}", hint="mend the data it came from")
+        raise DataError(f"{plan.name!r} {said}", hint="correct the data it was made from")
     dataset = group.create_dataset(plan.path, data=number.astype(np.uint8) if plan.type is bool else number)
     _describe(dataset, plan, values)
     if plan.type is bool:

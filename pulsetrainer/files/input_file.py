@@ -81,11 +81,11 @@ def _names_in(folder: Path, path: Path) -> str:
     near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
     near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
     near = near or [name for name in names if name.endswith(path.suffix or ".h5")][:5]
-    return f"in that folder there is: {', '.join(near)}" if near else f"nothing like it is in {folder}"
+    return f"in that folder there is: {', '.join(near)}" if near else f"there is no similar name in {folder}"
 
 
 def check_resumable(path: Path) -> None:
-    """Refuse to go on with a recording into ``path`` of which nothing is there.
+    """Refuse to resume a recording into ``path`` of which nothing is there.
 
     Raises
     ------
@@ -94,6 +94,6 @@ def check_resumable(path: Path) -> None:
     """
     if not path.exists() and not any(path.parent.glob(f"{path.name}.partial*")):
         raise UsageError(
-            f"there is nothing to resume: neither {path} nor {path.name}.partial is there",
+            f"there is nothing to resume: neither {path} nor {path.name}.partial exists",
             hint="leave --resume out to record from the beginning",
         )

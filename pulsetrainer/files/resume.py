@@ -1,4 +1,4 @@
-"""Going on with a recording that was cut off: which file holds it, and whether it is this recording."""
+"""Resuming a recording that was interrupted: which file holds it, and whether it is this recording."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
     Raises
     ------
     UsageError
-        There is nothing to go on with, it is being written, or it was recorded with other options.
+        There is nothing to resume, it is being written, or it was recorded with other options.
     DataError
         What is there cannot be read.
     """
@@ -50,7 +50,7 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
     if path.exists():
         final = _unfinished(path, must_read=source is None)
         if final is None and source is not None and not overwrite:
-            raise ExistsError(path, f"{source} can be continued, but {path} already exists")
+            raise ExistsError(path, f"{source} can be resumed, but {path} already exists")
         if final is None and source is None:
             raise UsageError(f"there is nothing to resume: {path} is complete", hint="leave --resume out")
         if final is not None and (not found or final.input.size >= found[0][1]):
@@ -94,7 +94,7 @@ def _unfinished(path: Path, *, must_read: bool) -> Run | None:
 def _check_same(source: Path, before: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
     """Raise UsageError where the recording was begun with other options."""
     differ = [
-        f"{name} was {before[name]}, now it is {value}"
+        f"`{name}` was {before[name]}, now it is {value}"
         for name, value in asked.items()
         if name in before and before[name] != value
     ]

@@ -101,10 +101,10 @@ class Table:
             raise DataError(
                 f"{self.path} has {values[bad[0]]} in column {name}, {self.place(int(bad[0]))} "
                 f"({bad.size} of {values.size} rows are not finite)",
-                hint="remove those rows, or export the record again",
+                hint="remove those rows, or export the recording again",
             )
         if said := beyond_all_quantities(values):
-            raise DataError(f"{self.path}, column {name}, {said}", hint="mend or remove those rows")
+            raise DataError(f"{self.path}, column {name}, {said}", hint="correct or remove those rows")
         return values
 
     def index(self, name: str) -> int:
@@ -178,10 +178,10 @@ def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None
     except OSError as error:
         raise unreadable(path, error) from error
     except UnicodeError as error:
-        raise DataError(f"{path} is not a text file: {error}", hint="export the record as CSV") from error
+        raise DataError(f"{path} is not a text file: {error}", hint="export the recording as CSV") from error
     except (csv.Error, ValueError, IndexError) as error:  # quotes that do not close, cells without end
         raise DataError(
-            f"{path} is no table of numbers: {error}", hint="export it as CSV with one column a quantity"
+            f"{path} is not a table of numbers: {error}", hint="export it as CSV, one column per quantity"
         ) from error
     columns = {table.names[k]: column for k, column in zip(kept, rows.columns, strict=True)}
     return replace(table, columns=columns, shifts=rows.shifts)

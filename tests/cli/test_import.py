@@ -244,7 +244,7 @@ def test_units_far_from_one(run, tmp_path):
         (GOOD.replace("0.9,2,4", "0.3,2,4"), [], ["does not increase", "line 11", "sort"]),
         ("t_s,current_A,force_N\n0,1,nan\n0.2,2,\n0.3,3,NaN\n", [], ["no numbers", "force_N", "all 3"]),
         ("", [], ["empty"]),
-        ("t_s,current_A,force_N\n", [], ["empty below its header"]),
+        ("t_s,current_A,force_N\n", [], ["no rows below its header"]),
         (GOOD.replace("force_N", "forse_N"), [], ["no column 'force_N'", "did you mean 'forse_N'"]),
         (GOOD, ["--output-unit", "Newtonss"], ["'Newtonss'", "not a known unit", "--output-unit"]),
         (GOOD, ["--time", "current_A"], ["in 'A'", "expected s, ms"]),

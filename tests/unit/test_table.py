@@ -255,7 +255,7 @@ def test_the_last_rows_tell_the_order_of_a_date(table, days, encoding):
 def test_what_no_quantity_reaches_is_refused(table, cell):
     """Its square is infinite: no figure and no fit would come of it."""
     path = table(f"when,u,y\n0,1,2\n1,{cell},3\n2,1,2\n").path
-    with pytest.raises(DataError, match=r"t\.csv, column u, goes from .* the limit is 1e\+100"):
+    with pytest.raises(DataError, match=r"t\.csv, column u, goes from .* the limit of 1e\+100"):
         read_run(path, **COLUMNS)
 
 
@@ -314,7 +314,7 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
     [
         ("", ["is empty"]),
         ("\n  \n# only a comment\n", ["is empty"]),
-        ("t,u\n", ["is empty below its header"]),
+        ("t,u\n", ["no rows below its header"]),
         ("t,u,y\n0,1,2\n1,abc,3\n", ["'abc'", "column u", "line 3", "not a number"]),
         ("t,u,y\n0,1,2\n\n# x\n1,2,1_000\n", ["'1_000'", "column y", "line 5"]),
         ("t,u,y\n0,1,2\n1,2\n", ["2 columns in line 3", "expected 3"]),
