@@ -259,7 +259,7 @@ class RunRecorder:
             if block is not None:
                 kept.append(block.samples)
             count = sum(samples.shape[1] for samples in kept)
-            if block is None or count >= _COPIED_SAMPLES:
+            if kept and (block is None or count >= _COPIED_SAMPLES):
                 for name, values in zip(COLUMNS, np.concatenate(kept, axis=1), strict=True):
                     file[paths[name]][start : start + count] = values
                 start, kept = start + count, []

@@ -374,12 +374,13 @@ def test_an_artefact_that_a_fault_ended_goes_on(tmp_path):
     assert _names(tmp_path) == ["a.h5"]
 
 
-def test_a_long_recording_becomes_the_same_file(tmp_path):
-    """More samples than are copied at a time: in order, and none is lost between two pieces."""
-    time = np.arange(200_000.0)
+@pytest.mark.parametrize("batch", [7001, 65_536, 100_000])
+def test_a_long_recording_becomes_the_same_file(tmp_path, batch):
+    """More samples than are copied at a time: in order, none lost between two pieces, nor after the last."""
+    time = np.arange(200_000.0 if batch == 7001 else 2.0 * batch)
     with RunRecorder(tmp_path / "a.h5", examples.header()) as recorder:
-        for start in range(0, time.size, 7001):
-            part = time[start : start + 7001]
+        for start in range(0, time.size, batch):
+            part = time[start : start + batch]
             recorder.append(part, part + 0.25, part + 0.5, part + 0.75)
     run = read(tmp_path / "a.h5", Run)
     for values, offset in ((run.time_s, 0.0), (run.reference, 0.25), (run.input, 0.5), (run.output, 0.75)):
