@@ -69,11 +69,11 @@ def next_step(problem: PulsetrainerError) -> str:
     return problem.hint
 
 
-_PARAMETER = re.compile(r"`([a-z]+(?:_[a-z]+)*)`")
+_PARAMETER = re.compile(r"`([a-z]+(?:_[a-z]+)*)(?:_[A-Z]\w*)?`")  # without the unit at its end
 
 
 def as_options(text: str) -> str:
-    """Return a text with the parameters in it as options: ```force_min``` is ``--force-min`` here."""
+    """Return a text with the parameters in it as options: ```force_min_N``` is ``--force-min`` here."""
     return _PARAMETER.sub(lambda found: f"--{found[1].replace('_', '-')}", text)
 
 

@@ -62,7 +62,7 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
         raise DataError(
             f"{path} lasts {seconds:g} s, {lasts:.3g} samples at {rate_Hz:g} Hz; "
             f"{signals.MOST_SAMPLES} are the most",
-            hint="give its time in s, a lower `rate`, or a shorter signal with `repeats`",
+            hint="give its time in s, a lower `rate_Hz`, or a shorter signal with `repeats`",
         )
     count = int(np.floor(lasts + 1e-9)) + 1
     value = np.interp(time[0] + np.arange(count) / rate_Hz, time, current)

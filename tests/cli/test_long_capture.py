@@ -138,7 +138,7 @@ def test_what_cannot_be_resumed_says_why(tmp_path):
     slow = ("capture", "identification", "--levels", "12", "--speed", "0.75", "-o", "run.h5")
     killed(tmp_path, (*slow, "--port", "bench:?speed=real"), 200)
     before = (tmp_path / "run.h5.partial").read_bytes()
-    refused((), "other options: speed_A_per_s was 0.75, now it is 12", "same options")
+    refused((), "other options: --speed was 0.75, now it is 12", "same options")
     noted = pulsetrainer(tmp_path, *words)
     assert noted.code == 0, noted
     assert "run.h5.partial holds" in noted.err
