@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+from api import api_page
 from architecture import architecture_page
 from demo import readme
 
@@ -371,6 +372,7 @@ PAGES = {
     "pulsetrainer.1": manual_page,
     "format.md": format_page,
     "decisions/README.md": decisions_page,
+    "api.md": lambda: api_page(MARK),
     "../ARCHITECTURE.md": lambda: architecture_page(MARK),
     "../README.md": readme,
 }
