@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
-from api import api_page
+from api_reference import api_page
 from architecture import architecture_page
 from demo import readme
 

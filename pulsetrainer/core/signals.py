@@ -14,6 +14,8 @@ from pulsetrainer.errors import ArgumentError
 
 MOST_SAMPLES = 100_000_000  # of one signal: a day at 1 kHz
 
+_DUST = 1e-12  # of the largest point: closer than this two points are one
+
 
 @dataclass(frozen=True, slots=True)
 class Signal:
@@ -73,10 +75,15 @@ def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
             f"at {rate_Hz:g} Hz",
             hint="another speed or rate",
         )
-    count = int(np.ceil(steps)) + 1
-    path = np.interp(np.arange(count) * (speed / rate_Hz), distance, points)
-    # a turn between two samples would be cut short: put it on the nearest sample
-    path[np.minimum(np.round(distance / speed * rate_Hz).astype(np.int64), count - 1)] = points
+    # a turn between two samples would be cut short: put it on the nearest sample, each turn on one of its own
+    apart = np.abs(np.diff(points)) > _DUST * np.abs(points).max()
+    turn = np.concatenate(([0], np.cumsum(apart)))
+    nearest = np.round(distance / speed * rate_Hz).astype(np.int64)
+    at = np.maximum.accumulate(nearest - turn) + turn
+    path = np.interp(
+        np.arange(max(int(np.ceil(steps)), int(at[-1])) + 1) * (speed / rate_Hz), distance, points
+    )
+    path[at] = points
     return path
 
 

@@ -59,6 +59,13 @@ def test_after_the_lead_in_the_output_goes_on_as_if_nothing_had_happened(course,
     np.testing.assert_allclose(resumed, unbroken, atol=1e-9 * PREISACH.total)
 
 
+def test_a_swing_shorter_than_a_sample_is_kept():
+    """Two turns less than half a sample apart: both are visited, so that the memory is what it should be."""
+    path = signals.through(np.array([0.0, 0.265625, 0.24921875]), 3.0, 100.0)
+    assert path.max() == 0.265625
+    assert path[-1] == 0.24921875
+
+
 @given(course=courses(), longest=st.integers(1, 400))
 def test_parts_cover_the_course_once(course, longest):
     """Parts follow one another without gap or overlap, none longer than allowed, each one goes ahead."""
