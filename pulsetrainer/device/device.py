@@ -15,7 +15,7 @@ from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.heat import HeatMemory, added, in_words, wait_s
 from pulsetrainer.device.identity import DeviceInfo
-from pulsetrainer.device.plausibility import FORCE_REMEDY, ForceWatch
+from pulsetrainer.device.plausibility import ForceWatch
 from pulsetrainer.device.player import Player
 from pulsetrainer.device.ports import find_device_port
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
@@ -23,7 +23,13 @@ from pulsetrainer.device.schemes import OpenPort, find_opener, redact
 from pulsetrainer.device.session import Session
 from pulsetrainer.device.trace import Block, FloatArray, Trace
 from pulsetrainer.device.transport import SerialTransport
-from pulsetrainer.device.wording import NOT_OFF_REMEDY, describe_fault, describe_not_off, flows_A
+from pulsetrainer.device.wording import (
+    FORCE_REMEDY,
+    NOT_OFF_REMEDY,
+    describe_fault,
+    describe_not_off,
+    flows_A,
+)
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 
 if TYPE_CHECKING:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     FloatArray = NDArray[np.float64]
 
-FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
-
 WINDOW_S = 5.0  # looked at together: some beats of a slow pulse
 STEP_S = 0.5  # looked at again after so long
 _LEAST_S = 0.5  # less says nothing

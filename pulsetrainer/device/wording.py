@@ -8,13 +8,19 @@ from enum import IntEnum
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 
-# What to do about a fault whose cause is not in the device.
+FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
+# What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
     codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
     codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
     codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",
     codes.Fault.ON_TIME: "play it in several pieces",
     codes.Fault.WAVE_CRC: "check the cable, then run the command again",
+    codes.Fault.NO_FORCE: FORCE_REMEDY,
+    codes.Fault.FORCE_FROZEN: FORCE_REMEDY,
+    codes.Fault.FORCE_IMPLAUSIBLE: FORCE_REMEDY,
+    codes.Fault.FORCE_ZERO: FORCE_REMEDY,
+    codes.Fault.FORCE_RAIL: FORCE_REMEDY,
 }
 
 NOT_OFF_REMEDY = "pull the supply's plug, then have the device's output transistor and current sensor checked"

@@ -12,7 +12,8 @@ from pulsetrainer.artefacts import DrivePlayback, Playback, Waveform
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.signals import check_size
-from pulsetrainer.device.plausibility import FORCE_REMEDY, judge_against
+from pulsetrainer.device.plausibility import judge_against
+from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
