@@ -1,7 +1,7 @@
 """Write the reference: ``python docs/make.py`` writes the pages that are made from the code.
 
 They are read off the code: the commands off the program's own parser, the format off the annotations that
-the store writes by, the architecture off the imports, the decisions off their titles. ``--check`` writes nothing and exits 1 where a page is not what the code says.
+the store writes by, the verdict off the stages of the diagnosis, the architecture off the imports, the decisions off their titles. ``--check`` writes nothing and exits 1 where a page is not what the code says.
 """  # noqa: INP001 - a folder of pages with its script, not a package
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import typer
 from api_reference import api_page
 from architecture import architecture_page
 from demo import readme
+from verdict import verdict_page
 
 from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.app import app
@@ -193,7 +194,7 @@ WORDS = {
     "next_experiment": "what to measure next, in words",
     "output_quantity": "what the output is",
     "output_unit": "unit of the output",
-    "p_value": "over the whole library; 0 for what is read off the raw data",
+    "p_value": "over the whole library; missing where no null was drawn",
     "polarity": "1; or -1 where the output falls as the input rises",
     "quick": "screened only",
     "repeats": "how often each drive was played",
@@ -373,6 +374,7 @@ PAGES = {
     "format.md": format_page,
     "decisions/README.md": decisions_page,
     "api.md": lambda: api_page(MARK),
+    "how-a-verdict-is-reached.md": lambda: verdict_page(MARK),
     "../ARCHITECTURE.md": lambda: architecture_page(MARK),
     "../README.md": readme,
 }

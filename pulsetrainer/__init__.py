@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Waveform
     from pulsetrainer.steps.capture import capture
     from pulsetrainer.steps.compare import compare
+    from pulsetrainer.steps.diagnose import diagnose
     from pulsetrainer.steps.evaluate import evaluate
+    from pulsetrainer.steps.extend import extend
     from pulsetrainer.steps.identify import identify
     from pulsetrainer.steps.play import play
 
@@ -35,7 +37,9 @@ __all__ = [
     "__version__",
     "capture",
     "compare",
+    "diagnose",
     "evaluate",
+    "extend",
     "identify",
     "invert",
     "load",
@@ -49,7 +53,7 @@ _NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Waveform")
 _HOME = {
     **dict.fromkeys(_NOUNS, "artefacts"),
     **dict.fromkeys(("invert", "load", "open_device", "read_table", "save"), "api"),
-    **{verb: f"steps.{verb}" for verb in ("capture", "compare", "evaluate", "identify", "play")},
+    **{verb: f"steps.{verb}" for verb in ("capture", "compare", "diagnose", "evaluate", "extend", "identify", "play")},
 }
 
 

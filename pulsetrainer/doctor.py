@@ -22,7 +22,7 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
-from pulsetrainer.diagnosis import gates
+from pulsetrainer.diagnosis import gates, wording
 from pulsetrainer.errors import PulsetrainerError
 from pulsetrainer.simulation import build
 from pulsetrainer.version import __version__
@@ -274,7 +274,9 @@ def _rails(recording: Trace, top: float) -> Iterator[Finding]:
     if cut is None:
         yield Finding("saturation", "ok", f"none up to {top:g} A and {recording.force_N.max():.3g} N")
     else:
-        yield Finding("saturation", "problem", cut.text, "lower the gain of the force amplifier")
+        yield Finding(
+            "saturation", "problem", wording.text(cut.evidence), "lower the gain of the force amplifier"
+        )
     worst = float(np.abs(recording.current_A - recording.reference_A).max()) / top
     if worst > _TRACKING_SHARE:
         yield Finding(
@@ -287,4 +289,6 @@ def _rails(recording: Trace, top: float) -> Iterator[Finding]:
         yield Finding("current tracking", "ok", f"{100 * worst:.2g} % of the range at worst")
     fired.pop("current-tracking", None)
     for cause, one in fired.items():
-        yield Finding(f"force: {cause}", "warning", one.text, "pulsetrainer diagnose tells more")
+        yield Finding(
+            f"force: {cause}", "warning", wording.text(one.evidence), "pulsetrainer diagnose tells more"
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 from pulsetrainer.artefacts.data import Data, FloatArray
 from pulsetrainer.artefacts.model import Model, Parameter
@@ -15,7 +15,7 @@ class Cause:
 
     cause: str
     found: bool
-    p_value: float  # over the whole library; 0 for what is read off the raw data
+    p_value: float | None  # over the whole library; None where no null was drawn
     explains_percent: float  # of the reducible part of the baseline's squared error
     held_out_gain_percent: float  # of the reducible part; NaN where it was not measured
     parameters: tuple[Parameter, ...] = ()
@@ -33,6 +33,13 @@ class Profile:
     before: Annotated[FloatArray, Data("@output_unit", "rms residual of the static refit", "group")]  # (k,)
     after: Annotated[FloatArray, Data("@output_unit", "rms residual of the extended refit", "group")]  # (k,)
     output_unit: str = "N"
+
+
+class Left(NamedTuple):
+    """The rms residual of averages, per cent of the span, and what it would be if nothing were wrong."""
+
+    percent: float
+    floor_percent: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,3 +73,15 @@ class Diagnosis:
     extended: Model | None = None  # weights refitted together with the causes found
     input_unit: str = "A"
     output_unit: str = "N"
+    held_out_gain_percent: float = float("nan")  # of all causes together; NaN where it was not measured
+    notes: tuple[str, ...] = ()  # what a person should know about the records
+
+    @property
+    def found(self) -> tuple[Cause, ...]:
+        """The causes that were found, the verdict first."""
+        return tuple(one for one in self.causes if one.found)
+
+    @property
+    def left(self) -> Left:
+        """What is left with the causes found."""
+        return Left(self.extended_percent, self.floor_percent)

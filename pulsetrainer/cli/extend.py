@@ -7,34 +7,42 @@ from typing import Annotated
 
 import typer
 
-from pulsetrainer.cli.console import Screen
-from pulsetrainer.cli.diagnose import words_of
-from pulsetrainer.cli.options import AsJson, Force, Out
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
 
 def extend(
+    context: typer.Context,
     diagnosis: Annotated[Path, typer.Argument(help="Diagnosis of the model.", metavar="DIAGNOSIS.h5")],
     model: Annotated[Path, typer.Option(help="Model that was diagnosed.")],
     out: Out,
-    force: Force = False,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Write the model with the causes found, its weights refitted together with them.
 
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
-    from pulsetrainer.steps import preflight
+    job = Job(context, inputs=(diagnosis, model), outputs=(out,), overwrite=overwrite, as_json=json)
+    from pulsetrainer.artefacts import Diagnosis, Model
+    from pulsetrainer.report.diagnosis_text import parameter
+    from pulsetrainer.steps.extend import extend as extended_by
 
-    preflight.check_files(outputs=(out,), force=force, artefacts=(diagnosis, model))
-    from pulsetrainer.steps import extend as flow
-
-    screen = Screen("extend", as_json=json)
-    with screen.working("extending") as context:
-        result = flow.run(flow.Options(diagnosis, model, out, force), context)
-    screen.result(result)
-    rows = {one.cause: "; ".join(words_of(p) for p in one.parameters) for one in result.extensions}
-    screen.facts(
-        f"{result.output}: extended model of {result.levels} levels",
-        rows
-        | {"residual": f"{result.static_percent:.3f} % -> {result.extended_percent:.3f} % rms of the span"},
+    with job.working("extending"):
+        found = job.load(diagnosis, Diagnosis)
+        extended = extended_by(job.load(model, Model), found, names=(str(model), str(diagnosis)))
+        added = [one.cause for one in extended.extensions]
+        job.save(out, extended, f"Model extended by {', '.join(added)}")
+    figures = ("static_percent", "extended_percent", "held_out_gain_percent")
+    job.screen.result(
+        {
+            "output": out,
+            "added": added,
+            "extensions": extended.extensions,
+            "levels": extended.levels,
+            **{name: getattr(found, name) for name in figures},
+        }
     )
+    rows = {one.cause: "; ".join(map(parameter, one.parameters)) for one in extended.extensions}
+    left = f"{found.static_percent:.3f} % -> {found.extended_percent:.3f} % rms of the span"
+    job.screen.facts(f"{out}: extended model of {extended.levels} levels", rows | {"residual": left})

@@ -23,22 +23,13 @@ from scipy import linalg
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis.answer import Estimate
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.extended import Term, in_order
+from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.fitting import Fitted, weights_for
 from pulsetrainer.diagnosis.problem import Problem
-
-_PLACES = 12  # along each branch
-_SAME = 0.015  # of the range: turns that near are equal
-_SAME_TIME = 0.1  # relative
-_NARROWEST = 0.04  # of the range: shorter loops than this say nothing
-_PERMUTATIONS = 1999
-_ROUNDS = 4
-_STUDENT = 1.96
-# Of the strength: the slope of the loops is that of a density smoothed over the levels. Without noise the
-# bench's feedbacks come out as 0.80 to 1.08 of what they are.
-_SLOPE = 0.2
+from pulsetrainer.diagnosis.screening import p_value
+from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
 
 @dataclass(frozen=True)
@@ -65,7 +56,8 @@ class Contrast:
 
     def estimate(self, cause: Cause) -> Estimate:
         """Return the strength with its 95 % interval."""
-        quantity, half = cause.parameters[0], _STUDENT * self.error + _SLOPE * abs(self.value)
+        quantity = cause.parameters[0]
+        half = LIMITS.normal * self.error + LIMITS.contrast_slope * abs(self.value)
         return Estimate(quantity.name, self.value, quantity.unit, self.value - half, self.value + half)
 
 
@@ -75,14 +67,14 @@ def loops_of(records: Sequence[Record], low: float, high: float) -> list[Loop]:
     found: list[tuple[int, int, int, int, float, float]] = []
     for k, record in enumerate(records):
         u = record.input
-        at = input_noise.real_turns(u, 0.5 * _NARROWEST * reach)
+        at = input_noise.real_turns(u, LIMITS.loop_turn * LIMITS.loop_narrowest * reach)
         values = u[at]
         for j in range(1, at.size - 2):
-            before, top, bottom, back = values[j - 1 : j + 3]
+            before, top, bottom, back = (values[j + k] for k in (-1, 0, 1, 2))
             wide = top - bottom
-            closed = abs(back - top) < _SAME * reach and before < bottom + _SAME * reach
-            inside = top < high - _SAME * reach and bottom > low + _SAME * reach
-            if wide > _NARROWEST * reach and closed and inside:
+            closed = abs(back - top) < LIMITS.loop_same * reach and before < bottom + LIMITS.loop_same * reach
+            inside = top < high - LIMITS.loop_same * reach and bottom > low + LIMITS.loop_same * reach
+            if wide > LIMITS.loop_narrowest * reach and closed and inside:
                 whole = slice(int(at[j]), int(at[j + 2]) + 1)
                 if np.all(record.sample_weight[whole] > 0):
                     found.append((k, int(at[j]), int(at[j + 1]), int(at[j + 2]), float(bottom), float(top)))
@@ -93,15 +85,15 @@ def loops_of(records: Sequence[Record], low: float, high: float) -> list[Loop]:
         equal = [
             kind
             for kind, (a, b, seconds) in enumerate(kinds)
-            if max(abs(a - bottom), abs(b - top)) < _SAME * reach
-            and abs(seconds - took) < _SAME_TIME * seconds
+            if max(abs(a - bottom), abs(b - top)) < LIMITS.loop_same * reach
+            and abs(seconds - took) < LIMITS.loop_same_time * seconds
         ]
         if not equal:
             equal = [len(kinds)]
             kinds.append((bottom, top, took))
         loops.append(Loop(k, equal[0], begin, turn, end))
     number = np.bincount([loop.kind for loop in loops], minlength=1)
-    return [loop for loop in loops if number[loop.kind] > 2]
+    return [loop for loop in loops if number[loop.kind] >= LIMITS.least_loops]
 
 
 def contrasts(loops: Sequence[Loop], signals: Sequence[FloatArray]) -> FloatArray:
@@ -123,7 +115,7 @@ def _less_means(rows: FloatArray, kind: IntArray) -> FloatArray:
 def _along(loop: Loop, signal: FloatArray) -> FloatArray:
     """Averages (2 places,) of a signal along the way down and the way up."""
     parts = [
-        np.array_split(signal[begin:end], _PLACES)
+        np.array_split(signal[begin:end], LIMITS.loop_places)
         for begin, end in ((loop.begin, loop.turn), (loop.turn, loop.end))
     ]
     return np.asarray([float(piece.mean()) for branch in parts for piece in branch])
@@ -143,7 +135,7 @@ def fitted_contrast(
     loops = [
         loop
         for loop in loops_of(problem.records, low, high)
-        if min(loop.turn - loop.begin, loop.end - loop.turn) >= _PLACES
+        if min(loop.turn - loop.begin, loop.end - loop.turn) >= LIMITS.loop_places
     ]
     if not loops:
         return None
@@ -152,14 +144,18 @@ def fitted_contrast(
     quantity = cause.parameters[0]
     first = cause.starts(problem.frames, [])[0][0][0]
     others = _movable(loops, fitted)
-    value, p_value, error = 0.0, 1.0, float("inf")
+    value, p, error = 0.0, 1.0, float("inf")
     current = fitted
-    for number in range(_ROUNDS):
+    for number in range(LIMITS.contrast_rounds):
         terms = fitted.terms if number == 0 else (*fitted.terms, Term(cause, (value,)))
         if number:
             current = weights_for(problem, in_order(terms), current, rebuild=True)
         base = current.simulator.full(in_order(terms))
-        step = 0.25 * first if number == 0 else max(0.1 * abs(value), quantity.small)
+        step = (
+            LIMITS.contrast_first * first
+            if number == 0
+            else max(LIMITS.contrast_step * abs(value), quantity.small)
+        )
         moved = current.simulator.full(in_order((*fitted.terms, Term(cause, (value + step,)))))
         slope = contrasts(loops, [(b - a) / step for a, b in zip(base, moved, strict=True)])
         left = measured - contrasts(loops, base)
@@ -170,15 +166,15 @@ def fitted_contrast(
             return None
         change = float(np.sum(slope * left)) / squares
         if number == 0:
-            p_value = permuted(slope, left, kind, rng)
+            p = permuted(slope, left, kind, rng)
         each = np.sum((left - change * slope) * slope, axis=1)
         free = max(kind.size - np.unique(kind).size, 1)
         error = float(np.sqrt(np.sum(each**2) * kind.size / free)) / squares
         value = min(max(value + change, quantity.low), quantity.high)
-        if p_value > 0.05 or abs(change) < 0.1 * error:
+        if p > LIMITS.contrast_hopeless or abs(change) < LIMITS.contrast_settled * error:
             break
     at_bound = value in (quantity.low, quantity.high)
-    return Contrast(value, error, p_value, kind.size, np.unique(kind).size, at_bound)
+    return Contrast(value, error, p, kind.size, np.unique(kind).size, at_bound)
 
 
 def _movable(loops: Sequence[Loop], fitted: Fitted) -> FloatArray:
@@ -191,18 +187,14 @@ def _movable(loops: Sequence[Loop], fitted: Fitted) -> FloatArray:
     if not columns:
         return np.empty((0, 0))
     matrix = np.stack(columns, axis=1)
-    return np.asarray(linalg.orth(matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)))
+    return np.asarray(linalg.orth(matrix / np.maximum(np.linalg.norm(matrix, axis=0), TINY)))
 
 
 def permuted(slope: FloatArray, left: FloatArray, kind: IntArray, rng: np.random.Generator) -> float:
     """Probability that exchanged loops follow the cause as well."""
     overlap = slope @ left.T  # (loops, loops)
     same = [np.flatnonzero(kind == k) for k in np.unique(kind)]
-    reached = 0
-    observed = abs(float(np.trace(overlap)))
-    for _ in range(_PERMUTATIONS):
-        total = 0.0
-        for members in same:
-            total += float(overlap[members, rng.permutation(members)].sum())
-        reached += abs(total) >= observed
-    return (1.0 + reached) / (_PERMUTATIONS + 1.0)
+    drawn = np.empty(LIMITS.permutations)
+    for k in range(drawn.size):
+        drawn[k] = sum(float(overlap[members, rng.permutation(members)].sum()) for members in same)
+    return p_value(abs(float(np.trace(overlap))), np.abs(drawn))

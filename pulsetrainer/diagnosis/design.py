@@ -25,14 +25,8 @@ from pulsetrainer.core.operator import Preisach, base_rows, follow, steps
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import penalty
+from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
-
-# Short enough for a resonance of 70 Hz; longer when the records would otherwise make more rows than this.
-_BIN_S = 0.005
-_MOST_ROWS = 20_000
-# Spaced as the time constants of a creep; the longest must have gone by well before the record's end.
-_START_S = (0.2, 0.8, 3.2)
-_START_SHARE = 6.0
 
 
 @dataclass(frozen=True)
@@ -65,10 +59,12 @@ class Bins:
         for k in np.unique(self.record):
             own = self.record == k
             since = self.time_s - self.time_s[own][0]
-            longest = float(since[own][-1]) / _START_SHARE
+            longest = float(since[own][-1]) / LIMITS.start_share
             # decays far in the past would be zero, and exp would overflow before the record
             columns += [
-                np.where(own, np.exp(-np.maximum(since, 0.0) / tau), 0.0) for tau in _START_S if tau < longest
+                np.where(own, np.exp(-np.maximum(since, 0.0) / tau), 0.0)
+                for tau in LIMITS.start_tau_s
+                if tau < longest
             ]
         return np.stack(columns, axis=1)
 
@@ -123,7 +119,7 @@ def bins_of(records: Sequence[Record]) -> Bins:
         Hardly any sample has weight.
     """
     duration = sum(r.input.size * r.step for r in records)
-    width = max(_BIN_S, duration / _MOST_ROWS)
+    width = max(LIMITS.bin_s, duration / LIMITS.most_rows)
     numbers, record, time, widths, count = [], [], [], [], 0
     for k, r in enumerate(records):
         per_bin = max(1, round(width / r.step))
@@ -136,7 +132,7 @@ def bins_of(records: Sequence[Record]) -> Bins:
         time.append((used[first:] + 0.5) * per_bin * r.step)
         widths.append(per_bin)
         count += size
-    if count < 100:
+    if count < LIMITS.least_rows:
         raise DataError(
             f"only {count} short averages can be made of this data, too few to tell causes apart",
             hint="record longer: pulsetrainer capture diagnostic -o run.h5",
@@ -237,8 +233,8 @@ class Followed:
 def _to_cells(plane: Plane, packed: sparse.csr_array) -> FloatArray:
     """Rows in node space to rows (count, n_q) in cell space, in pieces that fit the cache."""
     matrix = np.empty(packed.shape)
-    for begin in range(0, packed.shape[0], 2000):
-        part = slice(begin, begin + 2000)
+    for begin in range(0, packed.shape[0], LIMITS.rows_at_once):
+        part = slice(begin, begin + LIMITS.rows_at_once)
         matrix[part] = plane.adjoint(packed[part].toarray())
     return matrix
 
@@ -252,7 +248,7 @@ class Projector:
             free = np.asarray([int(np.argmax(np.diagonal(design.gram)))], dtype=np.int64)
         self.design, self.free = design, free
         block = design.gram[np.ix_(free, free)].copy()
-        block[np.diag_indices_from(block)] += 1e-10 * float(np.diagonal(block).max())
+        block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max())
         self.factor = linalg.cho_factor(block, lower=True, check_finite=False)
 
     def __call__(self, columns: FloatArray) -> FloatArray:

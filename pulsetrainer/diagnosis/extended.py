@@ -24,9 +24,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import cause_named
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
-
-STEP = 0.8
-_FEEDBACK_PASSES = 6  # each multiplies the error of the fed back output by k dP/du, some per cent
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ def chain(
     if not feeds_back:
         return shown_output(terms, static(seen_input(terms, frame.input, frame)), frame)
     inner = static(frame.input) if y is None else y
-    for _ in range(_FEEDBACK_PASSES):
+    for _ in range(LIMITS.feedback_passes):
         inner = static(seen_input(terms, inner, frame))
     return shown_output(terms, inner, frame)
 
@@ -127,7 +125,7 @@ class Extended:
         *,
         lead: FloatArray,
         band_Hz: float | None = None,
-        steps: int = 16,
+        steps: int = LIMITS.inverse_rounds,
     ) -> Tracked:
         """Input (n,) whose output is ``target`` (n,), after the input ``lead`` (m,) has been played.
 
@@ -152,21 +150,21 @@ class Extended:
                 best = Tracked(found.input, predicted, found.clipped, 0, rms, rms)
             elif rms < best.rms:
                 best = Tracked(found.input, predicted, found.clipped, k, rms, best.rms_static)
-            elif k > best.steps + 3:
+            elif k > best.steps + LIMITS.inverse_patience:
                 break
-            wanted = wanted + STEP * smooth(error)
+            wanted = wanted + LIMITS.inverse_step * smooth(error)
         assert best is not None
         return best
 
 
 def _low_pass(band_Hz: float | None, dt_s: float) -> Callable[[FloatArray], FloatArray]:
     """A zero-phase low-pass, or nothing where the band is as wide as the samples allow."""
-    if band_Hz is None or band_Hz * dt_s >= 0.4:
+    if band_Hz is None or band_Hz * dt_s >= LIMITS.inverse_band:
         return lambda x: x
-    b, a = signal.butter(2, 2.0 * band_Hz * dt_s)
+    b, a = signal.butter(LIMITS.inverse_order, 2.0 * band_Hz * dt_s)
 
     def smooth(x: FloatArray) -> FloatArray:
-        pad = min(x.size - 1, round(3.0 / (band_Hz * dt_s)))
+        pad = min(x.size - 1, round(LIMITS.inverse_pad / (band_Hz * dt_s)))
         return np.asarray(signal.filtfilt(b, a, x, padlen=pad))
 
     return smooth

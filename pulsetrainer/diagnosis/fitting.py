@@ -16,16 +16,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.design import Design, Projector
 from pulsetrainer.diagnosis.extended import Term, chain, in_order, shown_output
 from pulsetrainer.diagnosis.problem import Problem
-
-_ROUNDS = 6
-_PASSES = 8
-_SETTLED = 0.05  # change of what the causes add, over the residual, at which the passes end
-_ENOUGH = 2e-3  # relative fall of the sum of squares below which the refit ends
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 @dataclass(frozen=True)
@@ -39,6 +36,16 @@ class Fitted:
     simulated: FloatArray  # (count,) as the causes and the operator give it
     residual: FloatArray  # (count,) measured less simulated, without offset and start
     squares: float
+
+    @property
+    def problem(self) -> Problem:
+        """What it was fitted to."""
+        return self.simulator.problem
+
+    @property
+    def rms(self) -> float:
+        """Rms of the residual."""
+        return root_mean_square(self.residual)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -121,7 +128,7 @@ def weights_for(
     added = np.zeros(problem.bins.count)
     if simulator is not None:
         added = simulator(terms) - design.output(simulator.operator)
-    for _ in range(_PASSES):
+    for _ in range(LIMITS.passes):
         wanted = problem.measured - added
         found = design.fit(wanted, passive)
         passive = found.passive
@@ -130,7 +137,9 @@ def weights_for(
         simulated = simulator(terms)
         residual = problem.bins.settled(problem.measured - simulated)
         before, added = added, simulated - design.output(simulator.operator)
-        if np.linalg.norm(problem.bins.settled(added - before)) < _SETTLED * np.linalg.norm(residual):
+        if np.linalg.norm(problem.bins.settled(added - before)) < LIMITS.passes_settled * np.linalg.norm(
+            residual
+        ):
             break
     assert simulator is not None
     squares = float(residual @ residual)
@@ -154,14 +163,14 @@ def _rows(problem: Problem, terms: Sequence[Term]) -> Design:
 
 def _difference(term: Term, j: int) -> float:
     quantity = term.cause.parameters[j]
-    return max(quantity.small, 0.02 * abs(term.values[j]))
+    return max(quantity.small, LIMITS.difference * abs(term.values[j]))
 
 
 def refit(
     problem: Problem,
     terms: Sequence[Term],
     near: Fitted | None,
-    rounds: int = _ROUNDS,
+    rounds: int = LIMITS.refit_rounds,
     *,
     rebuild: bool = False,
 ) -> Fitted:
@@ -180,18 +189,18 @@ def refit(
         scaled = free / size
         normal = scaled.T @ scaled
         better = None
-        for _ in range(4):
-            ridge = np.eye(normal.shape[0]) * (damping + 1e-9)
+        for _ in range(LIMITS.step_tries):
+            ridge = np.eye(normal.shape[0]) * (damping + LIMITS.ridge_steps)
             step = np.linalg.solve(normal + ridge, scaled.T @ fitted.residual) / size
             trial = weights_for(problem, _moved(fitted.terms, step), fitted)
             if trial.squares < fitted.squares:
                 better = trial
-                damping *= 0.3
+                damping *= LIMITS.damping_falls
                 break
-            damping = max(10.0 * damping, 0.1)
+            damping = max(LIMITS.damping_rises * damping, LIMITS.damping_least)
         if better is None:
             return fitted
-        done = fitted.squares - better.squares < _ENOUGH * better.squares
+        done = fitted.squares - better.squares < LIMITS.enough * better.squares
         fitted = better
         if done:
             break
@@ -207,7 +216,7 @@ def _moved(terms: Sequence[Term], step: FloatArray) -> tuple[Term, ...]:
             new = value + float(step[at])
             at += 1
             if quantity.low >= 0 and value > 0:
-                new = min(max(new, value / 3.0), value * 3.0)
+                new = min(max(new, value / LIMITS.step_factor), value * LIMITS.step_factor)
             values.append(min(max(new, quantity.low), quantity.high))
         moved.append(replace(term, values=tuple(values)))
     return tuple(moved)

@@ -12,13 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.fitting import Fitted, weights_for
-from pulsetrainer.diagnosis.problem import LEVELS, Problem
-
-COARSE_LEVELS = 22
-NOISE_SHARE = 0.3
-SPAN_SHARE = 0.0003  # a smaller effect than this is irrelevant on any device
+from pulsetrainer.diagnosis.problem import Problem
+from pulsetrainer.diagnosis.raw import Firing, coarse_step, noise_of
+from pulsetrainer.diagnosis.thresholds import LIMITS, TINY, UNIFORM
 
 
 @dataclass(frozen=True)
@@ -44,12 +41,12 @@ class Floor:
     @property
     def relevant(self) -> float:
         """Fall of the sum of squares below which an effect is irrelevant."""
-        size = max(NOISE_SHARE * self.white, self.discretisation, SPAN_SHARE * self.span)
+        size = max(LIMITS.relevant_noise * self.white, self.discretisation, LIMITS.relevant_span * self.span)
         return float(self.count * size**2)
 
     def reducible(self, baseline: Fitted) -> float:
         """What causes could lower the baseline's sum of squares by."""
-        return max(baseline.squares - self.squares, 1e-12 * baseline.squares, 1e-300)
+        return max(baseline.squares - self.squares, LIMITS.least_reducible * baseline.squares, TINY)
 
     def at(self, coarse: Problem, fitted: Fitted) -> Floor:
         """Return the floor with the discretisation error of a fit, by refitting it on a coarser plane.
@@ -60,14 +57,16 @@ class Floor:
         """
         refitted = weights_for(coarse, fitted.terms, None)
         fall = max(refitted.squares - fitted.squares, 0.0) / self.count
-        return replace(self, discretisation=float(np.sqrt(fall / ((LEVELS / COARSE_LEVELS) ** 2 - 1.0))))
+        return replace(
+            self, discretisation=float(np.sqrt(fall / ((LIMITS.levels / LIMITS.coarse_levels) ** 2 - 1.0)))
+        )
 
 
-def floor_of(records: Sequence[Record], firings: Sequence[gates.Firing], problem: Problem) -> Floor:
+def floor_of(records: Sequence[Record], firings: Sequence[Firing], problem: Problem) -> Floor:
     """Return the floor of some records from their raw noise and steps, discretisation left out."""
-    noise = float(np.sqrt(np.mean([gates.noise_of(r.output, r.sample_weight) ** 2 for r in records])))
-    coarse_step = max(gates.coarse_step(r.output) for r in records)
+    noise = float(np.sqrt(np.mean([noise_of(r.output, r.sample_weight) ** 2 for r in records])))
+    step = max(coarse_step(r.output) for r in records)
     jump = max((f.value for f in firings if f.cause == "stick-slip"), default=0.0)
-    held = (coarse_step**2 + jump**2) / 12.0  # does not average out
+    held = (step**2 + jump**2) / UNIFORM  # does not average out
     white = float(np.sqrt(noise**2 * np.mean(1.0 / problem.bins.sizes) + held))
     return Floor(problem.bins.count, float(np.ptp(problem.measured)), noise, white)

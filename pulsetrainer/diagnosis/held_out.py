@@ -18,10 +18,9 @@ from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.problem import Problem
+from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
-_BLOCKS = 20
-_JACKKNIFE = 10
-_KEPT = 0.01  # of the squared norm of a column
+_HALVES = 2
 
 
 class HeldOut:
@@ -38,9 +37,9 @@ class HeldOut:
         for known, value in self._errors:
             if known is fitted:
                 return value
-        halves = list(self._left_out(fitted, 2))
-        total = sum(float(error @ error) for error, _ in halves) if len(halves) == 2 else float("nan")
-        self._errors = [*self._errors[-5:], (fitted, total)]
+        halves = list(self._left_out(fitted, _HALVES))
+        total = sum(float(error @ error) for error, _ in halves) if len(halves) == _HALVES else float("nan")
+        self._errors = [*self._errors[-LIMITS.most_causes :], (fitted, total)]
         return total
 
     def gain(self, before: Fitted, after: Fitted, floor: Floor) -> float:
@@ -53,10 +52,10 @@ class HeldOut:
 
         Efron and Stein, Annals of Statistics 9, 1981. None where a tenth cannot be left out.
         """
-        changes = np.asarray([change for _, change in self._left_out(fitted, _JACKKNIFE)])
-        if changes.shape[0] < _JACKKNIFE:
+        changes = np.asarray([change for _, change in self._left_out(fitted, LIMITS.jackknife)])
+        if changes.shape[0] < LIMITS.jackknife:
             return None
-        return (1.0 - 1.0 / _JACKKNIFE) * np.sum((changes - changes.mean(axis=0)) ** 2, axis=0)
+        return (1.0 - 1.0 / LIMITS.jackknife) * np.sum((changes - changes.mean(axis=0)) ** 2, axis=0)
 
     def _left_out(self, fitted: Fitted, folds: int) -> Iterator[tuple[FloatArray, FloatArray]]:
         """For each fold its errors, and the changes (p,) of the parameters, when it is left out."""
@@ -65,7 +64,7 @@ class HeldOut:
         more = np.hstack((extra, design.bins.free))
         test = (self.block[:, None] % folds == np.arange(folds)).astype(np.float64)  # (count, folds)
         size = free.size + more.shape[1]
-        if np.any((self.count - test.sum(axis=0) < 2 * size) | (test.sum(axis=0) == 0)):
+        if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | (test.sum(axis=0) == 0)):
             return
         grams = self._block_grams(design)
         masses = (fitted.simulator.operator.weights * design.plane.areas)[free]
@@ -74,7 +73,7 @@ class HeldOut:
         smooth[: free.size, : free.size] = design.smooth[np.ix_(free, free)]
         pull[: free.size] = smooth[: free.size, : free.size] @ masses
         # without its first block a record says nothing of its start: what all of it said is kept
-        smooth[-design.bins.free.shape[1] :, -design.bins.free.shape[1] :] = _KEPT * np.eye(
+        smooth[-design.bins.free.shape[1] :, -design.bins.free.shape[1] :] = LIMITS.start_kept * np.eye(
             design.bins.free.shape[1]
         )
         share = 1.0 - 1.0 / folds
@@ -82,12 +81,12 @@ class HeldOut:
             train = 1.0 - test[:, fold]
             weighted = more * train[:, None]
             normal = share * smooth
-            kept = np.arange(_BLOCKS) % folds != fold
+            kept = np.arange(LIMITS.blocks) % folds != fold
             normal[: free.size, : free.size] += grams[kept].sum(axis=0)[np.ix_(free, free)]
             normal[free.size :, : free.size] += (weighted.T @ design.matrix)[:, free]
             normal[free.size :, free.size :] += weighted.T @ more
-            normal[np.diag_indices(size)] *= 1.0 + 1e-9
-            normal[np.diag_indices(size)] += 1e-300
+            normal[np.diag_indices(size)] *= 1.0 + LIMITS.ridge_held_out
+            normal[np.diag_indices(size)] += TINY
             left = fitted.residual * train
             rhs = np.concatenate(((left @ design.matrix)[free], left @ more)) - share * pull
             factor = linalg.cho_factor(normal, lower=True, check_finite=False)
@@ -100,8 +99,8 @@ class HeldOut:
     def _block_grams(self, design: Design) -> FloatArray:
         """D'D of every block (blocks, n_q, n_q): made once for each design."""
         if self._grams[0] is not design:
-            parts = np.empty((_BLOCKS, design.plane.n_q, design.plane.n_q))
-            for k in range(_BLOCKS):
+            parts = np.empty((LIMITS.blocks, design.plane.n_q, design.plane.n_q))
+            for k in range(LIMITS.blocks):
                 own = design.matrix[self.block == k]
                 parts[k] = own.T @ own
             self._grams = design, parts
@@ -113,7 +112,7 @@ def _blocks_of(problem: Problem) -> IntArray:
     plane, bins = problem.plane, problem.bins
     found = np.zeros(bins.count, dtype=np.int64)
     for record, number in zip(problem.records, bins.number, strict=True):
-        part = blocks(record.input, plane.low, plane.high, _BLOCKS)
+        part = blocks(record.input, plane.low, plane.high, LIMITS.blocks)
         inside = number >= 0
         found[number[inside]] = part[inside]
     return found

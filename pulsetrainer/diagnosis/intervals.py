@@ -12,16 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.answer import Estimate
 from pulsetrainer.diagnosis.extended import shown_output
+from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.screening import Screen
-
-_STUDENT = 2.26  # 95 % of Student's t with nine degrees of freedom, of ten jackknife blocks
-_ALIGNED = 0.2
-_MOMENT = 0.2  # sample steps
+from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
 
 def estimates_of(
@@ -31,7 +28,7 @@ def estimates_of(
     columns = fitted.projector(fitted.slopes)
     if columns.shape[1] == 0:
         return {}
-    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    size = np.maximum(np.linalg.norm(columns, axis=0), TINY)
     drawn = np.linalg.lstsq(columns / size, noise.draws, rcond=None)[0] / size[:, None]
     variance = np.var(drawn, axis=1)
     left_out = held_out.jackknife(fitted)
@@ -39,8 +36,8 @@ def estimates_of(
         variance = np.maximum(variance, left_out)
     others = np.stack([_late(fitted), *_otherwise(fitted)], axis=1)
     systematic = np.abs(np.linalg.lstsq(columns / size, others, rcond=None)[0]).sum(axis=1) / size
-    aligned = _ALIGNED * floor.discretisation * np.sqrt(floor.count) / size
-    half = _STUDENT * np.sqrt(variance) + aligned + systematic
+    aligned = LIMITS.aligned * floor.discretisation * np.sqrt(floor.count) / size
+    half = LIMITS.student * np.sqrt(variance) + aligned + systematic
     found: dict[str, tuple[Estimate, ...]] = {}
     at = 0
     for term in fitted.terms:
@@ -55,7 +52,7 @@ def estimates_of(
 
 def _late(fitted: Fitted) -> FloatArray:
     """What a slightly later sample of the output would change (count,), weights projected off."""
-    changes = [_MOMENT * np.gradient(y) for y in fitted.simulator.full(fitted.terms)]
+    changes = [LIMITS.moment * np.gradient(y) for y in fitted.simulator.full(fitted.terms)]
     return fitted.projector(fitted.design.bins.average(changes)[:, None])[:, 0]
 
 

@@ -13,12 +13,8 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.design import Bins, Followed, bins_of
 from pulsetrainer.diagnosis.extended import Term, seen_input
+from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
-
-LEVELS = 32  # of the plane on which causes are sought: finer ones take longer and decide the same
-SMOOTHING = 0.035  # share of the range
-_NEAR_END = 0.01  # of the range
-_KEPT = 6  # followed inputs: some ten megabytes each
 
 
 @dataclass(frozen=True)
@@ -40,13 +36,13 @@ class Problem:
                 Followed.along(self.plane, seen_input(terms, record.output, frame))
                 for record, frame in zip(self.records, self.frames, strict=True)
             ]
-            if len(self._followed) > _KEPT:
+            if len(self._followed) > LIMITS.followed_kept:
                 self._followed.popitem(last=False)
         self._followed.move_to_end(terms)
         return self._followed[terms]
 
 
-def problem_for(records: Sequence[Record], low: float, high: float, levels: int = LEVELS) -> Problem:
+def problem_for(records: Sequence[Record], low: float, high: float, levels: int = LIMITS.levels) -> Problem:
     """The records with masks applied, ready to be fitted.
 
     Raises
@@ -60,7 +56,7 @@ def problem_for(records: Sequence[Record], low: float, high: float, levels: int 
     if np.ptp(measured) == 0 or np.ptp(moved) == 0:
         what = "output" if np.ptp(measured) == 0 else "input"
         raise DataError(
-            f"the {what} does not vary, so nothing can be said about a cause",
+            f"the {what} does not vary, so it shows no cause",
             hint="record a signal that sweeps the range: pulsetrainer capture diagnostic -o run.h5",
         )
     span, reach = float(np.ptp(measured)), high - low
@@ -68,14 +64,14 @@ def problem_for(records: Sequence[Record], low: float, high: float, levels: int 
     frames = tuple(
         Frame(r.step, r.input, span, reach, k, len(records), low, ends) for k, r in enumerate(records)
     )
-    return Problem(tuple(records), frames, Plane.uniform(low, high, levels), bins, measured, SMOOTHING)
+    return Problem(tuple(records), frames, Plane.uniform(low, high, levels), bins, measured, LIMITS.smoothing)
 
 
 def _ends(records: Sequence[Record], low: float, high: float) -> tuple[float, float]:
     """Mean outputs near both ends of the input's range, or as near as the records come to them."""
     u = np.concatenate([r.input[r.sample_weight > 0] for r in records])
     y = np.concatenate([r.output[r.sample_weight > 0] for r in records])
-    near = _NEAR_END * (high - low)
+    near = LIMITS.near_end * (high - low)
     bottom = y[u <= max(low, float(u.min())) + near]
     top = y[u >= min(high, float(u.max())) - near]
     return float(bottom.mean()), float(top.mean())

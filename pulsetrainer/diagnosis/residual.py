@@ -9,9 +9,10 @@ from scipy import signal
 
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.diagnosis.problem import Problem
+from pulsetrainer.diagnosis.thresholds import LIMITS, THIRD
 
-_RATE_EDGES = np.asarray([0.0, 0.05, 0.3, 1.0, 3.0, 7.0, np.inf])  # ranges per second; below the first: rest
-_GROUPS = 10
+# What a record may lack
+RATES, HOLDS, LENGTH = "rates", "holds", "length"
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ def rates(problem: Problem) -> FloatArray:
     reach = problem.plane.high - problem.plane.low
     per_record = []
     for record in problem.records:
-        width = max(3, round(0.01 / record.step))
+        width = max(LIMITS.rate_samples, round(LIMITS.rate_s / record.step))
         even = np.convolve(np.pad(record.input, width, mode="edge"), np.ones(width) / width, "same")
         per_record.append(np.gradient(even[width:-width], record.step) / reach)
     return problem.bins.average(per_record)
@@ -41,19 +42,19 @@ def groups(problem: Problem) -> list[Group]:
     level = problem.bins.average([r.input for r in problem.records])
     reach = problem.plane.high - problem.plane.low
     speed = np.abs(rate)
-    by_rate = np.digitize(speed, _RATE_EDGES[1:-1]).astype(np.int64)
+    by_rate = np.digitize(speed, LIMITS.rate_edges).astype(np.int64)
     at_rate = np.asarray(
         [np.median(speed[by_rate == k]) if np.any(by_rate == k) else np.nan for k in range(by_rate.max() + 1)]
     )
     share = (level - problem.plane.low) / reach
-    by_level = np.clip((share * _GROUPS).astype(np.int64), 0, _GROUPS - 1)
-    at_level = problem.plane.low + (np.arange(_GROUPS) + 0.5) / _GROUPS * reach
+    by_level = np.clip((share * LIMITS.groups).astype(np.int64), 0, LIMITS.groups - 1)
+    at_level = problem.plane.low + (np.arange(LIMITS.groups) + 0.5) / LIMITS.groups * reach
     count = speed.size
-    by_time = np.arange(count) * _GROUPS // count
+    by_time = np.arange(count) * LIMITS.groups // count
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
     time = problem.bins.time_s + ends[problem.bins.record]
-    at_time = np.asarray([time[by_time == k].mean() for k in range(_GROUPS)])
-    direction = np.sign(np.where(speed < _RATE_EDGES[1], 0.0, rate)).astype(np.int64) + 1
+    at_time = np.asarray([time[by_time == k].mean() for k in range(LIMITS.groups)])
+    direction = np.sign(np.where(speed < LIMITS.rate_edges[0], 0.0, rate)).astype(np.int64) + 1
     return [
         Group("rate", "1/s", at_rate, by_rate),  # ranges of the input a second
         Group("level", "{u}", at_level, by_level),
@@ -74,8 +75,8 @@ def spectrum(problem: Problem, residual: FloatArray) -> tuple[FloatArray, FloatA
     one = residual[problem.bins.record == 0]
     time = problem.bins.time_s[problem.bins.record == 0]
     step = float(np.median(np.diff(time)))
-    frequency, density = signal.welch(one, 1.0 / step, nperseg=min(one.size, 4096))
-    edges = frequency[1] * 2.0 ** (np.arange(0.0, np.log2(frequency[-1] / frequency[1]) + 1 / 3, 1 / 3))
+    frequency, density = signal.welch(one, 1.0 / step, nperseg=min(one.size, LIMITS.welch))
+    edges = frequency[1] * 2.0 ** (np.arange(0.0, np.log2(frequency[-1] / frequency[1]) + THIRD, THIRD))
     band = np.digitize(frequency, edges)
     power = np.bincount(band, weights=density, minlength=edges.size + 1) * (frequency[1] - frequency[0])
     used = np.bincount(band, minlength=edges.size + 1)[1:-1] > 0
@@ -83,21 +84,25 @@ def spectrum(problem: Problem, residual: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def excitation_limits(problem: Problem) -> list[str]:
-    """What the records lack for causes to be told apart, in words; empty when nothing."""
+    """What the records lack for causes to be told apart: rates, holds, length; empty when nothing."""
     speed = np.abs(rates(problem))
-    moving = speed[speed > _RATE_EDGES[1]]
-    lacks = []
-    slow, fast = np.quantile(moving, [0.1, 0.9]) if moving.size > 20 else (1.0, 1.0)
-    if fast < 3.0 * slow:
-        lacks.append("one single rate")
-    rest, longest = speed <= _RATE_EDGES[1], 0.0
+    moving = speed[speed > LIMITS.rate_edges[0]]
+    lacks: list[str] = []
+    slow, fast = (
+        np.quantile(moving, [LIMITS.slow_quantile, LIMITS.fast_quantile])
+        if moving.size > LIMITS.least_moving
+        else (1.0, 1.0)
+    )
+    if fast < LIMITS.one_rate * slow:
+        lacks.append(RATES)
+    rest, longest = speed <= LIMITS.rate_edges[0], 0.0
     edges = np.flatnonzero(np.diff(np.concatenate(([0], rest.astype(np.int64), [0]))))
     if edges.size:
         inside = edges.reshape(-1, 2)
         duration = problem.bins.time_s[inside[:, 1] - 1] - problem.bins.time_s[inside[:, 0]]
         longest = float(duration.max())
-    if longest < 0.8:
-        lacks.append("no holds")
-    if problem.bins.time_s.max() < 20.0:
-        lacks.append("a short record")
+    if longest < LIMITS.hold_s:
+        lacks.append(HOLDS)
+    if problem.bins.time_s.max() < LIMITS.short_s:
+        lacks.append(LENGTH)
     return lacks

@@ -14,20 +14,18 @@ that enter nonlinearly are taken on the grid of start values instead of being re
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import linalg, signal
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes import RATE_FREE, library
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.problem import Problem
-
-DRAWS = 199
-_AR_ORDER = 10
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 @dataclass(frozen=True)
@@ -45,13 +43,10 @@ class Score:
 class Screen:
     """Scores of all causes, best first, and the noise they were judged against."""
 
-    scores: tuple[Score, ...]
-    null: FloatArray  # (draws,) largest score on noise alone, sorted
-    draws: FloatArray  # (count, draws) that noise, weights projected off
-
-    def critical(self, level: float) -> float:
-        """Score that noise alone exceeds with probability ``level``."""
-        return float(np.quantile(self.null, 1.0 - level))
+    scores: tuple[Score, ...] = ()
+    draws: FloatArray = field(
+        default_factory=lambda: np.empty((0, 0))
+    )  # (count, draws), weights projected off
 
 
 @dataclass(frozen=True)
@@ -77,7 +72,7 @@ class _Block:
         return np.asarray(gain)
 
 
-def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: int = DRAWS) -> Screen:
+def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: int = LIMITS.draws) -> Screen:
     """Score every cause that is not in the model yet."""
     project = fitted.projector
     residual = project(fitted.residual[:, None])[:, 0]
@@ -92,18 +87,25 @@ def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: in
         if block.cause.id not in best or gain > best[block.cause.id][0]:
             best[block.cause.id] = gain, block
         largest = np.maximum(largest, block.gains(noise))
-    null = np.sort(largest)
     scores = [
         Score(
             block.cause,
             gain,
             _start(block, residual),
-            (1.0 + float(np.sum(null >= gain))) / (draws + 1.0),
+            p_value(gain, largest),
             block.basis,
         )
         for gain, block in best.values()
     ]
-    return Screen(tuple(sorted(scores, key=lambda s: -s.gain)), null, noise)
+    return Screen(tuple(sorted(scores, key=lambda s: -s.gain)), noise)
+
+
+def p_value(observed: float, drawn: FloatArray) -> float:
+    """Probability of as much as ``observed`` by chance: (1 + k) / (1 + B) where k of B draws (B,) reach it.
+
+    Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 4.2.
+    """
+    return (1.0 + float(np.count_nonzero(drawn >= observed))) / (1.0 + drawn.size)
 
 
 def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Block]:
@@ -116,7 +118,7 @@ def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Blo
     tried: list[tuple[Cause, list[Values]]] = [
         (cause, values)
         for cause in library().values()
-        if cause.stage != "record" and cause.id not in fitted.names and (timed or cause.id in RATE_FREE)
+        if cause.stage != "record" and cause.id not in fitted.names and (timed or not cause.needs_time)
         for values in cause.starts(problem.frames, parts)
     ]
     if not tried:
@@ -133,7 +135,7 @@ def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Blo
     free = project(columns)
     free -= known @ (known.T @ free)
     size, whole_size = np.linalg.norm(free, axis=0), np.linalg.norm(columns, axis=0)
-    visible = np.isfinite(size) & (size > 1e-6 * whole_size)  # else the weights can do all of it
+    visible = np.isfinite(size) & (size > LIMITS.visible * whole_size)  # else the weights can do all of it
     found: list[_Block] = []
     end = 0
     for cause, values in tried:
@@ -148,13 +150,14 @@ def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Blo
 
 
 def _start(block: _Block, residual: FloatArray) -> Values:
-    """Parameter values scaled by the fitted strengths, within a factor of five of the grid's."""
+    """Parameter values scaled by the fitted strengths, within a factor of those tried."""
     strength = block.back @ (block.basis.T @ residual)
     values = list(block.values[0])
     for j in range(block.cause.strengths):
-        one = block.values[j][j] * float(strength[j])
+        tried = block.values[j][j]
+        one = tried * float(strength[j])
         if block.cause.parameters[j].low >= 0:
-            one = min(max(one, 0.2 * block.values[j][j]), 5.0 * block.values[j][j])
+            one = min(max(one, LIMITS.start_falls * tried), LIMITS.start_rises * tried)
         values[j] = min(max(one, block.cause.parameters[j].low), block.cause.parameters[j].high)
     return tuple(float(v) for v in values)
 
@@ -164,18 +167,18 @@ def _unexplained(residual: FloatArray, columns: FloatArray) -> FloatArray:
     if columns.shape[1] == 0:
         return residual
     left, size, _ = linalg.svd(columns, full_matrices=False, check_finite=False)
-    left = left[:, size > 1e-3 * size[0]]
+    left = left[:, size > LIMITS.rank * size[0]]
     return residual - left @ (left.T @ residual)
 
 
 def coloured(like: FloatArray, draws: int, rng: np.random.Generator) -> FloatArray:
     """Noise (count, draws) with the spectrum of ``like`` (count,): an autoregression (Yule-Walker)."""
-    lags = np.asarray([like[: like.size - k] @ like[k:] for k in range(_AR_ORDER + 1)]) / like.size
+    lags = np.asarray([like[: like.size - k] @ like[k:] for k in range(LIMITS.ar_order + 1)]) / like.size
     if lags[0] <= 0:
         return np.zeros((like.size, draws))
-    lags[0] *= 1.0 + 1e-9
+    lags[0] *= 1.0 + LIMITS.ar_ridge
     phi = linalg.solve_toeplitz(lags[:-1], lags[1:])
     power = max(float(lags[0] - phi @ lags[1:]), 0.0)
-    warm = 20 * _AR_ORDER
+    warm = LIMITS.ar_warm_up * LIMITS.ar_order
     white = rng.standard_normal((like.size + warm, draws)) * np.sqrt(power)
     return np.asarray(signal.lfilter([1.0], np.concatenate(([1.0], -phi)), white, axis=0)[warm:])

@@ -17,11 +17,11 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis import wording
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
-POOR = 0.05  # of the output's span: a fit better than this needs no such question
-BETTER = 0.75  # f(v) must leave less than this share of what the operator leaves
-_GROUPS = 40
-_WINDOW = 9  # samples of the local parabolas whose slope is the velocity
+_PARABOLA = 2  # degree
 
 
 class Comparison(NamedTuple):
@@ -34,7 +34,7 @@ class Comparison(NamedTuple):
     @property
     def wrong(self) -> bool:
         """True where the output follows the velocity, and the operator fits badly."""
-        return self.preisach > POOR * self.span and self.velocity < BETTER * self.preisach
+        return self.preisach > LIMITS.poor * self.span and self.velocity < LIMITS.better * self.preisach
 
 
 def compare(
@@ -58,7 +58,7 @@ def compare(
             for r, step, k in zip(records, dt_s, kept, strict=True)
         ]
     )
-    edges = np.unique(np.quantile(speed, np.linspace(0.0, 1.0, _GROUPS + 1)[1:-1]))
+    edges = np.unique(np.quantile(speed, np.linspace(0.0, 1.0, LIMITS.speed_groups + 1)[1:-1]))
     group = np.searchsorted(edges, speed, side="right")
     count = np.bincount(group)
     mean = np.bincount(group, weights=output) / np.maximum(count, 1)
@@ -68,20 +68,21 @@ def compare(
 
 def _velocity(u: FloatArray, dt_s: float | None) -> FloatArray:
     """Slope of local parabolas (n,), input unit per s; without time its sign."""
-    if u.size < _WINDOW:
+    if u.size < LIMITS.speed_window:
         return np.sign(np.gradient(u)) if dt_s is None else np.gradient(u, dt_s)
-    slope = scipy.signal.savgol_filter(u, _WINDOW, 2, deriv=1, delta=dt_s or 1.0)
+    slope = scipy.signal.savgol_filter(u, LIMITS.speed_window, _PARABOLA, deriv=1, delta=dt_s or 1.0)
     return np.sign(slope) if dt_s is None else np.asarray(slope)
+
+
+def evidence(found: Comparison) -> Evidence:
+    """Return the comparison as evidence against the kind of model."""
+    percent = PERCENT / found.span
+    figures = {"preisach": found.preisach * percent, "velocity": found.velocity * percent}
+    return Evidence("wrong kind", figures=figures)
 
 
 def warning(found: Comparison, input_quantity: str, output_quantity: str) -> str:
     """Return in words that the model is the wrong one, or nothing."""
     if not found.wrong:
         return ""
-    percent = 100.0 / found.span
-    return (
-        f"{output_quantity} follows the velocity of {input_quantity}, not {input_quantity} itself: a "
-        f"Preisach model in {input_quantity} is the wrong model here. It leaves "
-        f"{found.preisach * percent:.1f} % rms of the span, a mere function of the velocity leaves "
-        f"{found.velocity * percent:.1f} %; take the velocity as the input, or a damper model"
-    )
+    return wording.text(evidence(found), {"input": input_quantity, "output": output_quantity})

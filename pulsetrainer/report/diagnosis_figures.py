@@ -86,7 +86,7 @@ def ranking(found: Diagnosis) -> Figure:
     )
     for k, one in enumerate(shown):
         axes.annotate(
-            f"p = {one.p_value:.3f}",
+            "" if one.p_value is None else f"p = {one.p_value:.3f}",
             (max(one.explains_percent, 1e-3), k),
             xytext=(4, 0),
             textcoords="offset points",

@@ -34,8 +34,7 @@ def render_diagnosis(
         From the header of the artefact.
 
     """
-    named = [one for one in found.causes if one.found]
-    shown = [*named, *[one for one in found.causes if not one.found and one.explains_percent > 0]][:12]
+    shown = [*found.found, *[one for one in found.causes if not one.found and one.explains_percent > 0]][:12]
     return (
         environment()
         .get_template("diagnosis.html.j2")
@@ -46,7 +45,7 @@ def render_diagnosis(
             history=tuple(history),
             found=found,
             headline=headline(found),
-            named=[_words(one) for one in named],
+            named=[_words(one) for one in found.found],
             levels=[(words, number(getattr(found, name), name, ".3f")) for name, words in _levels(found)],
             rows=[_row(one) for one in shown],
             course=_course(found),
@@ -59,14 +58,14 @@ def render_diagnosis(
 def headline(found: Diagnosis) -> str:
     """Return the verdict as one sentence for a technician."""
     if found.verdict == "none":
-        return "Nothing is wrong with the model that these runs could show."
+        return "These runs show nothing wrong with the model."
     if found.verdict == "unknown":
-        return "Something is wrong that no cause of the library explains."
+        return "Something is wrong that no known cause explains."
     cause = next(one for one in found.causes if one.cause == found.verdict)
-    also = [one.text for one in found.causes if one.found and one.cause != found.verdict]
+    also = [one.text for one in found.found if one.cause != found.verdict]
     words = f"{cause.text[:1].upper()}{cause.text[1:]}"
-    tied = f" (not told from {', '.join(cause.confounded_with)})" if cause.confounded_with else ""
-    return f"{words}{tied}{'; besides, ' + '; '.join(also) if also else ''}."
+    tied = f" (could equally be {' or '.join(cause.confounded_with)})" if cause.confounded_with else ""
+    return f"{words}{tied}{'; in addition, ' + '; '.join(also) if also else ''}."
 
 
 def _words(one: Cause) -> dict[str, str]:
@@ -90,7 +89,7 @@ def _levels(found: Diagnosis) -> list[tuple[str, str]]:
         ("noise_percent", "noise of single samples"),
         ("static_percent", "weights refitted, short averages"),
         *([] if found.quick else [("extended_percent", "extended, short averages")]),
-        ("floor_percent", "when nothing is wrong, short averages"),
+        ("floor_percent", "if nothing were wrong, short averages"),
     ]
 
 
@@ -99,7 +98,7 @@ def _row(one: Cause) -> dict[str, str | Number]:
     return {
         "id": one.cause,
         "found": "yes" if one.found else "no",
-        "p": number(one.p_value, f"{one.cause}.p_value", ".3f"),
+        "p": Number("") if one.p_value is None else number(one.p_value, f"{one.cause}.p_value", ".3f"),
         "explains": number(one.explains_percent, f"{one.cause}.explains_percent"),
         "gain": number(one.held_out_gain_percent, f"{one.cause}.held_out_gain_percent", ".1f")
         if measured

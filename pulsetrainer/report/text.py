@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pulsetrainer.artefacts import Evaluation
+from pulsetrainer.artefacts import Diagnosis, Evaluation
 from pulsetrainer.artefacts.evaluation import PUBLISHED
 from pulsetrainer.report import tables
+from pulsetrainer.report.diagnosis_text import Facts, sections
 from pulsetrainer.report.facts import facts
 
 _TITLED = {
@@ -50,13 +51,21 @@ def of(artefact: Any) -> str:
     """Return an artefact as text: its main figures, a line each, or its tables."""
     if isinstance(artefact, Evaluation):
         return "\n".join(tables.drawn(t.title, t.columns, t.rows) for t in tables_of(artefact)).rstrip("\n")
+    if isinstance(artefact, Diagnosis):
+        return "\n".join(
+            _lines(part.title, part.rows)
+            if isinstance(part, Facts)
+            else tables.drawn(part.title, part.columns, part.rows)
+            for part in sections(artefact)
+        )
     known = {tables.label(name): value for name, value in facts(artefact).items() if value is not None}
-    width = max(map(len, known))
-    lines = [
-        f"{artefact.kind}",
-        *(f"  {name:<{width}}  {tables.text(value)}" for name, value in known.items()),
-    ]
-    return "\n".join(lines)
+    return _lines(artefact.kind, known)
+
+
+def _lines(title: str, rows: Mapping[str, Any]) -> str:
+    """Return names and values, one a line, below a title."""
+    width = max(map(len, rows), default=0)
+    return "\n".join([title, *(f"  {name:<{width}}  {tables.text(value)}" for name, value in rows.items())])
 
 
 def tables_of(evaluation: Evaluation, width: int = _WIDTH) -> Iterator[Table]:

@@ -2,89 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from pulsetrainer.artefacts import Diagnosis, Extension, Model
+from pulsetrainer.artefacts import Diagnosis, Model
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import atomic_write, provenance, store
-
-if TYPE_CHECKING:
-    from pulsetrainer.steps.context import Context
 
 
-@dataclass(frozen=True, slots=True)
-class Options:
-    """Which diagnosis, of which model."""
+def extend(model: Model, diagnosis: Diagnosis, *, names: Sequence[str] = ()) -> Model:
+    """Extend a model by the causes that a diagnosis of it found.
 
-    diagnosis: Path
-    model: Path
-    output: Path
-    force: bool = False
+    Its weights are those refitted together with the causes, on the runs that were diagnosed. What was added
+    is in ``extensions`` of the new model; what it gains on blocks that were not fitted is in
+    ``held_out_gain_percent`` of the diagnosis.
 
+    Parameters ---------- names Names of the model and of the diagnosis, for messages.
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """The extended model."""
+    Raises ------ DataError The diagnosis found nothing that extends a model, or is of another model.
 
-    output: Path
-    extensions: tuple[Extension, ...]
-    levels: int
-    static_percent: float
-    extended_percent: float
-
-
-def run(options: Options, context: Context) -> Result:
-    """Write the model with the extensions found and the weights refitted together with them.
-
-    Raises
-    ------
-    UsageError
-        The output exists.
-    DataError
-        The diagnosis found nothing that extends a model, or is of another model.
+    Examples -------- >>> import pulsetrainer as pt >>> model, found =
+    pt.load("tests/data/files-0.1/model.h5"), pt.load("tests/data/files-0.1/diagnosis.h5") >>> [one.cause for
+    one in pt.extend(model, found).extensions] ['field-lag']
     """
-    atomic_write.check_output(options.output, options.force)
-    diagnosis = store.read(options.diagnosis, Diagnosis)
-    model = store.read(options.model, Model)
+    model_name, diagnosis_name = names or ("the model", "the diagnosis")
     extended = diagnosis.extended
     if extended is None:
         why = (
-            "was quick, without a refit"
+            "only screened for causes and fitted none"
             if diagnosis.quick
-            else f"ended with the verdict {diagnosis.verdict!r}, and found no property of the device"
+            else f"ended with the verdict {diagnosis.verdict!r} and found no property of the device"
         )
         raise DataError(
-            f"{options.diagnosis} {why}: there is nothing to extend the model by",
-            hint="run `pulsetrainer diagnose RUN.h5 --model model.h5 -o diagnosis.h5` without --quick, "
-            "on a run of `pulsetrainer capture diagnostic`",
+            f"{diagnosis_name} {why}: there is nothing to extend the model by",
+            hint="diagnose without `quick`, on a run of `pulsetrainer capture diagnostic`",
         )
     same_range = np.allclose(extended.edges[[0, -1]], model.edges[[0, -1]])
     if not same_range or (extended.input_unit, extended.output_unit) != (model.input_unit, model.output_unit):
         raise DataError(
-            f"{options.diagnosis} is of a model over {extended.edges[0]:.4g} .. {extended.edges[-1]:.4g} "
-            f"{extended.input_unit}, but {options.model} spans {model.edges[0]:.4g} .. "
-            f"{model.edges[-1]:.4g} {model.input_unit}",
+            f"{diagnosis_name} is of a model over {extended.edges[0]:.4g} .. {extended.edges[-1]:.4g} "
+            f"{extended.input_unit}, but {model_name} spans {model.edges[0]:.4g} .. {model.edges[-1]:.4g} "
+            f"{model.input_unit}",
             hint="give the model that was diagnosed",
         )
-    context.progress(0.5)
-    header = provenance.make_header(
-        f"Model extended by {', '.join(e.cause for e in extended.extensions)}",
-        argv=context.argv,
-        now=context.now(),
-        inputs=provenance.digests([options.diagnosis, options.model]),
-        ancestors=[store.read_header(path) for path in (options.diagnosis, options.model)],
-        libraries=provenance.library_versions(),
-    )
-    store.write(options.output, extended, header, overwrite=options.force)
-    context.progress(1.0)
-    return Result(
-        options.output,
-        extended.extensions,
-        extended.edges.size - 1,
-        diagnosis.static_percent,
-        diagnosis.extended_percent,
-    )
+    return extended

@@ -11,12 +11,13 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import hidden
 import numpy as np
 
-from pulsetrainer.diagnosis.answer import Answer
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.held_out import HeldOut
-from pulsetrainer.diagnosis.selection import HELD_OUT_MIN, diagnose
+from pulsetrainer.diagnosis.procedure import diagnose
+from pulsetrainer.diagnosis.state import Question, State
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def judge(kind: str, seed: int, *, sized: bool = False) -> Verdict:
     case = hidden.draw(kind, seed)
     data = hidden.measure(case)
     begun = time.process_time()
-    answer = diagnose(data.records, 0.0, data.high, rng=np.random.default_rng(seed))
+    answer = diagnose(Question(data.records, 0.0, data.high, np.random.default_rng(seed)))
     seconds = time.process_time() - begun
     # the verdict is in: from here on the truth may be looked at
     found = {f.cause.id: f for f in answer.findings if f.found}
@@ -70,7 +71,6 @@ def judge(kind: str, seed: int, *, sized: bool = False) -> Verdict:
                 errors[f"{name}.{e.name}"] = abs(e.value - truth[e.name]) / abs(truth[e.name])
                 covered[f"{name}.{e.name}"] = bool(e.lower <= truth[e.name] <= e.upper)
     held = [f.held_out_gain_percent for f in found.values() if np.isfinite(f.held_out_gain_percent)]
-    count = answer.problem.bins.count
     return Verdict(
         kind,
         seed,
@@ -87,7 +87,7 @@ def judge(kind: str, seed: int, *, sized: bool = False) -> Verdict:
         covered,
         max(held, default=float("nan")),
         _oracle_share(case, answer),
-        float(np.sqrt(answer.final.squares / count) / max(answer.floor, 1e-12)),
+        answer.current.rms / max(answer.floor.rms, 1e-12),
         seconds,
     )
 
@@ -103,7 +103,7 @@ def _compare(case, named, found, tied):
     return found == set(case.causes), all(family(name) & found for name in case.causes)
 
 
-def _oracle_share(case, answer: Answer) -> float:
+def _oracle_share(case, answer: State) -> float:
     """Gain on held-out blocks over that of the true causes with the true parameters.
 
     NaN where the truth is no complete set of parameters (a phase, the moment of a step), or gains nothing.
@@ -114,11 +114,11 @@ def _oracle_share(case, answer: Answer) -> float:
         if cause.stage == "record" or any(q.name not in truth for q in cause.parameters):
             return float("nan")
         terms.append(Term(cause, tuple(truth[q.name] for q in cause.parameters)))
-    if not terms or answer.final is answer.baseline:
+    if not terms or answer.current is answer.baseline:
         return float("nan") if not terms else 0.0
     held_out = HeldOut(answer.problem)
     before = held_out.error(answer.baseline)
     best = before - held_out.error(weights_for(answer.problem, terms, None))
-    if best < HELD_OUT_MIN * before:  # the weights hold it: there is no gain to share
+    if best < LIMITS.held_out_least * before:  # the weights hold it: there is no gain to share
         return float("nan")
-    return (before - held_out.error(answer.final)) / best
+    return (before - held_out.error(answer.current)) / best

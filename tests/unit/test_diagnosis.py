@@ -12,13 +12,14 @@ from pulsetrainer.core import signals
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import experiment, gates, screening
+from pulsetrainer.diagnosis import experiment, gates, raw, screening
 from pulsetrainer.diagnosis.causes import cause_named, library
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass
 from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
-from pulsetrainer.diagnosis.selection import diagnose
+from pulsetrainer.diagnosis.procedure import diagnose
+from pulsetrainer.diagnosis.state import Question
 from pulsetrainer.errors import DataError
 
 DT = 1e-3
@@ -234,8 +235,8 @@ def test_the_noise_is_that_of_the_samples_with_weight():
     weight = np.ones(9000)
     weight[1000:7000] = 0.0
     y[1000:7000] = 1.0
-    assert gates.noise_of(y, weight) == pytest.approx(0.05, rel=0.06)
-    assert gates.noise_of(y) < 0.01
+    assert raw.noise_of(y, weight) == pytest.approx(0.05, rel=0.06)
+    assert raw.noise_of(y) < 0.01
 
 
 def _lagging(n_h: int = 24, rate_Hz: float = 200.0, **causes: tuple[float, ...]) -> Record:
@@ -274,7 +275,7 @@ def test_the_best_experiment_tells_lags_apart_better_than_one_rate_does():
     u = signals.identification(0.0, 1.5, n_h=12, speed=1.5, rate_Hz=200.0).value
     y = Extended.of(_operator(), [("output-lag", (0.02,))])(u, 0.005)
     y += 0.01 * np.random.default_rng(9).standard_normal(u.size)
-    answer = diagnose([Record(u, y, dt_s=0.005)], 0.0, 1.5, rng=np.random.default_rng(0))
+    answer = diagnose(Question([Record(u, y, dt_s=0.005)], 0.0, 1.5, np.random.default_rng(0)))
     best = experiment.best_experiment(answer, ("output-lag", "delay"))
     assert best.distance > 3.0 * best.distance_here
 
@@ -283,7 +284,7 @@ def test_a_step_is_found_where_it_is():
     """The moment within a sample or two, the size within a few per cent."""
     record = _lagging()
     y = record.output + 0.15 * (np.arange(record.input.size) * record.step > 17.3)
-    answer = diagnose([replace(record, output=y)], 0.0, 1.5, rng=np.random.default_rng(0))
+    answer = diagnose(Question([replace(record, output=y)], 0.0, 1.5, np.random.default_rng(0)))
     assert answer.verdict == "step"
     values = {e.name: e for e in answer.findings[0].parameters}
     assert values["time"].value == pytest.approx(17.3, abs=0.02)
@@ -294,7 +295,7 @@ def test_noise_is_measured_without_a_model():
     """Third differences see the noise on any smooth course."""
     rng = np.random.default_rng(2)
     y = 5 * np.sin(np.arange(20_000) / 300) + 0.04 * rng.standard_normal(20_000)
-    assert gates.noise_of(y) == pytest.approx(0.04, rel=0.03)
+    assert raw.noise_of(y) == pytest.approx(0.04, rel=0.03)
 
 
 def test_simulated_noise_has_the_spectrum_of_its_model():
@@ -318,4 +319,4 @@ def test_what_does_not_vary_is_refused(constant):
         dt_s=0.005,
     )
     with pytest.raises(DataError, match=f"the {constant} does not vary"):
-        diagnose([record], 0.0, 1.5, rng=np.random.default_rng(0))
+        diagnose(Question([record], 0.0, 1.5, np.random.default_rng(0)))

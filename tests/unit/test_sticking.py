@@ -9,15 +9,17 @@ from pulsetrainer.core import signals
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import gates, sticking
+from pulsetrainer.diagnosis import gates
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.fitting import weights_for
-from pulsetrainer.diagnosis.gates import Firing
 from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.raw import Firing
 
 DT = 1e-3
 FINE = signals.diagnostic(0.0, 1.5, rate_Hz=10 / DT).value[:600_000]  # a device jumps between samples too
 INPUT = FINE[::10]
 NOISE = 0.04
+STICKING = library()["stick-slip"]
 
 
 def _smooth() -> FloatArray:
@@ -41,7 +43,7 @@ def _sawtooth(y: FloatArray, seed: int = 1) -> tuple[Firing | None, Record]:
     noisy = y + NOISE * np.random.default_rng(seed).standard_normal(y.size)
     record = Record(INPUT, noisy, dt_s=DT)
     problem = problem_for([record], 0.0, 1.5)
-    return sticking.sawtooth(problem, weights_for(problem, (), None)), record
+    return STICKING.gate_left(weights_for(problem, (), None)), record
 
 
 @pytest.mark.parametrize("force", [0.2, 0.25, 0.4])

@@ -10,9 +10,6 @@ from functools import cache
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.errors import DataError
 
-# What can be told without a clock: it depends on the order of the samples and on the record, not on time.
-RATE_FREE = frozenset(["load-dependence", "accommodation", "step", "condition-change"])
-
 
 @cache
 def library() -> dict[str, Cause]:

@@ -9,6 +9,10 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED = 0.05  # amplitude
+_TRIED_PATHS = (7.0, 20.0, 60.0)  # ranges of the input: some loops, dozens, a whole record
+_STRETCH = 200.0  # decay lengths in one sum: exp stays a number
+
 
 class Accommodation(Cause):
     """A low-pass of the output along the path of the input."""
@@ -22,6 +26,7 @@ class Accommodation(Cause):
     stage = "output"
     order = 60
     family = "slow memory"
+    needs_time = False
     parameters = (
         Quantity("amplitude", "1", -0.5, 1.0, 0.002),
         Quantity("path", "{u}", 0.5, 1000.0, 0.5),
@@ -29,7 +34,7 @@ class Accommodation(Cause):
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.05, path * frames[0].reach)] for path in (7.0, 20.0, 60.0)]
+        return [[(_TRIED, path * frames[0].reach)] for path in _TRIED_PATHS]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
@@ -40,7 +45,7 @@ class Accommodation(Cause):
         last, begin = float(y[0]), 0
         while begin < y.size:
             origin = done[begin - 1] if begin else 0.0
-            end = max(int(np.searchsorted(done, origin + 200.0)), begin + 1)
+            end = max(int(np.searchsorted(done, origin + _STRETCH)), begin + 1)
             grown = np.exp(done[begin:end] - origin)
             slow[begin:end] = (last + np.cumsum(y[begin:end] * grown * -np.expm1(-share[begin:end]))) / grown
             last, begin = float(slow[end - 1]), end

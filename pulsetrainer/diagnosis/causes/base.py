@@ -1,21 +1,29 @@
-"""What a cause is: one file in this folder defines one class derived from ``Cause``.
+"""What a cause is: one file in this folder, with one class derived from ``Cause``; nothing else names it.
 
 The extended model is a chain: the measured input passes the causes of stage ``input`` in their order, then
 the Preisach operator, then the causes of stage ``output``. A cause of stage ``record`` is found on the raw
-data by ``gates`` and changes no model.
+data by its own ``gate`` and changes no model. The file holds all that is the cause's own: formula, start
+values, gate, thresholds, flags and words.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from scipy import signal
 
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.raw import Firing, Raw
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.fitting import Fitted
+
+_NO_LAG_S = 1e-9  # a shorter time constant is none
+_NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
 
 Stage = Literal["input", "output", "record"]
 Values = tuple[float, ...]
@@ -53,7 +61,7 @@ class Frame:
     @cached_property
     def path(self) -> FloatArray:
         """Length of the input's path at each sample (n,), wiggles of noise left out."""
-        turned = settled(self.input, 0.004 * self.reach)
+        turned = settled(self.input, _NO_PATH * self.reach)
         return np.append(0.0, np.cumsum(np.abs(np.diff(turned))))
 
 
@@ -71,10 +79,27 @@ class Cause:
     family: ClassVar[str]  # causes of one family are easily taken for one another
     parameters: ClassVar[tuple[Quantity, ...]] = ()
     strengths: ClassVar[int] = 1  # so many leading parameters enter almost linearly
-    lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model
+    texts: ClassVar[Mapping[str, str]] = {}  # what its gate says, by the kind of firing, figures in braces
+    # how it is sought
+    needs_time: ClassVar[bool] = True  # cannot be told where only the order of the samples is known
     in_rows: ClassVar[bool] = False  # an output cause too strong to be subtracted: linear, filters the rows
     feeds_back: ClassVar[bool] = False  # needs the output to compute the input
     by_contrast: ClassVar[bool] = False  # sought where the weights cannot hold it: see ``congruency``
+    wild: ClassVar[bool] = False  # its gate finds samples that the other gates must not see
+    blinded_by: ClassVar[tuple[str, ...]] = ()  # causes whose firing makes its gate blind
+    doubted: ClassVar[bool] = False  # others also set off its gate: it is asked again without what they add
+    # what it means
+    lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model
+    jagged: ClassVar[bool] = False  # leaves what no refit can take away: then what is left is its own
+    widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
+
+    def gate(self, raw: Raw) -> Firing | None:
+        """Return what the raw data of a record show of a cause of stage ``record``."""
+        return None
+
+    def gate_left(self, fitted: Fitted) -> Firing | None:
+        """Return what a fit with all other causes leaves of a cause of stage ``record``."""
+        return None
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try; the columns of a block are fitted together.
@@ -101,7 +126,7 @@ def low_pass(x: FloatArray, tau_s: float, dt_s: float) -> FloatArray:
 
     Exact: y+ = a y + (1 - a) u + (1 - (tau/dt)(1 - a)) (u+ - u) with a = exp(-dt/tau).
     """
-    if tau_s <= 1e-9:
+    if tau_s <= _NO_LAG_S:
         return x
     a = np.exp(-dt_s / tau_s)
     slope = 1.0 - tau_s / dt_s * (1.0 - a)

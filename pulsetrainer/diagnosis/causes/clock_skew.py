@@ -9,6 +9,8 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED = (1e-5, 1e-4)  # a good crystal's, a bad one's
+
 
 class ClockSkew(Cause):
     """A relative error of the output's clock."""
@@ -27,7 +29,7 @@ class ClockSkew(Cause):
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(1e-5,)], [(1e-4,)]]
+        return [[(one,)] for one in _TRIED]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -1,11 +1,30 @@
-"""gain or offset differs from record to record: y (1 + g) + b in all records but the first."""
+"""gain or offset differs from record to record: y (1 + g) + b in all records but the first.
+
+The records may also differ from the model as given. The search for causes refits the weights, so it finds
+nothing wrong with a record that a Preisach model of its own describes well. Where the model as given is far
+off and the refitted one is not, that is the finding: load, configuration or zero have changed. How, is told
+by the gain and the offset that carry the given prediction over, y = (1 + g) M(u) + b.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
+import numpy as np
+
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+
+_TRIED = 0.003  # of the span, and of the gain
+# Against the model as given
+_FAR = 0.01  # of the output's span: a model nearer than this is not in question
+_REFITTED = 0.2  # of what the given weights leave: refitted ones must leave less
+_ALL_BUT = 0.001  # of the squared error: beside such a change nothing that is left over matters
+_GAIN = 2.0 * _FAR  # about the middle of the output, this gain alone would put the model in question
+_BLOCKS = 10  # of the jackknife: neighbouring samples are not independent
 
 
 class ConditionChange(Cause):
@@ -20,17 +39,100 @@ class ConditionChange(Cause):
     stage = "output"
     order = 110
     family = "condition"
+    needs_time = False
     strengths = 2
     parameters = (
         Quantity("offset", "{y}", -1e6, 1e6, 1e-3),
         Quantity("gain", "1", -0.9, 0.9, 1e-4),
     )
     lasting = False
+    texts: ClassVar[Mapping[str, str]] = {
+        "shifted": (
+            "a Preisach model fitted to these recordings describes them, the given one does not: the device"
+            " is in another condition (load, configuration, zero). Its output is shifted by "
+            "{shift:.2g}{in_y} on average; gain and shape are unchanged ({gain:+.1f} %, {left:.2g}{in_y} "
+            "rms). Reset the zero before each use, or identify it again"
+        ),
+        "changed": (
+            "a Preisach model fitted to these recordings describes them, the given one does not: the device"
+            " is in another condition (load, configuration, zero). Its output is shifted by "
+            "{shift:.2g}{in_y} on average, has {times:.3f} times the gain of the model, and differs in "
+            "shape by {left:.2g}{in_y} rms. Identify it again in this condition"
+        ),
+    }
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.003 * frames[0].span, 0.0), (0.0, 0.003)]] if len(frames) > 1 else []
+        return [[(_TRIED * frames[0].span, 0.0), (0.0, _TRIED)]] if len(frames) > 1 else []
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
         return y if frame.record == 0 else y * (1.0 + values[1]) + values[0]
+
+
+@dataclass(frozen=True)
+class Change:
+    """Gain and offset of the records against the model, with their standard errors over blocks."""
+
+    gain: float
+    gain_error: float
+    offset: float  # output unit
+    offset_error: float
+    explains: float  # share of the given model's squared error that refitted weights take away
+    left: float  # rms of what gain and offset alone leave, output unit
+    shift: float  # mean of measured less predicted, output unit; the offset is that where the model is 0
+    span: float  # of the records, output unit
+
+    @property
+    def is_everything(self) -> bool:
+        """Whether it leaves so little that nothing else can be named before the device is identified anew."""
+        return self.explains > 1.0 - _ALL_BUT
+
+    @property
+    def kind(self) -> str:
+        """Which text says it: gain and shape within 1 % of the span are unchanged."""
+        return "shifted" if abs(self.gain) <= _GAIN and self.left <= _FAR * self.span else "changed"
+
+
+def left_by(measured: FloatArray, predicted: FloatArray, noise_rms: float) -> float:
+    """Rms error of a prediction (n,) without the white noise of single samples, output unit."""
+    return float(np.sqrt(max(float(np.mean((measured - predicted) ** 2)) - noise_rms**2, 0.0)))
+
+
+def against_model(
+    measured: FloatArray, predicted: FloatArray, refitted_rms: float, noise_rms: float
+) -> Change | None:
+    """Return how the condition changed, or None where it did not.
+
+    Parameters
+    ----------
+    measured, predicted
+        Output (n,) and what the model as given says.
+    refitted_rms
+        What the model leaves when its weights are fitted to these very records, output unit.
+    noise_rms
+        White noise of single samples, output unit: nobody's fault.
+    """
+    given = left_by(measured, predicted, noise_rms)
+    if given < _FAR * np.ptp(measured) or refitted_rms > _REFITTED * given:
+        return None
+    gain, offset = _fit(measured, predicted)
+    parts = np.array_split(np.arange(measured.size), _BLOCKS)
+    without = np.stack([_fit(np.delete(measured, p), np.delete(predicted, p)) for p in parts])
+    spread = np.sqrt(_BLOCKS - 1) * without.std(axis=0)
+    return Change(
+        float(gain - 1.0),
+        float(spread[0]),
+        float(offset),
+        float(spread[1]),
+        1.0 - (refitted_rms / given) ** 2,
+        root_mean_square(measured - gain * predicted - offset),
+        float(np.mean(measured - predicted)),
+        float(np.ptp(measured)),
+    )
+
+
+def _fit(measured: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Gain and offset (2,) that carry the prediction over to the measurement."""
+    columns = np.stack((predicted, np.ones(predicted.size)), axis=1)
+    return np.asarray(np.linalg.lstsq(columns, measured, rcond=None)[0], dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The output goes on creeping under a constant input: a bank of low-passes."""
+"""the output creeps on under a constant input: a bank of low-passes."""
 
 from __future__ import annotations
 
@@ -9,12 +9,18 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
 
+_TRIED = 0.03  # amplitude
+_TRIED_S = (0.1, 0.3, 1.0, 3.0)  # middle time constants, a factor of three apart
+_RATIOS = (0.25, 4.0)  # of the outer time constants to the middle one
+_EQUAL = 1.0 / 3.0  # share of each time constant
+_OTHER = 0.5  # share of the middle one that is as plausible
+
 
 class Creep(Cause):
     """Slow relaxation, as three low-passes on a logarithmic grid of time constants."""
 
     id = "creep"
-    title = "the output goes on creeping under a constant input"
+    title = "the output creeps on under a constant input"
     formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau"
     signature = "relaxation towards a new value during holds, over several decades of time"
     excitation = "holds of three time constants after reversals, on several levels"
@@ -29,20 +35,20 @@ class Creep(Cause):
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.03, tau)] for tau in (0.1, 0.3, 1.0, 3.0)]
+        return [[(_TRIED, tau)] for tau in _TRIED_S]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return _crept(y, values, frame, 1.0 / 3.0)
+        return _crept(y, values, frame, _EQUAL)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Half of the creep in the middle time constant: no record tells the shares of all three."""
-        return [_crept(y, values, frame, 0.5)]
+        return [_crept(y, values, frame, _OTHER)]
 
 
 def _crept(y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
     """Creep with a share ``middle`` of its amplitude in the middle time constant."""
     slow = middle * low_pass(y, values[1], frame.dt_s)
-    for ratio in (0.25, 4.0):
+    for ratio in _RATIOS:
         slow = slow + 0.5 * (1.0 - middle) * low_pass(y, values[1] * ratio, frame.dt_s)
     return np.asarray((y + values[0] * slow) / (1.0 + values[0]))

@@ -1,20 +1,43 @@
-"""the driver does not deliver the reference: found on the raw data."""
+"""the driver does not follow its reference: found on the raw data."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
 from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.raw import Firing, Raw
+
+_SHARE = 0.02  # of the input's range: a driver that errs less does its work
+_WORST = 0.99  # quantile of the error: what lasts less than a hundredth of the record is a turn
 
 
 class CurrentTracking(Cause):
-    """The driver does not deliver the reference; see ``gates``."""
+    """The driver does not follow its reference."""
 
     id = "current-tracking"
-    title = "the driver does not deliver the reference"
+    title = "the driver does not follow its reference"
     formula = "u - reference"
     signature = "input and reference differ by more than their noise"
     excitation = "a recorded reference"
     source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
     stage = "record"
-    order = 3
+    order = 4
     family = "current-tracking"
     lasting = False
+    texts: ClassVar[Mapping[str, str]] = {
+        "gate": "one sample in a hundred of the input is {worst:.3g} or more away from its reference"
+    }
+
+    def gate(self, raw: Raw) -> Firing | None:
+        """Input and reference apart by more than a share of the range."""
+        if raw.record.reference is None:
+            return None
+        error = np.abs(raw.record.input - raw.record.reference)
+        worst = float(np.quantile(error, _WORST))
+        if worst <= _SHARE * raw.reach:
+            return None
+        share = float(np.mean(error > _SHARE * raw.reach))
+        return Firing(self.id, "gate", share, worst, "{u}", {"worst": worst})

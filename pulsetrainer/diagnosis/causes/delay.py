@@ -1,4 +1,4 @@
-"""the output comes a fixed time late: P[u(t - d)].
+"""the output is late by a fixed time: P[u(t - d)].
 
 The operator does not know time, so P[u(t - d)] is its output shifted by d. Shifting the output is the better
 of the two: an input interpolated between samples loses the tips of its loops, which the memory keeps long.
@@ -13,12 +13,14 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED_S = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
+
 
 class Delay(Cause):
     """A pure transport delay."""
 
     id = "delay"
-    title = "the output comes a fixed time late"
+    title = "the output is late by a fixed time"
     formula = "P[u(t - d)]"
     signature = (
         "dead time after every stop or jump, then an exact copy; the phase falls in proportion to frequency"
@@ -28,11 +30,12 @@ class Delay(Cause):
     stage = "output"
     order = 45
     family = "lag"
+    widens = True
     parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005),)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.002,)], [(0.01,)], [(0.03,)]]
+        return [[(one,)] for one in _TRIED_S]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

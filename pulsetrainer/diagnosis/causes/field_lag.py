@@ -1,4 +1,4 @@
-"""the magnetic field follows the current late (eddy currents): P[v], tau v' + v = u."""
+"""the magnetic field lags behind the current (eddy currents): P[v], tau v' + v = u."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
 
+_TRIED_S = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
+
 
 class FieldLag(Cause):
     """A first-order lag before the hysteresis."""
 
     id = "field-lag"
-    title = "the magnetic field follows the current late (eddy currents)"
+    title = "the magnetic field lags behind the current (eddy currents)"
     formula = "P[v], tau v' + v = u"
     signature = "the tips of minor loops shrink as the rate rises; an exponential tail after a stop"
     excitation = "reversals at three rates or more, spanning ten to one, with stops"
@@ -20,11 +22,12 @@ class FieldLag(Cause):
     stage = "input"
     order = 20
     family = "lag"
+    widens = True
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005),)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.002,)], [(0.01,)], [(0.03,)]]
+        return [[(one,)] for one in _TRIED_S]
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Input (n,) that the hysteresis sees."""

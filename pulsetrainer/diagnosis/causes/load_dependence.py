@@ -1,4 +1,4 @@
-"""the effective input moves with the output: P[u + k y].
+"""the output feeds back into the input: P[u + k y].
 
 The static weights live on the range of the input; u + k y has a wider one. Any straight scale of the seen
 input is the weights' own, so it is brought back to the range of u: with y- and y+ the output at its ends,
@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED = 0.01  # of the range over the span
 _LEAST = 0.2  # of the range: a feedback that takes more of it away is none
 
 
@@ -20,7 +21,7 @@ class LoadDependence(Cause):
     """The moving Preisach model."""
 
     id = "load-dependence"
-    title = "the effective input moves with the output"
+    title = "the output feeds back into the input"
     formula = "P[u + k y]"
     signature = "equal minor loops at different bias are not congruent"
     excitation = "equal minor loops, entered from below and from above"
@@ -28,13 +29,14 @@ class LoadDependence(Cause):
     stage = "input"
     order = 40
     family = "load"
+    needs_time = False
     parameters = (Quantity("coefficient", "{u}/{y}", -0.1, 0.1, 2e-4),)
     feeds_back = True
     by_contrast = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.01 * frames[0].reach / frames[0].span,)]]
+        return [[(_TRIED * frames[0].reach / frames[0].span,)]]
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Input (n,) that the hysteresis sees."""

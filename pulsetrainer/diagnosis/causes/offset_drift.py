@@ -1,4 +1,4 @@
-"""the zero moves slowly with time: y + b t."""
+"""the zero drifts slowly with time: y + b t."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED = 0.01  # of the span over the record
+
 
 class OffsetDrift(Cause):
     """A zero that moves in proportion to time."""
 
     id = "offset-drift"
-    title = "the zero moves slowly with time"
+    title = "the zero drifts slowly with time"
     formula = "y + b t"
     signature = "equal states give different outputs, and the difference grows with time"
     excitation = "the same loop at the beginning, in the middle and at the end"
@@ -25,7 +27,7 @@ class OffsetDrift(Cause):
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.01 * frames[0].span / (frames[0].time_s[-1] + frames[0].dt_s),)]]
+        return [[(_TRIED * frames[0].span / (frames[0].time_s[-1] + frames[0].dt_s),)]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -1,20 +1,55 @@
-"""the input leaves the range that was identified: found on the raw data."""
+"""the input leaves the identified range: found on the raw data."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
 from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw
+
+_SLACK = 0.01  # of the range: a noisy input goes that far beyond its end
+_LEFT_OVER = 0.25  # of the samples with weight: a mask that leaves less takes too much
 
 
 class OutOfRange(Cause):
-    """The input leaves the range that was identified; see ``gates``."""
+    """The input leaves the identified range."""
 
     id = "out-of-range"
-    title = "the input leaves the range that was identified"
+    title = "the input leaves the identified range"
     formula = "u outside the levels"
     signature = "samples beyond the model's first or last level"
     excitation = "any"
     source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
     stage = "record"
-    order = 4
+    order = 5
     family = "out-of-range"
     lasting = False
+    texts: ClassVar[Mapping[str, str]] = {
+        "gate": "{count:.0f} samples of the input lie outside {low:.4g} .. {high:.4g}, by up to {beyond:.3g}"
+    }
+
+    def gate(self, raw: Raw) -> Firing | None:
+        """Input beyond the range; what it leaves in the memory lasts until the other end is reached."""
+        u, weight, slack = raw.record.input, raw.record.sample_weight, _SLACK * raw.reach
+        above, below = u > raw.high + slack, u < raw.low - slack
+        outside = above | below
+        if not outside.any():
+            return None
+        beyond = float(np.max(np.maximum(raw.low - u, u - raw.high)))
+        lasting = _lasting(above, u <= raw.low + slack) | _lasting(below, u >= raw.high - slack)
+        # an input that never comes to the other end leaves hardly any: then what is outside must do
+        mask = lasting if weight[~lasting].sum() > _LEFT_OVER * weight.sum() else outside
+        count = float(np.count_nonzero(outside))
+        figures = {"count": count, "low": raw.low, "high": raw.high, "beyond": beyond}
+        return Firing(self.id, "gate", float(outside.mean()), beyond, "{u}", figures, mask)
+
+
+def _lasting(begins: BoolArray, ends: BoolArray) -> BoolArray:
+    """From every sample that ``begins`` to the next that ``ends``, which is not in it."""
+    number = np.arange(begins.size)
+    last_begin = np.maximum.accumulate(np.where(begins, number, -1))
+    last_end = np.maximum.accumulate(np.where(ends, number, -1))
+    return np.asarray(last_begin > last_end)

@@ -1,20 +1,67 @@
-"""single samples are wrong: found on the raw data."""
+"""isolated samples are wrong: found on the raw data."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from scipy import ndimage
+
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
+
+_SIGMAS = 8.0  # of Gaussian noise one sample in 10^15 is farther out
+_DIFFERENCE = 2.0**0.5  # a sample less a neighbour has that much more noise
+_AROUND = 7  # samples of the median
+_FAST = 0.95  # quantile of the steps from sample to sample: the fast branches
+_TIP = 4.0  # of those steps: a tip at full speed stands out from its median by up to three
+_STEPS = 2.0  # converter steps: nearer is its rounding
+_LINE = 5  # samples on one side of a suspect that may explain it
+_LEAST = 3  # wild samples: fewer are no fault of a device
 
 
 class Outliers(Cause):
-    """Single samples are wrong; see ``gates``."""
+    """Isolated samples are wrong."""
 
     id = "outliers"
-    title = "single samples are wrong"
+    title = "isolated samples are wrong"
     formula = "y + wild error"
     signature = "isolated samples far from both neighbours"
     excitation = "any"
     source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
     stage = "record"
-    order = 2
+    order = 1
     family = "outliers"
     lasting = False
+    wild = True
+    texts: ClassVar[Mapping[str, str]] = {
+        "gate": "{count:.0f} isolated samples differ from those around them by more than {limit:.3g}"
+    }
+
+    def gate(self, raw: Raw) -> Firing | None:
+        """Samples far from the median around them, farther than fast turns go."""
+        y = raw.record.output
+        apart = np.abs(y - ndimage.median_filter(y, _AROUND, mode="nearest"))
+        usual = _TIP * float(np.quantile(np.abs(np.diff(y)), _FAST))
+        limit = max(_SIGMAS * _DIFFERENCE * noise_of(y), usual, _STEPS * spacing_of(y))
+        wild = apart > limit
+        for at in np.flatnonzero(wild):  # where a stroke ends with a jump, its last sample still lies on it
+            wild[at] = min(_off_line(y, int(at), -1), _off_line(y, int(at), 1)) > limit
+        count = np.count_nonzero(wild)
+        if count < _LEAST:
+            return None
+        figures = {"count": float(count), "limit": float(limit)}
+        return Firing(self.id, "gate", float(wild.mean()), float(apart[wild].max()), "{y}", figures, wild)
+
+
+def _off_line(y: FloatArray, at: int, side: int) -> float:
+    """Distance of a sample from the line through those on one side of it, robust against a wild one there."""
+    near = y[max(at - _LINE, 0) : at][::-1] if side < 0 else y[at + 1 : at + 1 + _LINE]
+    if near.size < _LINE:
+        return float("inf")
+    steps = np.arange(1, _LINE + 1)
+    first, second = np.triu_indices(_LINE, 1)
+    slope = np.median((near[second] - near[first]) / (steps[second] - steps[first]))  # Theil and Sen
+    return float(abs(y[at] - np.median(near - slope * steps)))

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
 
+_TRIED_S = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
+
 
 class OutputLag(Cause):
     """A first-order lag after the hysteresis."""
@@ -22,11 +24,12 @@ class OutputLag(Cause):
     stage = "output"
     order = 100
     family = "lag"
+    widens = True
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005),)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.002,)], [(0.01,)], [(0.03,)]]
+        return [[(one,)] for one in _TRIED_S]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

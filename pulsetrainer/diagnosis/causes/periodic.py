@@ -9,6 +9,14 @@ from scipy import ndimage
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.thresholds import TINY
+
+_SLOWEST_Hz = 0.4  # slower lines are drift
+_LINES = 61  # lines of the spectrum whose median is what surrounds a line
+_FLOOR = 1e-12  # of the highest line: keeps the ratio finite where the spectrum is empty
+_LEAST = 0.02  # of the highest line: lower ones are noise, however far above their surroundings
+_FINER = 41  # frequencies tried between the two neighbours of a line
+_TRIED = 0.003  # of the span
 
 
 class Periodic(Cause):
@@ -37,12 +45,12 @@ class Periodic(Cause):
         power = np.abs(np.fft.rfft(one * np.hanning(one.size))) ** 2
         dt_s = frame.dt_s * round(frame.input.size / one.size)
         frequency = np.fft.rfftfreq(one.size, dt_s)
-        power[frequency < 0.4] = 0.0
+        power[frequency < _SLOWEST_Hz] = 0.0
         # against its surroundings: a line, not the slope of a spectrum
-        around = ndimage.median_filter(power, size=61) + 1e-12 * power.max(initial=0.0) + 1e-300
-        k = int(np.argmax(power / around * (power > 0.02 * power.max(initial=0.0))))
+        around = ndimage.median_filter(power, size=_LINES) + _FLOOR * power.max(initial=0.0) + TINY
+        k = int(np.argmax(power / around * (power > _LEAST * power.max(initial=0.0))))
         best = _refined(one, float(frequency[k]), float(frequency[1]), dt_s)
-        size = 0.003 * frame.span
+        size = _TRIED * frame.span
         return [[(size, 0.0, best), (0.0, size, best)]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
@@ -53,7 +61,7 @@ class Periodic(Cause):
 
 def _refined(residual: FloatArray, frequency: float, width: float, dt_s: float) -> float:
     """Frequency of the largest line within a ``width`` of ``frequency``: a spectrum's bins are too coarse."""
-    near = frequency + width * np.linspace(-1.0, 1.0, 41)
+    near = frequency + width * np.linspace(-1.0, 1.0, _FINER)
     turn = -2j * np.pi * dt_s * (np.arange(residual.size) + 0.5)
     power = [abs(np.sum(residual * np.exp(turn * one))) for one in near.tolist()]
     return float(near[int(np.argmax(power))])

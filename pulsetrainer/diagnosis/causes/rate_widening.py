@@ -9,6 +9,8 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED = (0.005, 0.015)  # of the root of the range
+_NONE = 1e-9  # a smaller coefficient widens nothing
 _PARTS = 4  # of a sample: after a turn the excess moves fast
 
 
@@ -24,16 +26,17 @@ class RateWidening(Cause):
     stage = "input"
     order = 30
     family = "lag"
+    widens = True
     parameters = (Quantity("coefficient", "({u} s)^0.5", 0.0, 0.2, 5e-4),)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.005 * frames[0].reach ** 0.5,)], [(0.015 * frames[0].reach ** 0.5,)]]
+        return [[(one * frames[0].reach ** 0.5,)] for one in _TRIED]
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Input (n,) that the hysteresis sees."""
         k = values[0]
-        if k <= 1e-9:
+        if k <= _NONE:
             return u
         # v' = sgn(e) (e/k)^2 with e = u - v: exact over a part of a sample with u held at its middle value
         per_step = frame.dt_s / _PARTS / k**2

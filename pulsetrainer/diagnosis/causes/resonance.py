@@ -1,4 +1,4 @@
-"""the mechanics ring after a jump: y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f."""
+"""the mechanics ring after a sudden change: y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f."""
 
 from __future__ import annotations
 
@@ -10,12 +10,16 @@ from scipy import signal
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED_Hz = (3.0, 80.0, 20)  # from, to, how many
+_TRIED_DAMPING = (0.07, 0.25)  # rings long, rings short
+_FASTEST = 0.2  # of the sample rate: faster ringing is not sampled
+
 
 class Resonance(Cause):
     """A second-order oscillator driven by the output."""
 
     id = "resonance"
-    title = "the mechanics ring after a jump"
+    title = "the mechanics ring after a sudden change"
     formula = "y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f"
     signature = "a decaying oscillation of one frequency after every stop, whatever the rate before it"
     excitation = "fast stops"
@@ -32,9 +36,9 @@ class Resonance(Cause):
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        fastest = 0.2 / frames[0].dt_s
-        grid = np.geomspace(3.0, 80.0, 20).tolist()
-        return [[(f, zeta)] for f in grid if f < fastest for zeta in (0.07, 0.25)]
+        fastest = _FASTEST / frames[0].dt_s
+        grid = np.geomspace(*_TRIED_Hz).tolist()
+        return [[(f, zeta)] for f in grid if f < fastest for zeta in _TRIED_DAMPING]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -9,6 +9,12 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED = 0.003  # of the span, and of the gain
+_WINDOWS = (0.02, 0.98, 13)  # of the record, from, to, edges: each window overlaps half of the next
+_SHARED = 20.0  # samples over which the change is shared out, so that the error falls smoothly with the time
+_EDGE = 20  # of a window: splits within one such part of its ends are left out
+_LEAST = 4  # such parts: a shorter window is split at its begin
+
 
 class Step(Cause):
     """A sudden change of offset and gain."""
@@ -22,6 +28,7 @@ class Step(Cause):
     stage = "output"
     order = 120
     family = "drift"
+    needs_time = False
     strengths = 2
     parameters = (
         Quantity("offset", "{y}", -1e6, 1e6, 1e-3),
@@ -34,17 +41,16 @@ class Step(Cause):
         """Blocks of parameter values to try."""
         frame, one = frames[0], residual[0]
         dt_s = frame.dt_s * round(frame.input.size / one.size)
-        size = 0.003 * frame.span
-        edges = np.linspace(0.02, 0.98, 13) * one.size
+        size = _TRIED * frame.span
+        edges = np.linspace(*_WINDOWS) * one.size
         times = [
             _split(one, int(begin), int(end)) * dt_s for begin, end in zip(edges[:-2], edges[2:], strict=True)
         ]
-        return [[(size, 0.0, t), (0.0, 0.003, t)] for t in dict.fromkeys(times)]
+        return [[(size, 0.0, t), (0.0, _TRIED, t)] for t in dict.fromkeys(times)]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        # between samples the change is shared out, so that the error falls smoothly with the time
-        after = np.clip((frame.time_s - values[2]) / (20.0 * frame.dt_s) + 0.5, 0.0, 1.0)
+        after = np.clip((frame.time_s - values[2]) / (_SHARED * frame.dt_s) + 0.5, 0.0, 1.0)
         return y + after * (values[0] + values[1] * y)
 
 
@@ -53,5 +59,7 @@ def _split(residual: FloatArray, begin: int, end: int) -> int:
     window = residual[begin:end]
     count = np.arange(1, window.size)
     apart = np.cumsum(window - window.mean())[:-1] ** 2 / (count * (window.size - count))
-    edge = window.size // 20 + 1
-    return begin + edge + 1 + int(np.argmax(apart[edge:-edge])) if window.size > 4 * edge else begin + edge
+    edge = window.size // _EDGE + 1
+    return (
+        begin + edge + 1 + int(np.argmax(apart[edge:-edge])) if window.size > _LEAST * edge else begin + edge
+    )

@@ -1,24 +1,166 @@
-"""The output sticks, then jumps: found on the raw data.
+"""the output sticks, then jumps: found on the raw data, or in what a fit leaves.
 
 Where the output is stuck follows from the exact moment of the last jump, so that no model of the jumps can
-be fitted sample by sample; what repeats is their size.
+be fitted sample by sample; what repeats is their size F. Large jumps are seen one by one. Small ones are
+not, but while the output sticks, the residual falls as fast as the model's output M rises, and at the end it
+jumps by F. So over M the residual of a stroke is periodic with period F and has the fundamental F/pi of a
+sawtooth, whatever the rate. Its phase is another one in every stroke: the powers are added,
+
+    P(F) = sum over strokes |sum r exp(-2 pi i M / F)|^2 / n,
+
+which of white noise is sigma^2 times a gamma variable of as many degrees as there are strokes (Scargle,
+Astrophysical Journal 263, 1982). Errors of the levels are periodic too, but far smaller than their period.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from scipy import ndimage
+
+from pulsetrainer.core import input_noise
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.raw import Firing, Raw, coarse_step, noise_of
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.fitting import Fitted
+
+# Jumps one by one
+_WIDE_S = 0.006  # of the two means whose difference is a jump
+_WIDE_LEAST = 3  # samples of each
+_SHORTEST = 20  # times that width: a shorter record shows no jumps
+_RATE = 5  # times that width, over which the rate of the input is averaged
+_APART = 6  # times that width, before and after: where the rate changes, other causes make jumps too
+_RATES = (0.1, 3.0)  # ranges a second: slow motion, where sticking shows
+_EVEN = 0.2  # of the rate: a larger change of it is a turn
+_SIGMAS = 7.0  # of the difference of two means
+_AROUND = 15  # such differences in the median: a smooth branch has equal ones, a stuck one none between jumps
+_SHARPER = 4.0  # times that median
+_JUMPS = 15  # fewer are chance
+# Sawtooth of what is left
+_PERIODS = (0.008, 0.08)  # sought, shares of the span: smaller is quantisation, larger is seen one by one
+_FINENESS = 0.004  # from one period to the next, relative
+_TURN = 0.02  # of the range: smaller turns of the input are noise
+_STROKE_PERIODS = 3.0  # a stroke must hold
+_SAMPLES = 4.0  # a period must hold
+_STROKE = 5.0  # periods of so many samples: shorter strokes are left out
+_STROKES = 5  # fewer show no period
+_SURE = 8.0  # standard deviations of noise
+_LIKE = (0.2, 1.4)  # fundamental over F/pi: where the model errs by some of F the phase is blurred
+_SHARP = 4.0  # times what periods beside it show: errors of other kinds have no sharp period (decision 044)
+_BESIDE = ((0.8, 0.93), (1.07, 1.25))  # times the period
+_BOTH = 4.0  # squared: an amplitude is twice what one of the two frequencies shows
+
+Strokes = list[tuple[FloatArray, FloatArray]]  # model's output and residual, each (n,)
 
 
 class StickSlip(Cause):
-    """Flat runs and jumps of one size; see ``gates``."""
+    """Flat runs and jumps of one size."""
 
     id = "stick-slip"
     title = "the output sticks, then jumps"
     formula = "y is held until |P[u] - y| > F, then jumps"
-    signature = "flat runs and then jumps of about equal size while the input moves slowly"
+    signature = "flat stretches and then jumps of about equal size while the input moves slowly"
     excitation = "slow ramps"
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30, 1994"
     stage = "record"
-    order = 5
+    order = 3
     family = "stick-slip"
     lasting = False
+    jagged = True
+    blinded_by = ("saturation",)
+    doubted = True
+    texts: ClassVar[Mapping[str, str]] = {
+        "gate": "{count:.0f} jumps of about {size:.3g} between flat stretches in slow motion",
+        "left": "the output moves in jumps of about {size:.3g}, whatever the rate",
+    }
+
+    def gate(self, raw: Raw) -> Firing | None:
+        """Jumps that last, while the input moves slowly: far more than noise or a smooth branch makes."""
+        record = raw.calm
+        wide = max(_WIDE_LEAST, round(_WIDE_S / record.step))
+        if record.output.size < _SHORTEST * wide or coarse_step(record.output) > 0:
+            return None
+        size = _jumps(record.output, wide)
+        around = ndimage.median_filter(size[::wide], _AROUND, mode="nearest").repeat(wide)[: size.size]
+        least = _SIGMAS * np.sqrt(2.0 / wide) * noise_of(record.output)
+        peak = (size == ndimage.maximum_filter1d(size, 2 * wide + 1)) & (size > least)
+        found = _slow(record.input, record.step, wide, raw.reach) & peak & (size > _SHARPER * around)
+        count = np.count_nonzero(found)
+        if count < _JUMPS:
+            return None
+        typical = float(np.median(size[found]))
+        figures = {"count": float(count), "size": typical}
+        return Firing(self.id, "gate", float(found.mean()), typical, "{y}", figures)
+
+    def gate_left(self, fitted: Fitted) -> Firing | None:
+        """Return the size of the jumps if what a model leaves is a sawtooth of its own output."""
+        problem = fitted.problem
+        noise = [noise_of(record.output, record.sample_weight) for record in problem.records]
+        white = float(np.mean(np.square(noise)))
+        strokes = _strokes(fitted)
+        if not strokes or white <= 0.0:
+            return None
+        count = round(np.log(_PERIODS[1] / _PERIODS[0]) / _FINENESS)
+        period = np.geomspace(*_PERIODS, count) * float(np.ptp(problem.measured))
+        sure, amplitude = np.asarray([_line(strokes, one, white) for one in period]).T
+        best = int(np.argmax(sure))
+        ratio = period / period[best]
+        beside = np.any([(low < ratio) & (ratio < high) for low, high in _BESIDE], axis=0)
+        sharp = sure[best] > max(_SURE, _SHARP * float(np.median(sure[beside])) if beside.any() else 0.0)
+        if not sharp or not _LIKE[0] < amplitude[best] * np.pi / period[best] < _LIKE[1]:
+            return None
+        size = float(period[best])
+        return Firing(self.id, "left", 1.0, size, "{y}", {"size": size})
+
+
+def _jumps(y: FloatArray, wide: int) -> FloatArray:
+    """Difference (n,) of the means of ``wide`` samples from each sample on and before it."""
+    total = np.concatenate(([0.0], np.cumsum(y)))
+    at = np.arange(wide, y.size - wide)  # the first sample after a jump
+    jump = np.zeros(y.size)
+    jump[at] = (total[at + wide] - 2.0 * total[at] + total[at - wide]) / wide
+    return np.abs(jump)
+
+
+def _slow(u: FloatArray, dt_s: float, wide: int, reach: float) -> FloatArray:
+    """Whether the input moves slowly and evenly at each sample (n,)."""
+    rate = ndimage.uniform_filter1d(np.gradient(u, dt_s), _RATE * wide) / reach
+    moved = np.abs(rate)
+    change = np.abs(np.roll(rate, -_APART * wide) - np.roll(rate, _APART * wide))
+    return np.asarray((moved > _RATES[0]) & (moved < _RATES[1]) & (change < _EVEN * moved))
+
+
+def _strokes(fitted: Fitted) -> Strokes:
+    """Every stroke of the input without a masked sample in it."""
+    problem = fitted.problem
+    reach = problem.plane.high - problem.plane.low
+    found = []
+    for record, said in zip(problem.records, fitted.simulator.full(fitted.terms), strict=True):
+        left = record.output - said
+        turns = input_noise.real_turns(record.input, _TURN * reach)
+        for begin, end in pairwise(turns.tolist()):
+            if end - begin > _STROKE * _SAMPLES and np.all(record.sample_weight[begin:end] > 0):
+                found.append((said[begin:end], left[begin:end] - left[begin:end].mean()))
+    return found
+
+
+def _line(strokes: Strokes, period: float, white: float) -> tuple[float, float]:
+    """How far the power at one period is above noise, in its standard deviations, and the amplitude."""
+    power, squares, total, used = 0.0, 0.0, 0, 0
+    for said, left in strokes:
+        moved = abs(float(said[-1] - said[0]))
+        if moved < _STROKE_PERIODS * period or moved * _SAMPLES > period * said.size:
+            continue
+        along = abs(complex(left @ np.exp(-2j * np.pi / period * said))) ** 2
+        power += along / said.size
+        squares += _BOTH * along
+        total += said.size**2
+        used += 1
+    if used < _STROKES:
+        return 0.0, 0.0
+    return (power / white - used) / float(np.sqrt(used)), float(np.sqrt(squares / total))

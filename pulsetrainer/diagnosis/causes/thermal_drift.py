@@ -9,6 +9,8 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
 
+_TRIED = 0.01  # coefficient
+_TRIED_S = (5.0, 15.0, 40.0)  # a wire's, a coil's, an iron core's
 _NOT_COLD = 0.05  # of the heat that the largest input would lead to
 
 
@@ -34,7 +36,7 @@ class ThermalDrift(Cause):
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(0.01, tau)] for tau in (5.0, 15.0, 40.0)]
+        return [[(_TRIED, tau)] for tau in _TRIED_S]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -9,6 +9,9 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
+_TRIED = 0.01  # of the span at the usual speed
+_NO_SPEED = 1e-12  # input units a second: an input at rest
+
 
 class Viscous(Cause):
     """A term proportional to the rate of the input."""
@@ -22,12 +25,13 @@ class Viscous(Cause):
     stage = "output"
     order = 90
     family = "viscous"
+    widens = True
     parameters = (Quantity("coefficient", "{y} s/{u}", -1e6, 1e6, 1e-4),)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
         speed = max(float(np.std(np.gradient(f.input, f.dt_s))) for f in frames)
-        return [[(0.01 * frames[0].span / max(speed, 1e-12),)]]
+        return [[(_TRIED * frames[0].span / max(speed, _NO_SPEED),)]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -1,0 +1,170 @@
+"""From what a diagnosis knows at its end to the noun, with the model extended by what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.artefacts import Cause, Diagnosis, Extension, Model, Parameter, Profile
+from pulsetrainer.core.identification import coverage
+from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.diagnosis import residual, wording
+from pulsetrainer.diagnosis.extended import seen_input
+from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.fitting import weights_for
+from pulsetrainer.diagnosis.prediction import predict
+from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.state import Given, State
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
+
+Words = dict[str, str]  # units by "u" and "y", and what a text needs
+
+
+def diagnosis_of(state: State) -> Diagnosis:
+    """Return the diagnosis of a model, as the noun that it is."""
+    given = state.question.given
+    assert given is not None
+    problem, model = state.problem, given.model
+    percent = PERCENT / float(np.ptp(problem.measured))
+    rms, extended = _rms_given(state, model), state.current if state.extends else state.baseline
+    thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
+    ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
+    sign, words = model.polarity, _words(given)
+    return Diagnosis(
+        verdict=state.verdict,
+        quick=state.question.quick,
+        rms=rms,
+        rms_percent=rms * percent,
+        noise_percent=state.floor.noise * percent,
+        static_percent=state.baseline.rms * percent,
+        extended_percent=extended.rms * percent,
+        floor_percent=state.floor.rms * percent,
+        causes=tuple(_cause(finding, words) for finding in state.findings),
+        evidence=tuple(wording.sentence(one, words) for one in state.evidence),
+        next_experiment=wording.advice(state.advice),
+        profiles=_profiles(state, words),
+        time_s=(problem.bins.time_s + ends[problem.bins.record])[thin],
+        input=problem.bins.average([r.input for r in problem.records])[thin],
+        output=sign * problem.measured[thin],
+        before=sign * (problem.measured - state.baseline.residual)[thin],
+        after=sign * (problem.measured - state.current.residual)[thin],
+        extended=extended_model(state, model),
+        input_unit=model.input_unit,
+        output_unit=model.output_unit,
+        held_out_gain_percent=_held_out_gain(state),
+        notes=state.question.notes,
+    )
+
+
+def _held_out_gain(state: State) -> float:
+    """Per cent of the reducible error on blocks that were not fitted, which all causes together remove."""
+    if state.current is state.baseline or not state.extends:
+        return float("nan")
+    return PERCENT * state.held_out.gain(state.baseline, state.current, state.floor)
+
+
+def _words(given: Given) -> Words:
+    unit = given.model.output_unit
+    return {
+        "input": given.input_quantity,
+        "output": given.output_quantity,
+        "u": given.model.input_unit,
+        "y": unit,
+        "in_y": "" if unit == "1" else f" {unit}",
+    }
+
+
+def _rms_given(state: State, model: Model) -> float:
+    """Rms error of the model as it was given, over the samples with weight."""
+    errors = [
+        (predict(model, r.input, r.step) * model.polarity - r.output)[r.sample_weight > 0]
+        for r in state.problem.records
+    ]
+    return root_mean_square(np.concatenate(errors))
+
+
+def _unit(text: str, words: Words) -> str:
+    return text.replace("{u}", words["u"]).replace("{y}", words["y"])
+
+
+def _parameters(estimates: Sequence[Estimate], words: Words) -> tuple[Parameter, ...]:
+    return tuple(Parameter(e.name, e.value, _unit(e.unit, words), e.lower, e.upper) for e in estimates)
+
+
+def _cause(finding: Finding, words: Words) -> Cause:
+    return Cause(
+        cause=finding.cause.id,
+        found=finding.found,
+        p_value=finding.p_value,
+        explains_percent=finding.explains_percent,
+        held_out_gain_percent=finding.held_out_gain_percent,
+        parameters=_parameters(finding.parameters, words),
+        confounded_with=finding.confounded_with,
+        text=wording.cause_text(finding, words),
+    )
+
+
+def _profiles(state: State, words: Words) -> tuple[Profile, ...]:
+    before, after, unit = state.baseline.residual, state.current.residual, words["y"]
+    found = [
+        Profile(
+            group.name,
+            _unit(group.unit, words),
+            group.at,
+            residual.rms_by(group, before),
+            residual.rms_by(group, after),
+            unit,
+        )
+        for group in residual.groups(state.problem)
+    ]
+    frequency, first = residual.spectrum(state.problem, before)
+    second = residual.spectrum(state.problem, after)[1]
+    return (*found, Profile("frequency", "Hz", frequency, first, second, unit))
+
+
+def extended_model(state: State, model: Model) -> Model | None:
+    """Return the model on its own levels, its weights refitted together with the causes found.
+
+    Raises
+    ------
+    DataError
+        The levels of the model are not even.
+    """
+    lasting = state.extensions
+    if not lasting:
+        return None
+    low, high = float(model.edges[0]), float(model.edges[-1])
+    plane = Plane(model.edges)
+    if plane.n_h > LIMITS.extended_levels or not _is_even(plane):
+        plane = Plane.uniform(low, high, min(plane.n_h, LIMITS.extended_levels))
+    problem = problem_for(state.problem.records, low, high, plane.n_h)
+    terms = state.current.terms
+    operator = weights_for(problem, terms, None).simulator.operator
+    seen = [
+        seen_input(terms, record.output, frame)
+        for record, frame in zip(problem.records, problem.frames, strict=True)
+    ]
+    words = {"u": model.input_unit, "y": model.output_unit}
+    return Model(
+        edges=plane.edges,
+        weights=operator.weights,
+        offset=model.polarity * operator.offset,
+        covered=coverage(plane, seen),
+        weights_unit=model.weights_unit,
+        input_unit=model.input_unit,
+        output_unit=model.output_unit,
+        input_quantity=model.input_quantity,
+        output_quantity=model.output_quantity,
+        reading="continuous",
+        polarity=model.polarity,
+        extensions=tuple(
+            Extension(term.cause.id, _parameters(state.estimates[term.cause.id], words)) for term in lasting
+        ),
+    )
+
+
+def _is_even(plane: Plane) -> bool:
+    steps = np.diff(plane.edges)
+    return bool(np.allclose(steps, steps[0]))

@@ -1,0 +1,33 @@
+"""What a diagnosis finds: parameters with their intervals, and what speaks for each cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.evidence import Evidence
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter with its interval."""
+
+    name: str
+    value: float
+    unit: str
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the data say about one cause."""
+
+    cause: Cause
+    found: bool
+    p_value: float | None = None  # None: no null was drawn for it
+    explains_percent: float = 0.0  # of the reducible part of the baseline's error
+    parameters: tuple[Estimate, ...] = ()
+    confounded_with: tuple[str, ...] = ()
+    held_out_gain_percent: float = 0.0  # of the reducible part; NaN where it was not measured
+    seen: Evidence | None = None  # on the raw data, or in what the model as given leaves

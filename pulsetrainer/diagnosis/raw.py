@@ -1,0 +1,87 @@
+"""What a record shows before any model: its noise, its steps, and the gates that fired on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.thresholds import DIFFERENCES, LIMITS, NORMAL_MAD, THIRD_DIFFERENCE
+
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Raw:
+    """A record as a gate sees it, with the range of the input that was identified."""
+
+    record: Record
+    low: float
+    high: float
+    wild: BoolArray | None = None  # samples that are wrong one by one
+
+    @property
+    def reach(self) -> float:
+        """Range of the input."""
+        return self.high - self.low
+
+    @property
+    def calm(self) -> Record:
+        """The record with its wild samples filled in: they pile up at the converter's end."""
+        if self.wild is None:
+            return self.record
+        good = np.flatnonzero(~self.wild)
+        output = np.interp(np.arange(self.wild.size), good, self.record.output[good])
+        return replace(self.record, output=output)
+
+
+@dataclass(frozen=True)
+class Firing:
+    """One gate that fired."""
+
+    cause: str
+    kind: str  # which of the cause's texts says it
+    share: float  # of the samples
+    value: float  # the size of it
+    unit: str  # "{y}", "{u}" or "1"
+    figures: Mapping[str, float] = field(default_factory=dict)  # for the text
+    mask: BoolArray | None = None  # samples to leave out
+    spread: float = 0.0  # of the value, where it is known
+
+    @property
+    def evidence(self) -> Evidence:
+        """What it says."""
+        return Evidence(self.kind, self.cause, self.figures)
+
+
+def noise_of(y: FloatArray, weight: FloatArray | None = None) -> float:
+    """White noise (rms) of a record from its third differences, robust against jumps.
+
+    A smooth output hardly has any; of white noise they have twenty times the variance. Where samples
+    without ``weight`` were filled in there is no noise to be seen.
+    """
+    if y.size < LIMITS.noise_least:
+        return 0.0
+    third = np.diff(y, DIFFERENCES)
+    if weight is not None:
+        known = ndimage.minimum_filter1d(weight, DIFFERENCES + 1, origin=-2)[:-DIFFERENCES] > 0
+        third = third[known] if np.count_nonzero(known) >= LIMITS.noise_least else third
+    return float(np.median(np.abs(third - np.median(third))) / NORMAL_MAD / np.sqrt(THIRD_DIFFERENCE))
+
+
+def spacing_of(y: FloatArray) -> float:
+    """Distance of the distinct values of ``y``: the step of its converter."""
+    values = np.unique(y)
+    return float(np.median(np.diff(values))) if values.size > 1 else 0.0
+
+
+def coarse_step(y: FloatArray) -> float:
+    """Step of the output where it is coarse against its noise, else 0: its error does not average out."""
+    step = spacing_of(y)
+    return step if step > LIMITS.coarse_noise * noise_of(y) else 0.0

@@ -1,0 +1,43 @@
+"""Acceptance: the best candidate that matters and predicts.
+
+Of the candidates, best fit first, the first one is taken whose refit lowers the squares by a relevant amount
+and the error on blocks that were left out by at least a twentieth of what can be lowered. Where too few
+blocks are left to ask, the fit alone decides. With a new cause in the model the error of the levels is
+estimated again: a missing cause makes that estimate too large, never too small.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.problem import Problem
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
+
+
+def stage(state: State) -> State:
+    """Return the state with the accepted cause in the model; the same model where none is."""
+    for trial, score in state.trials:
+        if state.current.squares - trial.squares < state.floor.relevant:
+            continue
+        gain = state.held_out.gain(state.current, trial, state.floor)
+        if np.isfinite(gain) and gain < LIMITS.held_out_least:
+            continue
+        accepted = settled(state.problem, trial)
+        return replace(
+            state,
+            current=accepted,
+            p_values={**state.p_values, score.cause.id: score.p_value},
+            floor=state.floor.at(state.coarse, accepted),
+            trials=(),
+        )
+    return replace(state, trials=())
+
+
+def settled(problem: Problem, trial: Fitted) -> Fitted:
+    """Refit a model to the end; a cause of the input gets rows of its own."""
+    changes_input = any(term.cause.stage == "input" for term in trial.terms)
+    return refit(problem, trial.terms, trial, rebuild=changes_input)

@@ -1,0 +1,55 @@
+"""Account: what speaks for the verdict, as data.
+
+What the static model leaves and what it would leave if nothing were wrong; for each cause found, what its
+gate saw or its p-value and share; what is left with all of them; where the rest is largest, when nothing
+explains it; what the records lack.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
+
+
+def stage(state: State) -> State:
+    """Return the state with its evidence."""
+    percent = PERCENT / float(np.ptp(state.problem.measured))
+    levels = {"left": percent * state.baseline.rms, "floor": percent * state.floor.rms}
+    said = [Evidence("static", figures=levels)]
+    said += [_of(finding) for finding in state.findings if finding.found]
+    if state.current is not state.baseline:
+        said.append(Evidence("extended", figures={"left": percent * state.current.rms}))
+    if state.verdict in ("none", "unknown"):
+        said += _largest(state)
+    if state.question.quick:
+        said.append(Evidence("quick"))
+    if state.lacks:
+        said.append(Evidence("lacks", names=state.lacks))
+    return replace(state, evidence=(*state.evidence, *said))
+
+
+def _of(finding: Finding) -> Evidence:
+    """What speaks for one cause."""
+    if finding.seen is not None:
+        return finding.seen
+    assert finding.p_value is not None
+    figures = {"p": finding.p_value, "explains": finding.explains_percent}
+    return Evidence("tested", finding.cause.id, figures)
+
+
+def _largest(state: State) -> Iterator[Evidence]:
+    """Where the remaining residual is largest."""
+    for group in residual.groups(state.problem):
+        rms = residual.rms_by(group, state.current.residual)
+        most, least = float(np.nanmax(rms)), float(np.nanmin(rms))
+        if most > LIMITS.largest_at * least:
+            figures = {"at": float(group.at[int(np.nanargmax(rms))]), "times": most / least}
+            yield Evidence("largest", figures=figures, names=(group.name,))

@@ -1,0 +1,43 @@
+"""Advice: what to measure next.
+
+Where the model as given is of the wrong kind, or of another condition, that comes first: another model is
+needed. Where causes are tied, the experiment on which they look least alike, tried on paper with the model
+that was found. Else what the recordings lack; else what the verdict asks for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.experiment import best_experiment
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import PERCENT
+
+# What the evidence says of the model as given, and the advice
+_ANOTHER_MODEL = {"wrong kind": "other model", "shifted": "identify anew", "changed": "identify anew"}
+
+
+def stage(state: State) -> State:
+    """Return the state with its advice."""
+    return replace(state, advice=_advice(state))
+
+
+def _advice(state: State) -> Evidence:
+    another = [_ANOTHER_MODEL[one.kind] for one in state.evidence if one.kind in _ANOTHER_MODEL]
+    if another:
+        return Evidence(another[0])
+    tied = next((one for one in state.findings if one.found and one.confounded_with), None)
+    if tied is not None:
+        names = (tied.cause.id, *tied.confounded_with)
+        if state.question.quick:
+            return Evidence("tied, quick", names=names)
+        best = best_experiment(state, names)
+        percent = PERCENT / float(np.ptp(state.problem.measured))
+        figures = {"there": percent * best.distance, "here": percent * best.distance_here}
+        return Evidence("tied", figures=figures, names=(best.name, *names))
+    if state.lacks:
+        return Evidence("lacks", names=state.lacks)
+    return Evidence(state.verdict if state.verdict in ("unknown", "none") else "extend")

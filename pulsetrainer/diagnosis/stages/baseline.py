@@ -1,0 +1,37 @@
+"""Baseline: a static model refitted to these records, and the floor under every model.
+
+The weights of a static Preisach model are fitted to the records, whatever the model as given says: what they
+leave is the baseline, which causes can lower. What no cause can lower is the noise of the averages, the
+steps of the output, and the error of the levels, told from how much a coarser plane leaves. An effect
+smaller than that error, than 0.3 of the noise or than 0.03 % of the span is irrelevant, however significant
+it is. What the records lack (several rates, holds, length) is written down here, since it limits what can be
+told apart later.
+"""
+
+from __future__ import annotations
+
+from pulsetrainer.diagnosis.fitting import weights_for
+from pulsetrainer.diagnosis.floor import floor_of
+from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.residual import excitation_limits
+from pulsetrainer.diagnosis.stages.raw_data import Masked
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
+
+
+def stage(masked: Masked) -> State:
+    """Return the state in which the search begins: no cause in the model.
+
+    Raises
+    ------
+    DataError
+        The data do not suffice for any statement.
+    """
+    question, records, firings = masked.question, masked.records, masked.firings
+    problem = problem_for(records, question.low, question.high)
+    coarse = problem_for(records, question.low, question.high, LIMITS.coarse_levels)
+    fitted = weights_for(problem, (), None)
+    floor = floor_of(records, [firing for _, firing in firings], problem).at(coarse, fitted)
+    lacks = tuple(excitation_limits(problem))
+    return State(question, firings, problem, coarse, fitted, floor, HeldOut(problem), lacks, fitted)

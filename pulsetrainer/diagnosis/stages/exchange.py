@@ -1,0 +1,48 @@
+"""Exchange: each cause against the others of its family.
+
+When a cause was chosen, others were still missing. So each is taken out, every other one of its family is
+fitted in its place, and the best is kept. The new one inherits the p-value of the old: that something of
+this family is there was tested, which one of it was not (decision 044).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.screening import screen
+from pulsetrainer.diagnosis.stages.acceptance import settled
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
+
+
+def stage(state: State) -> State:
+    """Return the state with each cause exchanged for a better one of its family, where there is one."""
+    for cause in [term.cause for term in state.current.terms]:
+        state = _exchanged(state, cause)
+    return state
+
+
+def _exchanged(state: State, cause: Cause) -> State:
+    current, problem = state.current, state.problem
+    kin = {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
+    if not kin:
+        return state
+    # by its cause: an exchange before this one has moved all terms
+    others = [term for term in current.terms if term.cause is not cause]
+    without = refit(problem, others, current, rounds=LIMITS.without_rounds)
+    known = screen(problem, without, state.question.rng, draws=LIMITS.draws_few)
+    trials = [
+        refit(problem, (*without.terms, Term(score.cause, score.start)), without)
+        for score in known.scores
+        if score.cause.id in kin
+    ]
+    best = min((current, *trials), key=lambda fitted: fitted.squares)
+    if best is current:
+        return state
+    (new,) = set(best.names) - set(current.names)
+    p_values = {new if name == cause.id else name: p for name, p in state.p_values.items()}
+    return replace(state, current=settled(problem, best), p_values=p_values)

@@ -1,0 +1,186 @@
+"""The model as given: another condition, or the wrong kind of model.
+
+So far the weights were refitted; now the model is judged as it was given, by what it predicts for these
+records.
+
+- If a mere function of the velocity describes the output much better, the model is of the wrong kind: causes
+  sought on top of it are withdrawn. If the speed matters and not only the direction, the force is `viscous`;
+  else the cause is `unknown`.
+- If the model as given leaves less than the search's best, the search found faults of its own coarser levels
+  only: they are withdrawn.
+- If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), the
+  device is in another condition: `condition-change` comes first. Where that is all but a thousandth of the
+  squared error, other causes would only repair the rest of it, and are withdrawn.
+
+What the raw data show stays, and so does what equal loops show, unless the model is of the wrong kind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pulsetrainer.core import input_noise
+from pulsetrainer.core.initial_state import start_of
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis import velocity
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.condition_change import Change, against_model, left_by
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.prediction import predict
+from pulsetrainer.diagnosis.state import Given, State
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
+
+_CHANGED, _SPEED = "condition-change", "viscous"
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """What the model as given says of the records."""
+
+    records: list[Record]
+    residuals: list[FloatArray]
+    measured: FloatArray  # (n,) outputs with weight, records one after another
+    predicted: FloatArray  # (n,)
+    speed: velocity.Comparison
+    polarity: int
+
+
+def stage(state: State) -> State:
+    """Return the state with what the records say of the model as given."""
+    if state.question.given is None:
+        return state
+    judged = _judged(state, state.question.given)
+    said: list[Evidence] = []
+    if not state.question.timed:
+        told = tuple(c.id for c in library().values() if c.stage != "record" and not c.needs_time)
+        said.append(Evidence("untimed", names=told))
+    if judged.speed.wrong:
+        said.append(velocity.evidence(judged.speed))
+        state = _of_another_kind(state, judged)
+    elif left_by(judged.measured, judged.predicted, state.floor.noise) <= state.current.rms:
+        said.append(Evidence("given better"))
+        state = withdrawn(state, state.by_contrast)
+    changed = against_model(judged.measured, judged.predicted, state.baseline.rms, state.floor.noise)
+    if changed is not None:
+        state, more = _in_another_condition(state, changed, judged.polarity)
+        said += more
+    return replace(state, evidence=(*said, *state.evidence))
+
+
+def _judged(state: State, given: Given) -> _Judged:
+    """Predict the records; noise in the input is no motion."""
+    question, model = state.question, given.model
+    core = [
+        Record(
+            input_noise.clean(r.input).input,
+            r.output,
+            r.sample_weight,
+            start_of(r.input, question.low, question.high),
+        )
+        for r in question.records
+    ]
+    steps = [r.dt_s for r in question.records]
+    # records have polarity 1: what the model says is turned alike
+    said = [
+        model.polarity * predict(model, one.input, step, one.start)
+        for one, step in zip(core, steps, strict=True)
+    ]
+    residuals = [one.output - p for one, p in zip(core, said, strict=True)]
+    kept = [one.sample_weight > 0 for one in core]
+    return _Judged(
+        core,
+        residuals,
+        np.concatenate([one.output[k] for one, k in zip(core, kept, strict=True)]),
+        np.concatenate([p[k] for p, k in zip(said, kept, strict=True)]),
+        velocity.compare(core, steps, residuals),
+        model.polarity,
+    )
+
+
+def withdrawn(state: State, told: Collection[str] = ()) -> State:
+    """Return a state in which only what was read off the raw data, and what is ``told``, stays found."""
+    findings = tuple(
+        one if one.cause.stage == "record" or one.cause.id in told else replace(one, found=False)
+        for one in state.findings
+    )
+    gone = {one.cause.id for one in findings if not one.found}
+    evidence = tuple(one for one in state.evidence if one.cause not in gone and one.kind != "extended")
+    verdict = next((one.cause.id for one in findings if one.found), "none")
+    return replace(state, findings=findings, verdict=verdict, evidence=evidence, extends=False)
+
+
+def _of_another_kind(state: State, judged: _Judged) -> State:
+    """Withdraw what was sought on top of the wrong kind of model."""
+    state, speed = withdrawn(state), judged.speed
+    direction = velocity.compare(judged.records, [None] * len(judged.records), judged.residuals)
+    if speed.velocity > LIMITS.speed_matters * direction.velocity:
+        return replace(state, verdict="unknown")
+    explains = PERCENT * (1.0 - (speed.velocity / speed.preisach) ** 2)
+    return _first(
+        state,
+        Finding(
+            library()[_SPEED],
+            found=True,
+            explains_percent=explains,
+            held_out_gain_percent=float("nan"),
+            seen=velocity.evidence(speed),
+        ),
+    )
+
+
+def _in_another_condition(state: State, changed: Change, polarity: int) -> tuple[State, list[Evidence]]:
+    """Put the change of condition first; withdraw what only repairs the rest of it."""
+    said = []
+    if changed.is_everything:
+        cleared = withdrawn(state, state.by_contrast)
+        pairs = zip(state.findings, cleared.findings, strict=True)
+        gone = tuple(before.cause.id for before, after in pairs if before.found and not after.found)
+        if gone:
+            left = PERCENT * state.baseline.rms / changed.span
+            figures = {"share": PERCENT * changed.explains, "left": left}
+            said.append(Evidence("overshadowed", figures=figures, names=gone))
+            state = cleared
+    if state.verdict != _CHANGED:
+        seen = _evidence(changed, polarity)
+        said.append(seen)
+        state = _first(state, _finding(changed, polarity, seen))
+    return state, said
+
+
+def _evidence(changed: Change, polarity: int) -> Evidence:
+    """Return what a changed condition looks like."""
+    figures = {
+        "shift": polarity * changed.shift,
+        "gain": PERCENT * changed.gain,
+        "times": 1.0 + changed.gain,
+        "left": changed.left,
+    }
+    return Evidence(changed.kind, _CHANGED, figures)
+
+
+def _finding(changed: Change, polarity: int, seen: Evidence) -> Finding:
+    """Return the finding that the device is not in the condition of the model."""
+    offset, gain = polarity * changed.offset, changed.gain
+    sure, wide = LIMITS.normal * changed.offset_error, LIMITS.normal * changed.gain_error
+    return Finding(
+        library()[_CHANGED],
+        found=True,
+        explains_percent=PERCENT * changed.explains,
+        parameters=(
+            Estimate("offset", offset, "{y}", offset - sure, offset + sure),
+            Estimate("gain", gain, "1", gain - wide, gain + wide),
+        ),
+        held_out_gain_percent=float("nan"),
+        seen=seen,
+    )
+
+
+def _first(state: State, finding: Finding) -> State:
+    """Put a finding before all others, and make it the verdict."""
+    others = tuple(one for one in state.findings if one.cause is not finding.cause)
+    return replace(state, findings=(finding, *others), verdict=finding.cause.id)

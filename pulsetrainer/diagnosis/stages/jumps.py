@@ -1,0 +1,36 @@
+"""Jumps: the raw data are asked again, now that causes are known.
+
+A hum also jumps between flat runs. So a gate that other causes can set off as well is asked once more about
+the output less what the causes found add to it, and its finding is dropped if it no longer fires. The other
+way round, sticking smaller than the noise shows only in what the model leaves: where that is relevant, and
+nothing jagged was found, the residual is searched for it (decision 044).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.raw import Firing, Raw
+from pulsetrainer.diagnosis.state import State
+
+
+def stage(state: State) -> State:
+    """Return the state with firings withdrawn and added."""
+    kept = tuple((k, firing) for k, firing in state.firings if not _explained(state, k, firing))
+    state = replace(state, firings=kept)
+    if state.current.squares - state.floor.squares <= state.floor.relevant or state.jagged:
+        return state
+    left = [cause.gate_left(state.current) for cause in library().values() if cause.stage == "record"]
+    return replace(state, firings=(*kept, *((0, firing) for firing in left if firing is not None)))
+
+
+def _explained(state: State, k: int, firing: Firing) -> bool:
+    """Whether what a gate saw on record ``k`` is what the causes found add."""
+    cause, terms = library()[firing.cause], state.current.terms
+    if not cause.doubted or not terms:
+        return False
+    record, simulator = state.problem.records[k], state.current.simulator
+    added = simulator.full(terms)[k] - simulator.inner(terms)[k]
+    plane = state.problem.plane
+    return cause.gate(Raw(replace(record, output=record.output - added), plane.low, plane.high)) is None

@@ -1,0 +1,50 @@
+"""Gates on the raw data.
+
+Before any model, each record is looked at for what no model can repair: an output cut off by its range,
+single wild samples, coarse steps, jumps, a driver that does not follow its reference, an input outside the
+range that was identified. Each gate stands in the file of its cause. A gate that fires is a finding, and the
+samples it names are left out of everything that follows: filled in, since causes filter the output and wild
+samples must not reach the filters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis import gates
+from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.state import Question
+
+
+@dataclass(frozen=True)
+class Masked:
+    """What the gates leave of the records, and which gates fired on which record."""
+
+    question: Question
+    records: tuple[Record, ...]
+    firings: tuple[tuple[int, Firing], ...]
+
+
+def stage(question: Question) -> Masked:
+    """Return the records with bad samples masked, and the gates that fired."""
+    found = [gates.check(record, question.low, question.high) for record in question.records]
+    masked = tuple(masked_by(record, fired) for record, fired in zip(question.records, found, strict=True))
+    return Masked(question, masked, tuple((k, one) for k, fired in enumerate(found) for one in fired))
+
+
+def masked_by(record: Record, firings: Sequence[Firing]) -> Record:
+    """Return a record in which the samples that gates name have no weight and are filled in."""
+    weight = record.sample_weight.copy()
+    for firing in firings:
+        if firing.mask is not None:
+            weight[firing.mask] = 0.0
+    output, bad = record.output, weight == 0
+    if bad.any() and not bad.all():
+        good = np.flatnonzero(~bad)
+        output = output.copy()
+        output[bad] = np.interp(np.flatnonzero(bad), good, output[good])
+    return replace(record, sample_weight=weight, output=output)

@@ -1,0 +1,29 @@
+"""Restart: the wrong one of a family may hide a second cause.
+
+Of a field lag and a resonance a delay explains most, and what it leaves looks like more lag, so that the
+resonance is never found. Where a cause is still significant whose family is in the model, the search begins
+again with that one in the other's place, and the better of both ends is kept (decision 044).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.stages import search
+from pulsetrainer.diagnosis.state import State
+
+
+def stage(state: State) -> State:
+    """Return the better of the search so far and of one that begins with another of a family."""
+    scores = state.scores.scores
+    left = next((s for s in scores if s.cause.family in state.families and state.significant(s)), None)
+    if left is None:
+        return state
+    others = [term for term in state.current.terms if term.cause.family != left.cause.family]
+    terms = (*others, Term(left.cause, left.start))
+    known = {term.cause.id: state.p_values[term.cause.id] for term in others} | {left.cause.id: left.p_value}
+    first = refit(state.problem, terms, state.current, rebuild=True)
+    found = search.stage(replace(state, current=first, p_values=known))
+    return state if state.current.squares - found.current.squares < state.floor.relevant else found

@@ -1,0 +1,71 @@
+"""Rivals: which causes explain the data as well as the one found.
+
+A name is unique only if no other cause fits as well in its place. The three that score best without it are
+fitted jointly; one that comes as close as two fits of the same data may differ is named beside it. On a
+record of one single rate all causes that widen the loop with the rate are named together: there they are
+just a wider loop. Causes that equal loops show have no rivals here: equal loops differ by nothing else that
+is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.screening import screen
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
+
+
+def stage(state: State) -> State:
+    """Return the state with a finding for every cause that was tried."""
+    found = [_finding(state, term) for term in state.current.terms]
+    rest = [
+        Finding(score.cause, False, score.p_value, state.explains(score.gain))
+        for score in state.scores.scores
+        if score.cause.id not in state.current.names
+    ]
+    return replace(state, findings=(*found, *rest))
+
+
+def _finding(state: State, term: Term) -> Finding:
+    name = term.cause.id
+    without = state.without[name]
+    return Finding(
+        term.cause,
+        found=True,
+        p_value=state.p_values[name],
+        explains_percent=state.explains(without.squares - state.current.squares),
+        parameters=state.estimates[name],
+        confounded_with=() if term.cause.by_contrast else rivals(state, term),
+        held_out_gain_percent=PERCENT * state.held_out.gain(without, state.current, state.floor),
+    )
+
+
+def rivals(state: State, term: Term) -> tuple[str, ...]:
+    """Causes that repair the data as well as ``term``, within the noise of the comparison."""
+    fitted, without, floor = state.current, state.without[term.cause.id], state.floor
+    gain = without.squares - fitted.squares
+    scores = screen(state.problem, without, state.question.rng, draws=LIMITS.draws_few)
+    margin = max(
+        LIMITS.rival_gain * gain,
+        LIMITS.rival_relevant * floor.relevant,
+        LIMITS.rival_noise * fitted.squares / floor.count,
+    )
+    found = []
+    for score in scores.scores[: LIMITS.closest]:
+        known = score.cause.id in (term.cause.id, *fitted.names)
+        if known or score.gain < LIMITS.rival_screened * gain:
+            continue
+        terms = (*without.terms, Term(score.cause, score.start))
+        trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds)
+        if trial.squares - fitted.squares < margin:
+            found.append(score.cause.id)
+    if residual.RATES in state.lacks and term.cause.widens:
+        alike = [c.id for c in library().values() if c.widens and c is not term.cause]
+        found += [name for name in alike if name not in (*found, *fitted.names)]
+    return tuple(found)

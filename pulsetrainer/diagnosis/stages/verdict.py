@@ -1,0 +1,50 @@
+"""Verdict: the strongest cause, or that it is unknown.
+
+Where more than half of what can be explained is left, and enough to matter, the verdict is the jagged cause
+that a gate saw, since no refit takes away what it leaves; else it is `unknown`, whatever was found besides.
+Otherwise it is the cause that explains most, then what a gate on the raw data saw, and `none` where nothing
+was found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.state import State
+
+
+def stage(state: State) -> State:
+    """Return the state with all findings in order, and the verdict."""
+    ranked = sorted(state.findings, key=lambda one: -one.explains_percent)
+    found, rest = [one for one in ranked if one.found], [one for one in ranked if not one.found]
+    gated = _gated(state)
+    fired = {one.cause.id for one in gated}
+    silent = [Finding(c, False) for c in library().values() if c.stage == "record" and c.id not in fired]
+    verdict = next((one.cause.id for one in (*found, *gated)), "none")
+    if state.unexplained and not state.question.quick:
+        verdict = next((one.cause.id for one in gated if one.cause.jagged), "unknown")
+    return replace(state, findings=(*found, *gated, *rest, *silent), verdict=verdict)
+
+
+def _gated(state: State) -> list[Finding]:
+    """Findings of the gates, one a cause: that of the first record where it fired."""
+    found: dict[str, Finding] = {}
+    several = len(state.problem.records) > 1
+    for k, firing in state.firings:
+        if firing.cause not in found:
+            found[firing.cause] = _seen(firing, k if several else None)
+    return list(found.values())
+
+
+def _seen(firing: Firing, record: int | None) -> Finding:
+    low, high = firing.value - firing.spread, firing.value + firing.spread
+    return Finding(
+        library()[firing.cause],
+        found=True,
+        parameters=(Estimate("size", firing.value, firing.unit, low, high),),
+        held_out_gain_percent=float("nan"),
+        seen=replace(firing.evidence, record=record),
+    )

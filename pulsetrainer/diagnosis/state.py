@@ -1,0 +1,110 @@
+"""What a diagnosis is asked, and what it knows after each stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pulsetrainer.artefacts import Model
+from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.fitting import Fitted
+from pulsetrainer.diagnosis.floor import Floor
+from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.problem import Problem
+from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.screening import Score, Screen
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
+
+
+@dataclass(frozen=True)
+class Given:
+    """The model as it was given, and what its input and output are called."""
+
+    model: Model
+    input_quantity: str = "input"
+    output_quantity: str = "output"
+
+
+@dataclass(frozen=True)
+class Question:
+    """Records of one device; of polarity 1, at even steps.
+
+    ``low`` and ``high`` are the range of the input that was identified; without ``given`` only the search for
+    causes is made, which needs no model.
+    """
+
+    records: Sequence[Record]
+    low: float
+    high: float
+    rng: np.random.Generator
+    quick: bool = False  # only screen
+    progress: Callable[[float], None] = lambda _share: None
+    given: Given | None = None
+    notes: tuple[str, ...] = ()  # what a person should know about the records
+
+    @property
+    def timed(self) -> bool:
+        """Whether the records have a clock."""
+        return all(record.timed for record in self.records)
+
+
+@dataclass(frozen=True)
+class State:
+    """What is known so far; every stage returns a new one."""
+
+    question: Question
+    firings: tuple[tuple[int, Firing], ...]  # gates that fired, with the number of their record
+    problem: Problem
+    coarse: Problem  # the same on fewer levels
+    baseline: Fitted  # no cause, weights refitted
+    floor: Floor
+    held_out: HeldOut
+    lacks: tuple[str, ...]  # what the records do not have: see ``residual``
+    current: Fitted  # the model with the causes accepted so far
+    scores: Screen = field(default_factory=Screen)  # of the causes that are not in it
+    trials: tuple[tuple[Fitted, Score], ...] = ()  # joint refits of the best of them
+    p_values: Mapping[str, float] = field(default_factory=dict)  # of every cause that was accepted
+    without: Mapping[str, Fitted] = field(default_factory=dict)  # the model without each of its causes
+    by_contrast: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)  # what equal loops show
+    estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()  # of every cause, strongest first
+    verdict: str = "none"
+    evidence: tuple[Evidence, ...] = ()
+    advice: Evidence = field(default_factory=lambda: Evidence("none"))
+    extends: bool = True  # False: what was found is no fault of the model as given
+
+    @property
+    def families(self) -> set[str]:
+        """Families of the causes in the model."""
+        return {term.cause.family for term in self.current.terms}
+
+    @property
+    def jagged(self) -> bool:
+        """Whether a gate fired of a cause that leaves what no refit can take away."""
+        return any(library()[firing.cause].jagged for _, firing in self.firings)
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether more than half of what can be explained is left, and enough to matter."""
+        left = self.current.squares - self.floor.squares
+        half = LIMITS.unexplained * self.floor.reducible(self.baseline)
+        return left > max(half, LIMITS.unexplained_relevant * self.floor.relevant)
+
+    @property
+    def extensions(self) -> list[Term]:
+        """Causes that go into the model: properties of the device, not of the record."""
+        return [term for term in self.current.terms if term.cause.lasting] if self.extends else []
+
+    def explains(self, gain: float) -> float:
+        """Per cent of what can be explained."""
+        return PERCENT * min(max(gain / self.floor.reducible(self.baseline), 0.0), 1.0)
+
+    def significant(self, score: Score) -> bool:
+        """Whether noise alone hardly scores so much, and it matters."""
+        return score.p_value <= LIMITS.p_max and score.gain > self.floor.relevant

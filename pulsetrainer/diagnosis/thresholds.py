@@ -1,0 +1,166 @@
+"""Every number that decides something in a diagnosis; those of one cause stand in the file of that cause.
+
+Where a line names no other origin, the number was set on the tuning seeds of docs/blind.md (4242, 7000 to
+7302, 500000 to 500109) and then frozen; the grids of that page judged it on other seeds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """The numbers of the procedure; each line says what the number guards."""
+
+    # Preparing a record
+    fastest_Hz: float = 1000.0  # faster records are averaged down: no cause of the library is faster
+    least_samples: int = 100  # of a record: fewer can be followed by any cause
+    gap_steps: float = 1.5  # median time steps: a longer one is a gap, whose filled samples do not count
+    least_present: float = 0.5  # share of a record's even steps that must be there
+    beyond_range: float = 0.02  # of the model's range: input farther out lies outside it
+    least_inside: float = 0.5  # share of the input: with less inside it is another device
+    bin_s: float = 0.005  # length of an average: short enough for a resonance of 70 Hz
+    most_rows: int = 20_000  # averages: longer records get longer averages, so that the fit fits in memory
+    least_rows: int = 100  # averages: fewer tell no causes apart
+    start_tau_s: tuple[float, ...] = (0.2, 0.8, 3.2)  # decays fitted from a record's start (decision 040)
+    start_share: float = 6.0  # time constants of such a decay that a record must hold: else it is an offset
+    rows_at_once: int = 2000  # rows brought to cell space in one piece: what fits the cache
+    noise_least: int = 8  # third differences: fewer tell no noise
+    coarse_noise: float = 1.5  # times the noise: larger steps of the output do not average out
+
+    # Static fit
+    levels: int = 32  # of the plane on which causes are sought: finer ones take longer and decide the same
+    coarse_levels: int = 22  # of the plane that shows how the discretisation error falls with the cell
+    smoothing: float = 0.035  # of the density, share of the range: holds the fit at the levels above
+    near_end: float = 0.01  # of the range: the outputs at its two ends are averaged over so much
+    followed_kept: int = 6  # inputs kept as they were followed through the plane: some 10 MB each
+    ridge: float = 1e-10  # of the largest diagonal entry: keeps the factor of the positive cells regular
+    ridge_held_out: float = 1e-9  # relative: the same where blocks are left out
+    ridge_steps: float = 1e-9  # relative: the same for the step of the parameters
+
+    # Joint refit
+    refit_rounds: int = 6  # Gauss-Newton steps of a refit
+    trial_rounds: int = 3  # of a candidate: ranks it; the accepted one gets a full refit
+    rival_rounds: int = 2  # of a rival: shows whether it comes close
+    without_rounds: int = 1  # of a model that a cause was taken from: the others move little
+    passes: int = 8  # at most, of the weights against what the output causes add (decision 041)
+    passes_settled: float = 0.05  # change of what they add, of the residual: below, the passes end
+    enough: float = 2e-3  # relative fall of the sum of squares: below, the refit ends
+    difference: float = 0.02  # of a parameter's value: step of its derivative, if larger than the cause's own
+    step_tries: int = 4  # dampings tried for one step
+    damping_falls: float = 0.3  # factor after a step that helps
+    damping_rises: float = 10.0  # factor after one that does not
+    damping_least: float = 0.1  # damping after the first step that does not help
+    step_factor: float = 3.0  # a positive parameter moves at most by this factor in one step
+
+    # Floor: what cannot matter
+    relevant_noise: float = 0.3  # of the noise of an average: smaller effects are irrelevant
+    relevant_span: float = 0.0003  # of the span: smaller effects are irrelevant on any device (decision 044)
+    least_reducible: float = 1e-12  # of the baseline's squares: keeps shares finite
+
+    # Screening and its null
+    p_max: float = 0.01  # over the whole library: the false alarms that a search may make in a hundred
+    draws: int = 199  # of the noise: the smallest that can show p = 0.005
+    draws_few: int = 20  # where only start values are wanted
+    ar_order: int = 10  # of the noise's autoregression: 50 ms of memory
+    ar_warm_up: int = 20  # orders thrown away before a draw begins
+    ar_ridge: float = 1e-9  # relative, of the variance: keeps its equations regular
+    visible: float = 1e-6  # of a column: less than that left by the weights is rounding
+    rank: float = 1e-3  # of the largest singular value: smaller ones of the library's columns are noise
+    start_falls: float = 0.2  # a linearised strength starts a refit within this ...
+    start_rises: float = 5.0  # ... and this factor of the value that was tried
+
+    # Accepting a cause
+    most_causes: int = 5  # at once: more has never been right
+    tried: int = 3  # candidates refitted in each round
+    linearised: float = 0.5  # of what a refit gains: a linearised score shows at least so much (decision 044)
+    held_out_least: float = 0.05  # of the reducible part: a smaller fall of the held-out error is no gain
+    blocks: int = 20  # of a record, cut where its memory is wiped out
+    jackknife: int = 10  # parts left out in turn for the intervals
+    rows_per_unknown: int = 2  # averages that must stay for each unknown when blocks are left out
+    start_kept: float = 0.01  # of a column's squared norm: holds a start whose block is left out
+
+    # Equal loops (decision 042)
+    contrast_p_max: float = 0.005  # the second of two tests: together they alarm in one or two of a hundred
+    permutations: int = 1999  # of equal loops: the smallest p is a tenth of the limit
+    loop_places: int = 12  # averages along each branch
+    loop_same: float = 0.015  # of the range: turns that near are equal
+    loop_same_time: float = 0.1  # relative: loops that took as long are equal
+    loop_narrowest: float = 0.04  # of the range: narrower loops say nothing
+    loop_turn: float = 0.5  # of the narrowest loop: smaller turns of the input are noise
+    least_loops: int = 3  # of one kind: two have one difference only
+    contrast_rounds: int = 4  # of the strength
+    contrast_first: float = 0.25  # of the cause's first start: the first step
+    contrast_step: float = 0.1  # of the strength: the later ones
+    contrast_hopeless: float = 0.05  # p above which the strength is not refined
+    contrast_settled: float = 0.1  # standard errors: a smaller change ends the rounds
+    contrast_slope: float = 0.2  # of the strength: the density is smoothed (bench: 0.8 to 1.08)
+
+    # Rivals
+    closest: int = 3  # rivals refitted
+    rival_screened: float = 0.5  # of the found cause's gain: rivals that score less are not refitted
+    rival_gain: float = 0.005  # of that gain: as good, if no farther behind than the largest of this,
+    rival_relevant: float = 0.3  # ... of the relevant fall of squares,
+    rival_noise: float = 12.0  # ... and mean squares: the noise of comparing two fits
+    alike: float = 0.9  # cosine of screened columns: above, a quick screen names both
+
+    # Intervals
+    student: float = 2.26  # 95 % of Student's t with the nine degrees of freedom of ten jackknife parts
+    normal: float = 1.96  # 95 % of the normal distribution
+    aligned: float = 0.2  # of the discretisation error: how far it may be in line with a parameter
+    moment: float = 0.2  # sample steps: how far input and output may be apart (decision 043)
+
+    # Verdict
+    unexplained: float = 0.5  # of the reducible part: with more left the cause is unknown
+    unexplained_relevant: float = 4.0  # times the relevant fall of squares: less left is not worth a word
+
+    # The model as given
+    speed_groups: int = 40  # of equal velocity, whose mean outputs stand against the model
+    speed_window: int = 9  # samples of the parabolas whose slope is the velocity
+    poor: float = 0.05  # of the span: a model that leaves less is not of the wrong kind
+    better: float = 0.75  # of what the model leaves: a function of velocity must leave less to win
+    speed_matters: float = 0.6  # of what the direction leaves: below, the force is viscous
+
+    # Where the residual is
+    rate_edges: tuple[float, ...] = (0.05, 0.3, 1.0, 3.0, 7.0)  # ranges a second; below the first is rest
+    rate_s: float = 0.01  # over which the rate of the input is averaged
+    rate_samples: int = 3  # on each side, at least, of that mean
+    groups: int = 10  # of level and of time
+    largest_at: float = 1.5  # times the least of its groups: below, the residual is the same everywhere
+    welch: int = 4096  # averages in one spectrum
+    slow_quantile: float = 0.1  # of the rates while moving: the slow ones ...
+    fast_quantile: float = 0.9  # ... and the fast ones
+    one_rate: float = 3.0  # fast over slow: below, the record has one single rate
+    least_moving: int = 20  # averages in motion: fewer have no rates
+    hold_s: float = 0.8  # a rest must last so long to be a hold
+    short_s: float = 20.0  # a shorter record is called short
+
+    # The extended model
+    inverse_step: float = 0.8  # of the error fed back in the inverse: 1 is the fastest that cannot overshoot
+    inverse_rounds: int = 16  # of the inverse
+    inverse_patience: int = 3  # rounds without gain that end it
+    inverse_band: float = 0.4  # of the sample rate: a reference that wide is not filtered
+    inverse_order: int = 2  # of the low-pass in the inverse
+    inverse_pad: float = 3.0  # periods of the band that pad its ends
+    feedback_passes: int = 6  # each multiplies the error of a fed back output by some per cent
+    extended_levels: int = 64  # at most: the joint refit holds dense rows
+    trace_samples: int = 6000  # kept for the figures
+    experiment_Hz: float = 200.0  # sample rate of the experiments tried on paper
+
+    # Progress bar only
+    search_begins: float = 0.15  # share of the work that is done before the search
+    search_share: float = 0.5  # of the work
+    search_round: float = 0.6  # share of the search that is left after each round
+
+
+LIMITS = Thresholds()
+
+# Not thresholds but mathematics.
+TINY = 1e-300  # keeps a division by nothing finite
+PERCENT = 100.0
+NORMAL_MAD = 0.6745  # median of |x| of a standard normal variable
+DIFFERENCES = 3  # third ones: a smooth output hardly has any
+THIRD_DIFFERENCE = 20.0  # 1 + 9 + 9 + 1: their variance for white noise
+THIRD = 1 / 3  # of an octave: bands of a spectrum
+UNIFORM = 12.0  # a step q spreads its error evenly: variance q^2 / 12
