@@ -188,6 +188,7 @@ WORDS = {
     "input_unit": "unit of the input",
     "inversion": "continuous, closest-match or extended",
     "iterations": "of the solver",
+    "lacks": "what the runs do not have: rates, holds, length",
     "lower": "lower end of the interval",
     "method": "joint or alternating",
     "name": "its name",

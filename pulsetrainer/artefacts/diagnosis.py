@@ -74,6 +74,7 @@ class Diagnosis:
     input_unit: str = "A"
     output_unit: str = "N"
     held_out_gain_percent: float = float("nan")  # of all causes together; NaN where it was not measured
+    lacks: tuple[str, ...] = ()  # what the records do not have: rates, holds, length
     notes: tuple[str, ...] = ()  # what a person should know about the records
 
     @property

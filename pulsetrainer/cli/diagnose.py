@@ -93,6 +93,7 @@ def _payload(found: Diagnosis) -> dict[str, Any]:
             }
             for one in found.causes
         ],
+        "lacks": found.lacks,
         "evidence": found.evidence,
         "next_experiment": found.next_experiment,
     }

@@ -54,6 +54,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         input_unit=model.input_unit,
         output_unit=model.output_unit,
         held_out_gain_percent=_held_out_gain(state),
+        lacks=state.lacks,
         notes=state.question.notes,
     )
 

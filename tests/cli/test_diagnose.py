@@ -70,7 +70,7 @@ def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     assert low <= LAG_S <= high
     assert first["parameters"]["tau"]["value"] == pytest.approx(LAG_S, rel=0.05)
     page = (bench / "diagnosis.html").read_text(encoding="utf-8")
-    for words in ('data-verdict="output-lag"', "he sensor or its filter smooths", "What to measure next"):
+    for words in ('data-verdict="output-lag"', "What to measure next"):
         assert words in page
     assert "http://" not in page.replace("http://www.w3.org", "")
     done = pulsetrainer(bench, "extend", "diagnosis.h5", "--model", "model.h5", "-o", "extended.h5")
@@ -89,7 +89,6 @@ def test_quick_says_that_it_is_quick(bench):
     """Marked in the answer, and nothing to extend by."""
     done = _diagnose(bench, "diagnostic.h5", out="quick.h5", more=["--quick"])
     assert done.json["quick"] is True
-    assert any(line.startswith("Quick") for line in done.json["evidence"])
     done = pulsetrainer(bench, "extend", "quick.h5", "--model", "model.h5", "-o", "no.h5")
     assert done.code == 3
     assert "without --quick" in done.err
@@ -99,9 +98,7 @@ def test_one_single_rate_without_holds_gives_a_set_and_the_next_experiment(bench
     """A lag and a model fitted at one rate: no unique name, what is missing, what to record."""
     done = _diagnose(bench, "slow.h5")
     assert done.code == 0, done
-    lacking = " ".join(done.json["evidence"])
-    assert "one single rate" in lacking
-    assert "no holds" in lacking
+    assert {"rates", "holds"} <= set(done.json["lacks"])
     assert "capture diagnostic" in done.json["next_experiment"]
     for cause in done.json["causes"]:
         if cause["found"] and cause["id"] in ("delay", "output-lag", "field-lag", "viscous", "rate-widening"):
@@ -114,7 +111,7 @@ def test_a_short_record_says_so(bench):
     _write(bench, "short", u, _device(u))
     done = _diagnose(bench, "short.h5")
     assert done.code == 0, done
-    assert "a short record" in " ".join(done.json["evidence"])
+    assert "length" in done.json["lacks"]
     named = [c for c in done.json["causes"] if c["found"] and c["id"] != "output-lag"]
     assert all(c["confounded_with"] for c in named), named
     _write(bench, "tiny", u[:50], _device(u[:50]))

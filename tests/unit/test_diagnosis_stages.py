@@ -1,0 +1,875 @@
+"""Each stage alone, on fits that are made up: what it decides at both sides of each of its thresholds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import count
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pulsetrainer.diagnosis import residual, velocity
+from pulsetrainer.diagnosis.causes import condition_change, library
+from pulsetrainer.diagnosis.congruency import Contrast
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.floor import Floor
+from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.screening import Score, Screen
+from pulsetrainer.diagnosis.stages import (
+    acceptance,
+    account,
+    advice,
+    elimination,
+    equal_loops,
+    exchange,
+    first_look,
+    given_model,
+    joint_fit,
+    jumps,
+    parameters,
+    restart,
+    rivals,
+    screened,
+    search,
+    verdict,
+)
+from pulsetrainer.diagnosis.state import Question, State
+
+CAUSE = library()
+NUMBER = count()
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What the stages ask of a fit."""
+
+    squares: float
+    terms: tuple[Term, ...] = ()
+
+    @property
+    def names(self):
+        """Ids of its causes."""
+        return tuple(term.cause.id for term in self.terms)
+
+    @property
+    def rms(self):
+        """Of ten averages."""
+        return float(np.sqrt(self.squares / 10))
+
+
+def _term(name: str) -> Term:
+    return Term(CAUSE[name], tuple(q.small for q in CAUSE[name].parameters))
+
+
+def _fit(squares: float, *names: str) -> Fit:
+    return Fit(squares, tuple(_term(name) for name in names))
+
+
+def _score(name: str, gain: float, p: float = 0.005, basis=None) -> Score:
+    start = tuple(q.small for q in CAUSE[name].parameters)
+    return Score(CAUSE[name], gain, start, p, np.eye(3)[:, :1] if basis is None else basis)
+
+
+class HeldOut:
+    """Gains that are told."""
+
+    def __init__(self, gain: float = 1.0) -> None:
+        self.told = gain
+
+    def gain(self, before, after, floor):
+        """Return what was told."""
+        return self.told
+
+
+class StillFloor(Floor):
+    """A floor whose error of the levels stays; relevant is 9, the squares that stay are 100."""
+
+    def at(self, coarse, fitted):
+        """Return one that remembers the fit it was asked about."""
+        floor = StillFloor(self.count, self.span, self.noise, self.white)
+        object.__setattr__(floor, "asked", fitted)
+        return floor
+
+
+FLOOR = StillFloor(count=100, span=1.0, noise=1.0, white=1.0)
+PROBLEM = SimpleNamespace(
+    records=("one",), measured=np.asarray([0.0, 1.0]), plane=SimpleNamespace(low=0.0, high=2.0)
+)
+
+
+def _state(current: Fit, baseline: Fit | None = None, **more) -> State:
+    first = baseline or _fit(1100.0)
+    question = Question([], 0.0, 2.0, np.random.default_rng(0))
+    known = State(question, (), PROBLEM, "coarse", first, FLOOR, HeldOut(), (), current)
+    return replace(known, **more)
+
+
+def test_the_made_up_floor_is_what_it_says():
+    """Relevant: a third of the noise; reducible: what is above it."""
+    assert FLOOR.relevant == pytest.approx(9.0)
+    assert FLOOR.squares == pytest.approx(100.0)
+    assert FLOOR.reducible(_fit(1100.0)) == pytest.approx(1000.0)
+
+
+# --- what the state knows
+@pytest.mark.parametrize(("left", "unknown"), [(600.0, False), (601.0, True), (100.0, False)])
+def test_more_than_half_is_unexplained(left, unknown):
+    """Of a baseline of 1100 over a floor of 100: half of a thousand may stay."""
+    assert _state(_fit(left)).unexplained is unknown
+
+
+@pytest.mark.parametrize(("left", "unknown"), [(136.0, False), (137.0, True)])
+def test_what_is_unexplained_must_matter(left, unknown):
+    """Four times the relevant fall of squares, 36: less is not worth a word, however large its share."""
+    assert _state(_fit(left), _fit(138.0)).unexplained is unknown
+
+
+def test_explained_shares_are_between_nothing_and_all():
+    """Per cent of the reducible squares."""
+    state = _state(_fit(500.0))
+    assert [state.explains(gain) for gain in (-5.0, 250.0, 5000.0)] == [0.0, pytest.approx(25.0), 100.0]
+
+
+@pytest.mark.parametrize(
+    ("p", "gain", "is_so"), [(0.01, 9.1, True), (0.0101, 9.1, False), (0.01, 9.0, False)]
+)
+def test_significant_is_rare_by_chance_and_matters(p, gain, is_so):
+    """Both must hold."""
+    assert _state(_fit(500.0)).significant(_score("creep", gain, p)) is is_so
+
+
+def test_only_what_lasts_extends_a_model():
+    """A property of the device, and not of the record; nothing that was withdrawn."""
+    state = _state(_fit(500.0, "creep", "step"))
+    assert [term.cause.id for term in state.extensions] == ["creep"]
+    assert replace(state, extends=False).extensions == []
+
+
+# --- the search
+@pytest.mark.parametrize(
+    ("p", "gain", "is_so"), [(0.01, 4.6, True), (0.0101, 4.6, False), (0.01, 4.5, False)]
+)
+def test_a_candidate_is_promising_at_half_of_what_is_relevant(p, gain, is_so):
+    """A linearised score shows less than a refit does."""
+    assert joint_fit.promising(_state(_fit(500.0)), _score("creep", gain, p)) is is_so
+
+
+def _refitting(monkeypatch, *modules, squares):
+    """Let refits of these modules come out as told by the set of their causes; return what was asked."""
+    asked = []
+
+    def refit(problem, terms, near, rounds=None, *, rebuild=False):
+        names = tuple(term.cause.id for term in terms)
+        asked.append((names, rounds, rebuild))
+        return Fit(squares[frozenset(names)], tuple(terms))
+
+    for module in modules:
+        monkeypatch.setattr(module, "refit", refit)
+    return asked
+
+
+def test_the_best_three_are_fitted_but_none_of_a_family_that_is_there(monkeypatch):
+    """Delay is of the family of the lag in the model; the fourth is not tried; the best fit comes first."""
+    names = ("delay", "creep", "step", "viscous", "resonance")
+    asked = _refitting(
+        monkeypatch,
+        joint_fit,
+        squares={
+            frozenset({"field-lag", name}): value
+            for name, value in zip(names[1:], (70.0, 50.0, 60.0, 0.0), strict=True)
+        },
+    )
+    scores = Screen(tuple(_score(name, 100.0 - k) for k, name in enumerate(names)))
+    found = joint_fit.stage(_state(_fit(500.0, "field-lag"), scores=scores))
+    assert [score.cause.id for _, score in found.trials] == ["step", "viscous", "creep"]
+    assert [trial.squares for trial, _ in found.trials] == [50.0, 60.0, 70.0]
+    assert asked == [(("field-lag", name), 3, False) for name in names[1:4]]
+
+
+def test_the_first_that_is_not_promising_ends_the_trials(monkeypatch):
+    """Scores are sorted: none behind it can be."""
+    _refitting(monkeypatch, joint_fit, squares={frozenset({"creep"}): 1.0})
+    scores = Screen((_score("creep", 100.0), _score("step", 50.0, p=0.02), _score("viscous", 40.0)))
+    found = joint_fit.stage(_state(_fit(500.0), scores=scores))
+    assert [score.cause.id for _, score in found.trials] == ["creep"]
+
+
+def _accepted(monkeypatch, squares: float, gain: float, name: str = "creep"):
+    rebuilt = _refitting(monkeypatch, acceptance, squares={frozenset({name}): squares - 1.0})
+    state = _state(
+        _fit(500.0), held_out=HeldOut(gain), trials=((_fit(squares, name), _score(name, 1.0, 0.007)),)
+    )
+    return state, acceptance.stage(state), rebuilt
+
+
+@pytest.mark.parametrize(
+    ("squares", "gain", "is_so"),
+    [
+        (491.0, 1.0, True),
+        (491.1, 1.0, False),
+        (400.0, 0.05, True),
+        (400.0, 0.0499, False),
+        (400.0, float("nan"), True),
+        (400.0, -1.0, False),
+    ],
+)
+def test_a_candidate_must_matter_and_predict(monkeypatch, squares, gain, is_so):
+    """Nine of the squares, a twentieth of the held-out error; where too few blocks are left, the fit
+    decides."""
+    before, after, _ = _accepted(monkeypatch, squares, gain)
+    assert (after.current is not before.current) is is_so
+    assert after.trials == ()
+    assert dict(after.p_values) == ({"creep": 0.007} if is_so else {})
+
+
+@pytest.mark.parametrize(("name", "rebuild"), [("creep", False), ("field-lag", True)])
+def test_the_accepted_one_is_refitted_and_the_floor_estimated_anew(monkeypatch, name, rebuild):
+    """A cause of the input gets rows of its own."""
+    _, after, asked = _accepted(monkeypatch, 400.0, 1.0, name)
+    assert asked == [((name,), None, rebuild)]
+    assert after.current.squares == 399.0
+    assert after.floor.asked is after.current
+
+
+def test_the_next_candidate_is_taken_where_the_best_does_not_predict(monkeypatch):
+    """Best fit first; the one that only fits is passed over."""
+    _refitting(monkeypatch, acceptance, squares={frozenset({"step"}): 300.0})
+    best, next_ = _fit(200.0, "creep"), _fit(300.0, "step")
+    held_out = HeldOut()
+    held_out.gain = lambda before, after, floor: 0.0 if after is best else 1.0
+    state = _state(
+        _fit(500.0), held_out=held_out, trials=((best, _score("creep", 1.0)), (next_, _score("step", 1.0)))
+    )
+    assert acceptance.stage(state).current.names == ("step",)
+
+
+def test_the_search_goes_on_until_nothing_is_accepted_or_there_are_five(monkeypatch):
+    """Each round screens anew, from the model with what was accepted."""
+    order = ("creep", "step", "viscous", "resonance", "field-lag", "clock-skew")
+    screens = []
+
+    def screen(state):
+        screens.append(state.current.names)
+        return state
+
+    def accept(most):
+        def stage(state):
+            number = len(state.current.terms)
+            if number == most:
+                return state
+            return replace(state, current=_fit(500.0 - number, *order[: number + 1]))
+
+        return stage
+
+    monkeypatch.setattr(screened, "stage", screen)
+    monkeypatch.setattr(joint_fit, "stage", lambda state: state)
+    for most, names in ((2, order[:2]), (9, order[:5])):
+        screens.clear()
+        monkeypatch.setattr(acceptance, "stage", accept(most))
+        assert search.stage(_state(_fit(500.0))).current.names == names
+        assert screens == [order[:k] for k in range(len(names) + 1)]
+
+
+def _restarted(monkeypatch, gain: float, p: float, end: float):
+    first = _refitting(monkeypatch, restart, squares={frozenset({"creep", "delay"}): 480.0})
+    found = _fit(end, "creep", "delay", "resonance")
+    begun = []
+    monkeypatch.setattr(search, "stage", lambda state: begun.append(state) or replace(state, current=found))
+    scores = Screen((_score("viscous", 99.0), _score("delay", gain, p)))
+    state = _state(
+        _fit(400.0, "creep", "field-lag"), scores=scores, p_values={"creep": 0.006, "field-lag": 0.007}
+    )
+    return state, restart.stage(state), begun, first
+
+
+@pytest.mark.parametrize(
+    ("gain", "p", "end", "is_so"),
+    [
+        (9.1, 0.01, 391.0, True),
+        (9.0, 0.01, 391.0, False),
+        (9.1, 0.02, 391.0, False),
+        (9.1, 0.01, 391.1, False),
+    ],
+)
+def test_the_search_begins_again_with_another_of_a_family(monkeypatch, gain, p, end, is_so):
+    """Where that one is significant, and kept only where the end is better by what matters."""
+    before, after, _, _ = _restarted(monkeypatch, gain, p, end)
+    assert (after.current is not before.current) is is_so
+    assert (after is before) is not is_so
+
+
+def test_a_restart_keeps_the_others_and_their_p_values(monkeypatch):
+    """The lag goes, the creep stays, the delay comes with the p-value of its score."""
+    _, _, begun, asked = _restarted(monkeypatch, 9.1, 0.008, 0.0)
+    assert begun[0].current.names == ("creep", "delay")
+    assert dict(begun[0].p_values) == {"creep": 0.006, "delay": 0.008}
+    assert asked == [(("creep", "delay"), None, True)]
+
+
+def _exchanged(monkeypatch, squares: dict[str, float]):
+    fits = {frozenset({"creep", name}): value for name, value in squares.items()} | {
+        frozenset({"creep"}): 450.0,
+        frozenset(): 500.0,
+    }
+    fits |= {frozenset({"delay", name}): 999.0 for name in ("accommodation",)}
+    fits |= {
+        frozenset({"field-lag", "accommodation"}): 999.0,
+        frozenset({"field-lag"}): 460.0,
+        frozenset({"delay"}): 460.0,
+    }
+    asked = _refitting(monkeypatch, exchange, acceptance, squares=fits)
+    names = ("output-lag", "rate-widening", "delay", "accommodation", "step")
+    screens = []
+
+    def screen(problem, fitted, rng, draws):
+        screens.append(draws)
+        return Screen(tuple(_score(name, 1.0) for name in names if name not in fitted.names))
+
+    monkeypatch.setattr(exchange, "screen", screen)
+    state = _state(_fit(400.0, "creep", "field-lag"), p_values={"creep": 0.006, "field-lag": 0.007})
+    return exchange.stage(state), asked, screens
+
+
+def test_a_cause_is_exchanged_for_a_better_one_of_its_family(monkeypatch):
+    """It inherits the p-value; the step, of another family, is not tried in its place."""
+    after, asked, screens = _exchanged(
+        monkeypatch, {"output-lag": 395.0, "rate-widening": 405.0, "delay": 390.0}
+    )
+    assert after.current.names == ("creep", "delay")
+    assert dict(after.p_values) == {"creep": 0.006, "delay": 0.007}
+    assert not [names for names, _, _ in asked if "step" in names]
+    assert screens == [20, 20]
+    assert asked[-1] == (("creep", "delay"), None, False)
+
+
+def test_a_cause_stays_where_no_other_of_its_family_is_better(monkeypatch):
+    """The fit is left as it was."""
+    after, asked, _ = _exchanged(monkeypatch, {"output-lag": 401.0, "rate-widening": 405.0, "delay": 400.0})
+    assert after.current.names == ("creep", "field-lag")
+    assert after.current.squares == 400.0
+    assert (("field-lag",), 1, False) in asked
+
+
+@pytest.mark.parametrize(("without", "kept"), [(409.0, ("creep", "step")), (408.9, ("step",))])
+def test_a_cause_that_is_not_missed_is_dropped(monkeypatch, without, kept):
+    """By a relevant amount; the scores are made again for the smaller model."""
+    squares = {frozenset({"step"}): without, frozenset({"creep"}): 450.0}
+    asked = _refitting(monkeypatch, elimination, squares=squares)
+    monkeypatch.setattr(screened, "stage", lambda state: replace(state, scores="anew"))
+    p_values = {"creep": 0.006, "step": 0.007}
+    after = elimination.stage(_state(_fit(400.0, "creep", "step"), p_values=p_values, scores="old"))
+    assert after.current.names == kept
+    assert after.scores == ("old" if len(kept) == 2 else "anew")
+    assert all(rounds == 1 for _, rounds, _ in asked)
+    if len(kept) == 2:
+        assert {name: one.names for name, one in after.without.items()} == {
+            "creep": ("step",),
+            "step": ("creep",),
+        }
+    else:
+        assert dict(after.without) == {"step": after.baseline}
+
+
+# --- raw data again, equal loops
+FIRED = Firing("stick-slip", "gate", 0.1, 0.5, "{y}", {"count": 20.0, "size": 0.5})
+
+
+@pytest.mark.parametrize(
+    ("left", "firings", "found"),
+    [(109.1, (), 1), (109.0, (), 0), (109.1, ((0, Firing("quantisation", "gate", 1.0, 0.1, "{y}")),), 1)],
+)
+def test_small_sticking_is_sought_where_something_is_left(monkeypatch, left, firings, found):
+    """Above the floor by a relevant amount, and nothing jagged known yet."""
+    monkeypatch.setattr(type(CAUSE["stick-slip"]), "gate_left", lambda self, fitted: FIRED)
+    after = jumps.stage(_state(_fit(left), firings=firings))
+    assert len(after.firings) == found
+    if found and not firings:
+        assert after.firings == ((0, FIRED),)
+
+
+@pytest.mark.parametrize("again", [None, FIRED])
+def test_jumps_that_the_causes_found_make_are_withdrawn(monkeypatch, again):
+    """The gate is asked about the output less what the causes add to the hysteresis."""
+    asked = []
+    monkeypatch.setattr(type(CAUSE["stick-slip"]), "gate", lambda self, raw: asked.append(raw) or again)
+
+    @dataclass(frozen=True)
+    class Recorded:
+        output: np.ndarray
+
+    simulator = SimpleNamespace(
+        full=lambda terms: [np.asarray([3.0, 5.0])], inner=lambda terms: [np.asarray([1.0, 1.0])]
+    )
+    current = SimpleNamespace(terms=(_term("periodic"),), simulator=simulator, squares=0.0)
+    problem = SimpleNamespace(records=[Recorded(np.asarray([10.0, 10.0]))], plane=PROBLEM.plane)
+    tracking = Firing("current-tracking", "gate", 0.1, 0.5, "{u}")
+    state = replace(_state(_fit(0.0)), firings=((0, FIRED), (0, tracking)), current=current, problem=problem)
+    assert [one.cause for _, one in jumps.stage(state).firings] == (["stick-slip"] if again else []) + [
+        "current-tracking"
+    ]
+    np.testing.assert_array_equal(asked[0].record.output, [8.0, 6.0])
+    assert (asked[0].low, asked[0].high) == (0.0, 2.0)
+
+
+def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firings=(), none=False):
+    held = None if none else Contrast(0.003, 0.001, p, 12, 3, at_bound)
+    monkeypatch.setattr(equal_loops.congruency, "fitted_contrast", lambda *_: held)
+    monkeypatch.setattr(
+        equal_loops,
+        "weights_for",
+        lambda problem, terms, near, rebuild: Fit(near.squares + rise, tuple(terms)),
+    )
+    return equal_loops.stage(_state(_fit(left, "creep"), firings=firings))
+
+
+@pytest.mark.parametrize(
+    ("how", "found"),
+    [
+        ({"p": 0.005}, True),
+        ({"p": 0.0051}, False),
+        ({"rise": 9.1}, False),
+        ({"at_bound": True}, False),
+        ({"none": True}, False),
+        ({"left": 700.0}, False),
+        ({"firings": ((0, FIRED),)}, False),
+        ({"firings": ((0, Firing("outliers", "gate", 0.1, 1.0, "{y}")),)}, True),
+    ],
+)
+def test_equal_loops_show_a_feedback_or_do_not(monkeypatch, how, found):
+    """Rare by chance, not at its bound, not denied by the rest, and nothing else that makes loops differ."""
+    after = _looped(monkeypatch, **how)
+    assert ("load-dependence" in after.current.names) is found
+    assert ("load-dependence" in after.by_contrast) is found
+
+
+def test_what_equal_loops_show_comes_with_its_interval(monkeypatch):
+    """1.96 standard errors and a fifth of the strength on each side; its p-value; the model before it."""
+    after = _looped(monkeypatch)
+    (known,) = after.by_contrast["load-dependence"]
+    half = 1.96 * 0.001 + 0.2 * 0.003
+    assert (known.value, known.lower, known.upper) == pytest.approx((0.003, 0.003 - half, 0.003 + half))
+    assert after.p_values["load-dependence"] == 0.004
+    assert after.without["load-dependence"].names == ("creep",)
+
+
+def test_the_interval_of_equal_loops_is_kept(monkeypatch):
+    """The others have that of the joint fit."""
+    known = {"creep": ("joint",), "load-dependence": ("joint",)}
+    monkeypatch.setattr(parameters, "estimates_of", lambda *_: known)
+    after = parameters.stage(_state(_fit(100.0, "creep"), by_contrast={"load-dependence": ("loops",)}))
+    assert dict(after.estimates) == {"creep": ("joint",), "load-dependence": ("loops",)}
+
+
+# --- rivals, verdict
+def _rivals(
+    monkeypatch, squares: float, *, gain=200.0, current=400.0, lacks=(), scores=("delay",), name="field-lag"
+):
+    fits = {frozenset({one}): squares for one in scores}
+    asked = _refitting(monkeypatch, rivals, squares=fits)
+    screened_draws = []
+
+    def screen(problem, fitted, rng, draws):
+        screened_draws.append(draws)
+        return Screen(tuple(_score(one, gain) for one in scores))
+
+    monkeypatch.setattr(rivals, "screen", screen)
+    without = {name: _fit(current + 400.0)}
+    state = _state(_fit(current, name), without=without, lacks=lacks)
+    found = rivals.rivals(state, state.current.terms[0])
+    assert screened_draws == [20]
+    return found, asked
+
+
+@pytest.mark.parametrize(
+    ("current", "squares", "gain", "found"),
+    [
+        (400.0, 447.9, 200.0, ("delay",)),  # twelve mean squares of 4: 48
+        (400.0, 448.1, 200.0, ()),
+        (400.0, 447.9, 199.9, ()),  # half of the gain of 400
+        (1.0, 3.69, 200.0, ("delay",)),  # 0.3 of the relevant 9: 2.7
+        (1.0, 3.71, 200.0, ()),
+    ],
+)
+def test_a_rival_comes_as_close_as_two_fits_may_differ(monkeypatch, current, squares, gain, found):
+    """The largest of the margins counts."""
+    rival, asked = _rivals(monkeypatch, squares, gain=gain, current=current)
+    assert rival == found
+    assert all(rounds == 2 for _, rounds, _ in asked)
+
+
+def test_a_rival_of_a_large_gain_may_be_a_little_worse(monkeypatch):
+    """A two hundredth of the gain, where that is more than the noise."""
+    for squares, found in ((50.9, ("delay",)), (51.1, ())):
+        fits = {frozenset({"delay"}): squares}
+        _refitting(monkeypatch, rivals, squares=fits)
+        monkeypatch.setattr(rivals, "screen", lambda *_, **__: Screen((_score("delay", 6000.0),)))
+        state = _state(_fit(1.0, "field-lag"), without={"field-lag": _fit(10_001.0)})
+        assert rivals.rivals(state, state.current.terms[0]) == found
+
+
+def test_only_the_closest_three_are_tried(monkeypatch):
+    """The fourth is not asked."""
+    found, asked = _rivals(monkeypatch, 400.0, scores=("delay", "creep", "step", "viscous"))
+    assert found == ("delay", "creep", "step")
+    assert len(asked) == 3
+
+
+def test_at_one_rate_all_that_widen_the_loop_are_one(monkeypatch):
+    """Whatever the fits say; a cause that does not widen it stays alone."""
+    found, _ = _rivals(monkeypatch, 999.0, lacks=(residual.RATES,))
+    assert set(found) == {"delay", "output-lag", "rate-widening", "viscous"}
+    assert _rivals(monkeypatch, 999.0, lacks=(residual.HOLDS,))[0] == ()
+    assert _rivals(monkeypatch, 999.0, lacks=(residual.RATES,), name="creep")[0] == ()
+
+
+def test_every_cause_gets_a_finding(monkeypatch):
+    """With p-value, share, interval, rivals and held-out gain; those that were only screened with their
+    score."""
+    monkeypatch.setattr(rivals, "rivals", lambda state, term: ("delay",))
+    state = _state(
+        _fit(300.0, "field-lag", "load-dependence"),
+        scores=Screen((_score("step", 50.0, 0.4), _score("field-lag", 1.0))),
+        without={"field-lag": _fit(800.0), "load-dependence": _fit(301.0)},
+        p_values={"field-lag": 0.006, "load-dependence": 0.002},
+        estimates={"field-lag": ("tau",), "load-dependence": ("k",)},
+        held_out=HeldOut(0.9),
+    )
+    lag, load, step = rivals.stage(state).findings
+    assert (lag.cause.id, lag.found, lag.p_value, lag.parameters) == ("field-lag", True, 0.006, ("tau",))
+    assert (lag.explains_percent, lag.held_out_gain_percent) == (pytest.approx(50.0), pytest.approx(90.0))
+    assert (lag.confounded_with, load.confounded_with) == (("delay",), ())
+    assert (step.cause.id, step.found, step.p_value, step.explains_percent) == (
+        "step",
+        False,
+        0.4,
+        pytest.approx(5.0),
+    )
+
+
+@pytest.mark.parametrize(("cosine", "found"), [(0.91, ("delay",)), (0.89, ())])
+def test_a_first_look_names_what_looks_alike(cosine, found):
+    """By the cosine of the signatures; only the best can be found, and only where it is significant."""
+    best, other = np.asarray([[1.0], [0.0]]), np.asarray([[cosine], [np.sqrt(1 - cosine**2)]])
+    scores = Screen((_score("creep", 50.0, 0.01, best), _score("delay", 40.0, 0.01, other)))
+    first, second = first_look.stage(_state(_fit(500.0), scores=scores)).findings
+    assert (first.found, first.confounded_with, second.found, second.confounded_with) == (
+        True,
+        found,
+        False,
+        (),
+    )
+    assert first.explains_percent == pytest.approx(5.0)
+    assert [(e.name, e.value) for e in first.parameters] == [("amplitude", 0.002), ("tau", 0.02)]
+    weak = Screen((_score("creep", 50.0, 0.02, best),))
+    assert not first_look.stage(_state(_fit(500.0), scores=weak)).findings[0].found
+
+
+def _finding(name: str, explains: float, found=True, **more) -> Finding:
+    return Finding(CAUSE[name], found, 0.005, explains, **more)
+
+
+QUANTISED = Firing("quantisation", "gate", 1.0, 0.1, "{y}", {"step": 0.1, "percent": 2.0}, spread=0.01)
+WILD = Firing("outliers", "gate", 0.1, 3.0, "{y}", {"count": 5.0, "limit": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("left", "findings", "firings", "quick", "expected"),
+    [
+        (200.0, (), (), False, "none"),
+        (200.0, (_finding("step", 10.0), _finding("creep", 20.0)), ((0, WILD),), False, "creep"),
+        (200.0, (_finding("creep", 20.0, False),), ((0, WILD),), False, "outliers"),
+        (900.0, (_finding("creep", 20.0),), ((0, WILD),), False, "unknown"),
+        (900.0, (_finding("creep", 20.0),), ((0, WILD), (0, QUANTISED)), False, "quantisation"),
+        (900.0, (_finding("creep", 20.0),), (), True, "creep"),
+    ],
+)
+def test_the_verdict_is_the_strongest_or_unknown(left, findings, firings, quick, expected):
+    """A jagged cause takes what is left on itself; a quick look is never unknown."""
+    state = _state(_fit(left), findings=findings, firings=firings)
+    state = replace(state, question=replace(state.question, quick=quick))
+    assert verdict.stage(state).verdict == expected
+
+
+def test_findings_come_in_order_and_gates_once_a_cause():
+    """Found, strongest first; gates; not found, strongest first; gates that did not fire. No p-value for a
+    gate."""
+    firings = ((1, QUANTISED), (2, replace(QUANTISED, value=9.0)))
+    findings = (
+        _finding("step", 10.0),
+        _finding("delay", 5.0, False),
+        _finding("creep", 20.0),
+        _finding("viscous", 7.0, False),
+    )
+    state = _state(_fit(200.0), findings=findings, firings=firings)
+    state = replace(state, problem=SimpleNamespace(records=(1, 2, 3)))
+    found = verdict.stage(state).findings
+    assert [f.cause.id for f in found[:5]] == ["creep", "step", "quantisation", "viscous", "delay"]
+    gate = found[2]
+    assert (gate.p_value, gate.seen.record, gate.seen.figures["step"]) == (None, 1, 0.1)
+    (size,) = gate.parameters
+    assert (size.value, size.unit) == (0.1, "{y}")
+    assert (size.lower, size.upper) == pytest.approx((0.09, 0.11))
+    silent = found[5:]
+    assert {f.cause.id for f in silent} == {c.id for c in CAUSE.values() if c.stage == "record"} - {
+        "quantisation"
+    }
+    assert not any(f.found or f.p_value is not None for f in silent)
+
+
+def test_a_single_record_has_no_number():
+    """There is nothing to tell apart."""
+    found = verdict.stage(_state(_fit(200.0), firings=((0, WILD),))).findings
+    assert found[0].seen.record is None
+
+
+# --- account and advice
+def _accounted(monkeypatch, **more):
+    groups = [residual.Group("rate", "1/s", np.asarray([0.0, 4.0]), np.asarray([0, 1]))]
+    monkeypatch.setattr(residual, "groups", lambda problem: groups)
+    monkeypatch.setattr(residual, "rms_by", lambda group, left: np.asarray(left))
+    current = SimpleNamespace(residual=more.pop("left", (1.0, 1.6)), rms=0.02)
+    baseline = SimpleNamespace(rms=0.05, residual=(1.0, 1.6))
+    state = replace(
+        _state(_fit(1.0)), baseline=baseline, current=current if more.pop("extended", False) else baseline
+    )
+    return account.stage(replace(state, **more)).evidence
+
+
+def test_the_account_says_what_is_left_before_and_after(monkeypatch):
+    """Per cent of a span of 1: the static model, the floor, and with the causes; where the rest is only if
+    unknown."""
+    static, extended = _accounted(monkeypatch, extended=True, verdict="creep")
+    assert (static.kind, static.figures) == (
+        "static",
+        {"left": pytest.approx(5.0), "floor": pytest.approx(100.0)},
+    )
+    assert (extended.kind, extended.figures) == ("extended", {"left": pytest.approx(2.0)})
+
+
+@pytest.mark.parametrize(("left", "said"), [((1.0, 1.51), True), ((1.0, 1.5), False)])
+@pytest.mark.parametrize("name", ["none", "unknown"])
+def test_where_the_rest_is_largest_is_said_if_it_stands_out(monkeypatch, left, said, name):
+    """By half, and only where nothing was named."""
+    found = _accounted(monkeypatch, left=left, extended=True, verdict=name)
+    largest = [one for one in found if one.kind == "largest"]
+    assert bool(largest) is said
+    if said:
+        assert largest[0].figures == {"at": 4.0, "times": pytest.approx(1.51)}
+        assert largest[0].names == ("rate",)
+
+
+def test_each_cause_found_brings_its_evidence(monkeypatch):
+    """What its gate saw, or its p-value and share."""
+    seen = Evidence("gate", "outliers", {"count": 3.0})
+    findings = (
+        _finding("creep", 20.0),
+        _finding("step", 2.0, False),
+        Finding(CAUSE["outliers"], True, seen=seen),
+    )
+    question = replace(_state(_fit(1.0)).question, quick=True)
+    found = _accounted(monkeypatch, verdict="creep", findings=findings, lacks=("rates",), question=question)
+    assert [(one.kind, one.cause) for one in found[1:]] == [
+        ("tested", "creep"), ("gate", "outliers"), ("quick", ""), ("lacks", ""),
+    ]  # fmt: skip
+    assert found[1].figures == {"p": 0.005, "explains": 20.0}
+    assert found[-1].names == ("rates",)
+
+
+TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
+
+
+@pytest.mark.parametrize(
+    ("more", "kind"),
+    [
+        ({"verdict": "none"}, "none"),
+        ({"verdict": "unknown"}, "unknown"),
+        ({"verdict": "creep"}, "extend"),
+        ({"verdict": "creep", "lacks": ("rates",)}, "lacks"),
+        ({"findings": (TIED,), "lacks": ("rates",)}, "tied"),
+        ({"findings": (replace(TIED, found=False),)}, "none"),
+        ({"findings": (TIED,), "evidence": (Evidence("wrong kind"),)}, "other model"),
+        ({"findings": (TIED,), "evidence": (Evidence("changed", "condition-change"),)}, "identify anew"),
+        ({"evidence": (Evidence("shifted", "condition-change"),)}, "identify anew"),
+    ],
+)
+def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
+    """Another model first, then ties, then what the recordings lack, then the verdict."""
+    best = SimpleNamespace(name="heating", distance=0.02, distance_here=0.001)
+    monkeypatch.setattr(advice, "best_experiment", lambda state, names: best)
+    said = advice.stage(replace(_state(_fit(1.0)), **more)).advice
+    assert said.kind == kind
+    if kind == "tied":
+        assert said.names == ("heating", "field-lag", "delay")
+        assert said.figures == {"there": pytest.approx(2.0), "here": pytest.approx(0.1)}
+
+
+def test_a_quick_look_makes_no_experiment():
+    """It says that the full diagnosis tells more."""
+    state = _state(_fit(1.0), findings=(TIED,))
+    said = advice.stage(replace(state, question=replace(state.question, quick=True))).advice
+    assert (said.kind, said.names) == ("tied, quick", ("field-lag", "delay"))
+
+
+# --- the model as given
+RAMP = np.linspace(0.0, 10.0, 1000)
+
+
+def _given(
+    monkeypatch, predicted, *, left=0.01, refitted=0.01, wrong=None, direction=1.0, polarity=1, **more
+):
+    """Judge a model that predicts this of a ramp from 0 to 10; the search leaves ``left``."""
+    speed = velocity.Comparison(1.0, 0.5 if wrong is None else wrong, 100.0 if wrong is None else 10.0)
+    judged = given_model._Judged([1], [RAMP - predicted], RAMP, predicted, speed, polarity)
+    monkeypatch.setattr(given_model, "_judged", lambda state, given: judged)
+    monkeypatch.setattr(velocity, "compare", lambda *_: velocity.Comparison(1.0, direction, 10.0))
+    findings = (_finding("creep", 20.0), _finding("load-dependence", 5.0), Finding(CAUSE["outliers"], True))
+    state = _state(_fit(1.0))
+    state = replace(
+        state,
+        question=replace(state.question, given="given"),
+        findings=findings,
+        verdict="creep",
+        evidence=(Evidence("static"), Evidence("tested", "creep"), Evidence("extended")),
+        current=SimpleNamespace(rms=left),
+        baseline=SimpleNamespace(rms=refitted),
+        floor=replace(state.floor, noise=0.0),
+        by_contrast={"load-dependence": ()},
+    )
+    return given_model.stage(replace(state, **more))
+
+
+def _found(state):
+    return [one.cause.id for one in state.findings if one.found]
+
+
+def test_a_good_model_changes_nothing(monkeypatch):
+    """It leaves more than the search, but is not far off."""
+    after = _given(monkeypatch, RAMP + 0.05)
+    assert _found(after) == ["creep", "load-dependence", "outliers"]
+    assert (after.verdict, after.extends) == ("creep", True)
+    assert [one.kind for one in after.evidence] == ["static", "tested", "extended"]
+
+
+@pytest.mark.parametrize(("error", "withdrawn"), [(0.0099, True), (0.0101, False)])
+def test_a_model_that_is_better_than_the_search_clears_what_it_found(monkeypatch, error, withdrawn):
+    """What raw data and equal loops show stays; the evidence of the rest goes, and nothing is extended."""
+    after = _given(monkeypatch, RAMP + error)
+    assert _found(after) == (
+        ["load-dependence", "outliers"] if withdrawn else ["creep", "load-dependence", "outliers"]
+    )
+    assert after.extends is not withdrawn
+    if withdrawn:
+        assert after.verdict == "load-dependence"
+        assert [one.kind for one in after.evidence] == ["given better", "static"]
+
+
+@pytest.mark.parametrize(("wrong", "direction", "name"), [(0.44, 0.74, "viscous"), (0.46, 0.74, "unknown")])
+def test_a_model_of_the_wrong_kind(monkeypatch, wrong, direction, name):
+    """A speed that says much more than its direction is a viscous force; else there is no name for it."""
+    after = _given(monkeypatch, RAMP + 0.001, wrong=wrong, direction=direction)
+    assert after.verdict == name
+    assert _found(after) == (["viscous", "outliers"] if name == "viscous" else ["outliers"])
+    assert [one.kind for one in after.evidence] == ["wrong kind", "static"]
+    if name == "viscous":
+        assert after.findings[0].p_value is None
+        assert after.findings[0].explains_percent == pytest.approx(100.0 * (1.0 - wrong**2))
+
+
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_another_condition_comes_first(monkeypatch, polarity):
+    """Twice the gain, shifted by one: with the sign of the output as it was measured."""
+    after = _given(monkeypatch, (RAMP - 1.0) / 2.0, refitted=0.5, polarity=polarity)
+    first = after.findings[0]
+    assert after.verdict == first.cause.id == "condition-change"
+    assert first.p_value is None
+    offset, gain = first.parameters
+    assert (offset.value, gain.value) == pytest.approx((polarity * 1.0, 1.0))
+    assert (offset.lower, offset.upper) == pytest.approx((offset.value, offset.value), abs=1e-6)
+    assert after.evidence[0].figures["shift"] == pytest.approx(polarity * 3.0)
+    assert after.evidence[0].figures["times"] == pytest.approx(2.0)
+    assert "creep" in _found(after)  # half a unit left: other causes may be there too
+
+
+def test_a_change_that_is_everything_overshadows_the_rest(monkeypatch):
+    """What only repairs a thousandth of the squared error is withdrawn, and said so."""
+    after = _given(monkeypatch, RAMP / 2.0, refitted=0.01)
+    assert _found(after) == ["condition-change", "load-dependence", "outliers"]
+    assert [one.kind for one in after.evidence] == ["overshadowed", "changed", "static"]
+    assert after.evidence[0].names == ("creep",)
+    assert after.evidence[0].figures["left"] == pytest.approx(0.1)
+    again = _given(monkeypatch, RAMP / 2.0, refitted=0.01, findings=(Finding(CAUSE["outliers"], True),))
+    assert again.extends
+    assert next(one.kind for one in again.evidence) == "changed"
+
+
+def test_a_change_from_record_to_record_is_not_said_twice(monkeypatch):
+    """The search found it already."""
+    after = _given(monkeypatch, (RAMP - 1.0) / 2.0, refitted=0.5, verdict="condition-change")
+    assert "condition-change" not in _found(after)
+
+
+def test_what_needs_no_time_is_named_where_there_is_none(monkeypatch):
+    """Only these causes were tried."""
+    state = _given(monkeypatch, RAMP + 0.05)
+    assert next(one.kind for one in state.evidence) == "static"
+    question = replace(state.question, records=[SimpleNamespace(timed=False)])
+    after = given_model.stage(replace(state, question=question, evidence=()))
+    assert after.evidence[0].kind == "untimed"
+    assert set(after.evidence[0].names) == {"load-dependence", "accommodation", "step", "condition-change"}
+
+
+def test_without_a_model_there_is_nothing_to_judge():
+    """A search alone."""
+    state = _state(_fit(1.0))
+    assert given_model.stage(state) is state
+
+
+# --- condition change
+@pytest.mark.parametrize(
+    ("error", "refitted", "is_so"),
+    [(0.0999, 0.0, False), (0.1001, 0.0, True), (1.0, 0.2, True), (1.0, 0.2001, False)],
+)
+def test_a_condition_has_changed_where_the_given_model_is_far_off(error, refitted, is_so):
+    """By 1 % of the span of 10, where refitted weights leave less than a fifth of that."""
+    found = condition_change.against_model(RAMP, RAMP + error, refitted, 0.0)
+    assert (found is not None) is is_so
+
+
+def test_the_noise_of_single_samples_is_nobodys_fault():
+    """It is taken off the error, squared; an error smaller than the noise is none."""
+    assert condition_change.left_by(RAMP, RAMP + 0.5, 0.3) == pytest.approx(0.4)
+    assert condition_change.left_by(RAMP, RAMP + 0.5, 0.6) == 0.0
+
+
+def test_gain_offset_and_what_they_leave():
+    """Fitted by least squares; their errors by leaving out a tenth after another."""
+    rest = np.where(np.arange(1000) % 2, 0.2, -0.2)
+    found = condition_change.against_model(1.5 * RAMP + 2.0 + rest, RAMP, 0.2, 0.0)
+    assert (found.gain, found.offset) == pytest.approx((0.5, 2.0), abs=1e-3)
+    assert found.left == pytest.approx(0.2, rel=1e-3)
+    assert found.shift == pytest.approx(4.5)
+    given = condition_change.left_by(1.5 * RAMP + 2.0 + rest, RAMP, 0.0)
+    assert found.explains == pytest.approx(1.0 - (0.2 / given) ** 2)
+    assert found.span == pytest.approx(15.4, rel=0.01)
+    blocks = np.array_split(np.arange(1000), 10)
+    y = 1.5 * RAMP + 2.0 + rest
+    each = np.asarray([np.polyfit(np.delete(RAMP, b), np.delete(y, b), 1) for b in blocks])
+    assert (found.gain_error, found.offset_error) == pytest.approx(3.0 * each.std(axis=0), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("gain", "left", "explains", "kind", "everything"),
+    [
+        (0.02, 0.1, 0.999, "shifted", False),
+        (0.021, 0.1, 0.9991, "changed", True),
+        (-0.021, 0.1, 0.5, "changed", False),
+        (0.0, 0.101, 0.5, "changed", False),
+    ],
+)
+def test_gain_and_shape_are_unchanged_within_a_hundredth(gain, left, explains, kind, everything):
+    """Of the span; and a change is everything but a thousandth of the squared error."""
+    found = condition_change.Change(gain, 0.0, 1.0, 0.0, explains, left, 1.0, 10.0)
+    assert (found.kind, found.is_everything) == (kind, everything)
