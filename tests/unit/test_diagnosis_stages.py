@@ -217,8 +217,7 @@ def _accepted(monkeypatch, squares: float, gain: float, name: str = "creep"):
     ],
 )
 def test_a_candidate_must_matter_and_predict(monkeypatch, squares, gain, is_so):
-    """Nine of the squares, a twentieth of the held-out error; where too few blocks are left, the fit
-    decides."""
+    """Nine of the squares, a twentieth of the held-out error; with too few blocks the fit decides."""
     before, after, _ = _accepted(monkeypatch, squares, gain)
     assert (after.current is not before.current) is is_so
     assert after.trials == ()
@@ -526,8 +525,7 @@ def test_at_one_rate_all_that_widen_the_loop_are_one(monkeypatch):
 
 
 def test_every_cause_gets_a_finding(monkeypatch):
-    """With p-value, share, interval, rivals and held-out gain; those that were only screened with their
-    score."""
+    """With p-value, share, interval, rivals and held-out gain; those only screened with their score."""
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ("delay",))
     state = _state(
         _fit(300.0, "field-lag", "load-dependence"),
@@ -594,8 +592,7 @@ def test_the_verdict_is_the_strongest_or_unknown(left, findings, firings, quick,
 
 
 def test_findings_come_in_order_and_gates_once_a_cause():
-    """Found, strongest first; gates; not found, strongest first; gates that did not fire. No p-value for a
-    gate."""
+    """Found, gates, not found, gates that did not fire: strongest first, and no p-value for a gate."""
     firings = ((1, QUANTISED), (2, replace(QUANTISED, value=9.0)))
     findings = (
         _finding("step", 10.0),
@@ -639,8 +636,7 @@ def _accounted(monkeypatch, **more):
 
 
 def test_the_account_says_what_is_left_before_and_after(monkeypatch):
-    """Per cent of a span of 1: the static model, the floor, and with the causes; where the rest is only if
-    unknown."""
+    """Per cent of a span of 1: the static model, the floor, and with the causes."""
     static, extended = _accounted(monkeypatch, extended=True, verdict="creep")
     assert (static.kind, static.figures) == (
         "static",
