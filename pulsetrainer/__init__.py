@@ -53,7 +53,10 @@ _NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Waveform")
 _HOME = {
     **dict.fromkeys(_NOUNS, "artefacts"),
     **dict.fromkeys(("invert", "load", "open_device", "read_table", "save"), "api"),
-    **{verb: f"steps.{verb}" for verb in ("capture", "compare", "diagnose", "evaluate", "extend", "identify", "play")},
+    **{
+        verb: f"steps.{verb}"
+        for verb in ("capture", "compare", "diagnose", "evaluate", "extend", "identify", "play")
+    },
 }
 
 

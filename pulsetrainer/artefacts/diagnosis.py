@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 from pulsetrainer.artefacts.data import Data, FloatArray
 from pulsetrainer.artefacts.model import Model, Parameter
+from pulsetrainer.artefacts.shown import Shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,8 @@ class Left(NamedTuple):
     floor_percent: float
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
+@dataclass(frozen=True, slots=True, repr=False)
+class Diagnosis(Shown):
     """What a model gets wrong on some runs, why, and the model extended by the causes found."""
 
     kind: ClassVar[str] = "diagnosis"

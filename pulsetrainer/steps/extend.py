@@ -17,13 +17,26 @@ def extend(model: Model, diagnosis: Diagnosis, *, names: Sequence[str] = ()) -> 
     is in ``extensions`` of the new model; what it gains on blocks that were not fitted is in
     ``held_out_gain_percent`` of the diagnosis.
 
-    Parameters ---------- names Names of the model and of the diagnosis, for messages.
+    Parameters
+    ----------
+    names
+        Names of the model and of the diagnosis, for messages.
 
-    Raises ------ DataError The diagnosis found nothing that extends a model, or is of another model.
+    Raises
+    ------
+    DataError
+        The diagnosis found nothing that extends a model, or is of another model.
 
-    Examples -------- >>> import pulsetrainer as pt >>> model, found =
-    pt.load("tests/data/files-0.1/model.h5"), pt.load("tests/data/files-0.1/diagnosis.h5") >>> [one.cause for
-    one in pt.extend(model, found).extensions] ['field-lag']
+    Source: Della Torre, Magnetic Hysteresis, 1999, chapters 3 to 5: the classical model and its extensions.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> model, found = pt.load("tests/data/files-0.1/model.h5"), pt.load("tests/data/files-0.1/diagnosis.h5")
+    >>> pt.extend(model, found)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    pulsetrainer.errors.DataError: ...
     """
     model_name, diagnosis_name = names or ("the model", "the diagnosis")
     extended = diagnosis.extended
