@@ -29,8 +29,8 @@ def question_of(
     Raises
     ------
     DataError
-        Runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is too short, or
-        has too many gaps or samples without a number.
+        Runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is too
+        short, or has too many gaps or samples without a number.
     """
     low, high = float(model.edges[0]), float(model.edges[-1])
     *called, model_name = names or (*(f"run {k}" for k in range(1, len(runs) + 1)), "the model")
