@@ -43,7 +43,7 @@ class NormalEquations:
         return gram, self.moment - self.row_sum * (self.output_sum / self.weight_sum)
 
     def offset(self, masses: FloatArray) -> float:
-        """Best offset y0 for given masses (n_q,)."""
+        """Best offset for given masses (n_q,): y0 = sum v (y - r . m) / sum v, output unit."""
         return float(self.output_sum - self.row_sum @ masses) / self.weight_sum
 
     def sum_of_squares(self, masses: FloatArray, offset: float) -> float:
@@ -57,7 +57,7 @@ class NormalEquations:
         )
 
     def rms(self, masses: FloatArray, offset: float) -> float:
-        """Weighted rms error, output unit."""
+        """Rms error sqrt(sum v (y - y0 - r . m)^2 / sum v) of masses (n_q,) and an offset, output unit."""
         return float(np.sqrt(max(self.sum_of_squares(masses, offset), 0.0) / self.weight_sum))
 
     def __sub__(self, part: NormalEquations) -> NormalEquations:
@@ -166,7 +166,22 @@ def _part_sums(
 
 
 def node_sums(plane: Plane, records: Sequence[Record], reading: Reading) -> NodeSums:
-    """Sums over all samples of all records, in node space."""
+    """Sums over all samples of all records in node space: S = sum v r r' (n_q, n_q), sparse, and its like.
+
+    Parameters
+    ----------
+    plane
+        The cells; inputs outside its range are clipped.
+    records
+        Each is followed from its own start; a sample counts as much as its sample weight v says.
+    reading
+        "continuous" or "relay".
+
+    Raises
+    ------
+    ArgumentError
+        The reading is unknown.
+    """
     total = NodeSums.nothing(plane)
     for record in records:
         path = follow(plane, record.input, record.start, reading)
@@ -183,7 +198,13 @@ def parted_sums(
 ) -> list[NodeSums]:
     """Sums of ``count`` parts of the records, each record followed once, from its start.
 
-    ``parts`` holds for each record the number of the part, in 0..count - 1, of each of its samples (n,).
+    ``parts`` holds for each record the number of the part of each of its samples (n,), 0 .. count - 1. Samples
+    with any other number are left out of the sums, but not out of the memory.
+
+    Raises
+    ------
+    ArgumentError
+        The reading is unknown.
     """
     sums = [NodeSums.nothing(plane) for _ in range(count)]
     for record, part in zip(records, parts, strict=True):
@@ -195,5 +216,11 @@ def parted_sums(
 
 
 def normal_equations(plane: Plane, records: Sequence[Record], reading: Reading) -> NormalEquations:
-    """Assemble the normal equations of all records in mass space; relays are -1 or +1."""
+    """Sums over all samples of all records in the coordinates of the masses: ``node_sums``, carried there.
+
+    Raises
+    ------
+    ArgumentError
+        The reading is unknown.
+    """
     return node_sums(plane, records, reading).dense()

@@ -48,12 +48,24 @@ class State:
 
 
 def negative_saturation(low: float) -> State:
-    """Return the state in which every relay is down and the input is ``low``."""
+    """Return the state in which every relay is down and the input is ``low``, input unit.
+
+    Raises
+    ------
+    ArgumentError
+        ``low`` is not finite.
+    """
     return State((float(low),))
 
 
 def positive_saturation(low: float, high: float) -> State:
-    """Return the state in which every relay is up and the input is ``high``."""
+    """Return the state in which every relay is up and the input is ``high``, input unit.
+
+    Raises
+    ------
+    ArgumentError
+        ``low`` is not below ``high``, or one of them is not finite.
+    """
     return State((float(low), float(high)))
 
 
@@ -116,14 +128,16 @@ def turning_points(path: FloatArray) -> IntArray:
 
 
 def trace(values: FloatArray, start: State, low: float, high: float) -> Trace:
-    """Follow ``values`` (n,), clipped to [low, high], from ``start``."""
+    """Follow an input (n,), clipped to [low, high], from a state: see ``trace_after``."""
     return trace_after(np.asarray(start.extremes), values, low, high)
 
 
 def trace_after(past: FloatArray, values: FloatArray, low: float, high: float) -> Trace:
-    """Follow ``values`` (n,), clipped to [low, high], after a ``past`` (p,) that begins with all relays down.
+    """Follow an input (n,), clipped to [low, high], after a ``past`` (p,) that begins with all relays down.
 
-    One pass over the turning points, each of which is pushed and wiped out at most once: linear in n.
+    The memory is the alternating sequence of dominant extremes (Mayergoyz 2003, section 1.2). One pass
+    over the turning points, each of which is pushed and wiped out at most once: linear in n + p. ``past``
+    and ``values`` are finite and not empty, in the unit of ``low`` and ``high``; nothing is checked here.
     """
     path = np.concatenate((past, values))
     np.clip(path, low, high, out=path)

@@ -46,11 +46,12 @@ def solve(
     passive: NDArray[np.bool_] | None = None,
     max_iterations: int = 500,
 ) -> NonNegative:
-    """Return the non-negative minimiser for ``gram`` (q, q) and ``rhs`` (q,).
+    """Return the non-negative minimiser of x' G x / 2 - f' x for G = ``gram`` (q, q) and f = ``rhs`` (q,).
 
     All variables on the wrong side are exchanged at once, which usually ends within ten systems. Where
-    the exchanges stop making progress, projected Newton steps with a line search go on from the best
-    point: they descend, so they cannot cycle (Bertsekas, SIAM J. Control Optim. 20 (1982) 221-246).
+    the exchanges stop making progress, Newton steps that never climb go on from there, so they cannot cycle:
+    as in Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23, but freeing all variables
+    that descend at once, and putting all to zero at once where that is lower.
 
     Variables whose diagonal entry is zero never appear in the data and stay at zero. ``passive``
     is a first guess of the positive variables, from a neighbouring problem.

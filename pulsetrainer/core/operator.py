@@ -33,7 +33,11 @@ class Rows(NamedTuple):
 
 
 def steps(plane: Plane, to: FloatArray, origin: FloatArray) -> scipy.sparse.csr_array:
-    """Rows (n, n_q) in node space of the signed output steps 2 G(to, origin)."""
+    """Rows (n, n_q) in node space of the signed output steps 2 G(to, origin), four entries each at most.
+
+    G is the Everett function continued antisymmetrically, interpolated bilinearly between nodes
+    (``Plane.signed_everett``); ``to`` and ``origin`` (n,) are inputs.
+    """
     corner, share = plane.corners(to, origin)
     number, sign = plane.signed_nodes
     share *= 2.0 * sign[corner]
@@ -71,7 +75,7 @@ def _check_reading(reading: str) -> None:
 
 
 def rows(plane: Plane, path: Trace) -> Rows:
-    """Design rows of a traced input in node space."""
+    """Design rows (n, n_q) of a traced input in node space, in two parts: see ``Rows``."""
     own = steps(plane, path.value, path.node_value[path.anchor])
     return Rows(own, base_rows(plane, path))
 

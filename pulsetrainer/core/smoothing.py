@@ -142,7 +142,7 @@ def penalty(plane: Plane, diagonal: FloatArray, smoothing: float) -> scipy.spars
 
 
 def smoothed(equations: NormalEquations, smoothing: float) -> tuple[FloatArray, FloatArray]:
-    """Centred Gram matrix and right side with s^8 g B added.
+    """Centred Gram matrix (n_q, n_q) with s^8 g B added, and the right side (n_q,).
 
     Raises
     ------

@@ -62,7 +62,18 @@ def stiffness_penalty(plane: Plane, diagonal: FloatArray, strength: float) -> sc
 
 
 def choose_stiffness(records: Sequence[Record], plane: Plane, reading: Reading) -> float:
-    """Return t by the error on the second half of each record: 0, or one of ``STRENGTHS``."""
+    """Return t by the error on the second half of each record: 0, or one of ``STRENGTHS``.
+
+    Each t is fitted to the first halves, on at most 32 levels, and judged by its rms error on the second
+    halves, both followed from the start of the record. The largest t within ``TOLERANCE`` of the best wins.
+
+    Raises
+    ------
+    ArgumentError
+        The reading is unknown.
+    ConvergenceError
+        A fit did not settle.
+    """
     coarse = thinned(plane, _LEVELS)
     parts = []
     for record in records:
