@@ -198,8 +198,8 @@ def parted_sums(
 ) -> list[NodeSums]:
     """Sums of ``count`` parts of the records, each record followed once, from its start.
 
-    ``parts`` holds for each record the number of the part of each of its samples (n,), 0 .. count - 1. Samples
-    with any other number are left out of the sums, but not out of the memory.
+    ``parts`` holds for each record the number of the part of each of its samples (n,), 0 .. count - 1.
+    Samples with any other number are left out of the sums, but not out of the memory.
 
     Raises
     ------
