@@ -9,12 +9,11 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from pulsetrainer.report import tables
-from pulsetrainer.steps.context import Context, Progress
+from pulsetrainer.steps.progress import Progress
 
 _PIPE_WIDTH = 110
 
@@ -46,12 +45,6 @@ class Screen:
     def note(self, text: str) -> None:
         """Say one line to the person, beside the results."""
         sys.stderr.write(f"note: {text}\n")
-
-    @contextmanager
-    def working(self, label: str) -> Iterator[Context]:
-        """Give a flow its context, with a progress bar when stderr is a terminal."""
-        with self.bar(label) as progress:
-            yield Context(argv=sys.argv[1:], now=lambda: datetime.now(UTC), progress=progress, note=self.note)
 
     @contextmanager
     def bar(self, label: str) -> Iterator[Progress]:

@@ -11,9 +11,11 @@ from pulsetrainer.diagnosis import procedure
 from pulsetrainer.diagnosis.answered import diagnosis_of
 from pulsetrainer.diagnosis.asked import question_of
 from pulsetrainer.errors import UsageError
+from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
 
+@one_thread
 def diagnose(
     runs: Run | Sequence[Run],
     model: Model,
