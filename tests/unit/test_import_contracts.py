@@ -49,6 +49,8 @@ def test_the_house_as_it_stands(check):
         ("files/store.py", "import pulsetrainer.device.codes", "Device, files and diagnosis"),
         ("diagnosis/gates.py", "import pulsetrainer.files.store", "Device, files and diagnosis"),
         ("core/plane.py", "import h5py", "The core is numpy and scipy only"),
+        ("steps/identify.py", "import pathlib", "Verbs know no file"),
+        ("diagnosis/gates.py", "import rich", "Libraries do not print"),
     ],
 )
 def test_a_bad_import_breaks_its_contract(check, module, line, contract):
