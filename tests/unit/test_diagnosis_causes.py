@@ -1,0 +1,411 @@
+"""Each cause alone: its formula against a closed form, its gate at both sides of each threshold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pulsetrainer.core import signals
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis import causes, wording
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Frame, low_pass, settled
+from pulsetrainer.diagnosis.procedure import diagnose
+from pulsetrainer.diagnosis.raw import Raw, coarse_step, noise_of, spacing_of
+from pulsetrainer.diagnosis.state import Question
+
+CAUSE = library()
+DT = 0.01
+T = np.arange(400) * DT
+RNG = np.random.default_rng(20260301)
+
+
+def _frame(u=T, **more) -> Frame:
+    return Frame(DT, np.asarray(u), span=2.0, reach=4.0, **more)
+
+
+def _shown(name: str, y, *values: float, u=T, **more):
+    return CAUSE[name].on_output(np.asarray(y, float), values, _frame(u, **more))
+
+
+def _lagged(tau: float):
+    """What a low-pass makes of t."""
+    return T - tau + tau * np.exp(-T / tau)
+
+
+# --- formulas
+def test_lags_follow_a_ramp():
+    """After the hysteresis and before it; without a time constant nothing is changed."""
+    np.testing.assert_allclose(_shown("output-lag", T, 0.3), _lagged(0.3), atol=1e-12)
+    np.testing.assert_allclose(CAUSE["field-lag"].on_input(T, T, (0.3,), _frame()), _lagged(0.3), atol=1e-12)
+    assert low_pass(T, 1e-9, DT) is T
+    assert low_pass(T, 2e-9, DT) is not T
+
+
+def test_creep_is_the_mean_of_three_lags():
+    """A third each of tau / 4, tau and 4 tau; the other formula has half in the middle."""
+    a, tau = 0.2, 0.4
+    slow = (_lagged(tau / 4) + _lagged(tau) + _lagged(4 * tau)) / 3
+    np.testing.assert_allclose(_shown("creep", T, a, tau), (T + a * slow) / (1 + a), atol=1e-12)
+    (other,) = CAUSE["creep"].variants(T, (a, tau), _frame())
+    slow = _lagged(tau / 4) / 4 + _lagged(tau) / 2 + _lagged(4 * tau) / 4
+    np.testing.assert_allclose(other, (T + a * slow) / (1 + a), atol=1e-12)
+
+
+@pytest.mark.parametrize("cold", [True, False])
+def test_a_coil_heats_with_the_square_of_the_input(cold):
+    """From rest to 3 at once: h rises over one step, then relaxes to u^2; or it begins at a twentieth."""
+    k, tau, begin = 0.02, 0.7, 0.0 if cold else 0.05 * 9.0
+    first = 9.0 - (9.0 - begin) * tau / DT * (1.0 - np.exp(-DT / tau))
+    heat = 9.0 - (9.0 - first) * np.exp(-T / tau)
+    u, y = np.full(T.size, 3.0), 2.0 + T
+    cause = CAUSE["thermal-drift"]
+    found = cause.on_output(y, (k, tau), _frame(u)) if cold else cause.variants(y, (k, tau), _frame(u))[0]
+    np.testing.assert_allclose(found, y * (1.0 - k * heat), atol=1e-12)
+
+
+def test_a_widening_trails_by_the_root_of_the_rate():
+    """On a steady ramp u - v = k sqrt(u'), falling as rising; a vanishing coefficient changes nothing."""
+    cause, k = CAUSE["rate-widening"], 0.05
+    for sign in (1.0, -1.0):
+        u = sign * 4.0 * T
+        assert (u - cause.on_input(u, u, (k,), _frame(u)))[-1] == pytest.approx(sign * k * 2.0, rel=0.01)
+    assert cause.on_input(T, T, (1e-9,), _frame()) is T
+    assert cause.on_input(T, T, (2e-9,), _frame()) is not T
+
+
+def test_simple_formulas():
+    """Delay, viscous force, drift, sine, skew, change of condition: each as it is written."""
+    y = np.sin(T)
+    late = _shown("delay", y, 0.03)
+    np.testing.assert_allclose(late[3:], y[:-3], atol=1e-12)
+    np.testing.assert_allclose(
+        _shown("viscous", y, 0.5, u=3.0 * T) - y, np.where(T > 0, 1.5, 0.0), atol=1e-12
+    )
+    np.testing.assert_allclose(_shown("offset-drift", y, 0.2), y + 0.2 * T)
+    wave = 0.3 * np.sin(2 * np.pi * 7 * T) + 0.1 * np.cos(2 * np.pi * 7 * T)
+    np.testing.assert_allclose(_shown("periodic", y, 0.3, 0.1, 7.0), y + wave, atol=1e-12)
+    np.testing.assert_allclose(_shown("clock-skew", T, 0.01)[:300], 1.01 * T[:300], atol=1e-12)
+    np.testing.assert_allclose(_shown("condition-change", y, 0.4, 0.1, record=0), y)
+    np.testing.assert_allclose(_shown("condition-change", y, 0.4, 0.1, record=1), 1.1 * y + 0.4)
+
+
+def test_a_step_is_shared_out_over_twenty_samples():
+    """Half of it at its moment, none ten samples before, all ten samples after."""
+    change = _shown("step", np.full(T.size, 2.0), 0.5, 0.1, 2.0) - 2.0
+    np.testing.assert_allclose(
+        change[[189, 190, 195, 200, 205, 210, 211]] / 0.7, [0, 0, 0.25, 0.5, 0.75, 1, 1], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("scale", [1.0, 500.0])
+def test_accommodation_is_a_low_pass_along_the_path(scale):
+    """Against the recurrence, a sample at a time; also where the path is hundreds of decay lengths."""
+    u = scale * np.cumsum(RNG.standard_normal(T.size))
+    y, a, length = np.sin(3 * T) + 2.0, 0.3, 5.0
+    frame = _frame(u)
+    share = np.diff(frame.path / length, prepend=0.0)
+    slow = [y[0]]
+    for now, step in zip(y[1:], share[1:], strict=True):
+        slow.append(now + (slow[-1] - now) * np.exp(-step))
+    expected = (y + a * np.asarray(slow)) / (1 + a)
+    np.testing.assert_allclose(CAUSE["accommodation"].on_output(y, (a, length), frame), expected, rtol=1e-9)
+
+
+def test_wiggles_are_no_path():
+    """A point dragged with play: only what goes beyond it moves it."""
+    np.testing.assert_allclose(
+        settled(np.asarray([0.0, 0.9, -0.9, 2.0, 1.5, -3.0]), 1.0), [0, 0, 0, 1, 1, -2]
+    )
+    path = _frame([0.0, 0.01, -0.01, 1.0, 0.0]).path
+    np.testing.assert_allclose(path, [0, 0, 0, 1.0 - 0.016, 1.0 - 0.016 + 1.0 - 0.032])
+
+
+def test_a_feedback_is_brought_back_to_the_range():
+    """(u - low + k (y - y-)) / (1 + k (y+ - y-) / reach) above low; never less than a fifth of the range."""
+    frame = _frame(low=1.0, ends=(2.0, 6.0))
+    cause, u, y = CAUSE["load-dependence"], np.asarray([2.0]), np.asarray([3.0])
+    assert cause.on_input(u, y, (0.5,), frame) == pytest.approx(1.0 + (1.0 + 0.5) / 1.5)
+    assert cause.on_input(u, y, (-2.0,), frame) == pytest.approx(1.0 + (1.0 - 2.0) / 0.2)
+
+
+def test_start_values_are_inside_the_bounds_and_scale_with_the_device():
+    """Every block of every cause; strengths in proportion to span and reach."""
+    u = 2.0 + 2.0 * np.sin(T)
+    residual = [np.sin(2 * np.pi * 5 * T) + (T > 2.0)]
+    frames = [_frame(u), _frame(u)]
+    for cause in CAUSE.values():
+        if cause.stage != "record":
+            blocks = cause.starts(frames, residual)
+            assert blocks, cause.id
+            for values in (values for block in blocks for values in block):
+                pairs = zip(cause.parameters, values, strict=True)
+                assert all(q.low <= value <= q.high for q, value in pairs), cause.id
+    assert CAUSE["condition-change"].starts(frames[:1], residual) == []
+    ((sine, cosine),) = CAUSE["periodic"].starts(frames, residual)
+    assert sine == pytest.approx((0.006, 0.0, 5.0), abs=0.02)
+    assert cosine[2] == sine[2]
+    nearest = min(
+        (block[0] for block in CAUSE["step"].starts(frames, residual)), key=lambda v: abs(v[2] - 2.0)
+    )
+    assert nearest[2] == pytest.approx(2.0, abs=0.03)
+
+
+# --- gates
+def _raw(y, u=None, *, reference=None, weight=1.0, dt=1e-3) -> Raw:
+    y = np.asarray(y, float)
+    u = np.linspace(0.0, 1.0, y.size) if u is None else u
+    return Raw(
+        Record(np.asarray(u, float), y, np.full(y.size, weight), dt_s=dt, reference=reference), 0.0, 1.0
+    )
+
+
+def _fires(name: str, *args, **more) -> bool:
+    return CAUSE[name].gate(_raw(*args, **more)) is not None
+
+
+def test_noise_and_steps_of_a_record():
+    """White noise by third differences; the step of a converter, and where it is coarse."""
+    noise = np.random.default_rng(1).standard_normal(40_000)
+    assert noise_of(0.3 * noise) == pytest.approx(0.3, rel=0.03)
+    assert noise_of(noise[:7]) == 0.0
+    assert noise_of(noise[:8]) > 0.0
+    assert spacing_of(np.asarray([0.0, 0.5, 0.5, 1.0])) == 0.5
+    assert spacing_of(np.ones(9)) == 0.0
+    assert coarse_step(np.repeat(np.arange(50.0), 9)) == 1.0
+    assert coarse_step(np.round(noise)) == 0.0
+
+
+def _piled(at: int, inside: int) -> np.ndarray:
+    """Noise far below, and so many samples at a rail and just inside it."""
+    low = np.round(5.0 * np.random.default_rng(2).random(3000), 2)
+    return np.concatenate((low, np.full(at, 10.0), 10.0 - 0.01 * (1 + np.arange(inside) % 9)))
+
+
+@pytest.mark.parametrize(
+    ("at", "inside", "fires"), [(21, 0, True), (20, 0, False), (40, 19, True), (40, 20, False)]
+)
+def test_a_cut_off_output_piles_up_at_its_end(at, inside, fires):
+    """More than twenty samples, more than twice as many as just inside."""
+    y = np.random.default_rng(3).permutation(_piled(at, inside))
+    assert _fires("saturation", y) is fires
+
+
+def test_what_is_next_to_the_rail_is_left_out_too():
+    """Three samples on each side in time; a flat top without noise is no cut."""
+    y = np.concatenate(
+        (np.round(5.0 * np.random.default_rng(2).random(3000), 2), np.full(30, 10.0), np.zeros(50))
+    )
+    firing = CAUSE["saturation"].gate(_raw(y))
+    assert np.flatnonzero(firing.mask[2990:3040]).tolist() == list(range(7, 43))
+    assert (firing.value, firing.figures["count"]) == (10.0, 30.0)
+    smooth = np.minimum(np.round(np.sin(np.arange(9000) / 3000) * 12, 2), 10.0)
+    assert not _fires("saturation", smooth)
+
+
+def _wild(size: float, number: int) -> np.ndarray:
+    y = np.tile([0.0, 1.0, 0.0, -1.0], 500) * 1e-3 + 0.0
+    y[100 : 100 + 150 * number : 150] += size
+    return y
+
+
+@pytest.mark.parametrize(("number", "fires"), [(3, True), (2, False)])
+def test_three_wild_samples_are_a_fault(number, fires):
+    """Fewer are no fault of a device."""
+    y = _wild(1.0, number)
+    assert _fires("outliers", y) is fires
+    if fires:
+        np.testing.assert_array_equal(np.flatnonzero(CAUSE["outliers"].gate(_raw(y)).mask), [100, 250, 400])
+
+
+@pytest.mark.parametrize(("over", "fires"), [(1.02, True), (0.98, False)])
+def test_wild_is_eight_sigmas_or_four_fast_steps(over, fires):
+    """Whatever is more: of noise, of the steps between samples, of the converter."""
+    y = np.random.default_rng(4).standard_normal(20_000)
+    fast = 4.0 * np.quantile(np.abs(np.diff(y)), 0.95)
+    limit = max(8.0 * np.sqrt(2.0) * noise_of(y), fast)
+    assert limit > fast
+    y[1000:19_000:3000] = 0.0
+    near = np.arange(1000, 19_000, 3000)[:, None] + np.arange(-6, 7)
+    y[near] = 0.0
+    y[near[:, 6]] = over * max(8.0 * np.sqrt(2.0) * noise_of(y), 4.0 * np.quantile(np.abs(np.diff(y)), 0.95))
+    assert _fires("outliers", y) is fires
+
+
+@pytest.mark.parametrize(("values", "times", "fires"), [(250, 2, True), (252, 2, False), (200, 1, False)])
+def test_coarse_steps_are_a_two_hundred_and_fiftieth_and_come_again(values, times, fires):
+    """0.4 % of the span; each value twice on average, or a short record would seem to have steps."""
+    y = np.tile(np.arange(values) * 0.1, times)
+    assert _fires("quantisation", y) is fires
+    if fires:
+        firing = CAUSE["quantisation"].gate(_raw(y))
+        assert (firing.value, firing.figures["percent"]) == pytest.approx((0.1, 10.0 / 24.9))
+        assert firing.spread == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("error", "share", "fires"), [(0.021, 0.02, True), (0.019, 0.02, False), (0.5, 0.005, False)]
+)
+def test_a_driver_that_lags_by_a_fiftieth_of_the_range(error, share, fires):
+    """In one sample of a hundred."""
+    u = np.linspace(0.0, 1.0, 2000)
+    off = np.where(np.arange(2000) < 2000 * share, error, 0.0)
+    assert _fires("current-tracking", u, u, reference=u + off) is fires
+    assert not _fires("current-tracking", u, u)
+    if fires:
+        firing = CAUSE["current-tracking"].gate(_raw(u, u, reference=u + off))
+        assert (firing.share, firing.value) == pytest.approx((share, error))
+
+
+@pytest.mark.parametrize(
+    ("top", "bottom", "fires"), [(1.011, 0, True), (1.009, 0, False), (1, -0.011, True), (1, -0.009, False)]
+)
+def test_an_input_a_hundredth_outside(top, bottom, fires):
+    """Of the range, at either end."""
+    u = np.concatenate((np.linspace(0, top, 200), np.linspace(top, bottom, 200), np.linspace(bottom, 1, 200)))
+    assert _fires("out-of-range", u, u) is fires
+    if fires:
+        firing = CAUSE["out-of-range"].gate(_raw(u, u))
+        assert firing.value == pytest.approx(max(top - 1, -bottom))
+
+
+@pytest.mark.parametrize(("back", "lasting"), [(300, True), (100, False)])
+def test_a_mask_that_takes_too_much_is_made_smaller(back, lasting):
+    """Where less than a quarter of the record would stay, only what is outside is left out."""
+    u = np.concatenate(
+        (np.linspace(0, 1, 100), np.full(10, 1.5), np.full(600, 0.5), np.linspace(0, 1, back)[: back - 5])
+    )
+    mask = CAUSE["out-of-range"].gate(_raw(u, u)).mask
+    assert mask[400] == lasting
+    assert mask[105]
+
+
+def _stairs(
+    number: int, rate: float, jump: float = 0.2, noise: float = 1e-3
+) -> tuple[np.ndarray, np.ndarray]:
+    """A slow ramp whose output stands still and jumps so many times."""
+    n = 4000
+    u = rate * np.arange(n) * 1e-3
+    steps = (np.arange(1, number + 1) * n / (number + 1)).astype(int)
+    y = jump * np.searchsorted(steps, np.arange(n), side="right")
+    return y + noise * np.random.default_rng(5).standard_normal(n), u
+
+
+@pytest.mark.parametrize(
+    ("number", "rate", "fires"),
+    [
+        (15, 0.5, True),
+        (14, 0.5, False),
+        (20, 0.11, True),
+        (20, 0.09, False),
+        (20, 2.9, True),
+        (20, 3.1, False),
+    ],
+)
+def test_jumps_in_slow_motion(number, rate, fires):
+    """Fifteen of them, at a tenth to three ranges a second."""
+    y, u = _stairs(number, rate)
+    assert _fires("stick-slip", y, u) is fires
+    if fires:
+        firing = CAUSE["stick-slip"].gate(_raw(y, u))
+        assert firing.figures["count"] == number
+        assert firing.value == pytest.approx(0.2, rel=0.02)
+
+
+def test_jumps_below_the_noise_and_short_records_show_nothing():
+    """Seven standard deviations of the difference of two means of six samples; twenty such means."""
+    deviation = 7.0 * np.sqrt(2.0 / 6.0) * 0.01
+    assert _fires("stick-slip", *_stairs(30, 0.5, 1.6 * deviation, 0.01))
+    assert not _fires("stick-slip", *_stairs(30, 0.5, 0.5 * deviation, 0.01))
+    y, u = _stairs(30, 0.5)
+    assert not _fires("stick-slip", y[:119], u[:119])
+
+
+def test_gates_do_not_see_what_blinds_them():
+    """Wild samples are filled in for the others; where the output is cut off no jumps are sought."""
+    from pulsetrainer.diagnosis import gates
+
+    y, u = _stairs(30, 0.5)
+    y[100::300] += 50.0
+    fired = {one.cause: one for one in gates.check(_raw(y, u).record, 0.0, 3.0)}
+    assert set(fired) == {"outliers", "stick-slip"}
+    piled = np.concatenate((y, np.random.default_rng(3).permutation(_piled(60, 0)) + 100.0))
+    u = np.concatenate((u, np.full(3060, 2.0)))
+    names = [one.cause for one in gates.check(_raw(piled, u).record, 0.0, 3.0)]
+    assert "saturation" in names
+    assert "stick-slip" not in names
+
+
+def test_every_text_of_a_gate_has_its_figures():
+    """The words of each firing, with numbers in them."""
+    y, u = _stairs(30, 0.5)
+    for firing in (
+        CAUSE["stick-slip"].gate(_raw(y, u)),
+        CAUSE["outliers"].gate(_raw(_wild(1.0, 3))),
+        CAUSE["quantisation"].gate(_raw(np.tile(np.arange(50) * 0.1, 3))),
+        CAUSE["out-of-range"].gate(_raw(u, u)),
+        CAUSE["saturation"].gate(_raw(_piled(30, 0))),
+        CAUSE["current-tracking"].gate(_raw(u, u, reference=u + 0.5)),
+    ):
+        said = wording.text(firing.evidence)
+        assert any(sign.isdigit() for sign in said), said
+        assert "{" not in said
+
+
+# --- a new cause is one file
+TOY = '''
+"""A force that no other cause has: y + a sin(0.3 t^2)."""
+
+import numpy as np
+
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity
+
+
+class Toy(Cause):
+    """A chirp."""
+
+    id = "toy"
+    title = "a chirp"
+    formula = "y + a sin(0.3 t^2)"
+    signature = "it whistles"
+    excitation = "any"
+    source = "made up"
+    stage = "output"
+    order = 65
+    family = "toy"
+    parameters = (Quantity("amplitude", "{y}", -9.0, 9.0, 1e-3),)
+
+    def starts(self, frames, residual):
+        """One."""
+        return [[(0.05,)]]
+
+    def on_output(self, y, values, frame):
+        """Add it."""
+        return y + values[0] * np.sin(0.3 * frame.time_s**2)
+'''
+
+
+def test_a_new_cause_is_one_file(tmp_path, monkeypatch):
+    """Put into the folder of the causes it is in the library, and is diagnosed with its strength."""
+    (tmp_path / "toy_cause.py").write_text(TOY)
+    monkeypatch.setattr(causes, "__path__", [*causes.__path__, str(tmp_path)])
+    library.cache_clear()
+    try:
+        plane = Plane.uniform(0.0, 1.5, 24)
+        i, j = plane.cell_indices
+        weights = 1.0 + np.exp(-(((i - j) / 24 - 0.25) ** 2) / 0.02)
+        operator = Preisach(plane, weights * 7.0 / float((weights * plane.areas).sum()), 7.0)
+        u = signals.diagnostic(0.0, 1.5, rate_Hz=100.0).value[:3000]
+        time = np.arange(u.size) / 100
+        y = (
+            operator(u)
+            + 0.3 * np.sin(0.3 * time**2)
+            + 0.01 * np.random.default_rng(6).standard_normal(u.size)
+        )
+        found = diagnose(Question([Record(u, y, dt_s=0.01)], 0.0, 1.5, np.random.default_rng(0)))
+        assert found.verdict == "toy"
+        assert found.findings[0].parameters[0].value == pytest.approx(0.3, rel=0.02)
+    finally:
+        library.cache_clear()
