@@ -120,9 +120,7 @@ def clean(values: ArrayLike, sigma: float | None = None) -> Cleaned:
     if turns.size >= reversals:  # every turn is a real one
         return Cleaned(u, noise, band, 0, reversals)
     smooth = _smooth_between(u, turns, noise)
-    left = max(turning_points(smooth).size - 1, 0)
-    if left >= reversals:
-        return Cleaned(u, noise, band, 0, reversals)
+    left = max(turning_points(smooth).size - 1, 0)  # monotone between real turns, so fewer than before
     return Cleaned(smooth, noise, band, reversals - left, left)
 
 

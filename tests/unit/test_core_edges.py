@@ -7,6 +7,7 @@ import pytest
 from core_jobs import curves, plant
 
 from pulsetrainer.core import edges, stiffness
+from pulsetrainer.core.equations import normal_equations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
@@ -69,6 +70,21 @@ def test_stiffness_of_equal_loops_and_of_others():
     assert masses @ (stiffness.stiffness_penalty(plane, weight, 2.0) @ masses) == pytest.approx(
         2.0 * 3.0 * 14 / 15 * 9
     )
+
+
+def test_the_strengths_lead_from_a_free_density_to_equal_loops():
+    """The weakest hardly binds, the strongest is all but equality."""
+    u = curves(1500, 12, 10)
+    noise = np.random.default_rng(3).normal(0.0, 0.02, u.size)
+    plane = Plane.uniform(-1.0, 1.0, 12)
+    sums = normal_equations(plane, [Record(u, plant(60)(u) + noise)], "continuous")
+    free, weakest, strongest, equal = (
+        stiffness._error(sums, sums, t)
+        for t in (0.0, *stiffness.STRENGTHS[:: len(stiffness.STRENGTHS) - 1], 1e6)
+    )
+    print(f"free {free:.5f}, weakest {weakest:.5f}, strongest {strongest:.5f}, equal {equal:.5f}")
+    assert weakest - free < 0.1 * (equal - free)
+    assert strongest - free > 0.9 * (equal - free)
 
 
 def test_stiffness_is_chosen_by_what_comes_later():
