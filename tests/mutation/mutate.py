@@ -229,9 +229,9 @@ def _tried(tree: Path, folder: Path, fault: Fault, tests: list[str], times: Time
     )  # as old and as long as before: it would be used
     path.write_bytes(fault.put_into(source))
     try:
-        limit = 60.0 + 5.0 * sum(times.get(one, 0.0) for one in tests)
+        limit = 30.0 + 4.0 * sum(times.get(one, 0.0) for one in tests)
         files = sorted({one.split("::")[0] for one in tests})
-        slowest = 60 + round(5 * max(times.get(one, 0.0) for one in tests))
+        slowest = 20 + round(5 * max(times.get(one, 0.0) for one in tests))
         code = _pytest(tree, "-x", f"--timeout={slowest}", *files, limit_s=limit, MUTATION_TESTS=str(chosen))
     finally:
         path.write_bytes(source)
