@@ -1,0 +1,302 @@
+"""How the figures of a diagnosis come about: each formula against a closed form."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pulsetrainer.artefacts import Model, Run
+from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis import asked, floor, intervals, residual, screening, velocity
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.design import bins_of
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_for
+from pulsetrainer.diagnosis.floor import Floor
+from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.screening import p_value
+from pulsetrainer.errors import DataError
+
+CAUSE = library()
+
+
+# --- the null
+@pytest.mark.parametrize(("observed", "p"), [(0.5, 5 / 5), (2.0, 4 / 5), (4.0, 2 / 5), (9.0, 1 / 5)])
+def test_a_p_value_counts_the_draws_that_reach_it(observed, p):
+    """(1 + k) / (1 + B): never 0, and what equals it has reached it."""
+    assert p_value(observed, np.asarray([1.0, 2.0, 3.0, 4.0])) == pytest.approx(p)
+
+
+def _block(cause: str, values, basis, back, *, one_sided=False, as_it_is=False):
+    return screening._Block(CAUSE[cause], values, np.asarray(basis), np.asarray(back), one_sided, as_it_is)
+
+
+def test_the_gain_of_a_block_is_what_its_columns_can_take_away():
+    """The squared part along them; none for a strength of the wrong sign; a whole column as it stands."""
+    signal = np.asarray([[3.0, -3.0], [4.0, 4.0]])
+    two = _block("step", ((0,), (0,)), np.eye(2), np.eye(2))
+    np.testing.assert_allclose(two.gains(signal), [25.0, 25.0])
+    first = np.asarray([[1.0], [0.0]])
+    one = _block("output-lag", ((0.01,),), first, [[0.5]], one_sided=True)
+    np.testing.assert_allclose(one.gains(signal), [9.0, 0.0])
+    whole = _block("resonance", ((9.0, 0.1),), first, [[0.5]], as_it_is=True)  # a column of length 2
+    np.testing.assert_allclose(whole.gains(signal), [2 * 2 * 3 - 4, -2 * 2 * 3 - 4])
+
+
+@pytest.mark.parametrize(("along", "start"), [(1.0, 0.02), (0.01, 0.002), (99.0, 0.05), (-1.0, 0.002)])
+def test_a_refit_starts_at_the_linearised_strength(along, start):
+    """But within a fifth and five times the value that was tried."""
+    block = _block("output-lag", ((0.01,),), [[1.0]], [[2.0]])
+    assert screening._start(block, np.asarray([along])) == pytest.approx((start,))
+
+
+def test_a_signed_strength_stays_within_its_bounds_only():
+    """A drift may be of either sign; an amplitude of creep has an upper bound."""
+    drift = _block("offset-drift", ((0.01,),), [[1.0]], [[1.0]])
+    assert screening._start(drift, np.asarray([-30.0])) == pytest.approx((-0.3,))
+    creep = _block("creep", ((0.03, 1.0),), [[1.0]], [[1.0]])
+    assert screening._start(creep, np.asarray([99.0])) == (0.6, 1.0)
+
+
+# --- the floor
+@pytest.mark.parametrize(
+    ("white", "error", "span", "size"), [(1.0, 0.2, 1.0, 0.3), (1.0, 0.4, 1.0, 0.4), (0.1, 0.01, 1000.0, 0.3)]
+)
+def test_an_effect_must_be_larger_than_noise_levels_and_a_share_of_the_span(white, error, span, size):
+    """The largest of 0.3 of the noise, the error of the levels and 0.03 % of the span."""
+    one = Floor(50, span, 1.0, white, error)
+    assert one.relevant == pytest.approx(50 * size**2)
+    assert one.squares == pytest.approx(50 * (white**2 + error**2))
+    assert one.rms == pytest.approx(np.hypot(white, error))
+
+
+def test_something_is_always_reducible():
+    """So that shares stay finite."""
+    one = Floor(1, 1.0, 1.0, 1.0)
+    assert one.reducible(SimpleNamespace(squares=3.0)) == pytest.approx(2.0)
+    assert one.reducible(SimpleNamespace(squares=0.5)) == pytest.approx(5e-13)
+    assert one.reducible(SimpleNamespace(squares=0.0)) == 1e-300
+
+
+@pytest.mark.parametrize(("coarse", "error"), [(300.0, np.sqrt(2.0 / ((32 / 22) ** 2 - 1))), (50.0, 0.0)])
+def test_the_error_of_the_levels_falls_with_the_cell(monkeypatch, coarse, error):
+    """From the fall of the mean square between 22 and 32 levels."""
+    monkeypatch.setattr(floor, "weights_for", lambda *_: SimpleNamespace(squares=coarse))
+    fitted = SimpleNamespace(terms=(), squares=100.0)
+    assert Floor(100, 1.0, 1.0, 1.0).at("coarse", fitted).discretisation == pytest.approx(error)
+
+
+# --- the joint refit
+def test_parameters_move_within_a_factor_of_three_and_their_bounds():
+    """A signed one is bounded only by its bounds; the derivative takes two hundredths of the value."""
+    lag, drift = Term(CAUSE["output-lag"], (0.01,)), Term(CAUSE["offset-drift"], (0.01,))
+    for step, lags, drifts in ((1.0, 0.03, 1.01), (-1.0, 0.01 / 3, -0.99), (0.005, 0.015, 0.015)):
+        (one,), (other,) = (_moved([term], np.asarray([step])) for term in (lag, drift))
+        assert one.values == pytest.approx((lags,))
+        assert other.values == pytest.approx((drifts,))
+    assert _moved([Term(CAUSE["output-lag"], (0.4,))], np.asarray([9.0]))[0].values == (0.5,)
+    assert _difference(Term(CAUSE["output-lag"], (0.1,)), 0) == pytest.approx(0.002)
+    assert _difference(Term(CAUSE["output-lag"], (0.001,)), 0) == 0.0005
+
+
+def _loops(rate: float = 100.0) -> np.ndarray:
+    t = np.arange(1200) / rate
+    return 0.75 - 0.75 * np.cos(2 * np.pi * t / 3.0) * np.minimum(1.0, 0.3 + t / 8.0)
+
+
+def test_one_step_finds_a_parameter_that_enters_linearly():
+    """A drift, whatever the weights had made of it; the derivative of the model with it is time itself."""
+    u = _loops()
+    record = Record(u, 3.0 * u + 0.05 * np.arange(u.size) / 100, dt_s=0.01)
+    problem = problem_for([record], 0.0, 1.5)
+    near = weights_for(problem, (), None)
+    fitted = refit(problem, (Term(CAUSE["offset-drift"], (0.01,)),), near, rounds=1)
+    assert fitted.terms[0].values == pytest.approx((0.05,), rel=0.02)
+    assert fitted.squares < 1e-2 * near.squares
+    time = problem.bins.time_s
+    np.testing.assert_allclose(np.diff(fitted.slopes[:, 0]), np.diff(time), rtol=1e-6)
+
+
+# --- blocks left out, intervals
+def _told(folds: dict[int, list]) -> HeldOut:
+    held_out = HeldOut.__new__(HeldOut)
+    held_out._errors = []
+    held_out._left_out = lambda fitted, number: iter(folds[number])
+    return held_out
+
+
+def test_the_held_out_gain_is_a_share_of_what_is_reducible():
+    """Both halves, each from the other; at least what is relevant is taken for reducible."""
+    error = np.asarray([3.0, 4.0])
+    halves = _told({2: [(error, None), (error, None)]})
+    assert halves.error("a fit") == pytest.approx(50.0)
+    assert np.isnan(_told({2: [(error, None)]}).error("a fit"))
+    halves._errors = [("before", 110.0), ("after", 20.0)]
+    assert halves.gain("before", "after", Floor(10, 1.0, 1.0, 1.0)) == pytest.approx(90.0 / 100.0)
+    assert halves.gain("after", "before", Floor(19, 1.0, 1.0, 1.0)) == pytest.approx(-90.0 / (19 * 0.09))
+
+
+def test_the_jackknife_leaves_out_a_tenth_at_a_time():
+    """(1 - 1/10) sum of squares about the mean; none where a tenth cannot be left out."""
+    changes = [np.asarray([k, 2.0 * k]) for k in range(10)]
+    found = _told({10: [(None, change) for change in changes]}).jackknife("a fit")
+    np.testing.assert_allclose(found, 0.9 * np.asarray([82.5, 330.0]))
+    assert _told({10: [(None, changes[0])] * 9}).jackknife("a fit") is None
+
+
+@pytest.mark.parametrize(("jackknife", "variance"), [(None, 0.04), (0.09, 0.09), (0.01, 0.04)])
+def test_intervals_hold_noise_levels_moment_and_formula(monkeypatch, jackknife, variance):
+    """2.26 standard deviations, the larger of the two, and the systematic parts beside them."""
+    term = Term(CAUSE["output-lag"], (0.3,))
+    column = np.asarray([[2.0], [0.0]])
+    fitted = SimpleNamespace(terms=(term,), slopes=column, projector=lambda x: x)
+    monkeypatch.setattr(intervals, "_late", lambda fitted: np.asarray([0.02, 0.0]))
+    monkeypatch.setattr(intervals, "_otherwise", lambda fitted: [np.asarray([-0.04, 5.0])])
+    noise = SimpleNamespace(draws=np.asarray([[0.4, -0.4], [0.0, 0.0]]))  # 0.2 of the parameter
+    told = SimpleNamespace(jackknife=lambda fitted: None if jackknife is None else np.asarray([jackknife]))
+    (one,) = intervals.estimates_of(fitted, noise, told, Floor(4, 1.0, 1.0, 1.0, 0.05))["output-lag"]
+    half = 2.26 * np.sqrt(variance) + 0.2 * 0.05 * 2.0 / 2.0 + (0.01 + 0.02)
+    assert (one.value, one.lower, one.upper) == pytest.approx(
+        (0.3, max(0.3 - half, 0.0), min(0.3 + half, 0.5))
+    )
+
+
+# --- where the residual is, and what the records lack
+def _lacks(rates, rest_s: float, seconds: float):
+    """Of a triangle at these rates (ranges a second), with a rest, so many seconds long."""
+    dt = 0.01
+    parts = [np.zeros(round(rest_s / dt))]
+    while sum(part.size for part in parts) < seconds / dt:
+        for rate in rates:
+            up = np.arange(0.0, 1.0, rate * dt)
+            parts += [up, up[::-1]]
+    u = np.concatenate(parts)
+    return set(residual.excitation_limits(problem_for([Record(u, u + 0.0, dt_s=dt)], 0.0, 1.0)))
+
+
+def test_what_a_record_lacks():
+    """Rates three to one, a rest of 0.8 s, twenty seconds."""
+    assert _lacks((0.5, 2.0), 1.0, 24.0) == set()
+    assert _lacks((0.5, 0.9), 1.0, 24.0) == {"rates"}
+    assert _lacks((0.5, 2.0), 0.7, 24.0) == {"holds"}
+    assert _lacks((0.5, 2.0), 1.0, 14.0) == {"length"}
+
+
+def test_residuals_are_grouped():
+    """Root mean square of each group; nothing where a group is empty."""
+    group = residual.Group("level", "1", np.zeros(3), np.asarray([0, 0, 2]))
+    np.testing.assert_allclose(
+        residual.rms_by(group, np.asarray([3.0, 4.0, -2.0])), [np.sqrt(12.5), np.nan, 2.0]
+    )
+
+
+def test_averages_of_short_bins():
+    """Five milliseconds; samples without weight are in none; the offset belongs to all records."""
+    weight = np.ones(1000)
+    weight[2] = 0.0
+    record = Record(np.arange(1000.0), np.arange(1000.0), weight, dt_s=1e-3)
+    bins = bins_of([record, record])
+    assert (bins.count, bins.width) == (400, (5, 5))
+    averaged = bins.average([record.output, record.output])
+    np.testing.assert_allclose(averaged[:2], [(0 + 1 + 3 + 4) / 4, 7.0])
+    np.testing.assert_allclose(bins.time_s[:2], [0.0025, 0.0075])
+    np.testing.assert_allclose(bins.even(averaged, 1), averaged[200:])
+    np.testing.assert_allclose(bins.settled(np.full(400, 7.0)), 0.0, atol=1e-12)
+    with pytest.raises(DataError):
+        bins_of([Record(np.arange(495.0), np.arange(495.0), dt_s=1e-3)])
+
+
+# --- the kind of model
+@pytest.mark.parametrize(
+    ("preisach", "speed", "wrong"), [(0.51, 0.38, True), (0.5, 0.3, False), (0.51, 0.3826, False)]
+)
+def test_a_model_of_the_wrong_kind_leaves_much_and_the_velocity_less(preisach, speed, wrong):
+    """More than 5 % of the span of 10, and the velocity less than three quarters of it."""
+    assert velocity.Comparison(preisach, speed, 10.0).wrong is wrong
+
+
+def test_a_function_of_the_velocity_is_found():
+    """A damper leaves nothing by its velocity, and by the direction alone what the speed makes of it."""
+    t = np.arange(4000) * 1e-2
+    u = np.sin(2 * np.pi * 0.2 * t)
+    record = Record(u, np.gradient(u, 1e-2), dt_s=1e-2)
+    timed = velocity.compare([record], [1e-2], [record.output])
+    assert timed.preisach == pytest.approx(np.sqrt(np.mean(record.output**2)))
+    assert timed.velocity < 0.05 * timed.span
+    untimed = velocity.compare([record], [None], [record.output])
+    assert untimed.velocity == pytest.approx(np.std(np.abs(record.output)), rel=0.02)
+
+
+# --- from runs to records
+def _run(t, **more) -> Run:
+    return Run(
+        t, np.interp(t, [0, 1, 2], [0.0, 1.0, 0.0]), 2.0 * np.interp(t, [0, 1, 2], [0.0, 1.0, 0.0]), **more
+    )
+
+
+def _model(**more) -> Model:
+    return Model(np.linspace(0, 1, 4), np.ones(6), 0.0, np.ones(6, bool), **more)
+
+
+def _measured(run: Run, polarity: int = 1) -> Record:
+    return asked.measured_of("a run", run, polarity, 0.0, 1.0)
+
+
+def test_a_gap_is_filled_and_does_not_count():
+    """Where samples are missing for more than one and a half steps; a falling output is turned."""
+    t = np.arange(200) * 0.01
+    kept = np.ones(200, bool)
+    kept[50:60] = False
+    found = _measured(_run(t[kept]), -1)
+    assert found.dt_s == pytest.approx(0.01)
+    gone = set(np.flatnonzero(found.sample_weight == 0).tolist())
+    assert set(range(50, 60)) <= gone <= set(range(49, 61))  # its ends are a matter of rounding
+    np.testing.assert_allclose(found.output, -2.0 * found.input, atol=1e-9)
+
+
+def test_a_fast_record_is_averaged_down():
+    """To a thousand samples a second; a record of that rate is left alone."""
+    assert _measured(_run(np.arange(8000) * 2.5e-4)).dt_s == pytest.approx(1e-3)
+    assert _measured(_run(np.arange(2000) * 1e-3)).input.size == 2000
+    fast = _measured(_run(np.arange(8000) * 2.5e-4))
+    assert fast.input.size == 2000
+    assert fast.input[100] == pytest.approx(0.1 + 1.5 * 2.5e-4)
+
+
+@pytest.mark.parametrize(("samples", "fits"), [(100, True), (99, False)])
+def test_a_record_has_a_hundred_samples(samples, fits):
+    """Fewer tell no causes apart."""
+    run = _run(np.arange(samples) * 0.02)
+    if fits:
+        assert _measured(run).input.size == samples
+    else:
+        with pytest.raises(DataError):
+            _measured(run)
+
+
+def _question(run: Run, model: Model):
+    return asked.question_of([run], model, rng=np.random.default_rng(0), quick=False, progress=lambda _: None)
+
+
+@pytest.mark.parametrize(("low", "high", "fits"), [(0.0, 1.0, True), (0.55, 1.0, False), (0.0, 0.45, False)])
+def test_half_of_the_input_lies_in_the_range_of_the_model(low, high, fits):
+    """Within a fiftieth; else the model is of another device."""
+    run, model = _run(np.arange(200) * 0.01), _model()
+    model = Model(np.linspace(low, high, 4), model.weights, 0.0, model.covered)
+    if fits:
+        assert _question(run, model).notes == ()
+    else:
+        with pytest.raises(DataError):
+            _question(run, model)
+
+
+def test_a_question_is_refused_where_it_makes_no_sense():
+    """Other units; weights read as relays. An incomplete run is said to be one."""
+    run = _run(np.arange(200) * 0.01)
+    for model in (_model(input_unit="mA"), _model(output_unit="mN"), _model(reading="relay")):
+        with pytest.raises(DataError):
+            _question(run, model)
+    assert len(_question(_run(np.arange(200) * 0.01, complete=False), _model()).notes) == 1
