@@ -21,6 +21,7 @@ void safety_init(struct safety *s, struct hal_kept *kept, bool power_on, int16_t
     static const struct safety_limits none = {0, 0, 0, 0};
     heat_init(&s->heat, kept, power_on);
     s->not_off = 0;
+    s->release_ticks = 0;
     s->slow_current = 0;
     s->slow_force = (int32_t)force_mN * (1 << SAFETY_ZERO_SHIFT);
     safety_begin(s, &none);
@@ -155,6 +156,7 @@ static uint8_t no_current(struct safety *s, const struct safety_input *in)
 {
     bool dead = in->duty_counts > in->full_counts / 4u && in->current_100uA < SAFETY_NO_CURRENT_100UA;
     bool weak = in->duty_counts >= in->full_counts && in->current_100uA < in->reference_100uA / 2;
+    s->release_ticks = SAFETY_RELEASE_TICKS;
     bool stray = in->reference_100uA == 0 && in->current_100uA > SAFETY_STRAY_100UA;
     stray = lasts(&s->stray, stray, SAFETY_STRAY_TICKS / SAFETY_TURNS);
     weak = lasts(&s->weak_current, weak, SAFETY_WEAK_TICKS / SAFETY_TURNS);
@@ -185,7 +187,7 @@ static uint8_t too_little_force(struct safety *s, const struct safety_input *in)
 {
     int16_t slow = (int16_t)(s->slow_current >> SAFETY_PLAUSIBLE_SHIFT);
     int32_t least = at_current(floor_mN, slow < in->current_100uA ? slow : in->current_100uA) - s->floor_margin_mN;
-    if (least > 0 && leaks(&s->too_little_force, in->force_mN < least, SAFETY_PLAUSIBLE_UP, SAFETY_PLAUSIBLE_DOWN,
+    if (least > SAFETY_FLOOR_LEAST_MN && leaks(&s->too_little_force, in->force_mN < least, SAFETY_PLAUSIBLE_UP, SAFETY_PLAUSIBLE_DOWN,
                            SAFETY_PLAUSIBLE_FULL))
         return in->force_mN < SAFETY_NO_FORCE_MN ? PT_FAULT_NO_FORCE : PT_FAULT_FORCE_IMPLAUSIBLE;
     return PT_FAULT_NONE;
@@ -253,6 +255,18 @@ static uint8_t armed(struct safety *s, const struct safety_input *in)
     return s->on_ticks > limits->on_ticks ? PT_FAULT_ON_TIME : PT_FAULT_NONE;
 }
 
+/* Output off: the force of the last run does not fall. */
+static bool still_presses(struct safety *s, const struct safety_input *in)
+{
+    if (in->driving || s->release_ticks == 0)
+        return false;
+    if (in->force_mN <= SAFETY_ZERO_HIGH_MN)
+        s->release_ticks = 0;
+    else if (s->release_ticks > 1u)
+        s->release_ticks--;
+    return s->release_ticks == 1u;
+}
+
 uint8_t safety_tick(struct safety *s, const struct safety_input *in)
 {
     heat_tick(&s->heat, in->current_100uA);
@@ -260,7 +274,7 @@ uint8_t safety_tick(struct safety *s, const struct safety_input *in)
     if (!in->driving) /* for the next ARM */
         s->slow_force += ((int32_t)in->force_mN * (1 << SAFETY_ZERO_SHIFT) - s->slow_force) >> SAFETY_ZERO_SHIFT;
     bool flows = !in->driving && in->current_100uA > SAFETY_STRAY_100UA;
-    if (lasts(&s->not_off, flows, SAFETY_OFF_TICKS))
+    if (lasts(&s->not_off, flows, SAFETY_OFF_TICKS) || still_presses(s, in))
         return PT_FAULT_OUTPUT_NOT_OFF;
     return in->armed ? armed(s, in) : PT_FAULT_NONE;
 }

@@ -70,12 +70,14 @@
  * shrink with what the finger was promised. A sensor that reads half is found where the truth passes the trip F:
  * 0.5 F < 0.7 F / s - F / 15 for every device whose force is s <= 1.23 of the nominal. The current is filtered over
  * 256 ticks (26 ms): a force that lags as much is honest. 50 ms in all, two points up and one back, counted across
- * pulses; where the floor is zero nothing is counted. */
+ * pulses. Where the floor is below 0.3 N nothing is counted: that is two standard deviations of a sensor three times
+ * as noisy as built (0.135 N). */
 #define SAFETY_PLAUSIBLE_SHIFT 8u
 #define SAFETY_PLAUSIBLE_UP 2u
 #define SAFETY_PLAUSIBLE_DOWN 1u
 #define SAFETY_PLAUSIBLE_FULL 250u /* of looks in every fourth tick */
 #define SAFETY_FLOOR_MARGIN_PER_TRIP 15
+#define SAFETY_FLOOR_LEAST_MN 300
 #define SAFETY_CEILING_MARGIN_MN 1500
 #define SAFETY_NO_FORCE_MN 300 /* under the floor and no more than this: none at all */
 
@@ -88,10 +90,12 @@
 
 /* No current may flow: 0.1 A presses with 0.1 N. While driven with a reference of zero for 200 ms (the integral
  * needs some). After a kill the current falls with L/R, 2.4 ms as built; 100 ms are enough for 0.2 H through 5 ohm,
- * (1.5 + 0.12) * exp(-0.1 / 0.04) - 0.12 = 0.01 A with the diode's 0.6 V. Longer: the output is not off. */
+ * (1.5 + 0.12) * exp(-0.1 / 0.04) - 0.12 = 0.01 A with the diode's 0.6 V. Longer: the output is not off. The
+ * force says so as well, where the shunt cannot: it has not once fallen to what is read before a play, in 500 ms. */
 #define SAFETY_STRAY_100UA 1000
 #define SAFETY_STRAY_TICKS 2000u
 #define SAFETY_OFF_TICKS 1000u
+#define SAFETY_RELEASE_TICKS 5000u
 
 struct safety_limits {
     int16_t current_trip_100uA;
@@ -138,6 +142,7 @@ struct safety {
     uint16_t too_much_force;
     uint16_t stray;
     uint16_t not_off;
+    uint16_t release_ticks; /* left for the force to fall after a run; 0: it has */
     struct safety_still current_still;
     struct safety_span reference_span;
     struct safety_span duty_span;

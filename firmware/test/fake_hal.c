@@ -8,6 +8,8 @@
 #include "units.h"
 
 struct fake fake;
+void (*fake_after_tick)(void);
+void (*fake_on_critical)(bool enter);
 
 static uint8_t rx[1024];
 static uint16_t rx_head, rx_tail;
@@ -46,6 +48,8 @@ void fake_ticks_without_main(uint32_t n)
 {
     for (uint32_t k = 0; k < n; k++) {
         app_tick();
+        if (fake_after_tick != NULL)
+            fake_after_tick();
         coil_step();
     }
 }
@@ -63,10 +67,15 @@ bool fake_output_on(void)
     return fake.pwm_enabled && fake.pwm > 0;
 }
 
-void fake_receive(const uint8_t *bytes, uint16_t count)
+void fake_wire(const uint8_t *bytes, uint16_t count)
 {
     for (uint16_t k = 0; k < count; k++)
         rx[rx_head++ % sizeof rx] = bytes[k];
+}
+
+void fake_receive(const uint8_t *bytes, uint16_t count)
+{
+    fake_wire(bytes, count);
     app_poll();
 }
 
@@ -119,6 +128,10 @@ static int32_t force_counts(int32_t current_counts)
 bool hal_adc_read(struct hal_adc *out)
 {
     static uint16_t dither;
+    if (fake.nest_read) {
+        fake.nest_read = false;
+        app_tick();
+    }
     dither ^= 1u;
     int32_t counts = fake.current / 256 * 4095 / 20000;
     out->current = (uint16_t)(fake.force_current >= 0 ? fake.force_current : counts);
@@ -134,6 +147,10 @@ void hal_pwm_enable(void)
 
 void hal_pwm_set(uint16_t on_counts)
 {
+    if (fake.nest_set) {
+        fake.nest_set = false;
+        app_tick();
+    }
     fake.pwm = on_counts;
 }
 
@@ -205,10 +222,14 @@ void hal_watchdog_feed(void)
 
 void hal_critical_enter(void)
 {
+    if (fake_on_critical != NULL)
+        fake_on_critical(true);
 }
 
 void hal_critical_exit(void)
 {
+    if (fake_on_critical != NULL)
+        fake_on_critical(false);
 }
 
 struct hal_kept *hal_kept(void)

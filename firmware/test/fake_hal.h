@@ -19,17 +19,22 @@ struct fake {
     bool comparator; /* has cut the current in each tick */
     bool tick_lost;
     bool stale;      /* no new readings */
+    bool nest_read;  /* the next reading is broken into by another tick */
+    bool nest_set;   /* the next write of the duty is, just before it */
     uint16_t tx_space;
     uint8_t reset_cause;
     uint32_t nonce;
 };
 extern struct fake fake;
+extern void (*fake_after_tick)(void);        /* NULL: nobody cares */
+extern void (*fake_on_critical)(bool enter); /* NULL: nobody cares */
 
 void fake_reset(void);                  /* power on, the coil cold and known to be: also calls app_init */
 void fake_ticks(uint32_t n);            /* n ticks, the main loop after each */
 void fake_ticks_without_main(uint32_t n);
 bool fake_output_on(void);
 
+void fake_wire(const uint8_t *bytes, uint16_t count);    /* as fake_receive, but nobody looks yet */
 void fake_receive(const uint8_t *bytes, uint16_t count); /* raw bytes, at most 270 */
 
 /* Sends a command and returns the reply (its payload valid until the next call); type 0: none came. */

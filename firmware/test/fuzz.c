@@ -44,6 +44,23 @@ static uint16_t next16(struct tape *t)
     return (uint16_t)(low | ((uint16_t)next(t) << 8));
 }
 
+static uint32_t latched_ticks;  /* since a fault was latched, while the output was on */
+static uint32_t over_force;     /* ticks in a row above the trip in force, while driven */
+
+/* After each tick: no limit is exceeded for longer than is stated. */
+static void check_tick(void)
+{
+    REQUIRE(!fake.pwm_enabled || control.state == PT_STATE_RUNNING || control.state == PT_STATE_RAMPING);
+    latched_ticks = fake.pwm_enabled && control.fault != PT_FAULT_NONE ? latched_ticks + 1u : 0u;
+    REQUIRE(latched_ticks <= CONTROL_RAMP_TICKS);
+    REQUIRE(!fake.pwm_enabled || safety_gravity(control.worst) <= SAFETY_RAMPS); /* a hard one: in the same tick */
+    bool over = fake.pwm_enabled && control.now.force_mN > control.safety.limits.force_trip_mN;
+    over_force = over ? over_force + 1u : 0u;
+    REQUIRE(over_force < 3u);
+    REQUIRE(!fake.pwm_enabled || control.now.current_100uA <= control.safety.limits.current_trip_100uA);
+    REQUIRE(control.state != PT_STATE_RUNNING || control.safety.silent_ticks <= control.safety.limits.heartbeat_ticks);
+}
+
 /* Whatever was said to it, this holds. */
 static void check(void)
 {
@@ -97,7 +114,7 @@ static void sensible_command(struct tape *t)
     static uint32_t announced_crc;
     uint8_t p[PT_MAX_PAYLOAD] = {0};
     uint8_t choice = next(t);
-    switch (next(t) < 200u ? step() : choice % 9u) {
+    switch (next(t) < 200u ? step() : choice % 11u) {
     case 0:
         put_u32(p + PT_HELLO_MAGIC, PT_MAGIC);
         p[PT_HELLO_MAJOR] = (uint8_t)(choice < 250u ? PT_PROTOCOL_MAJOR : choice);
@@ -145,6 +162,16 @@ static void sensible_command(struct tape *t)
         put_u16(p, (uint16_t)(next16(t) % (PT_MAX_DECIMATION + 10u)));
         (void)fake_command(PT_STREAM, p, PT_STREAM_LEN);
         break;
+    case 9: /* to an end of its range */
+        p[PT_SET_PARAM_ID] = (uint8_t)(next(t) % PT_PARAM_COUNT);
+        put_i32(p + PT_SET_PARAM_VALUE, choice & 64u ? commands_param_minimum(p[PT_SET_PARAM_ID])
+                                                     : commands_param_maximum(p[PT_SET_PARAM_ID]));
+        (void)fake_command(PT_SET_PARAM, p, PT_SET_PARAM_LEN);
+        break;
+    case 10:
+        put_u16(p, (uint16_t)(next16(t) % 2100u));
+        (void)fake_command(PT_COIL_HEAT, p, PT_COIL_HEAT_LEN);
+        break;
     default:
         (void)(control.fault == PT_FAULT_NONE ? fake_beat() : fake_clear_fault());
         break;
@@ -157,6 +184,8 @@ static void sequence(const uint8_t *bytes, size_t count)
     uint8_t noise[256];
     fake_reset();
     fake.tx_space = 4096;
+    latched_ticks = over_force = 0;
+    fake_after_tick = check_tick;
     while (t.left > 0) {
         uint8_t what = next(&t);
         switch (what % 8u) {
@@ -182,7 +211,13 @@ static void sequence(const uint8_t *bytes, size_t count)
             fake.force_force = what & 64u ? next16(&t) & 0xFFF : -1;
             fake.force_current = what & 128u ? next16(&t) & 0xFFF : -1;
             fake.tx_space = what & 32u ? next16(&t) % 4097u : 4096;
-            fake.overrun = next(&t) == 7u;
+            uint8_t odd = next(&t);
+            fake.overrun = odd == 7u;
+            fake.comparator = odd == 8u;
+            fake.stale = odd == 9u;
+            fake.tick_lost = odd == 10u;
+            fake.nest_set = odd == 11u;
+            fake.nest_read = odd == 12u;
             break;
         default:
             sensible_command(&t);

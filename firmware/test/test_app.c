@@ -458,6 +458,106 @@ static void a_missed_tick_is_a_fault(void)
     CHECK_EQUAL(control.fault, PT_FAULT_TICK_OVERRUN);
 }
 
+/* Wherever the inner one comes, the outer one's write does not switch on again what it has killed. */
+static void a_tick_that_breaks_into_itself_is_off(void)
+{
+    for (int at = 0; at < 2; at++) {
+        running(10000, 1000);
+        alive_ticks(1000);
+        fake.nest_read = at == 0;
+        fake.nest_set = at == 1;
+        fake_ticks_without_main(1);
+        CHECK(!fake.pwm_enabled);
+        CHECK_EQUAL(control.state, PT_STATE_FAULT);
+        CHECK_EQUAL(control.fault, PT_FAULT_TICK_OVERRUN);
+        fake_ticks(100);
+        CHECK(!fake.pwm_enabled);
+    }
+}
+
+static void a_tick_that_stays_away_is_told_by_the_main_loop(void)
+{
+    running(10000, 1000);
+    alive_ticks(1000);
+    fake.pwm_enabled = false; /* the port's own timer has done it */
+    fake.tick_lost = true;
+    app_poll();
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
+    CHECK_EQUAL(control.fault, PT_FAULT_TICK_LOST);
+    fake_ticks(100);
+    CHECK(!fake.pwm_enabled);
+}
+
+static void readings_that_are_not_new_are_a_fault(void)
+{
+    running(10000, 1000);
+    alive_ticks(1000);
+    fake.stale = true;
+    CHECK_EQUAL(off_after(10), 1);
+    CHECK_EQUAL(control.fault, PT_FAULT_CONVERTER);
+}
+
+/* The slowest slew, the weakest and the wildest gains that a host may choose. */
+static void no_parameter_makes_the_way_down_longer(void)
+{
+    for (int wild = 0; wild < 2; wild++) {
+        fake_reset();
+        (void)hello(PT_PROTOCOL_MAJOR);
+        for (uint8_t id = PT_PARAM_PID_KP; id < PT_PARAM_COUNT; id++)
+            (void)set_param(id, wild ? commands_param_maximum(id) : 1);
+        (void)set_param(PT_PARAM_SLEW_LIMIT, 1);
+        (void)begin(SAMPLES, 1000, crc_of_constant(9000, SAMPLES));
+        (void)data(0, 9000, SAMPLES);
+        (void)commit(SAMPLES, crc_of_constant(9000, SAMPLES));
+        (void)arm(fake.nonce);
+        (void)plain(PT_START);
+        for (uint32_t k = 0; k < 100 && control.state == PT_STATE_RUNNING; k++)
+            alive_ticks(100);
+        (void)plain(PT_STOP);
+        CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
+    }
+}
+
+static void the_worst_is_told_beside_the_first(void)
+{
+    running(10000, 1000);
+    alive_ticks(1000);
+    fake.force_current = 3500; /* 1.71 A, and so it stays */
+    CHECK_EQUAL(off_after(10), 1);
+    fake_ticks(SAFETY_OFF_TICKS - 1u);
+    CHECK_EQUAL(plain(PT_STATUS).payload[PT_STATUS_REPLY_FLAGS] & PT_STATUS_OUTPUT_NOT_OFF, 0);
+    fake_ticks(2);
+    struct frame f = plain(PT_STATUS);
+    CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FAULT], PT_FAULT_OVER_CURRENT);
+    CHECK_EQUAL(f.payload[PT_STATUS_REPLY_WORST], PT_FAULT_OUTPUT_NOT_OFF);
+    CHECK_EQUAL(f.payload[PT_STATUS_REPLY_FLAGS] & PT_STATUS_OUTPUT_NOT_OFF, PT_STATUS_OUTPUT_NOT_OFF);
+    CHECK(get_i16(f.payload + PT_STATUS_REPLY_CURRENT) > 17000);
+}
+
+static void a_force_that_does_not_fall_is_an_output_that_is_not_off(void)
+{
+    running(10000, 1000);
+    alive_ticks(1000);
+    fake.force_current = 0; /* no shunt any more */
+    fake.force_force = 2000; /* 7.8 N */
+    fake_ticks(2000);
+    CHECK_EQUAL(control.fault, PT_FAULT_NO_CURRENT);
+    CHECK_EQUAL(control.worst, PT_FAULT_NO_CURRENT);
+    fake_ticks(SAFETY_RELEASE_TICKS);
+    CHECK_EQUAL(control.worst, PT_FAULT_OUTPUT_NOT_OFF);
+}
+
+static void a_sensor_that_does_not_read_zero_is_not_armed(void)
+{
+    ready(5000, 1000, SAMPLES);
+    fake.force_force = 0; /* -1 N */
+    fake_ticks(200);
+    CHECK_EQUAL(nak_of(arm(fake.nonce)), PT_NAK_CODE_FAULT);
+    CHECK_EQUAL(control.fault, PT_FAULT_FORCE_ZERO);
+    CHECK_EQUAL(control.state, PT_STATE_FAULT);
+    CHECK(!fake.pwm_enabled);
+}
+
 static void an_underrun_ramps_down_and_faults(void)
 {
     ready(15000, 10, 2u * SAMPLES);
@@ -691,6 +791,13 @@ int main(void)
     RUN(every_ramping_fault_is_off_within_100_ms_and_told);
     RUN(a_force_while_only_armed_trips_too);
     RUN(a_missed_tick_is_a_fault);
+    RUN(a_tick_that_breaks_into_itself_is_off);
+    RUN(a_tick_that_stays_away_is_told_by_the_main_loop);
+    RUN(readings_that_are_not_new_are_a_fault);
+    RUN(no_parameter_makes_the_way_down_longer);
+    RUN(the_worst_is_told_beside_the_first);
+    RUN(a_force_that_does_not_fall_is_an_output_that_is_not_off);
+    RUN(a_sensor_that_does_not_read_zero_is_not_armed);
     RUN(an_underrun_ramps_down_and_faults);
     RUN(a_wave_with_a_wrong_checksum_is_stopped);
     RUN(the_first_cause_stays_with_its_snapshot);
