@@ -55,6 +55,6 @@ def test_a_tick_at_every_instruction_of_the_main_loop(tmp_path):
     """Each command, interrupted everywhere: what is latched has its way, what was not seen is not cleared."""
     done = subprocess.run([built("forks", tmp_path)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    rows = re.findall(r"^(\w+)\s+(\d+) instructions (\d+) ticks", done.stdout, re.MULTILINE)
+    rows = re.findall(r"^(\w+)\s+(\d+) instructions\s+(\d+) ticks", done.stdout, re.MULTILINE)
     assert {name for name, _, _ in rows} >= {"START", "ARM", "WAVE_COMMIT", "CLEAR_FAULT", "STOP", "HELLO"}
     assert all(int(ticks) > 200 for _, _, ticks in rows)
