@@ -42,7 +42,7 @@ $(VENV)/installed-test: $(VENV)/installed
 $(D):
 	mkdir -p $@
 
-$(D)/run.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
+$(D)/run.h5: $(FIRMWARE) pulsetrainer/core/excitations.py | $(VENV)/installed $(D)
 	$(PT) capture identification --port '$(PORT)' -o $@ --overwrite
 
 # the paper: relays, closest match, spline; ours: continuous reading, exact inverse
@@ -52,14 +52,14 @@ $(D)/model-continuous.h5: $(D)/run.h5 $(CORE)
 	$(PT) identify $< --reading continuous -o $@ --overwrite
 
 # the second act: the same device, not told what it hides, on a signal that tells causes apart
-$(D)/diagnostic.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
+$(D)/diagnostic.h5: $(FIRMWARE) pulsetrainer/core/excitations.py | $(VENV)/installed $(D)
 	$(PT) capture diagnostic --port '$(PORT)' -o $@ --overwrite
 $(D)/diagnosis.h5 $(D)/diagnosis.html &: $(D)/diagnostic.h5 $(D)/model-continuous.h5 $(DIAGNOSE)
 	$(PT) diagnose $< --model $(D)/model-continuous.h5 -o $(D)/diagnosis.h5 --html $(D)/diagnosis.html --overwrite
 $(D)/model-extended.h5: $(D)/diagnosis.h5 $(D)/model-continuous.h5
 	$(PT) extend $< --model $(D)/model-continuous.h5 -o $@ --overwrite
 # a run that neither model was fitted to, at the rate of a pulse
-$(D)/unseen.h5: $(FIRMWARE) pulsetrainer/core/signals.py | $(VENV)/installed $(D)
+$(D)/unseen.h5: $(FIRMWARE) pulsetrainer/core/excitations.py | $(VENV)/installed $(D)
 	$(PT) capture identification --speed 6 --port '$(PORT)' -o $@ --overwrite
 
 define PULSE_RULES

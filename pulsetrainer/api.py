@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import pulsetrainer.simulation  # noqa: F401 - announces the ports bench: and qemu:
 from pulsetrainer.artefacts import Waveform
-from pulsetrainer.core.waveforms import Shape
+from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device import device as _device
 from pulsetrainer.device.device import Device, Limits
 from pulsetrainer.files import provenance, pulses, store

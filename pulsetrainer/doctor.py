@@ -17,7 +17,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.api import open_device
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
@@ -216,7 +216,7 @@ def _short_capture(device: Device) -> Iterator[Finding]:
     """Rest, go up to half the range, hold, come back, rest; look at noise, rails, tracking and losses."""
     top = min(_LOOP_A, device.info.current_limit_A)
     rest = np.zeros(round(_REST_S * _RATE_HZ))
-    up = signals.through(np.asarray([0.0, top]), _LOOP_A_PER_S, _RATE_HZ)
+    up = excitations.through(np.asarray([0.0, top]), _LOOP_A_PER_S, _RATE_HZ)
     reference = np.concatenate((rest, up, rest + top, up[::-1], rest))
     held = slice(rest.size + up.size + rest.size // 5, rest.size + up.size + rest.size)
     recording = device.play(reference, _RATE_HZ, decimation=round(device.info.tick_rate_Hz / _RATE_HZ))

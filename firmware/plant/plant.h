@@ -34,11 +34,11 @@ real plant_random_normal(struct plant_random *r);  /* mean 0, standard deviation
 void plant_preisach_init(struct plant_preisach *p, uint32_t seed);
 real plant_preisach_step(struct plant_preisach *p, real field);
 
-/* imperfections_before.c: what lies between the current and the field that the hysteresis sees */
+/* imperfections_of_current.c: what lies between the current and the field that the hysteresis sees */
 void plant_before_init(struct plant_before *b, const struct solenoid_params *is);
 real plant_before_step(struct plant_before *b, const struct solenoid_params *is, real current, real force);
 
-/* imperfections_after.c: between the magnetic force and the finger, then between finger and amplifier */
+/* imperfections_of_force.c: between the magnetic force and the finger, then between finger and amplifier */
 void plant_after_init(struct plant_after *a, const struct solenoid_params *is);
 real plant_after_step(struct plant_after *a, const struct solenoid_params *is, real current, real magnetic);
 real plant_sense(struct plant_after *a, const struct solenoid_params *is, uint32_t tick, real force);

@@ -15,7 +15,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray, IntArray
-from pulsetrainer.core.waveforms import Shape
+from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
 
 _PROMINENCE = 0.5  # of the height between the 5th and the 95th percentile

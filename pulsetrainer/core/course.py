@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pulsetrainer.core.excitations import Signal, check_size, through
 from pulsetrainer.core.memory import State, negative_saturation, trace
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.signals import Signal, check_size, through
 from pulsetrainer.errors import ArgumentError
 
 _LOW = 0.0  # where the input goes when the device is off

@@ -1,10 +1,17 @@
-"""The state before a record: from which sample on it does not matter, and which one is assumed."""
+"""The state before a record: from which sample on it does not matter, which one is assumed, or estimated.
+
+A fit leaves out what comes before the memory is known (``record_of``). A prediction of a record that never
+makes the memory known tries several states and takes the one that predicts best (``estimated_start``).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from pulsetrainer.core.memory import State, positive_saturation
+from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
+from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 
@@ -61,3 +68,29 @@ def record_of(inputs: FloatArray, outputs: FloatArray, low: float, high: float) 
     counts = np.ones(inputs.size)
     counts[: known_from(inputs, low, high)] = 0.0
     return Record(inputs, outputs, counts, start_of(inputs, low, high))
+
+
+def estimated_start(
+    operator: Preisach, records: Sequence[tuple[FloatArray, FloatArray]]
+) -> tuple[State | None, str]:
+    """Return the state from which records, pairs of input and output (n,), are followed, and its name.
+
+    Records that never reach an end of the operator's range leave open what came before them. Tried are both
+    saturations and the demagnetised state; the one with the least sum of squared errors is taken.
+    """
+    low, high = operator.plane.low, operator.plane.high
+    if any(reaches_an_end(u, low, high) for u, _ in records):
+        return None, "known"
+    states = {
+        "negative saturation": negative_saturation(low),
+        "demagnetised": demagnetised(low, high),
+        "positive saturation": positive_saturation(low, high),
+    }
+    left = {
+        name: sum(
+            float(np.sum((operator(u, state) - y)[known_from(u, low, high) :] ** 2)) for u, y in records
+        )
+        for name, state in states.items()
+    }
+    best = min(left, key=left.__getitem__)
+    return states[best], f"{best}, estimated"

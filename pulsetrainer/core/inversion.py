@@ -7,7 +7,8 @@ extremes as the memory of the input, so one trace of the target tells every bran
 
 ``closest_match`` is the method of the original device: step the input edge by edge until the output is
 nearest (Tan, Venkataraman, Krishnaprasad 2001; Tan, Baras, Krishnaprasad 2005); ``smoothed`` is the
-spline that takes its steps off.
+spline that takes its steps off. The inverse of a model with extensions iterates around ``invert``:
+``diagnosis.extended``.
 """
 
 from __future__ import annotations

@@ -13,9 +13,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from pulsetrainer.core.excitations import through
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
-from pulsetrainer.core.signals import through
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order

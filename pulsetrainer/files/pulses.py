@@ -10,7 +10,7 @@ from pulsetrainer.files.input_file import check_file
 from pulsetrainer.resources import waveforms_dir
 
 if TYPE_CHECKING:
-    from pulsetrainer.core.waveforms import Shape
+    from pulsetrainer.core.pulses import Shape
 
 
 def library() -> dict[str, Path]:
@@ -47,7 +47,7 @@ def read_pulse(name: str) -> Shape:
     UsageError, DataError
         As ``pulse_file``; or the table cannot be used.
     """
-    from pulsetrainer.core.waveforms import Shape  # noqa: PLC0415 - so that a mistyped name is answered at once
+    from pulsetrainer.core.pulses import Shape  # noqa: PLC0415 - so that a mistyped name is answered at once
     from pulsetrainer.files import run_from_table, table  # noqa: PLC0415
 
     path = pulse_file(name)

@@ -10,7 +10,7 @@ from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.input_file import check_file
 
 if TYPE_CHECKING:
-    from pulsetrainer.core.signals import Signal
+    from pulsetrainer.core.excitations import Signal
 
 
 def signal_file(signal: str, known: Sequence[str]) -> Path | None:
@@ -46,7 +46,7 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
     # so that a mistyped name is answered at once
     import numpy as np  # noqa: PLC0415
 
-    from pulsetrainer.core import signals  # noqa: PLC0415
+    from pulsetrainer.core import excitations  # noqa: PLC0415
     from pulsetrainer.files import run_from_table, table  # noqa: PLC0415
 
     columns = table.read_table(path)
@@ -58,12 +58,12 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
     time, current = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
     seconds = float(time[-1]) - float(time[0])
     lasts = seconds * rate_Hz
-    if not lasts <= signals.MOST_SAMPLES:
+    if not lasts <= excitations.MOST_SAMPLES:
         raise DataError(
             f"{path} lasts {seconds:g} s, {lasts:.3g} samples at {rate_Hz:g} Hz; "
-            f"{signals.MOST_SAMPLES} are the most",
+            f"{excitations.MOST_SAMPLES} are the most",
             hint="give its time in s, a lower `rate_Hz`, or a shorter signal with `repeats`",
         )
     count = int(np.floor(lasts + 1e-9)) + 1
     value = np.interp(time[0] + np.arange(count) / rate_Hz, time, current)
-    return signals.Signal(value, rate_Hz, path.name)
+    return excitations.Signal(value, rate_Hz, path.name)

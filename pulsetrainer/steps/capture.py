@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.artefacts import Run
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
+from pulsetrainer.core.excitations import Signal
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import Plane
-from pulsetrainer.core.signals import Signal
 from pulsetrainer.device.codes import TICK_RATE_HZ
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.steps.asked import EXCITATIONS
@@ -42,7 +42,7 @@ def capture(
     Parameters
     ----------
     signal
-        "identification", "diagnostic", or samples (n,) in A as a ``core.signals.Signal``.
+        "identification", "diagnostic", or samples (n,) in A as a ``core.excitations.Signal``.
     levels, current_max_A, speed_A_per_s
         Of the identification signal: the levels whose cells it switches, its top, and how fast it moves.
     rate_Hz
@@ -103,9 +103,11 @@ def excitation(
     if isinstance(signal, Signal):
         return signal
     if signal == "identification":
-        return signals.identification(0.0, current_max_A, n_h=levels, speed=speed_A_per_s, rate_Hz=rate_Hz)
+        return excitations.identification(
+            0.0, current_max_A, n_h=levels, speed=speed_A_per_s, rate_Hz=rate_Hz
+        )
     if signal == "diagnostic":
-        return signals.diagnostic(0.0, current_max_A, rate_Hz=rate_Hz)
+        return excitations.diagnostic(0.0, current_max_A, rate_Hz=rate_Hz)
     raise UsageError(
         f"there is no signal {signal!r}; known signals: {', '.join(EXCITATIONS)}",
         hint="give one of them, or the samples of your own",

@@ -18,8 +18,7 @@ from pulsetrainer.artefacts import (
     WaveformEvaluation,
 )
 from pulsetrainer.core import metrics
-from pulsetrainer.core.initial_state import known_from, reaches_an_end
-from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
+from pulsetrainer.core.initial_state import estimated_start, known_from
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, QualityError, UsageError
@@ -181,7 +180,7 @@ def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> Mod
     low, high = float(model.edges[0]), float(model.edges[-1])
     parts = run.parts(SHORTEST_PART)
     known = [known_from(part.input, low, high) for part in parts]
-    start, state = _start(model, parts, known)
+    start, state = estimated_start(operator_of(model), [(part.input, part.output) for part in parts])
     predicted = np.concatenate(
         [predict(model, part.input, run.dt_s, start)[k:] for part, k in zip(parts, known, strict=True)]
     )
@@ -220,32 +219,6 @@ def _times(parts: Sequence[Run], known: Sequence[int], thinned: slice) -> FloatA
     """Times of the samples after ``known`` of each part, thinned; None where the run has no time."""
     times = [part.time_s[k:] for part, k in zip(parts, known, strict=True) if part.time_s is not None]
     return np.concatenate(times)[thinned] if times else None
-
-
-def _start(model: Model, parts: Sequence[Run], known: Sequence[int]) -> tuple[State | None, str]:
-    """Return the state from which a run is followed, and what it is called.
-
-    A run that never reaches an end of the model's range leaves open what came before it. Tried are both
-    saturations and the demagnetised state; the one that predicts best is taken.
-    """
-    low, high = float(model.edges[0]), float(model.edges[-1])
-    if any(reaches_an_end(part.input, low, high) for part in parts):
-        return None, "known"
-    states = {
-        "negative saturation": negative_saturation(low),
-        "demagnetised": demagnetised(low, high),
-        "positive saturation": positive_saturation(low, high),
-    }
-    operator = operator_of(model)
-    left = {
-        name: sum(
-            float(np.sum((operator(part.input, state)[k:] - part.output[k:]) ** 2))
-            for part, k in zip(parts, known, strict=True)
-        )
-        for name, state in states.items()
-    }
-    best = min(left, key=left.__getitem__)
-    return states[best], f"{best}, estimated"
 
 
 # --- bounds -----------------------------------------------------------------------------------------------

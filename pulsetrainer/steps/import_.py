@@ -12,10 +12,10 @@ from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.time_steps import GAP, steps_of
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage
+from pulsetrainer.core.excitations import MOST_SAMPLES
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.core.signals import MOST_SAMPLES
 from pulsetrainer.errors import DataError, UsageError
 
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range

@@ -9,10 +9,10 @@ import numpy as np
 
 from pulsetrainer.artefacts import Model, Waveform
 from pulsetrainer.artefacts.units import with_unit
-from pulsetrainer.core import inversion, signals
+from pulsetrainer.core import excitations, inversion
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.waveforms import Shape, train
+from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.diagnosis.prediction import extended_of, operator_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 from pulsetrainer.steps.asked import check_beat, check_force_range
@@ -199,7 +199,7 @@ def _force_range(
 
 def _major_loop(low: float, high: float, rate_Hz: float) -> FloatArray:
     """Input (n,) that wipes out whatever came before."""
-    return signals.conditioning(
+    return excitations.conditioning(
         low, high, speed=(high - low) / CONDITIONING_TIME_S, rate_Hz=rate_Hz, rest_s=REST_S
     )
 

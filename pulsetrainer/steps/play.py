@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.artefacts import DrivePlayback, Playback, Waveform
+from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.signals import check_size
 from pulsetrainer.device.plausibility import judge_against
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.errors import ArgumentError, DataError

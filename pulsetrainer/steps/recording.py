@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from pulsetrainer.artefacts import Run
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.memory import turning_points
@@ -268,7 +268,7 @@ def conditioning_loop(high_A: float, rate_Hz: float) -> FloatArray:
     """Samples (n,) of the major loop that comes first; none for a signal that stays at zero."""
     if high_A <= 0:
         return np.zeros(0)
-    return signals.conditioning(
+    return excitations.conditioning(
         0.0, high_A, speed=CONDITIONING_SPEED_A_PER_S, rate_Hz=rate_Hz, rest_s=CONDITIONING_REST_S
     )
 

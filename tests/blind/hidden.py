@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import open_device
 
@@ -184,11 +184,11 @@ def measure(case: Case) -> Data:
 
 
 def _play(case: Case, high: float, seconds: float | None = None) -> Record | None:
-    value = signals.diagnostic(0.0, high, rate_Hz=RATE_HZ).value
+    value = excitations.diagnostic(0.0, high, rate_Hz=RATE_HZ).value
     if seconds is not None:
         value = value[: round(seconds * RATE_HZ)]
     with open_device(case.port) as device:
-        lead = signals.conditioning(0.0, high, speed=3.0, rate_Hz=RATE_HZ, rest_s=0.2)
+        lead = excitations.conditioning(0.0, high, speed=3.0, rate_Hz=RATE_HZ, rest_s=0.2)
         if device.play(lead, RATE_HZ).fault:
             return None
         got = device.play(value, RATE_HZ)

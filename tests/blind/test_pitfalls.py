@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import hidden
 
 import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import open_device
 from pulsetrainer.diagnosis import gates, residual
@@ -48,7 +48,7 @@ def lagged():
 
 def test_one_rate_is_said_to_be_one_rate():
     """On a record of one rate the weights swallow a lag: the answer must say what is missing."""
-    value = signals.identification(0.0, 1.5, n_h=16, speed=1.5, rate_Hz=1000.0).value
+    value = excitations.identification(0.0, 1.5, n_h=16, speed=1.5, rate_Hz=1000.0).value
     forces = []
     for port in ("bench:?ideal", f"bench:?ideal&output-lag={TAU_S}"):
         with open_device(port) as device:

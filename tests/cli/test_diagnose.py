@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from program import pulsetrainer
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.diagnosis.extended import Extended
@@ -44,9 +44,9 @@ def _write(folder, name, u, y, *, t=None, units=("A", "N")):
 def bench(tmp_path_factory):
     """A folder with a diagnostic run and the model of the device."""
     folder = tmp_path_factory.mktemp("diagnose")
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
     _write(folder, "diagnostic", u, _device(u))
-    slow = signals.identification(0.0, 1.5, n_h=16, speed=ONE_SPEED, rate_Hz=RATE_HZ).value
+    slow = excitations.identification(0.0, 1.5, n_h=16, speed=ONE_SPEED, rate_Hz=RATE_HZ).value
     _write(folder, "slow", slow, _device(slow))
     done = pulsetrainer(folder, "identify", "slow.h5", "-o", "model.h5", "--levels", "32")
     assert done.code == 0, done
@@ -75,7 +75,7 @@ def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     assert "http://" not in page.replace("http://www.w3.org", "")
     done = pulsetrainer(bench, "extend", "diagnosis.h5", "--model", "model.h5", "-o", "extended.h5")
     assert done.code == 0, done
-    fresh = signals.identification(0.0, 1.5, n_h=12, speed=8.0, rate_Hz=RATE_HZ).value
+    fresh = excitations.identification(0.0, 1.5, n_h=12, speed=8.0, rate_Hz=RATE_HZ).value
     _write(bench, "fresh", fresh, _device(fresh))
     models = ["--model", "model.h5", "--model", "extended.h5"]
     done = pulsetrainer(bench, "evaluate", "fresh.h5", *models, "--json")
@@ -107,7 +107,7 @@ def test_one_single_rate_without_holds_gives_a_set_and_the_next_experiment(bench
 
 def test_a_short_record_says_so(bench):
     """Six seconds: an answer that names the shortness; half a second: none."""
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value[: round(6 * RATE_HZ)]
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value[: round(6 * RATE_HZ)]
     _write(bench, "short", u, _device(u))
     done = _diagnose(bench, "short.h5")
     assert done.code == 0, done
@@ -122,7 +122,7 @@ def test_a_short_record_says_so(bench):
 
 def test_a_model_of_another_range_is_refused(bench):
     """Most of the input beyond what was identified."""
-    u = 10.0 + 5.0 * signals.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    u = 10.0 + 5.0 * excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
     _write(bench, "other", u, _device(u / 5.0 - 2.0))
     done = _diagnose(bench, "other.h5")
     assert done.code == 3
@@ -131,7 +131,7 @@ def test_a_model_of_another_range_is_refused(bench):
 
 def test_other_units_are_refused(bench):
     """Of the model, and of a second run."""
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
     _write(bench, "milli", 1e3 * u, _device(u), units=("mA", "N"))
     for runs in (("milli.h5",), ("diagnostic.h5", "milli.h5")):
         done = _diagnose(bench, *runs)
@@ -144,7 +144,7 @@ def test_other_units_are_refused(bench):
 @pytest.mark.slow
 def test_gaps_are_left_out_and_a_record_of_gaps_is_refused(bench):
     """Three holes in the middle of a record change no verdict; a tenth of the samples is no record."""
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
     y, t = _device(u), np.arange(u.size) / RATE_HZ
     kept = np.ones(u.size, dtype=bool)
     for begin in (1500, 4000, 7000):
@@ -163,7 +163,7 @@ def test_gaps_are_left_out_and_a_record_of_gaps_is_refused(bench):
 @pytest.mark.parametrize("constant", ["input", "output"])
 def test_what_does_not_vary_is_an_error(bench, constant):
     """A resting device tells nothing."""
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
     flat = np.full_like(u, 0.7)
     _write(bench, constant, flat if constant == "input" else u, flat if constant == "output" else _device(u))
     done = _diagnose(bench, f"{constant}.h5")

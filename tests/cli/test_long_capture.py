@@ -16,7 +16,7 @@ import pytest
 
 from program import PROGRAM, pulsetrainer
 from pulsetrainer.artefacts import Run
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.recorder import RunRecorder
 from pulsetrainer.files.store import read, read_header
@@ -50,7 +50,7 @@ def follows(played: np.ndarray, rest: np.ndarray) -> bool:
 
 def course() -> np.ndarray:
     """The reference of ``IDENTIFICATION`` in full."""
-    one = signals.identification(0.0, 1.5, n_h=16, speed=3.0, rate_Hz=1000.0).value
+    one = excitations.identification(0.0, 1.5, n_h=16, speed=3.0, rate_Hz=1000.0).value
     return np.tile(one, 40)
 
 
@@ -119,7 +119,7 @@ def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
     assert np.array_equal(run.output[: cut.size], cut)
     assert len(run.parts()) == 2
     last = run.parts()[1].reference
-    one = signals.identification(0.0, 1.5, n_h=12, speed=3.0, rate_Hz=1000.0).value
+    one = excitations.identification(0.0, 1.5, n_h=12, speed=3.0, rate_Hz=1000.0).value
     np.testing.assert_allclose(last[-500:], one[-500:], atol=STEP_A)
 
 

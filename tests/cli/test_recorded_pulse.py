@@ -10,7 +10,7 @@ import pytest
 
 from program import pulsetrainer
 from pulsetrainer.core.beats import find_beats
-from pulsetrainer.core.waveforms import Shape
+from pulsetrainer.core.pulses import Shape
 from wording import refusal, tells
 
 RECORD = Path(__file__).resolve().parents[1] / "data" / "fingerbp_AAC3_3.csv"

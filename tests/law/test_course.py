@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.course import Course
+from pulsetrainer.core.excitations import Signal
 from pulsetrainer.core.memory import negative_saturation, trace
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
-from pulsetrainer.core.signals import Signal
 from pulsetrainer.errors import ArgumentError
 
 RATE_HZ = 100.0
@@ -25,7 +25,7 @@ PREISACH = Preisach(PLANE, np.linspace(1.0, 2.0, PLANE.n_q))
 def courses(draw: st.DrawFn) -> Course:
     """Draw a signal between random turning points, from zero on, some times over."""
     turns = draw(st.lists(st.floats(0.0, HIGH), min_size=1, max_size=12))
-    path = np.append(signals.through(np.array([0.0, *turns]), 3.0, RATE_HZ), turns[-1])
+    path = np.append(excitations.through(np.array([0.0, *turns]), 3.0, RATE_HZ), turns[-1])
     return Course(Signal(path, RATE_HZ, "random"), draw(st.integers(1, 4)))
 
 
@@ -61,7 +61,7 @@ def test_after_the_lead_in_the_output_goes_on_as_if_nothing_had_happened(course,
 
 def test_a_swing_shorter_than_a_sample_is_kept():
     """Two turns less than half a sample apart: both are visited, so that the memory is what it should be."""
-    path = signals.through(np.array([0.0, 0.265625, 0.24921875]), 3.0, 100.0)
+    path = excitations.through(np.array([0.0, 0.265625, 0.24921875]), 3.0, 100.0)
     assert path.max() == 0.265625
     assert path[-1] == 0.24921875
 
@@ -80,7 +80,7 @@ def test_parts_cover_the_course_once(course, longest):
 
 def test_a_part_ends_at_rest_where_it_can():
     """A signal that comes to zero is cut there, and the next part needs no lead-in."""
-    course = Course(Signal(signals.through(np.array([0, 1.0, 0]), 1.0, RATE_HZ), RATE_HZ, "strokes"), 10)
+    course = Course(Signal(excitations.through(np.array([0, 1.0, 0]), 1.0, RATE_HZ), RATE_HZ, "strokes"), 10)
     end = course.part_end(0, 500)
     assert end % course.signal.value.size in (0, 1)
     assert course.lead_in(end, speed=3.0, rest_s=0.2).size == 0
@@ -89,7 +89,7 @@ def test_a_part_ends_at_rest_where_it_can():
 def test_a_deep_memory_is_gone_through_in_time():
     """Many remembered extremes are led through faster: the lead-in stays below a minute and its rest."""
     swings = 0.5 + 0.5 * np.linspace(1, 0.01, 2000) * np.where(np.arange(2000) % 2 == 0, 1, -1)
-    signal = Signal(signals.through(np.array([0.0, *swings]), 20.0, 1000.0), 1000.0, "decay")
+    signal = Signal(excitations.through(np.array([0.0, *swings]), 20.0, 1000.0), 1000.0, "decay")
     lead = Course(signal).lead_in(signal.value.size, speed=3.0, rest_s=0.2)
     assert lead.size <= 60.3 * 1000
 

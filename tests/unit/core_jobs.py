@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pulsetrainer.core.excitations import through
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
-from pulsetrainer.core.signals import through
 
 FloatArray = NDArray[np.float64]
 

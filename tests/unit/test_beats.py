@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pulsetrainer.core.beats import find_beats
-from pulsetrainer.core.waveforms import Shape
+from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
 
 DATA = Path(__file__).resolve().parents[1] / "data"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
@@ -21,7 +21,7 @@ from pulsetrainer.diagnosis.problem import problem_for
 DT = 1e-3
 HIGH = 1.5
 LOAD = library()["load-dependence"]
-INPUT = signals.diagnostic(0.0, HIGH, rate_Hz=1 / DT).value
+INPUT = excitations.diagnostic(0.0, HIGH, rate_Hz=1 / DT).value
 
 
 def _operator(n_h: int, weights: np.ndarray | None = None) -> Preisach:
@@ -70,7 +70,7 @@ def test_no_weights_make_equal_loops_differ(seed, n_h):
     weights = rng.exponential(size=n_h * (n_h + 1) // 2) ** 3
     bottom, top = 0.3, 0.9
     turns = (0.0, bottom, *(top, bottom) * 4, HIGH, bottom, *(top, bottom) * 4, 0.0)
-    u = signals.through(
+    u = excitations.through(
         np.asarray(turns), 6.0, 1 / DT
     )  # a hundred samples a stroke: loops equal to the sample
     output = _operator(n_h, weights)(u)

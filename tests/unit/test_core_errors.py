@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pulsetrainer.core import inversion, memory, metrics, nnls, signals, waveforms
+from pulsetrainer.core import excitations, inversion, memory, metrics, nnls, waveforms
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.identification import identify
 from pulsetrainer.core.operator import Preisach, outputs
@@ -42,7 +42,7 @@ TAKES_A_VECTOR = {
     "target, closest match": lambda y: inversion.closest_match(RELAYS, y),
     "inputs, slew": lambda u: inversion.slew_limited(u, 1000.0, 1.0),
     "inputs, spline": lambda u: inversion.smoothed(u, FIVE, 0.1, 0.0, 1.0),
-    "points": lambda p: signals.through(p, 1.0, 100.0),
+    "points": lambda p: excitations.through(p, 1.0, 100.0),
     "time": lambda t: waveforms.Shape("pulse", t, FIVE),
     "value": lambda v: waveforms.Shape("pulse", FIVE, v),
     "target, tracking": lambda y: metrics.tracking(y, FIVE, 1.0),
@@ -203,33 +203,33 @@ BAD = {
     ),
     # signals and waveforms
     "signal at no speed": (
-        lambda: signals.identification(0.0, 1.0, n_h=4, speed=0.0, rate_Hz=100.0),
+        lambda: excitations.identification(0.0, 1.0, n_h=4, speed=0.0, rate_Hz=100.0),
         ["speed", "positive", "0"],
     ),
     "signal at no rate": (
-        lambda: signals.identification(0.0, 1.0, n_h=4, speed=1.0, rate_Hz=NAN),
+        lambda: excitations.identification(0.0, 1.0, n_h=4, speed=1.0, rate_Hz=NAN),
         ["rate", "positive", "nan"],
     ),
     "signal of one level": (
-        lambda: signals.identification(0.0, 1.0, n_h=1, speed=1.0, rate_Hz=100.0),
+        lambda: excitations.identification(0.0, 1.0, n_h=1, speed=1.0, rate_Hz=100.0),
         ["n_h", "at least 2", "1"],
     ),
     "signal of no range": (
-        lambda: signals.identification(1.0, 1.0, n_h=4, speed=1.0, rate_Hz=100.0),
+        lambda: excitations.identification(1.0, 1.0, n_h=4, speed=1.0, rate_Hz=100.0),
         ["low < high", "1"],
     ),
-    "path at no speed": (lambda: signals.through(np.arange(3.0), 0.0, 100.0), ["speed", "positive", "0"]),
-    "path at infinite speed": (lambda: signals.through(np.arange(3.0), INF, 100.0), ["speed", "finite"]),
+    "path at no speed": (lambda: excitations.through(np.arange(3.0), 0.0, 100.0), ["speed", "positive", "0"]),
+    "path at infinite speed": (lambda: excitations.through(np.arange(3.0), INF, 100.0), ["speed", "finite"]),
     "negative rest": (
-        lambda: signals.conditioning(0.0, 1.0, speed=1.0, rate_Hz=100.0, rest_s=-1.0),
+        lambda: excitations.conditioning(0.0, 1.0, speed=1.0, rate_Hz=100.0, rest_s=-1.0),
         ["rest", "negative", "-1"],
     ),
     "conditioning in no range": (
-        lambda: signals.conditioning(1.0, 0.0, speed=1.0, rate_Hz=100.0, rest_s=1.0),
+        lambda: excitations.conditioning(1.0, 0.0, speed=1.0, rate_Hz=100.0, rest_s=1.0),
         ["low < high", "1", "0"],
     ),
-    "diagnostic in no range": (lambda: signals.diagnostic(1.0, 1.0, rate_Hz=100.0), ["low < high", "1"]),
-    "diagnostic at no rate": (lambda: signals.diagnostic(0.0, 1.0, rate_Hz=0.0), ["rate", "0"]),
+    "diagnostic in no range": (lambda: excitations.diagnostic(1.0, 1.0, rate_Hz=100.0), ["low < high", "1"]),
+    "diagnostic at no rate": (lambda: excitations.diagnostic(0.0, 1.0, rate_Hz=0.0), ["rate", "0"]),
     "constant pulse": (lambda: shape(value=np.ones(4)), ["constant", "1"]),
     "pulse of three samples": (
         lambda: shape(time_s=np.arange(3.0), value=np.arange(3.0)),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
@@ -88,7 +88,7 @@ def test_the_resonance_rings_at_its_frequency_and_settles_at_its_input():
 @pytest.mark.parametrize("name", sorted(STRENGTHS))
 def test_a_cause_without_strength_does_nothing(name):
     """At zero strength the extended model is the static one; with strength it is not."""
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=1 / DT).value[:8000]
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=1 / DT).value[:8000]
     operator = _operator()
     strong, none = STRENGTHS[name]
     np.testing.assert_allclose(Extended.of(operator, [(name, none)])(u, DT), operator(u), atol=1e-9)
@@ -114,7 +114,7 @@ def test_the_one_inverse_compensates_every_extension(extensions, polarity):
     model = Extended.of(static, extensions)
     t = np.arange(3000) * DT
     target = 7.0 + 4.0 * np.sin(2 * np.pi * t) + 1.0 * np.sin(6 * np.pi * t)
-    lead = signals.conditioning(0.0, 1.5, speed=3.0, rate_Hz=1 / DT, rest_s=0.2)
+    lead = excitations.conditioning(0.0, 1.5, speed=3.0, rate_Hz=1 / DT, rest_s=0.2)
     rest = model(lead, DT)[-1]
     target = rest + (target - rest) * np.minimum(t / 0.5, 1.0)
     found = model.invert(target, DT, lead=lead, band_Hz=30.0)
@@ -128,7 +128,7 @@ def test_the_diagnostic_signal_has_what_the_causes_need():
     """Ninety seconds, in range, every cell switched, four rates over ten to one, holds, a rest."""
     from pulsetrainer.core.coverage import coverage
 
-    signal = signals.diagnostic(0.2, 1.4, rate_Hz=1000.0)
+    signal = excitations.diagnostic(0.2, 1.4, rate_Hz=1000.0)
     u = signal.value
     assert 85 < signal.duration_s < 95
     assert u.min() == pytest.approx(0.2)
@@ -141,7 +141,7 @@ def test_the_diagnostic_signal_has_what_the_causes_need():
     assert peaks.max() / peaks.min() > 10
     assert np.sum(speed < 1e-9) > 15_000
     with pytest.raises(ValueError, match="low < high"):
-        signals.diagnostic(1.0, 1.0, rate_Hz=1000.0)
+        excitations.diagnostic(1.0, 1.0, rate_Hz=1000.0)
 
 
 def _record(y: np.ndarray, u: np.ndarray | None = None, reference: np.ndarray | None = None) -> Record:
@@ -190,7 +190,7 @@ def test_wild_samples_side_by_side_are_found():
 def test_the_tip_of_a_stroke_that_ends_with_a_jump_is_not_wild():
     """A viscous force jumps when the input turns: a stroke's last sample is alone there, but on its line."""
     rng = np.random.default_rng(5)
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=1 / DT).value[:30_000]
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=1 / DT).value[:30_000]
     rate = np.diff(u, prepend=u[0]) / DT
     y = np.round(8 * u + 0.04 * rate + 0.03 * rng.standard_normal(u.size), 3)
     apart = np.abs(y - ndimage.median_filter(y, 7))  # the naive rule alone would name some of these
@@ -203,7 +203,7 @@ def test_the_tip_of_a_stroke_that_ends_with_a_jump_is_not_wild():
 
 def test_a_delay_keeps_the_tips_that_the_memory_remembers():
     """Whole samples late it is a copy; in between it errs far less than an interpolated input would."""
-    fine = signals.diagnostic(0.0, 1.5, rate_Hz=10_000.0).value[:80_000]
+    fine = excitations.diagnostic(0.0, 1.5, rate_Hz=10_000.0).value[:80_000]
     operator = _operator()
     truth, u = operator(fine), fine[::10]
     late = Extended.of(operator, [("delay", (0.005,))])(u, DT)
@@ -241,7 +241,7 @@ def test_the_noise_is_that_of_the_samples_with_weight():
 
 def _lagging(n_h: int = 24, rate_Hz: float = 200.0, **causes: tuple[float, ...]) -> Record:
     """A short diagnostic record of a device with some causes."""
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=rate_Hz).value[: round(40 * rate_Hz)]
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=rate_Hz).value[: round(40 * rate_Hz)]
     named = [(name.replace("_", "-"), values) for name, values in causes.items()]
     y = Extended.of(_operator(n_h), named)(u, 1 / rate_Hz)
     noise = 0.01 * np.random.default_rng(8).standard_normal(u.size)
@@ -272,7 +272,7 @@ def test_a_strong_resonance_converges():
 @pytest.mark.slow
 def test_the_best_experiment_tells_lags_apart_better_than_one_rate_does():
     """On a record of one rate a lag before and one after the hysteresis are one; elsewhere they are not."""
-    u = signals.identification(0.0, 1.5, n_h=12, speed=1.5, rate_Hz=200.0).value
+    u = excitations.identification(0.0, 1.5, n_h=12, speed=1.5, rate_Hz=200.0).value
     y = Extended.of(_operator(), [("output-lag", (0.02,))])(u, 0.005)
     y += 0.01 * np.random.default_rng(9).standard_normal(u.size)
     answer = diagnose(Question([Record(u, y, dt_s=0.005)], 0.0, 1.5, np.random.default_rng(0)))
@@ -311,7 +311,7 @@ def test_simulated_noise_has_the_spectrum_of_its_model():
 @pytest.mark.parametrize("constant", ["input", "output"])
 def test_what_does_not_vary_is_refused(constant):
     """A clear error, not a verdict."""
-    u = signals.diagnostic(0.0, 1.5, rate_Hz=200.0).value
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=200.0).value
     y = _operator()(u)
     record = Record(
         np.full_like(u, 0.7) if constant == "input" else u,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
@@ -397,7 +397,7 @@ def test_a_new_cause_is_one_file(tmp_path, monkeypatch):
         i, j = plane.cell_indices
         weights = 1.0 + np.exp(-(((i - j) / 24 - 0.25) ** 2) / 0.02)
         operator = Preisach(plane, weights * 7.0 / float((weights * plane.areas).sum()), 7.0)
-        u = signals.diagnostic(0.0, 1.5, rate_Hz=100.0).value[:3000]
+        u = excitations.diagnostic(0.0, 1.5, rate_Hz=100.0).value[:3000]
         time = np.arange(u.size) / 100
         y = (
             operator(u)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.record import Record
@@ -16,7 +16,7 @@ from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.raw import Firing
 
 DT = 1e-3
-FINE = signals.diagnostic(0.0, 1.5, rate_Hz=10 / DT).value[:600_000]  # a device jumps between samples too
+FINE = excitations.diagnostic(0.0, 1.5, rate_Hz=10 / DT).value[:600_000]  # a device jumps between samples too
 INPUT = FINE[::10]
 NOISE = 0.04
 STICKING = library()["stick-slip"]

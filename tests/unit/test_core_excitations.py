@@ -5,25 +5,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pulsetrainer.core import signals
+from pulsetrainer.core import excitations
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.errors import ArgumentError
 
 
 def test_a_path_goes_through_its_points():
     """At constant speed, with every point on the nearest sample."""
-    path = signals.through([0.0, 1.0, 0.4, 2.0], 10.0, 100.0)
+    path = excitations.through([0.0, 1.0, 0.4, 2.0], 10.0, 100.0)
     assert path[[0, 10, 16, 32]] == pytest.approx([0.0, 1.0, 0.4, 2.0], abs=0)
     assert path.size == 33
     assert np.abs(np.diff(path)) == pytest.approx(0.1)
-    between = signals.through([0.0, 1.0, 0.0], 3.0, 7.0)  # the turn lies at sample 2.33
+    between = excitations.through([0.0, 1.0, 0.0], 3.0, 7.0)  # the turn lies at sample 2.33
     assert between == pytest.approx([0.0, 3 / 7, 1.0, 1 - 2 / 7, 2 - 12 / 7, 0.0], abs=1e-12)
 
 
 @pytest.mark.parametrize("n_h", [2, 5, 12])
 def test_identification_visits_every_edge(n_h):
     """Down from the top to each edge in turn, the finest loop first: 2 n_h reversals with the last."""
-    signal = signals.identification(-1.0, 2.0, n_h=n_h, speed=1.5, rate_Hz=200.0)
+    signal = excitations.identification(-1.0, 2.0, n_h=n_h, speed=1.5, rate_Hz=200.0)
     edges = np.linspace(-1.0, 2.0, n_h + 1)
     expected = [2.0]
     for k in range(n_h - 1, -1, -1):
@@ -38,26 +38,26 @@ def test_identification_visits_every_edge(n_h):
 
 def test_a_signal_must_not_jump_over_its_range():
     """One step as wide as the range is just possible."""
-    assert signals.identification(0.0, 1.0, n_h=2, speed=10.0, rate_Hz=10.0).value.max() == 1.0
+    assert excitations.identification(0.0, 1.0, n_h=2, speed=10.0, rate_Hz=10.0).value.max() == 1.0
     with pytest.raises(ArgumentError, match="its range is 1"):
-        signals.identification(0.0, 1.0, n_h=2, speed=10.1, rate_Hz=10.0)
+        excitations.identification(0.0, 1.0, n_h=2, speed=10.1, rate_Hz=10.0)
     for rate in (0.0, -0.5):
         with pytest.raises(ArgumentError, match="rate must be positive"):
-            signals.identification(0.0, 1.0, n_h=2, speed=1.0, rate_Hz=rate)
+            excitations.identification(0.0, 1.0, n_h=2, speed=1.0, rate_Hz=rate)
 
 
 def test_conditioning_is_one_loop_and_a_rest():
     """Up, down, and still."""
-    value = signals.conditioning(0.5, 1.5, speed=2.0, rate_Hz=10.0, rest_s=0.4)
+    value = excitations.conditioning(0.5, 1.5, speed=2.0, rate_Hz=10.0, rest_s=0.4)
     assert value == pytest.approx([*np.arange(0.5, 1.5, 0.2), *np.arange(1.5, 0.4, -0.2), 0.5, 0.5, 0.5, 0.5])
 
 
 def test_size_is_checked_before_anything_is_made():
     """The limit itself passes, one more does not."""
-    signals.check_size(4, 25.0, 100)
+    excitations.check_size(4, 25.0, 100)
     for times, samples in ((4, 25.1), (101, 0.0), (10**400, 0.0), (2, np.inf), (2, np.nan)):
         with pytest.raises(ArgumentError):
-            signals.check_size(times, samples, 100)
+            excitations.check_size(times, samples, 100)
 
 
 def holds(value):
@@ -72,7 +72,7 @@ def holds(value):
 
 def test_the_diagnostic_signal_is_what_it_says():
     """Ten blocks over the whole range, each with its hold; four rates 14 to 1; loops at four biases."""
-    value = signals.diagnostic(0.0, 1.0, rate_Hz=1000.0).value
+    value = excitations.diagnostic(0.0, 1.0, rate_Hz=1000.0).value
     assert (value[0], value[-1], value.min(), value.max()) == (0.0, 0.0, 0.0, 1.0)
     levels = (0.8, 0.3, 0.6, 0.45, 0.9, 0.2, 0.7, 1.0, 0.0, 0.5)
     seconds = (1.2, 1.2, 2.4, 1.2, 1.2, 2.4, 1.2, 6.0, 6.0, 0.8)
@@ -96,5 +96,5 @@ def test_the_diagnostic_signal_is_what_it_says():
 
 def test_the_diagnostic_signal_fits_any_range():
     """The same shape between any two ends."""
-    one = signals.diagnostic(0.0, 1.0, rate_Hz=50.0).value
-    assert signals.diagnostic(-3.0, 5.0, rate_Hz=50.0).value == pytest.approx(8.0 * one - 3.0)
+    one = excitations.diagnostic(0.0, 1.0, rate_Hz=50.0).value
+    assert excitations.diagnostic(-3.0, 5.0, rate_Hz=50.0).value == pytest.approx(8.0 * one - 3.0)

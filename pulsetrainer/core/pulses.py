@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # its parts load when they are first used
 
+from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.plane import FloatArray, ascending, finite_vector, positive
-from pulsetrainer.core.signals import check_size
 from pulsetrainer.errors import ArgumentError
 
 
@@ -62,7 +62,7 @@ def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float
     ------
     ArgumentError
         No periods, an empty range, a rate that is not positive or leaves no sample, or more than
-        ``signals.MOST_SAMPLES``.
+        ``excitations.MOST_SAMPLES``.
     """
     if periods < 1:
         raise ArgumentError(f"a pulse train needs at least 1 period, got {periods}", hint="12 suit a session")
