@@ -9,10 +9,13 @@ import pytest
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import asked, floor, intervals, residual, screening, velocity
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis import asked, floor, intervals, residual, screening, velocity, wording
+from pulsetrainer.diagnosis.causes import library, stick_slip
+from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.design import bins_of
+from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_for
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
@@ -300,3 +303,104 @@ def test_a_question_is_refused_where_it_makes_no_sense():
         with pytest.raises(DataError):
             _question(run, model)
     assert len(_question(_run(np.arange(200) * 0.01, complete=False), _model()).notes) == 1
+
+
+def test_the_evidence_of_the_wrong_kind_is_in_per_cent():
+    """Of the span."""
+    figures = velocity.evidence(velocity.Comparison(0.5, 0.2, 10.0)).figures
+    assert figures == {"preisach": pytest.approx(5.0), "velocity": pytest.approx(2.0)}
+
+
+# --- sticking
+def _waves(strokes: int, periods: float, samples: int, amplitude: float = 0.3) -> list:
+    said = np.linspace(0.0, periods, samples, endpoint=False)
+    return [(said, amplitude * np.cos(2 * np.pi * said + k)) for k in range(strokes)]
+
+
+def test_the_power_of_a_line_adds_up_over_the_strokes():
+    """A cosine of amplitude A has n A^2 / 4 in each stroke of n samples, whatever its phase."""
+    sure, amplitude = stick_slip._line(_waves(8, 10.0, 500), 1.0, 0.01)
+    assert amplitude == pytest.approx(0.3, rel=1e-6)
+    assert sure == pytest.approx((8 * 500 * 0.09 / 4 / 0.01 - 8) / np.sqrt(8), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("strokes", "periods", "samples", "known"),
+    [
+        (5, 10.0, 500, True),
+        (4, 10.0, 500, False),
+        (5, 2.9, 500, False),
+        (5, 10.0, 38, False),
+        (5, 10.0, 41, True),
+        (5, 3.1, 500, True),
+    ],
+)
+def test_a_line_needs_strokes_periods_and_samples(strokes, periods, samples, known):
+    """Five strokes of three periods, four samples a period."""
+    assert (stick_slip._line(_waves(strokes, periods, samples), 1.0, 0.01)[1] > 0) is known
+
+
+@pytest.mark.parametrize(
+    ("name", "starts"),
+    [
+        ("output-lag", [(0.002,), (0.01,), (0.03,)]),
+        ("rate-widening", [(0.01,), (0.03,)]),
+        ("viscous", [(0.01 * 8.0 / 0.5,)]),
+        ("creep", [(0.03, 0.1), (0.03, 0.3), (0.03, 1.0), (0.03, 3.0)]),
+        ("thermal-drift", [(0.01, 5.0), (0.01, 15.0), (0.01, 40.0)]),
+        ("accommodation", [(0.05, 28.0), (0.05, 80.0), (0.05, 240.0)]),
+        ("load-dependence", [(0.01 * 4.0 / 8.0,)]),
+        ("offset-drift", [(0.01 * 8.0 / 10.0,)]),
+        ("clock-skew", [(1e-5,), (1e-4,)]),
+    ],
+)
+def test_start_values_scale_with_span_range_and_length(name, starts):
+    """A span of 8, a range of 4, ten seconds, and an input that moves at half a unit a second to and fro."""
+    u = 0.5 * np.abs((np.arange(1000) * 0.01) % 5.0 - 2.5)
+    frame = Frame(0.01, u, span=8.0, reach=4.0)
+    found = [block[0] for block in CAUSE[name].starts([frame, Frame(0.01, 0.0 * u, 1.0, 1.0)], [])]
+    assert np.asarray(found) == pytest.approx(np.asarray(starts), rel=0.01)
+    assert np.asarray(found).shape == np.asarray(starts).shape
+
+
+# --- words
+def test_every_kind_of_evidence_and_advice_has_words():
+    """With all its figures, and no brace left over."""
+    words = {"input": "current", "output": "force", "y": "N", "in_y": " N"}
+    figures = dict.fromkeys(
+        [
+            "left",
+            "floor",
+            "p",
+            "explains",
+            "at",
+            "times",
+            "preisach",
+            "velocity",
+            "share",
+            "shift",
+            "gain",
+            "there",
+            "here",
+        ],
+        1.25,
+    )
+    for kind in wording.TEXTS:
+        said = wording.sentence(
+            Evidence(kind, "creep" if kind == "tested" else "", figures, ("rates", "x")), words
+        )
+        assert said.endswith(".")
+        assert "{" not in said
+    for kind in wording.ADVICE:
+        names = ("heating", "delay", "creep", "step") if kind == "tied" else ("delay", "creep", "step")
+        said = wording.advice(Evidence(kind, figures=figures, names=names))
+        assert "{" not in said
+        assert ("delay, creep and step" in said) is (kind in ("tied", "tied, quick", "lacks"))
+
+
+def test_evidence_names_its_cause_and_its_record():
+    """Records are counted from one."""
+    seen = Evidence("gate", "outliers", {"count": 3.0, "limit": 0.5}, record=1)
+    assert wording.sentence(seen, {}).startswith("outliers: record 2: 3 ")
+    assert wording.cause_text(Finding(CAUSE["outliers"], True, seen=seen), {}) == wording.text(seen)
+    assert wording.cause_text(Finding(CAUSE["creep"], True), {}) == CAUSE["creep"].title
