@@ -156,7 +156,8 @@ static uint8_t no_current(struct safety *s, const struct safety_input *in)
 {
     bool dead = in->duty_counts > in->full_counts / 4u && in->current_100uA < SAFETY_NO_CURRENT_100UA;
     bool weak = in->duty_counts >= in->full_counts && in->current_100uA < in->reference_100uA / 2;
-    s->release_ticks = SAFETY_RELEASE_TICKS;
+    s->release_ticks = SAFETY_RELEASE_TICKS; /* what is looked at once the output is off begins anew */
+    s->not_off = 0;
     bool stray = in->reference_100uA == 0 && in->current_100uA > SAFETY_STRAY_100UA;
     stray = lasts(&s->stray, stray, SAFETY_STRAY_TICKS / SAFETY_TURNS);
     weak = lasts(&s->weak_current, weak, SAFETY_WEAK_TICKS / SAFETY_TURNS);
@@ -255,10 +256,10 @@ static uint8_t armed(struct safety *s, const struct safety_input *in)
     return s->on_ticks > limits->on_ticks ? PT_FAULT_ON_TIME : PT_FAULT_NONE;
 }
 
-/* Output off: the force of the last run does not fall. */
+/* The force of the last run does not fall. */
 static bool still_presses(struct safety *s, const struct safety_input *in)
 {
-    if (in->driving || s->release_ticks == 0)
+    if (s->release_ticks == 0)
         return false;
     if (in->force_mN <= SAFETY_ZERO_HIGH_MN)
         s->release_ticks = 0;
@@ -267,14 +268,19 @@ static bool still_presses(struct safety *s, const struct safety_input *in)
     return s->release_ticks == 1u;
 }
 
+/* While the output is off. */
+static bool is_not_off(struct safety *s, const struct safety_input *in)
+{
+    s->slow_force += ((int32_t)in->force_mN * (1 << SAFETY_ZERO_SHIFT) - s->slow_force) >> SAFETY_ZERO_SHIFT;
+    bool flows = lasts(&s->not_off, in->current_100uA > SAFETY_STRAY_100UA, SAFETY_OFF_TICKS);
+    return still_presses(s, in) || flows;
+}
+
 uint8_t safety_tick(struct safety *s, const struct safety_input *in)
 {
     heat_tick(&s->heat, in->current_100uA);
     s->slow_current += (((int32_t)in->current_100uA << SAFETY_PLAUSIBLE_SHIFT) - s->slow_current) >> SAFETY_PLAUSIBLE_SHIFT;
-    if (!in->driving) /* for the next ARM */
-        s->slow_force += ((int32_t)in->force_mN * (1 << SAFETY_ZERO_SHIFT) - s->slow_force) >> SAFETY_ZERO_SHIFT;
-    bool flows = !in->driving && in->current_100uA > SAFETY_STRAY_100UA;
-    if (lasts(&s->not_off, flows, SAFETY_OFF_TICKS) || still_presses(s, in))
+    if (!in->driving && is_not_off(s, in))
         return PT_FAULT_OUTPUT_NOT_OFF;
     return in->armed ? armed(s, in) : PT_FAULT_NONE;
 }
