@@ -194,6 +194,7 @@ RAMP = np.linspace(-1.0, 1.0, 40)
         (lambda: identify([Record(RAMP, RAMP)], PLANE, method="guess"), ["method", "'guess'"]),
         (lambda: identify([Record(RAMP, RAMP)], PLANE, smoothing="much"), ["smoothing", "'much'"]),
         (lambda: identify([Record(RAMP, RAMP)], PLANE, smoothing=-0.1), ["smoothing", "-0.1"]),
+        (lambda: identify([Record(RAMP, RAMP)], PLANE, smoothing=1.01), ["smoothing", "1.01"]),
         (lambda: identify([Record(RAMP, RAMP)], PLANE, smoothing=float("nan")), ["smoothing", "nan"]),
         (lambda: Record(RAMP[:0], RAMP[:0]), ["input", "(0,)"]),
         (lambda: Record(RAMP[:1], RAMP[:1]), ["input", "(1,)", "at least 2"]),
