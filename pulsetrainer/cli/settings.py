@@ -101,7 +101,9 @@ def read(path: Path) -> dict[str, Any]:
     try:
         tree = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise UsageError(f"the settings in {path} cannot be read: {error}", hint="mend the file") from error
+        raise UsageError(
+            f"the settings in {path} cannot be read: {error}", hint="correct the file"
+        ) from error
     return {key: _value(path, key, value) for key, value in _leaves(tree)}
 
 
@@ -130,7 +132,7 @@ def _value(path: Path, key: str, value: Any) -> Any:
     if type(value) is not setting.kind or (isinstance(value, int | float) and not value > 0):
         wanted = {str: "text", int: "a whole number above 0", float: f"a number of {setting.unit} above 0"}
         raise UsageError(
-            f"{path} sets {key} = {value!r}; it must be {wanted[setting.kind]}", hint="mend the file"
+            f"{path} sets {key} = {value!r}; it must be {wanted[setting.kind]}", hint="correct the file"
         )
     return value
 

@@ -50,9 +50,10 @@ class Beats:
             There is no such beat.
         """
         if not 1 <= number <= self.count:
+            held = f"{self.count} whole beat{'s' if self.count != 1 else ''}"
             raise DataError(
-                f"{self.record.name} holds {self.count} whole beats, so there is no beat {number}",
-                hint=f"give --beat 1 .. {self.count}, or --beat mean",
+                f"{self.record.name} has no beat {number}: it holds {held}",
+                hint=f"give `beat` 1 .. {self.count}, or mean",
             )
         begin, end = int(self.feet[number - 1]), int(self.feet[number])
         time_s = self.record.time_s[begin:end] - self.record.time_s[begin]

@@ -28,7 +28,7 @@ class Shape:
             raise ArgumentError(
                 f"the waveform {self.name} needs one value for each of its increasing times, got shapes "
                 f"{t.shape} of time and {value.shape} of value",
-                hint="mend the time column",
+                hint="correct the time column",
             )
         with np.errstate(over="ignore"):
             length, span = self.period_s, float(np.ptp(value))

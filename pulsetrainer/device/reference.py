@@ -50,7 +50,7 @@ def to_wire(reference_A: ArrayLike, *, limit_A: float) -> NDArray[np.int16]:
         )
     bad = np.flatnonzero(~np.isfinite(reference))
     if bad.size:
-        raise ArgumentError(f"sample {bad[0]} of the reference is not a number", hint="mend the waveform")
+        raise ArgumentError(f"sample {bad[0]} of the reference is not a number", hint="correct the waveform")
     # Half a wire unit of tolerance: rounding must not refuse a waveform that uses the whole range.
     half = codes.CURRENT_UNIT_A / 2
     out = np.flatnonzero((reference < -half) | (reference > limit_A + half))
