@@ -128,7 +128,7 @@ static int32_t force_counts(int32_t current_counts)
 bool hal_adc_read(struct hal_adc *out)
 {
     static uint16_t dither;
-    if (fake.nest_read) {
+    if (fake.nest_read && control.in_tick) {
         fake.nest_read = false;
         app_tick();
     }
@@ -147,7 +147,7 @@ void hal_pwm_enable(void)
 
 void hal_pwm_set(uint16_t on_counts)
 {
-    if (fake.nest_set) {
+    if (fake.nest_set && control.in_tick) {
         fake.nest_set = false;
         app_tick();
     }

@@ -19,8 +19,8 @@ struct fake {
     bool comparator; /* has cut the current in each tick */
     bool tick_lost;
     bool stale;      /* no new readings */
-    bool nest_read;  /* the next reading is broken into by another tick */
-    bool nest_set;   /* the next write of the duty is, just before it */
+    bool nest_read;  /* a tick breaks into the next tick as it reads */
+    bool nest_set;   /* the same, just before it writes the duty */
     uint16_t tx_space;
     uint8_t reset_cause;
     uint32_t nonce;

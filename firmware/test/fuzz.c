@@ -381,6 +381,7 @@ static struct verdict frames(uint32_t count)
 int main(int argc, char **argv)
 {
     static uint8_t bytes[600];
+    setvbuf(stdout, NULL, _IOLBF, 0); /* what is found is said before the end by abort() */
     if (argc != 4) {
         fprintf(stderr, "usage: fuzz SEED FRAMES SEQUENCES\n");
         return 2;
