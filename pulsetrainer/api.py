@@ -98,6 +98,20 @@ def invert(
     """Find the drive for a pulse: its name in the library, a table, a drive, or times (s) and values.
 
     Everything else is as in ``steps.invert.invert``, which this calls.
+
+    Raises
+    ------
+    UsageError
+        There is no pulse of that name, or the method does not suit the model.
+    DataError
+        The table cannot be used, or the force range is beyond the model's reach.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> drive = pt.invert("bifid", pt.load("tests/data/files-0.1/model.h5"), periods=2)
+    >>> drive.name, drive.inversion
+    ('bifid', 'continuous')
     """
     return _invert(_shape(pulse), model, **options)
 

@@ -49,6 +49,13 @@ def compare(
         There are fewer than two evaluations.
     DataError
         They have no figure in common.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> before = pt.load("tests/data/files-0.1/evaluation.h5")
+    >>> [metric.better for metric in pt.compare([before, before])]
+    [None, None, None]
     """
     check_several(evaluations)
     every = _figures(evaluations)
