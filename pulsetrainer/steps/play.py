@@ -74,9 +74,12 @@ def play(drive: Waveform, device: Device, *, repeats: int = 5, progress: Progres
 
     Examples
     --------
-    >>> import numpy as np, pulsetrainer as pt
-    >>> with pt.open_device("bench:") as device:  # doctest: +SKIP
-    ...     played = pt.play(pt.load("drive.h5"), device)
+    >>> import pulsetrainer as pt
+    >>> drive = pt.load("tests/data/files-0.1/drive.h5")
+    >>> with pt.open_device("bench:") as device:
+    ...     played = pt.play(drive, device, repeats=1)
+    >>> played.complete, played.compensated.output.shape[0]
+    (True, 1)
     """
     _check(drive, repeats)
     decimation = round(device.info.tick_rate_Hz / drive.rate_Hz)
