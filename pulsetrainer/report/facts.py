@@ -72,7 +72,7 @@ def _model(model: Model) -> dict[str, Any]:
     return {
         "levels": model.levels,
         "cells": model.weights.size,
-        "operator": model.reading,
+        "reading": model.reading,
         "polarity": model.polarity,
         f"input ({model.input_quantity})": _span(model.edges, model.input_unit),
         "offset": with_unit(f"{model.offset:.4g}", model.output_unit),
