@@ -17,7 +17,7 @@ HEAD = """\
 ```python
 import pulsetrainer as pt
 
-run   = pt.load("run.h5")
+run = pt.load("run.h5")
 model = pt.identify(run)
 drive = pt.invert("normal", model)
 with pt.open_device("bench:") as device:
