@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pulsetrainer.core import excitations, inversion, memory, metrics, nnls, waveforms
+from pulsetrainer.core import excitations, inversion, memory, metrics, nnls, pulses
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.identification import identify
 from pulsetrainer.core.operator import Preisach, outputs
@@ -43,8 +43,8 @@ TAKES_A_VECTOR = {
     "inputs, slew": lambda u: inversion.slew_limited(u, 1000.0, 1.0),
     "inputs, spline": lambda u: inversion.smoothed(u, FIVE, 0.1, 0.0, 1.0),
     "points": lambda p: excitations.through(p, 1.0, 100.0),
-    "time": lambda t: waveforms.Shape("pulse", t, FIVE),
-    "value": lambda v: waveforms.Shape("pulse", FIVE, v),
+    "time": lambda t: pulses.Shape("pulse", t, FIVE),
+    "value": lambda v: pulses.Shape("pulse", FIVE, v),
     "target, tracking": lambda y: metrics.tracking(y, FIVE, 1.0),
     "measured": lambda y: metrics.prediction(y, FIVE),
     "predicted": lambda y: metrics.prediction(FIVE, y),
@@ -69,13 +69,13 @@ def test_every_vector_is_checked(argument, values, words):
 
 def shape(**changes):
     """A waveform of four samples with something wrong."""
-    return waveforms.Shape(**({"name": "p", "time_s": np.arange(4.0), "value": np.arange(4.0)} | changes))
+    return pulses.Shape(**({"name": "p", "time_s": np.arange(4.0), "value": np.arange(4.0)} | changes))
 
 
 def train(**changes):
     """A pulse train with something wrong."""
     right = {"periods": 1, "rate_Hz": 100.0, "low": 0.0, "high": 1.0}
-    return waveforms.train(shape(), **(right | changes))
+    return pulses.train(shape(), **(right | changes))
 
 
 def fit(u, y, *, n_h=4, low=0.0, high=1.0, sample_weight=1.0):
