@@ -3,6 +3,7 @@
 #include "app.h"
 #include "board.h"
 #include "hal.h"
+#include "protocol.h"
 #include "semihost.h"
 
 int main(void)

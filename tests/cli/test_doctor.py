@@ -28,7 +28,7 @@ def test_a_sound_bench_has_no_findings(run):
 @pytest.mark.parametrize(
     ("setting", "name", "state"),
     [
-        ("saturation=4", "saturation", "problem"),
+        ("saturation=6", "saturation", "problem"),
         ("noise=0.02", "force noise", "warning"),
         ("wire=0.002&wire-seed=2", "link", "warning"),
     ],

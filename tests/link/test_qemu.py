@@ -226,7 +226,7 @@ def test_a_bad_wire_costs_counted_samples_only(seed, tell):
     for _ in range(3):  # a computer busy with something else may be away for longer than the heartbeat
         with open_device(f"qemu:?wire=0.0003&wire-seed={seed}") as device:
             recording = device.play(reference, 1000)
-            wire = device._transport
+            wire = device._port.transport
         if "heard nothing" not in recording.fault:
             break
         tell(f"stopped: {recording.fault}")

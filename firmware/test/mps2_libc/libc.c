@@ -9,6 +9,7 @@
 int test_main(void); /* the test program's main */
 void uart0_rx_handler(void);
 void timer0_handler(void);
+void dual_timer_handler(void);
 void nmi_handler(void);
 void fault_handler(void);
 
@@ -80,6 +81,11 @@ void uart0_rx_handler(void)
 }
 
 void timer0_handler(void)
+{
+    lost();
+}
+
+void dual_timer_handler(void)
 {
     lost();
 }
