@@ -39,6 +39,11 @@ _OUTSIDE_S = 0.1  # at least half of so long outside: single wild samples are no
 # The drawn devices have 1.8 N/A at least over 1 s, 1.4 N/A over 3 s and more.
 _SLOPES = ((1.0, 0.1), (WINDOW_S, 0.05))
 _LEAST_SLOPE_N_PER_A = 0.5
+# A force that swings by more than noise does is that of a living sensor, whatever its slope: a finger that
+# rings is behind the current by half a period and more. Three times the usual noise is 0.13 N.
+_SWING_N = 0.15
+_OVER_NOISE = 3.0
+_MIRRORED = 0.7  # correlation with the current, negative: no lag, but a sensor the wrong way round
 
 _MODEL_FACTOR, _MODEL_OFFSET_N = 2.0, 1.5
 
@@ -107,12 +112,19 @@ def _dead(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> str
         if moved < moves_A**2:
             continue
         slope = float(np.mean((current - current.mean()) * force)) / moved
-        if slope < _LEAST_SLOPE_N_PER_A:
+        mirrored = slope * np.sqrt(moved) < -_MIRRORED * float(np.std(force))
+        if slope < _LEAST_SLOPE_N_PER_A and (mirrored or not _swings(force)):
             return (
                 f"the force reading does not follow the current: {slope:.2f} N/A while it moves between "
                 f"{current.min():.2f} and {current.max():.2f} A"
             )
     return ""
+
+
+def _swings(force_N: FloatArray) -> bool:
+    """Whether the force does more than its noise, whose rms is that of second differences over sqrt(6)."""
+    noise = float(np.sqrt(np.mean(np.diff(force_N, 2) ** 2) / 6.0)) if force_N.size > 2 else 0.0
+    return float(np.std(force_N)) >= max(_SWING_N, _OVER_NOISE * noise)
 
 
 def _outside(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> str:
