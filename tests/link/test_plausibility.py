@@ -123,6 +123,15 @@ def test_what_diagnose_is_there_for_is_not_refused(spoil):
     assert judge_force(TIME_S, current, spoil(force)) == ""
 
 
+def test_a_finger_that_rings_is_a_living_sensor():
+    """A force a quarter of a period behind a fast current has no slope over it, and yet it lives."""
+    noise = np.random.default_rng(3).normal(0, NOISE_N, TIME_S.size)
+    current = 0.5 - 0.15 * np.cos(2 * np.pi * 17 * TIME_S)
+    ringing = 3.9 - 1.2 * np.sin(2 * np.pi * 17 * TIME_S) + noise
+    assert judge_force(TIME_S, current, ringing) == ""
+    assert "does not follow" in judge_force(TIME_S, current, 3.9 + noise)
+
+
 def test_too_little_is_not_judged():
     """Under half a second, or at a current that does not move, a force of nothing says nothing."""
     current, force = _healthy()
