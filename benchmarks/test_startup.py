@@ -16,6 +16,7 @@ from mistakes import INSIDE, PREPARATION, Mistake, at_once, lay_out
 
 ROUNDS = 7
 HELP_S, USAGE_S = 0.25, 0.5  # the bars, on a machine with nothing else to do
+IMPORT_TIMES = 5.0  # an empty interpreter
 EMPTY_S = 0.010  # there an empty interpreter takes as long: the bars as ratios are 25 and 50
 
 
@@ -42,8 +43,8 @@ def _once(command: list[str], environment: dict[str, str], code: int) -> tuple[f
 
 
 def starts(words: list[str], code: int, more: dict[str, str] | None = None, rounds: int = ROUNDS) -> Start:
-    """Start the program and ``python -c pass`` in turns."""
-    program = [sys.executable, "-m", "pulsetrainer", *words]
+    """Start python with ``words`` and ``python -c pass`` in turns."""
+    program = [sys.executable, *words]
     empty = [sys.executable, "-c", "pass"]
     # as after an installation: the modules are compiled, by the first start if by nobody else
     installed = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
@@ -63,6 +64,7 @@ def starts(words: list[str], code: int, more: dict[str, str] | None = None, roun
     )
 
 
+PROGRAM = ["-m", "pulsetrainer"]
 COMPLETION = {"_PULSETRAINER_COMPLETE": "complete_bash", "COMP_WORDS": "pulsetrainer i", "COMP_CWORD": "1"}
 JOBS = {
     "pulsetrainer --help": (["--help"], {}, HELP_S),
@@ -71,12 +73,25 @@ JOBS = {
 }
 
 
+def test_import(table):
+    """``import pulsetrainer`` in a notebook: names are loaded when first used."""
+    start = starts(["-c", "import pulsetrainer"], 0, rounds=3 * ROUNDS)
+    table.add(
+        "import pulsetrainer",
+        ours=f"{start.wall_s:.3f} s, {start.cpu_s:.3f} s of processor",
+        baseline="python -c pass",
+        figure=f"{start.wall_ratio:.1f} times, {start.cpu_ratio:.1f} of processor",
+        bar=f"{IMPORT_TIMES:.0f} times",
+    )
+    assert start.cpu_ratio < IMPORT_TIMES
+
+
 @pytest.mark.parametrize("job", JOBS)
 def test_start(table, job, tmp_path, monkeypatch):
     """The bar is held as a ratio of processor times: other work on the machine lengthens both."""
     monkeypatch.chdir(tmp_path)
     words, more, bar = JOBS[job]
-    start = starts(words, 0, more)
+    start = starts([*PROGRAM, *words], 0, more)
     table.add(
         job,
         ours=f"{start.wall_s:.3f} s, {start.cpu_s:.3f} s of processor",
@@ -89,7 +104,7 @@ def test_start(table, job, tmp_path, monkeypatch):
 
 def slowest(table, what: str, cases: dict[str, Mistake]) -> float:
     """Time every mistake and add a row with the one that takes longest; return its ratio."""
-    found = {name: starts(list(one.words), one.code, rounds=3) for name, one in cases.items()}
+    found = {name: starts([*PROGRAM, *one.words], one.code, rounds=3) for name, one in cases.items()}
     for name, start in found.items():
         print(f"{start.wall_s:.3f} s, {start.cpu_s:.3f} s of processor: {name}")
     name, start = max(found.items(), key=lambda pair: pair[1].cpu_s)

@@ -81,6 +81,10 @@ def _become(order: dict, streams: list[int]) -> None:
         os.chdir(order["folder"])
         os.environ.clear()
         os.environ.update(order["env"])
+        if "COVERAGE_PROCESS_START" in os.environ:  # which test runs what: tests/mutation
+            import coverage
+
+            coverage.Coverage.current().switch_context(os.environ.get("PYTEST_CURRENT_TEST", ""))
         sys.argv = [os.path.join(pulsetrainer.__path__[0], "__main__.py"), *order["words"]]  # noqa: PTH118
         main()
     except SystemExit as end:

@@ -19,7 +19,6 @@ from urllib.parse import quote
 
 import numpy as np
 from platformdirs import user_state_path
-from scipy.signal import lfilter
 
 from pulsetrainer.device.codes import HEAT_LIMIT_A2, HEAT_TAU_S
 
@@ -37,6 +36,8 @@ def cooled(heat: float, seconds: float) -> float:
 
 def added(reference_A: NDArray[np.float64], rate_Hz: float) -> NDArray[np.float64]:
     """Return the heat (n,) that a reference (n,) in A gives a cold coil, at each of its samples."""
+    from scipy.signal import lfilter  # noqa: PLC0415 - slow to load: what plays nothing waits for nothing
+
     share = -math.expm1(-1.0 / (rate_Hz * HEAT_TAU_S))
     heat: NDArray[np.float64] = lfilter([share], [1.0, share - 1.0], reference_A**2 / HEAT_LIMIT_A2)
     return heat

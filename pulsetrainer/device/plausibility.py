@@ -15,7 +15,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -168,6 +167,8 @@ def _recent(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatAr
     """Return the least and the most of what a lagging force may still belong to, at each sample."""
     width = max(1, round(_SETTLES_S / float(np.median(np.diff(time_s)))))
     back = (width - 1) // 2  # the filter's window then ends at the sample itself
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d  # noqa: PLC0415 - what plays nothing waits
+
     return (
         minimum_filter1d(values, width, mode="nearest", origin=back),
         maximum_filter1d(values, width, mode="nearest", origin=back),
