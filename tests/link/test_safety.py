@@ -42,6 +42,7 @@ STROKES = (7500 - 7500 * np.cos(2 * np.pi * 2 * np.arange(1000) / 1000)).astype(
 HELD = np.full(1000, 14_500, dtype=np.int16)
 PLATEAU = np.full(1000, 5_000, dtype=np.int16)
 WEAK = np.full(1000, 1_000, dtype=np.int16)
+BETWEEN = np.full(1000, 5_003, dtype=np.int16)  # between two readings, 5001 and 5006: none is right
 BREAK_TICK = 3000
 
 
@@ -82,7 +83,6 @@ def stays_off(one, status: m.StatusReply) -> None:
         ("force-zero", HELD, Fault.NO_FORCE, 510),
         ("force-zero", STROKES, Fault.NO_FORCE, 3000),  # counted across strokes
         ("force-half", HELD, Fault.FORCE_IMPLAUSIBLE, 510),
-        ("current-low", PLATEAU, Fault.CURRENT_FROZEN, 1500),  # as the integral winds up
         ("current-stuck", WEAK, Fault.CURRENT_FROZEN, 110),
         ("shunt-half", PLATEAU, Fault.CURRENT_IMPLAUSIBLE, 4100),
         ("stuck-on", PLATEAU, Fault.OVER_CURRENT, 40),
@@ -100,6 +100,19 @@ def test_what_breaks_is_off_within_its_time(wire, port, what, samples, fault, ti
     assert BREAK_TICK <= status.fault_tick <= BREAK_TICK + ticks
     assert status.fault_state == State.RUNNING
     assert abs(status.fault_reference - np.interp(status.fault_tick / 10, np.arange(1000), samples)) <= 200
+    stays_off(one, status)
+
+
+@everywhere
+def test_a_reading_that_stands_still_beside_a_plateau_is_off_as_the_integral_winds_up(wire, port):
+    """400 counts of duty at ki times the error a tick; how far beside it stands is a matter of the noise."""
+    one = wire(f"{port}?break=current-low@{BREAK_TICK / 10_000}")
+    one.start(BETWEEN)
+    status = one.wait_for(State.FAULT)
+    assert Fault(status.fault) == Fault.CURRENT_FROZEN
+    (ki,) = (p.default for p in PARAMETERS if p.name == "pid_ki")
+    winds_up = 400 * 65_536 / (ki * abs(status.fault_reference - status.fault_current))
+    assert BREAK_TICK <= status.fault_tick <= BREAK_TICK + winds_up + 100
     stays_off(one, status)
 
 
