@@ -94,6 +94,7 @@ MESSAGES = {
     "force-high": Message("force above its limit", "cause", "during the capture", got=KEPT),
     "current-rail": Message("current above its hard limit", "plug", "during the capture", got=KEPT),
     "force-frozen": Message("force reading", "cause", "during the capture", got=KEPT),
+    "force reading": Message("force", "sensor"),
     "tick-overrun": Message("missed its tick", "cause", "during the capture", got=KEPT),
     "reset": Message("restarted in mid-play (cause: external)", "power supply", got=KEPT),
     "hang": Message("restarted in mid-play (cause: watchdog)", "power supply", got=KEPT),

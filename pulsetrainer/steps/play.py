@@ -12,7 +12,7 @@ from pulsetrainer.artefacts import DrivePlayback, Playback, Waveform
 from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.device.plausibility import judge_against
+from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.progress import Progress, silent
@@ -95,8 +95,7 @@ def play(drive: Waveform, device: Device, *, repeats: int = 5, progress: Progres
         if fault:
             break
         grid = _on_grid(recording, drive.time_s.size, decimation)
-        if name == "compensated":  # the one whose force the model foretells
-            fault, remedy = judge_against(drive.time_s, drive.predicted, grid[2]), FORCE_REMEDY
+        fault, remedy = _judge(drive, name, kept[name], grid[2]), FORCE_REMEDY
         if fault:
             break
         kept[name].append(grid)
@@ -127,6 +126,15 @@ def _check(drive: Waveform, repeats: int) -> None:
             f"the drive {drive.name} is in {drive.input_unit}; the device takes a current in A",
             hint="identify and invert a run that was captured on the device",
         )
+
+
+def _judge(drive: Waveform, name: str, earlier: list[FloatArray], force: FloatArray) -> str:
+    """Return what is wrong with a force by the model, which foretells it, and by the repeat before."""
+    fault = judge_against(drive.time_s, drive.predicted, force) if name == "compensated" else ""
+    if fault or not earlier:
+        return fault
+    begun = slice(int(np.argmax(drive.scored)), None)  # the first beat shows what was before
+    return judge_repeat(drive.time_s[begun], earlier[-1][2][begun], force[begun])
 
 
 def _on_grid(recording: Trace, samples: int, decimation: int) -> FloatArray:

@@ -8,6 +8,7 @@ import subprocess
 import threading
 import time
 import tty
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -15,11 +16,13 @@ import numpy as np
 import pytest
 
 from program import PROGRAM, Ran, pulsetrainer
+from pulsetrainer import load, save
 from pulsetrainer.device.codes import PROTOCOL_MAJOR, PROTOCOL_MINOR
 from pulsetrainer.device.device import open_device
 from pulsetrainer.simulation.build import firmware_executable
 from wording import refusal
 
+DRIVE = Path(__file__).parents[1] / "data/files-0.1/drive.h5"
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the bench needs a pty")
 
 
@@ -178,6 +181,32 @@ def test_what_breaks_in_mid_capture_is_told_and_the_part_kept(folder, what):
     np.savetxt(folder / "wave.csv", wave, delimiter=",", header="t_s,current_A", comments="")
     refusal(pulsetrainer(folder, *capture(f"bench:?break={what}@2", "--json")), 4, what)
     assert 1900 < kept(folder, 1900) < 4600
+
+
+@pytest.mark.parametrize(
+    ("what", "at_s", "stroke_A"),
+    [
+        ("force-zero", 0.0, 1.5),
+        ("force-zero", 0.0, 0.4),
+        ("force-zero", 5.9, 0.8),
+        ("force-frozen", 0.0, 1.25),
+        ("force-frozen", 5.9, 0.8),
+        ("force-half", 0.0, 1.2),
+    ],
+)
+def test_a_play_whose_force_reading_is_dead_stuck_or_half_never_ends_well(tmp_path, what, at_s, stroke_A):
+    """From the start or in the last moments of the first play, with a limit that it can not trip: exit 4."""
+    drive = load(DRIVE)
+    scale = stroke_A / float(drive.compensated.max())
+    nothing_foretold = np.full(drive.time_s.size, np.nan)
+    drives = {"compensated": scale * drive.compensated, "scaled": scale * drive.scaled}
+    save(replace(drive, predicted=nothing_foretold, **drives), tmp_path / "drive.h5")
+    words = ["play", "drive.h5", "-o", "played.h5", "--port", f"bench:?break={what}@{at_s}", "--json"]
+    refusal(
+        pulsetrainer(tmp_path, *words, "--limit-force", "3" if what == "force-zero" and not at_s else "14"),
+        4,
+        "force reading",
+    )
 
 
 def test_losses_on_a_bad_wire_are_in_the_file(folder):

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pulsetrainer import load
 from pulsetrainer.device.device import Limits, open_device
-from pulsetrainer.device.plausibility import ForceWatch, judge_against, judge_force
+from pulsetrainer.device.plausibility import ForceWatch, judge_against, judge_force, judge_repeat
+from pulsetrainer.errors import DeviceError
+from pulsetrainer.steps.play import DRIVES, play
 
 WAVEFORMS = sorted((Path(__file__).parents[2] / "waveforms").glob("*.csv"))
 TIME_S = np.arange(3000) / 1000
@@ -176,3 +180,47 @@ def test_a_force_that_a_model_has_foretold(gain, offset, plausible):
     force[100:300] = np.nan
     assert (judge_against(TIME_S, expected, force) == "") is plausible
     assert judge_against(TIME_S, expected, np.full(expected.size, np.nan)) == ""
+
+
+class DiesAt:
+    """A device on the bench whose force sensor goes on as ``spoil`` says from some moment of one play on."""
+
+    def __init__(self, device, number, spoil):
+        self.device, self.info, self.left, self.spoil = device, device.info, number, spoil
+
+    def play(self, *args, **kwargs):
+        """Play it there."""
+        trace = self.device.play(*args, **kwargs)
+        self.left -= 1
+        return trace if self.left >= 0 else replace(trace, force_N=self.spoil(trace.force_N))
+
+
+@pytest.mark.parametrize("last", [200, 450])
+@pytest.mark.parametrize("drive", range(len(DRIVES)))
+@pytest.mark.parametrize("repeats", [2, 3])
+def test_a_sensor_that_dies_at_the_very_end_of_a_play_and_goes_on_with_noise(last, drive, repeats):
+    """Whichever drive comes last: the play is a failed one, what went before is kept."""
+    rng = np.random.default_rng([last, drive, repeats])
+    waveform = load(Path(__file__).parents[1] / "data/files-0.1/drive.h5")
+
+    def dies(force):
+        return np.where(np.arange(force.size) < force.size - last, force, rng.normal(0, NOISE_N, force.size))
+
+    number = len(DRIVES) * (repeats - 1) + drive
+    with open_device("bench:?seed=33") as device, pytest.raises(DeviceError) as caught:
+        play(waveform, DiesAt(device, number, dies), repeats=repeats)
+    assert len(caught.value.kept.compensated.output) == repeats - 1
+    assert "force" in caught.value.message
+    with open_device("bench:?seed=33&noise=0.009") as device:
+        assert play(waveform, device, repeats=repeats).complete
+
+
+@pytest.mark.parametrize(("last", "plausible"), [(0.4, True), (0.6, False), (-0.6, False)])
+def test_a_drive_that_is_played_again(last, plausible):
+    """It may press half a newton more or less; lost samples are left out."""
+    rng = np.random.default_rng(6)
+    before, again = (9.0 * _healthy()[0] + rng.normal(0, NOISE_N, TIME_S.size) for _ in range(2))
+    again[-100:] += last
+    again[400:500] = before[700:900] = np.nan
+    assert (judge_repeat(TIME_S, before, again) == "") is plausible
+    assert judge_repeat(TIME_S, before, np.full(TIME_S.size, np.nan)) == ""
