@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from healthy_plays import SIGNALS, WAVEFORMS, beats, signal, stopped
 
 from pulsetrainer import load
 from pulsetrainer.device.device import Limits, open_device
@@ -14,38 +15,13 @@ from pulsetrainer.device.plausibility import ForceWatch, judge_against, judge_fo
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.play import DRIVES, play
 
-WAVEFORMS = sorted((Path(__file__).parents[2] / "waveforms").glob("*.csv"))
 TIME_S = np.arange(3000) / 1000
 NOISE_N = 0.045  # of the bench as built
 
 
-def _pulse(path):
-    """Return one period and more of a library pulse at 1 kHz, 0 to 1."""
-    rows = [line for line in path.read_text().splitlines() if line and not line.startswith("#")][1:]
-    time, value = np.array([[float(cell) for cell in row.split(",")[:2]] for row in rows]).T
-    grid = np.interp(np.arange(time[0], time[-1], 1e-3), time, value)
-    return (grid - grid.min()) / np.ptp(grid)
-
-
-def _beats(path, peak_A, seconds=6.0):
-    pulse = _pulse(path)
-    return peak_A * np.tile(pulse, int(np.ceil(1000 * seconds / pulse.size)))[: round(1000 * seconds)]
-
-
 def _mixed(rng):
     """Return all six pulses, a sine, a square, a saw and plateaus, each at a range of its own, A."""
-    time = np.arange(4000) / 1000
-    rate, low = float(np.exp(rng.uniform(np.log(0.4), np.log(8)))), rng.uniform(0, 0.7)
-    span = rng.uniform(0.2, 1.5 - low)
-    return np.concatenate(
-        [
-            *(_beats(path, rng.uniform(0.3, 1.5), 4.0) for path in WAVEFORMS),
-            low + span * (0.5 - 0.5 * np.cos(2 * np.pi * rate * time)),
-            np.where((time * rate) % 1 < 0.5, low, low + span),
-            low + span * ((time * rate) % 1),
-            np.repeat(rng.uniform(0, 1.5, 6), 1200),
-        ]
-    )
+    return np.concatenate([signal(name, rng) for name in SIGNALS])
 
 
 # The thresholds were set on devices 1 to 10 and judged on 11 to 20: these are others.
@@ -59,12 +35,18 @@ def test_a_healthy_force_is_never_doubted(seed):
         assert trace.complete, trace.fault
 
 
+@pytest.mark.slow
+def test_a_healthy_play_over_a_bad_wire_is_never_stopped():
+    """A sample of ``python tests/link/healthy_plays.py``: each signal four times on forty devices."""
+    assert list(stopped(40 * len(SIGNALS), seed=2)) == []
+
+
 @pytest.mark.parametrize("peak_A", [0.4, 0.8, 1.25])
 @pytest.mark.parametrize("what", ["force-zero", "force-frozen"])
 @pytest.mark.parametrize("path", WAVEFORMS, ids=lambda path: path.stem)
 def test_a_sensor_that_dies_below_the_strokes_that_the_device_watches(path, what, peak_A):
     """From the start, or in mid-play: never a complete play, and what was recorded is kept."""
-    reference = _beats(path, peak_A)
+    reference = beats(path, peak_A)
     for at_s in (0.0, 0.4 + float(np.random.default_rng(len(path.stem)).uniform(0, 5.0))):
         with open_device(f"bench:?seed=32&break={what}@{at_s:.3f}") as device:
             trace = device.play(reference, 1000)
@@ -76,7 +58,7 @@ def test_a_sensor_that_dies_below_the_strokes_that_the_device_watches(path, what
 
 def test_a_dead_sensor_under_a_force_limit_stops_the_play_early():
     """The limit can not trip without a reading: the output is off within seconds, not after 52 of them."""
-    reference = np.tile(_beats(WAVEFORMS[-1], 1.5), 9)
+    reference = np.tile(beats(WAVEFORMS[-1], 1.5), 9)
     with open_device("bench:?speed=real&break=force-zero@0", limits=Limits(force_N=3.0)) as device:
         trace = device.play(reference, 1000)
     assert not trace.complete
