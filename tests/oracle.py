@@ -263,3 +263,12 @@ def coverage(edges, inputs):
             up = up or u >= a
         done.append(down_again)
     return np.array(done)
+
+
+# --- a pulse --------------------------------------------------------------------------------------------
+
+
+def parabola(values):
+    """Middle of the parabola of least squares through an odd number of even samples."""
+    at = np.arange(len(values)) - len(values) // 2
+    return np.polyfit(at, values, 2)[-1]

@@ -93,7 +93,7 @@ def find_beats(record: Shape) -> Beats:
     low, high = np.percentile(p, [5.0, 95.0])
     height = float(high - low)
     window = 2 * max(round(0.5 * _SMOOTH_S / step), 1) + 1
-    smooth = scipy.signal.savgol_filter(p, window, min(2, window - 1)) if window < p.size else p
+    smooth = scipy.signal.savgol_filter(p, window, 2) if window < p.size else p
     # a record may begin or end in a peak's flank: lower ends make the first and last peak whole
     padded = np.concatenate(([low - height], smooth, [low - height]))
     peaks, _ = scipy.signal.find_peaks(

@@ -63,10 +63,11 @@ class Course:
     def memory(self, count: int) -> State:
         """Return what the memory holds after ``count`` samples, when it began at the negative saturation.
 
-        Whole repeats after the second change nothing: the input passes the same extremes again.
+        Whole repeats after the first change nothing: the input passes the same extremes again.
         """
         one = self.signal.value.size
-        count = min(count // one, 2) * one + count % one
+        if count > one:
+            count = one + count % one
         state, high = negative_saturation(_LOW), max(float(self.signal.value.max()), _LOW)
         for start in range(0, count, _BLOCK):
             state = trace(self.values(start, min(start + _BLOCK, count)), state, _LOW, high).final

@@ -37,7 +37,7 @@ class Gap:
         # beta never exceeds alpha, so a limit at alpha's own end says nothing new
         if self.beta_low > plane.low:
             parts.append(f"beta above {self.beta_low:.3g} {unit}")
-        if self.beta_high < min(self.alpha_high, plane.high):
+        if self.beta_high < self.alpha_high:
             parts.append(f"beta below {self.beta_high:.3g} {unit}")
         which = f"relays with {' and '.join(parts)}" if parts else "all relays"
         rest = self.uncovered - self.share

@@ -72,7 +72,7 @@ def plane_for(records: Sequence[Record], low: float, high: float, n_h: int) -> P
     along = np.concatenate(([0.0], np.cumsum(sizes) / sizes.sum()))
     mixed = 0.5 * (along + np.linspace(0.0, 1.0, _BINS + 1))
     edges = np.interp(np.linspace(0.0, 1.0, n_h + 1), mixed, np.linspace(low, high, _BINS + 1))
-    edges[0], edges[-1] = low, high
+    edges[-1] = high  # the sum may be off by its rounding
     return Plane(edges)
 
 
@@ -81,6 +81,4 @@ def thinned(plane: Plane, n_h: int) -> Plane:
     if plane.n_h <= n_h:
         return plane
     at = np.linspace(0.0, plane.n_h, n_h + 1)
-    edges = np.interp(at, np.arange(plane.n_h + 1), plane.edges)
-    edges[0], edges[-1] = plane.low, plane.high
-    return Plane(edges)
+    return Plane(np.interp(at, np.arange(plane.n_h + 1), plane.edges))

@@ -23,9 +23,10 @@ PREISACH = Preisach(PLANE, np.linspace(1.0, 2.0, PLANE.n_q))
 
 @st.composite
 def courses(draw: st.DrawFn) -> Course:
-    """Draw a signal between random turning points, from zero on, some times over."""
+    """Draw a signal between random turning points, from zero on or from anywhere, some times over."""
     turns = draw(st.lists(st.floats(0.0, HIGH), min_size=1, max_size=12))
-    path = np.append(excitations.through(np.array([0.0, *turns]), 3.0, RATE_HZ), turns[-1])
+    first = draw(st.just(0.0) | st.floats(0.0, HIGH))
+    path = np.append(excitations.through(np.array([first, *turns]), 3.0, RATE_HZ), turns[-1])
     return Course(Signal(path, RATE_HZ, "random"), draw(st.integers(1, 4)))
 
 
@@ -84,6 +85,14 @@ def test_a_part_ends_at_rest_where_it_can():
     end = course.part_end(0, 500)
     assert end % course.signal.value.size in (0, 1)
     assert course.lead_in(end, speed=3.0, rest_s=0.2).size == 0
+
+
+@pytest.mark.parametrize(("rests_at", "end"), [(9, 10), (8, 20)])
+def test_only_a_rest_in_the_second_half_ends_a_part(rests_at, end):
+    """Of parts of 20 samples, one that ends with its tenth is long enough, one with its ninth is not."""
+    value = np.ones(100)
+    value[rests_at] = 0.0
+    assert Course(Signal(value, RATE_HZ, "rest")).part_end(0, 20) == end
 
 
 def test_a_deep_memory_is_gone_through_in_time():

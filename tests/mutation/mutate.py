@@ -24,6 +24,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from itertools import accumulate
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -78,7 +79,7 @@ def main() -> int:
         tree = _copied(Path(folder) / "tree")
         chosen = _tests(tree, options.tests or PACKAGES[options.package])
         source = f"pulsetrainer/{options.package}"
-        runs, times = _recorded(tree, Path(folder), source, chosen)
+        runs, times = _recorded(tree, Path(folder), chosen)
         faults = [
             fault
             for path in sorted((tree / source).rglob("*.py"))
@@ -156,21 +157,24 @@ def _child(tree: Path, words: tuple[str, ...], env: dict[str, str]) -> None:
     sys.exit(pytest.main(["-q", "-p", "chosen", "-p", "no:cacheprovider", *words]))
 
 
-def _recorded(tree: Path, folder: Path, source: str, tests: list[str]) -> tuple[Runs, Times]:
-    """Which tests run each line of ``source``, and how long they take; kept in build/ for each test file."""
+def _recorded(tree: Path, folder: Path, tests: list[str]) -> tuple[Runs, Times]:
+    """Which tests run each line of the package, and how long they take.
+
+    Kept in build/ for each test file, until it, what lies beside it or some code that it runs changes.
+    """
     runs: Runs = defaultdict(lambda: defaultdict(list))
     times: Times = {}
     for test in tests:
-        code = sorted((tree / source).rglob("*.py"))
         beside = [path for path in (tree / test).parent.glob("*.py") if not path.name.startswith("test_")]
         digest = hashlib.sha256(test.encode())
-        for path in (*code, *sorted((tree / "tests").glob("*.py")), *sorted(beside), tree / test):
+        for path in (*sorted((tree / "tests").glob("*.py")), *sorted(beside), tree / test):
             digest.update(path.read_bytes())
         kept = ROOT / "build" / "mutation" / f"{digest.hexdigest()[:16]}.json"
-        if not kept.exists():
+        known = json.loads(kept.read_text()) if kept.exists() else {"code": {"": ""}}
+        if any(_digest(tree / path) != was for path, was in known["code"].items()):
+            known = _record(tree, folder, test)
             kept.parent.mkdir(parents=True, exist_ok=True)
-            kept.write_text(json.dumps(_record(tree, folder, source, test)))
-        known = json.loads(kept.read_text())
+            kept.write_text(json.dumps(known))
         times |= known["times"]
         for path, lines in known["runs"].items():
             for line, contexts in lines.items():
@@ -178,12 +182,16 @@ def _recorded(tree: Path, folder: Path, source: str, tests: list[str]) -> tuple[
     return runs, times
 
 
-def _record(tree: Path, folder: Path, source: str, test: str) -> dict[str, object]:
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
+def _record(tree: Path, folder: Path, test: str) -> dict[str, Any]:
     """Run one test file under coverage, the programs that it starts too."""
     print(f"recording {test}", file=sys.stderr, flush=True)
     data, rc = folder / "coverage", folder / "rc"
     rc.write_text(
-        f"[run]\nparallel = true\nsource = {tree / source}\ndata_file = {data}\n"
+        f"[run]\nparallel = true\nsource = {tree / 'pulsetrainer'}\ndata_file = {data}\n"
         "context = ${PYTEST_CURRENT_TEST-}\n"
     )
     (folder / "sitecustomize.py").write_text("import coverage\ncoverage.process_startup()\n")
@@ -200,7 +208,8 @@ def _record(tree: Path, folder: Path, source: str, test: str) -> dict[str, objec
         for path in found.measured_files()
     }
     data.unlink()
-    return {"runs": runs, "times": json.loads((folder / "times").read_text())}
+    code = {path: _digest(tree / path) for path in runs}
+    return {"code": code, "runs": runs, "times": json.loads((folder / "times").read_text())}
 
 
 def _order(fault: Fault, lines: dict[str, list[str]], times: Times, budget_s: float) -> list[str]:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import oracle
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
@@ -39,6 +40,12 @@ def test_recorded_pulses(name, count, length):
         assert abs(one.value[0] - one.value[-1]) < 0.01 * height
         assert one.value.min() >= one.value[0] - 0.01 * height
         assert np.ptp(one.value) > 0.85 * height
+    half = round(0.01 / np.median(np.diff(record.time_s)))  # of local parabolas over 20 ms
+    for foot in beats.feet:
+        near = range(max(foot - 60, half), min(foot + 60, record.value.size - half))
+        ends = [oracle.parabola(record.value[k - half : k + half + 1]) for k in near]
+        if half <= foot < record.value.size - half:
+            assert near[int(np.argmin(ends))] == pytest.approx(foot, abs=0)
     mean = beats.mean()
     assert mean.period_s == pytest.approx(np.median(beats.periods_s), abs=2e-3)
     assert 0.85 * height < np.ptp(mean.value) <= height
@@ -62,6 +69,18 @@ def test_beats_of_a_train_are_found_whatever_unit_rate_and_cut(beats, rate, gain
     np.testing.assert_allclose(found.periods_s, 0.8, atol=0.06)
     again = find_beats(Shape("train", t, pulse))
     assert np.abs(found.feet - again.feet).max() <= 1
+    mean, one = found.mean(), found.single(1)
+    apart = np.interp(one.time_s, mean.time_s, mean.value)[: -rate // 20] - one.value[: -rate // 20]
+    assert np.abs(apart).max() < 0.2 * np.ptp(gain * pulse)
+
+
+def test_a_record_from_peak_to_peak_has_its_outer_feet():
+    """Begun and ended at a peak, on a falling baseline: neither peak is lost, nor the high foot beside it."""
+    t = np.arange(0.0, 3.2001, 0.005)
+    pulse = np.exp(-(((t / 0.8 + 0.5) % 1.0 - 0.5) ** 2) / 0.02)
+    found = find_beats(Shape("falling", t, pulse - 0.25 * t))
+    assert t[found.feet] == pytest.approx(t[found.feet[0]] + 0.8 * np.arange(4.0), abs=0.01)
+    assert 0.4 < t[found.feet[0]] < 0.6
 
 
 def test_a_drifting_record_repeats_without_a_jump():

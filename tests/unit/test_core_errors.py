@@ -219,6 +219,10 @@ BAD = {
         ["low < high", "1"],
     ),
     "path at no speed": (lambda: excitations.through(np.arange(3.0), 0.0, 100.0), ["speed", "positive", "0"]),
+    "path in steps beyond every float": (
+        lambda: excitations.through(np.arange(3.0), 1e300, 1e-300),
+        ["path", "speed", "1e+300"],
+    ),
     "path at infinite speed": (lambda: excitations.through(np.arange(3.0), INF, 100.0), ["speed", "finite"]),
     "negative rest": (
         lambda: excitations.conditioning(0.0, 1.0, speed=1.0, rate_Hz=100.0, rest_s=-1.0),

@@ -1,0 +1,53 @@
+"""The fit as a verb asks for it: where the levels lie, which samples count, what is left."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_jobs import curves, plant
+
+from pulsetrainer.core.fit import CROWDED_MISFIT, fit
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+
+U = curves(1500, 12, 10)
+DEVICE = plant(12)
+Y = DEVICE(U)
+
+
+def test_residual_and_misfit_are_of_the_samples_that_count():
+    """What is measured less what is fitted; the misfit leaves out what comes before the memory is known."""
+    late = U[40:]  # begins on the way: unknown until it first reaches an end
+    noise = np.random.default_rng(1).normal(0.0, 0.05, late.size)
+    spoilt = Y[40:] + noise
+    found = fit([(late, spoilt)], -1.0, 1.0, 12, smoothing=0.0)
+    operator, record = found.identified.operator, found.records[0]
+    counted = record.sample_weight > 0
+    assert 0 < np.count_nonzero(~counted) < 100
+    left = spoilt - operator(late, record.start)
+    np.testing.assert_array_equal(found.residuals[0], left)
+    assert found.misfit == pytest.approx(np.sqrt(np.mean(left[counted] ** 2)) / np.ptp(spoilt[counted]))
+
+
+def test_levels_crowd_only_where_that_fits():
+    """A steep loop has crowded levels, relays even ones; what no operator follows falls back to even ones."""
+    plane = Plane.uniform(-1.0, 1.0, 60)
+    i, j = plane.cell_indices
+    steep = Preisach(plane, np.exp(-(((i - 32.0) / 1.5) ** 2) - ((j - 28.0) / 1.5) ** 2))(U)
+    assert not fit([(U, steep)], -1.0, 1.0, 12).evenly_spaced
+    assert fit([(U, steep)], -1.0, 1.0, 12, reading="relay", smoothing=0.0).evenly_spaced
+    assert fit([(U, Y)], -1.0, 1.0, 12).evenly_spaced
+    jumps = np.sign(np.sin(40.0 * np.arange(U.size) / U.size)) * (np.abs(U) < 0.05)
+    lost = fit([(U, jumps)], -1.0, 1.0, 12)
+    assert lost.evenly_spaced
+    assert lost.misfit > CROWDED_MISFIT
+
+
+def test_records_shifted_against_each_other_have_offsets():
+    """They are fitted as if they were not; the offsets are against the mean."""
+    found = fit([(U, Y), (U, Y + 0.5)], -1.0, 1.0, 12, smoothing=0.0)
+    assert found.offsets == pytest.approx([-0.25, 0.25], abs=1e-3)
+    assert found.misfit < 1e-3
+    alone = fit([(U, Y)], -1.0, 1.0, 12, smoothing=0.0)
+    assert not np.any(alone.offsets)
+    assert alone.misfit < 1e-6
