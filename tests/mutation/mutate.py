@@ -170,7 +170,7 @@ def _recorded(tree: Path, folder: Path, tests: list[str]) -> tuple[Runs, Times]:
         for path in (*sorted((tree / "tests").glob("*.py")), *sorted(beside), tree / test):
             digest.update(path.read_bytes())
         kept = ROOT / "build" / "mutation" / f"{digest.hexdigest()[:16]}.json"
-        known = json.loads(kept.read_text()) if kept.exists() else {"code": {"": ""}}
+        known = json.loads(kept.read_text()) if kept.exists() else {"code": {"": "none yet"}}
         if any(_digest(tree / path) != was for path, was in known["code"].items()):
             known = _record(tree, folder, test)
             kept.parent.mkdir(parents=True, exist_ok=True)
