@@ -12,7 +12,7 @@ from program import pulsetrainer
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 # one short record for all: six seconds of the device, twelve levels
-STEPS = (
+EVALUATED = (
     "capture identification --levels 12 --speed 3 -o run.h5",
     "identify run.h5 --levels 12 -o model.h5",
     "invert normal --model model.h5 -o drive.h5",
@@ -20,6 +20,8 @@ STEPS = (
     "play drive.h5 --repeats 2 -o played.h5",
     "play drive2.h5 --repeats 2 -o played2.h5",
     "evaluate played.h5 played2.h5 -o evaluation.h5 --html evaluation.html",
+)
+DIAGNOSED = (
     "diagnose run.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html",
     "extend diagnosis.h5 --model model.h5 -o extended.h5",
     "evaluate run.h5 --model model.h5 --model extended.h5 -o prediction.h5 --html prediction.html",
@@ -37,15 +39,26 @@ class Report:
 
 
 @pytest.fixture(scope="session")
-def folder(made_once) -> Path:
+def evaluated(made_once) -> Path:
+    """A folder in which the program has made the report of pulses."""
+    return made_once("report-of-pulses", lambda here: _make(here, EVALUATED))
+
+
+@pytest.fixture(scope="session")
+def diagnosed(evaluated, made_once) -> Path:
     """A folder in which the program has made all reports."""
 
     def fill(here: Path) -> None:
-        for step in STEPS:
-            done = pulsetrainer(here, *step.split(), env={"PULSETRAINER_PORT": "bench:?seed=1"})
-            assert done.code == 0, (step, done)
+        shutil.copytree(evaluated, here, dirs_exist_ok=True)
+        _make(here, DIAGNOSED)
 
     return made_once("reports", fill)
+
+
+def _make(folder: Path, steps: tuple[str, ...]) -> None:
+    for step in steps:
+        done = pulsetrainer(folder, *step.split(), env={"PULSETRAINER_PORT": "bench:?seed=1"})
+        assert done.code == 0, (step, done)
 
 
 SLOW = pytest.mark.slow  # a browser takes its time; the first page has every part of a page
@@ -53,9 +66,10 @@ REPORTS = ("evaluation", pytest.param("prediction", marks=SLOW), pytest.param("d
 
 
 @pytest.fixture(scope="session", params=REPORTS)
-def report(request, folder) -> Report:
+def report(request) -> Report:
     """Each report in turn."""
     kind = request.param
+    folder = request.getfixturevalue("evaluated" if kind == "evaluation" else "diagnosed")
     figures = {"evaluation": 2 * 2 + 2, "prediction": 2 + 1, "diagnosis": 1 + 5 + 1}[kind]
     return Report(kind, folder / f"{kind}.html", folder / f"{kind}.h5", figures)
 

@@ -19,6 +19,7 @@ def folder(as_built, run):
     return call
 
 
+@pytest.mark.slow
 def test_before_and_after(folder, as_built):
     """The values are those of the evaluations; the change has the right sign and word."""
     import json

@@ -59,6 +59,7 @@ def _diagnose(folder, *runs, model="model.h5", out="diagnosis.h5", more=()):
     )
 
 
+@pytest.mark.slow
 def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     """The name, the constant within its interval, and half the error gone at another rate."""
     done = _diagnose(bench, "diagnostic.h5", more=["--html", "diagnosis.html"])

@@ -203,7 +203,8 @@ def _record(tree: Path, folder: Path, test: str) -> dict[str, Any]:
     found = combined.get_data()
     runs = {
         str(Path(path).relative_to(tree)): {
-            line: sorted(filter(None, contexts)) for line, contexts in found.contexts_by_lineno(path).items()
+            str(line): sorted(filter(None, contexts))
+            for line, contexts in found.contexts_by_lineno(path).items()
         }
         for path in found.measured_files()
     }

@@ -46,7 +46,7 @@ def _sawtooth(y: FloatArray, seed: int = 1) -> tuple[Firing | None, Record]:
     return STICKING.gate_left(weights_for(problem, (), None)), record
 
 
-@pytest.mark.parametrize("force", [0.2, 0.25, 0.4])
+@pytest.mark.parametrize("force", [0.2, *(pytest.param(f, marks=pytest.mark.slow) for f in (0.25, 0.4))])
 def test_jumps_of_a_few_times_the_noise_are_measured(force):
     """Their size within a tenth; no jump alone, seen against the noise, would do."""
     found, record = _sawtooth(_stuck(_smooth(), force))

@@ -22,11 +22,12 @@ from pulsetrainer.errors import DataError
 from pulsetrainer.files.schema import plan_of
 from pulsetrainer.files.store import read, read_any, read_header, read_one_of, write
 
+EXAMPLES = settings.default.max_examples  # a file costs more than a number: a share of what laws get
 ANY_KIND = pytest.mark.parametrize("kind", sorted(KINDS))
 
 
 @ANY_KIND
-@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=EXAMPLES // 3, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_round_trip(kind, data, tmp_path_factory):
     """Whatever its shapes, NaN, missing parts and texts: what is read equals what was written."""
@@ -37,7 +38,7 @@ def test_round_trip(kind, data, tmp_path_factory):
     assert examples.equal(read_any(path), artefact)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=EXAMPLES // 3, deadline=None)
 @given(title=st.text(max_size=20), lines=st.lists(st.text(max_size=20), max_size=3))
 def test_header_round_trip(title, lines, tmp_path_factory):
     """Title, history and provenance come back; lone surrogates and NUL as escapes, never as an error."""
@@ -80,7 +81,7 @@ def _fields(cls, group=""):
 
 
 @ANY_KIND
-@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=EXAMPLES // 12, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_every_field_of_every_kind_is_readable_without_us(kind, data, tmp_path_factory):
     """Whatever fields a kind has: h5py finds each, xarray opens it with named axes, pint knows its units."""
