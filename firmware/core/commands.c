@@ -63,8 +63,8 @@ uint8_t commands_wave_begin(uint32_t total, uint16_t ticks_per_sample, uint32_t 
 {
     if (total == 0 || ticks_per_sample == 0 || ticks_per_sample > PT_MAX_TICKS_PER_SAMPLE)
         return PT_NAK_CODE_RANGE;
-    /* Too long for the on-time limit: refuse now, not in mid-play. */
-    if (total - 1u > (on_ticks_limit() - CONTROL_RAMP_TICKS) / ticks_per_sample)
+    /* Too long for the on-time limit: refuse now, not in mid-play. An open-ended one ends at the limit. */
+    if (total != PT_WAVE_OPEN && total - 1u > (on_ticks_limit() - CONTROL_RAMP_TICKS) / ticks_per_sample)
         return PT_NAK_CODE_RANGE;
     return control_wave_begin(total, ticks_per_sample, crc);
 }

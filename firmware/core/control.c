@@ -298,6 +298,23 @@ uint8_t control_wave_commit(uint32_t count, uint32_t crc)
     return refused;
 }
 
+/* While an open-ended wave is played: is what has arrived what was sent? If not, the tick ramps down. */
+uint8_t control_wave_check(uint32_t count, uint32_t crc, bool end)
+{
+    hal_critical_enter();
+    uint8_t refused = 0;
+    if (control.state != PT_STATE_RUNNING)
+        refused = PT_NAK_CODE_STATE;
+    else if (count != control.wave.received)
+        refused = PT_NAK_CODE_OFFSET;
+    else if (crc != control.wave.crc)
+        control.wave.corrupt = true;
+    else if (end && !wave_end(&control.wave))
+        refused = PT_NAK_CODE_STATE;
+    hal_critical_exit();
+    return refused;
+}
+
 void control_wave_forget(void)
 {
     hal_critical_enter();

@@ -62,6 +62,7 @@ bool control_is_alive(void); /* a tick has come since the last call */
 uint8_t control_wave_begin(uint32_t total, uint16_t ticks_per_sample, uint32_t crc);
 uint8_t control_wave_publish(uint8_t count);
 uint8_t control_wave_commit(uint32_t count, uint32_t crc);
+uint8_t control_wave_check(uint32_t count, uint32_t crc, bool end);
 void control_wave_forget(void);
 uint8_t control_arm(const struct control_settings *settings);
 uint8_t control_start(void);

@@ -209,6 +209,10 @@ static uint8_t execute(const struct frame *f)
     case PT_WAVE_COMMIT:
         refused = control_wave_commit(get_u32(p + PT_WAVE_COMMIT_COUNT), get_u32(p + PT_WAVE_COMMIT_CRC32));
         break;
+    case PT_WAVE_CHECK:
+        refused = control_wave_check(get_u32(p + PT_WAVE_CHECK_COUNT), get_u32(p + PT_WAVE_CHECK_CRC32),
+                                     p[PT_WAVE_CHECK_END] != 0);
+        break;
     case PT_ARM:
         refused = commands_arm(get_u32(p + PT_ARM_NONCE));
         break;

@@ -10,7 +10,7 @@
 #define PT_PROTOCOL_MAJOR 2u
 #endif
 #ifndef PT_PROTOCOL_MINOR
-#define PT_PROTOCOL_MINOR 0u
+#define PT_PROTOCOL_MINOR 1u
 #endif
 #ifndef PT_FIRMWARE_MAJOR
 #define PT_FIRMWARE_MAJOR 0u
@@ -19,10 +19,11 @@
 #define PT_FIRMWARE_MINOR 2u
 #endif
 #ifndef PT_FIRMWARE_PATCH
-#define PT_FIRMWARE_PATCH 0u
+#define PT_FIRMWARE_PATCH 1u
 #endif
 
 #define PT_MAGIC 0x52545031uL
+#define PT_WAVE_OPEN 0xFFFFFFFFuL
 #define PT_MAX_PAYLOAD 128u
 #define PT_TICK_RATE_HZ 10000u
 #define PT_WAVE_BUFFER_SAMPLES 1024u
@@ -188,6 +189,12 @@
 #define PT_COIL_HEAT_HEAT 0u
 #define PT_COIL_HEAT_LEN 2u
 
+#define PT_WAVE_CHECK 0x0Fu
+#define PT_WAVE_CHECK_COUNT 0u
+#define PT_WAVE_CHECK_CRC32 4u
+#define PT_WAVE_CHECK_END 8u
+#define PT_WAVE_CHECK_LEN 9u
+
 #define PT_HELLO_REPLY 0x81u
 #define PT_HELLO_REPLY_MAGIC 0u
 #define PT_HELLO_REPLY_MAJOR 4u
@@ -281,6 +288,7 @@
     X(STOP, 0) \
     X(CLEAR_FAULT, 0) \
     X(STREAM, 0) \
-    X(COIL_HEAT, 0)
+    X(COIL_HEAT, 0) \
+    X(WAVE_CHECK, 0)
 
 #endif

@@ -73,6 +73,14 @@ void wave_publish(struct wave *w, uint8_t count)
     w->corrupt = w->received == w->total && w->crc != w->crc_announced;
 }
 
+bool wave_end(struct wave *w)
+{
+    if (w->total != PT_WAVE_OPEN)
+        return false;
+    w->total = w->received;
+    return true;
+}
+
 uint32_t wave_ticks_left(const struct wave *w)
 {
     if (w->received >= w->total)

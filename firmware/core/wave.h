@@ -40,6 +40,9 @@ uint16_t wave_free(const struct wave *w);
 void wave_append(struct wave *w, const uint8_t *samples, uint8_t count);
 void wave_publish(struct wave *w, uint8_t count);
 
+/* A wave begun with a total of PT_WAVE_OPEN has no end until wave_end. False: it is no open one. */
+bool wave_end(struct wave *w);
+
 /* Ticks until the ring runs dry; UINT32_MAX when all samples are there. */
 uint32_t wave_ticks_left(const struct wave *w);
 

@@ -68,6 +68,15 @@ static struct frame commit(uint32_t count, uint32_t crc)
     return fake_command(PT_WAVE_COMMIT, p, sizeof p);
 }
 
+static struct frame check_sent(uint32_t count, uint32_t crc, uint8_t end)
+{
+    uint8_t p[PT_WAVE_CHECK_LEN];
+    put_u32(p + PT_WAVE_CHECK_COUNT, count);
+    put_u32(p + PT_WAVE_CHECK_CRC32, crc);
+    p[PT_WAVE_CHECK_END] = end;
+    return fake_command(PT_WAVE_CHECK, p, sizeof p);
+}
+
 static struct frame arm(uint32_t nonce)
 {
     uint8_t p[PT_ARM_LEN];
@@ -93,7 +102,7 @@ static void ready(int16_t value, uint16_t ticks, uint32_t total)
 {
     fake_reset();
     CHECK_EQUAL(hello(PT_PROTOCOL_MAJOR).type, PT_HELLO_REPLY);
-    CHECK_EQUAL(state_of(begin(total, ticks, crc_of_constant(value, total))), PT_STATE_IDLE);
+    CHECK_EQUAL(state_of(begin(total, ticks, total == PT_WAVE_OPEN ? 0 : crc_of_constant(value, total))), PT_STATE_IDLE);
     CHECK_EQUAL(state_of(data(0, value, SAMPLES)), PT_STATE_IDLE);
     CHECK_EQUAL(state_of(commit(SAMPLES, crc_of_constant(value, SAMPLES))), PT_STATE_IDLE);
 }
@@ -583,6 +592,74 @@ static void a_wave_with_a_wrong_checksum_is_stopped(void)
     CHECK_EQUAL(control.fault, PT_FAULT_WAVE_CRC);
 }
 
+/* An open-ended wave of 8000 that is being played, SAMPLES samples of `ticks` ticks sent. */
+static void running_open(uint16_t ticks)
+{
+    ready(8000, ticks, PT_WAVE_OPEN);
+    CHECK_EQUAL(state_of(arm(fake.nonce)), PT_STATE_ARMED);
+    CHECK_EQUAL(state_of(plain(PT_START)), PT_STATE_RUNNING);
+}
+
+static void an_open_wave_goes_on_until_its_end_is_told(void)
+{
+    uint32_t sent = SAMPLES;
+    running_open(10);
+    for (uint32_t turn = 0; turn < 40u; turn++) { /* twice round the ring */
+        alive_ticks(10u * SAMPLES - 100u * (turn == 0));
+        CHECK_EQUAL(state_of(data(sent, 8000, SAMPLES)), PT_STATE_RUNNING);
+        sent += SAMPLES;
+        CHECK_EQUAL(state_of(check_sent(sent, crc_of_constant(8000, sent), 0)), PT_STATE_RUNNING);
+    }
+    CHECK_EQUAL(state_of(check_sent(sent, crc_of_constant(8000, sent), 1)), PT_STATE_RUNNING);
+    CHECK_EQUAL(nak_of(data(sent, 8000, SAMPLES)), PT_NAK_CODE_OFFSET); /* nothing behind the end */
+    CHECK_EQUAL(nak_of(check_sent(sent, crc_of_constant(8000, sent), 1)), PT_NAK_CODE_STATE);
+    alive_ticks(10u * SAMPLES + 1000u);
+    CHECK_EQUAL(control.state, PT_STATE_IDLE);
+    CHECK_EQUAL(control.fault, PT_FAULT_NONE);
+    CHECK_EQUAL(control.tick, 10u * (sent - 1u) + 1u);
+    CHECK(!fake.pwm_enabled);
+    CHECK_EQUAL(nak_of(check_sent(sent, crc_of_constant(8000, sent), 1)), PT_NAK_CODE_STATE);
+}
+
+static void an_open_wave_that_runs_dry_ramps_down_and_faults(void)
+{
+    running_open(10);
+    alive_ticks(10u * SAMPLES);
+    CHECK_EQUAL(control.fault, PT_FAULT_UNDERRUN);
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
+}
+
+static void an_open_wave_that_arrived_wrong_ramps_down_and_faults(void)
+{
+    running_open(10);
+    CHECK_EQUAL(nak_of(check_sent(SAMPLES - 1u, crc_of_constant(8000, SAMPLES - 1u), 1)), PT_NAK_CODE_OFFSET);
+    CHECK_EQUAL(control.fault, PT_FAULT_NONE);
+    CHECK_EQUAL(state_of(check_sent(SAMPLES, 1, 1)), PT_STATE_RUNNING);
+    fake_ticks(1);
+    CHECK_EQUAL(control.fault, PT_FAULT_WAVE_CRC);
+    CHECK_EQUAL(control.state, PT_STATE_RAMPING);
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
+}
+
+static void an_open_wave_needs_a_living_host_and_keeps_the_on_time(void)
+{
+    running_open(1000);
+    fake_ticks(2001);
+    CHECK_EQUAL(control.fault, PT_FAULT_HEARTBEAT);
+    CHECK_EQUAL(control.state, PT_STATE_RAMPING);
+    fake_reset();
+    (void)hello(PT_PROTOCOL_MAJOR);
+    (void)set_param(PT_PARAM_ON_TIME, 1);
+    CHECK_EQUAL(nak_of(begin(PT_WAVE_OPEN, 10000, 0)), 0);
+    (void)data(0, 100, SAMPLES);
+    (void)commit(SAMPLES, crc_of_constant(100, SAMPLES));
+    CHECK_EQUAL(state_of(arm(fake.nonce)), PT_STATE_ARMED);
+    CHECK_EQUAL(state_of(plain(PT_START)), PT_STATE_RUNNING);
+    alive_ticks(PT_TICK_RATE_HZ + 1u);
+    CHECK_EQUAL(control.fault, PT_FAULT_ON_TIME);
+    CHECK(off_after(2000) <= CONTROL_RAMP_TICKS);
+}
+
 static void the_first_cause_stays_with_its_snapshot(void)
 {
     running(12000, 1000);
@@ -651,7 +728,7 @@ static void upload_is_idempotent_and_in_order(void)
     CHECK_EQUAL(nak_of(begin(0, 10, 0)), PT_NAK_CODE_RANGE);
     CHECK_EQUAL(nak_of(begin(10, 0, 0)), PT_NAK_CODE_RANGE);
     CHECK_EQUAL(nak_of(begin(9000001, 1, 0)), PT_NAK_CODE_RANGE); /* longer than the on-time */
-    CHECK_EQUAL(nak_of(begin(0xFFFFFFFFu, 10000, 0)), PT_NAK_CODE_RANGE);
+    CHECK_EQUAL(nak_of(begin(0xFFFFFFFEu, 10000, 0)), PT_NAK_CODE_RANGE);
     (void)begin(30, 10, 0);
     CHECK_EQUAL(nak_of(data(0, 1, 50)), PT_NAK_CODE_OFFSET); /* beyond what was announced */
 }
@@ -800,6 +877,10 @@ int main(void)
     RUN(a_sensor_that_does_not_read_zero_is_not_armed);
     RUN(an_underrun_ramps_down_and_faults);
     RUN(a_wave_with_a_wrong_checksum_is_stopped);
+    RUN(an_open_wave_goes_on_until_its_end_is_told);
+    RUN(an_open_wave_that_runs_dry_ramps_down_and_faults);
+    RUN(an_open_wave_that_arrived_wrong_ramps_down_and_faults);
+    RUN(an_open_wave_needs_a_living_host_and_keeps_the_on_time);
     RUN(the_first_cause_stays_with_its_snapshot);
     RUN(stop_ramps_and_disarms);
     RUN(a_new_hello_stops_what_an_earlier_host_left_running);

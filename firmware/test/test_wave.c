@@ -111,6 +111,37 @@ static void a_wrong_checksum_shows_when_all_is_there(void)
     CHECK(w.corrupt);
 }
 
+static void an_open_wave_has_no_last_sample_until_its_end_is_told(void)
+{
+    const int16_t samples[3] = {10, 30, 20};
+    int16_t r = 0;
+    wave_begin(&w, PT_WAVE_OPEN, 1, 0);
+    feed(samples, 3);
+    wave_start(&w);
+    CHECK(wave_tick(&w, &r) == WAVE_OK);
+    CHECK(wave_tick(&w, &r) == WAVE_OK);
+    CHECK_EQUAL(r, 30);
+    CHECK(wave_ticks_left(&w) != UINT32_MAX);
+    CHECK(wave_end(&w));
+    CHECK_EQUAL(wave_ticks_left(&w), UINT32_MAX);
+    CHECK(wave_tick(&w, &r) == WAVE_LAST);
+    CHECK_EQUAL(r, 20);
+    CHECK(!wave_end(&w));
+}
+
+static void an_open_wave_runs_dry(void)
+{
+    const int16_t samples[2] = {10, 30};
+    int16_t r = 0;
+    wave_begin(&w, PT_WAVE_OPEN, 1, 0);
+    feed(samples, 2);
+    wave_start(&w);
+    CHECK(wave_tick(&w, &r) == WAVE_OK);
+    CHECK(wave_tick(&w, &r) == WAVE_UNDERRUN);
+    CHECK_EQUAL(r, 30);
+    CHECK(!w.corrupt);
+}
+
 int main(void)
 {
     RUN(crc_known_value);
@@ -120,5 +151,7 @@ int main(void)
     RUN(a_long_wave_goes_round_the_ring);
     RUN(ticks_left_never_promises_too_much);
     RUN(a_wrong_checksum_shows_when_all_is_there);
+    RUN(an_open_wave_has_no_last_sample_until_its_end_is_told);
+    RUN(an_open_wave_runs_dry);
     CHECK_DONE();
 }

@@ -10,16 +10,17 @@ from enum import IntEnum
 
 MAGIC = 0x52545031  # "1PTR" on the wire: tells our firmware from whatever else sits behind a port
 PROTOCOL_MAJOR = 2
-PROTOCOL_MINOR = 0
+PROTOCOL_MINOR = 1
 FIRMWARE_MAJOR = (
     0  # of the firmware that comes with this program; below 1.0.0 each minor version is another one
 )
 FIRMWARE_MINOR = 2
-FIRMWARE_PATCH = 0
+FIRMWARE_PATCH = 1
 
 MAX_PAYLOAD = 128  # bytes: the longest frame stays under 254, so COBS adds exactly one byte
 TICK_RATE_HZ = 10_000
 WAVE_BUFFER_SAMPLES = 1024
+WAVE_OPEN = 0xFFFFFFFF  # samples of a wave whose end is not known when it begins; since protocol 2.1
 MAX_TICKS_PER_SAMPLE = 10_000  # one reference sample a second
 MAX_DECIMATION = 10_000
 HEARTBEAT_MAX_MS = 200

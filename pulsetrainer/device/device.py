@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
+from pulsetrainer.device.feed import Feed
 from pulsetrainer.device.heat import HeatMemory, added, in_words, wait_s
 from pulsetrainer.device.identity import DeviceInfo
 from pulsetrainer.device.plausibility import ForceWatch
@@ -50,6 +51,7 @@ _GREETED = {
     "on_time": "on_time_s",
     "heartbeat": "heartbeat_ms",
 }
+_STREAMS_SINCE = (2, 1)  # the protocol of the first firmware that takes a wave without a known end
 _TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
 
 
@@ -152,6 +154,11 @@ class Device:
                 playing.ended.wait()
         finally:
             self._port.close()
+
+    @property
+    def heat(self) -> float:
+        """Heat of the coil now, of the limit at which the device stops."""
+        return self._status().heat * codes.HEAT_UNIT
 
     @property
     def longest_play_s(self) -> float:
@@ -275,16 +282,78 @@ class Device:
                 hint="10 gives 1000 samples a second",
             )
         self._check_heat(codes.CURRENT_UNIT_A * wire.astype(float), rate_Hz)
-        player = Player(
+        player = self._player_of(Feed(wire), step, decimation)
+        return self._perform(player, on_block, should_stop, keep=keep)
+
+    def stream(
+        self,
+        more: Callable[[], FloatArray | None],
+        rate_Hz: float,
+        *,
+        lead_s: float = 0.4,
+        decimation: int = 10,
+        on_block: Callable[[Block], None] | None = None,
+        should_stop: Callable[[], bool] | None = None,
+    ) -> Trace:
+        """Play a coil current that is made while it is played.
+
+        ``more`` returns the next samples (n,) in A at ``rate_Hz``, or None at the end. It is called between
+        pieces of telemetry, as soon as less than ``lead_s`` is left to play: that is how late a change takes
+        effect, and how long ``more`` may take. The rest is as in ``play``; memory stays flat.
+
+        Raises
+        ------
+        ArgumentError
+            There is no sample at all, or one that the device cannot play: the output is stopped first.
+        DeviceError
+            The device's firmware knows no open-ended waves, or it cannot be talked to before it starts.
+        """
+        if (self._hello.major, self._hello.minor) < _STREAMS_SINCE:
+            raise DeviceError(
+                f"the device's firmware {self.info.firmware} speaks protocol {self.info.protocol}, which has "
+                f"no open-ended waves; they came with {'.'.join(map(str, _STREAMS_SINCE))}",
+                hint="flash the firmware that came with this program (make -C firmware)",
+            )
+        step = ticks_per_sample(rate_Hz, self.info.tick_rate_Hz)
+        feed, lead = Feed(), round(lead_s * rate_Hz)
+        player = self._player_of(feed, step, decimation)
+
+        def top_up() -> None:
+            while not feed.ended and feed.size - player.played < lead:
+                samples = more()
+                if samples is None:
+                    feed.end()
+                else:
+                    feed.append(to_wire(samples, limit_A=self.info.current_limit_A))
+
+        top_up()
+        if feed.size == 0:
+            raise ArgumentError("there is nothing to play", hint="give at least one sample")
+        self._remember_heat(1.0)  # at most: should nobody be left to ask afterwards
+        return self._perform(player, on_block, should_stop, keep=False, top_up=top_up)
+
+    def _player_of(self, feed: Feed, ticks: int, decimation: int) -> Player:
+        return Player(
             self._session,
-            wire,
-            step,
+            feed,
+            ticks,
             decimation,
             hello=self._hello,
             seen=self._seen,
             monotonic=self._monotonic,
             piece_s=self._port.piece_s,
         )
+
+    def _perform(
+        self,
+        player: Player,
+        on_block: Callable[[Block], None] | None,
+        should_stop: Callable[[], bool] | None,
+        *,
+        keep: bool,
+        top_up: Callable[[], None] | None = None,
+    ) -> Trace:
+        """Let a player play in a thread of its own, and follow what it brings back."""
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
         with self._turn:
             if self._player is not None:
@@ -295,7 +364,7 @@ class Device:
         watch, interrupted = ForceWatch(), False
         try:
             thread.start()
-            interrupted = self._follow(player, watch, on_block, should_stop, keep=keep)
+            interrupted = self._follow(player, watch, on_block, should_stop, keep=keep, top_up=top_up)
         finally:
             player.stop(_STOPPED)
             while thread.is_alive():  # it is stopping the device: not to be interrupted, and soon over
@@ -320,6 +389,7 @@ class Device:
         should_stop: Callable[[], bool] | None,
         *,
         keep: bool,
+        top_up: Callable[[], None] | None,
     ) -> bool:
         """Hand over the telemetry as it comes until the play has ended; True if Ctrl-C hastened the end."""
         passed = forgotten = 0
@@ -340,6 +410,8 @@ class Device:
                 if not keep:
                     player.forget(forgotten, passed)
                     forgotten = passed
+                if top_up is not None and not ended:
+                    top_up()
                 if should_stop is not None and should_stop():
                     player.stop(_STOPPED)
                 if not ended:
@@ -370,6 +442,7 @@ class Device:
             fault=outcome.fault or (_INTERRUPTED if interrupted else implausible),
             samples=received,
             remedy=outcome.remedy or (FORCE_REMEDY if implausible else ""),
+            underrun=bool(outcome.fault) and player.seen[0] == codes.Fault.UNDERRUN,
         )
 
 

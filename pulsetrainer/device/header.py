@@ -67,6 +67,7 @@ def c_header() -> str:
         lines += [f"#ifndef PT_{name}", f"#define PT_{name} {getattr(codes, name)}u", "#endif"]
     lines.append("")
     lines.append(f"#define PT_MAGIC 0x{codes.MAGIC:08X}uL")
+    lines.append(f"#define PT_WAVE_OPEN 0x{codes.WAVE_OPEN:08X}uL")
     lines += [f"#define PT_{name} {getattr(codes, name)}u" for name in _CONSTANTS]
     for title, prefix, members in (
         ("what the device is doing", "STATE", codes.State),

@@ -195,6 +195,19 @@ class CoilHeat(Message):
     heat: U16
 
 
+@dataclass(frozen=True, slots=True)
+class WaveCheck(Message):
+    """The first ``count`` samples of the running wave have this CRC-32; ``end``: no more will come.
+
+    A wrong CRC ramps down; ``end`` is for a wave that was begun with ``codes.WAVE_OPEN`` samples.
+    """
+
+    TYPE: ClassVar[int] = 0x0F
+    count: U32
+    crc32: U32
+    end: U8
+
+
 # --- device to host ------------------------------------------------------------------------------
 
 
@@ -313,7 +326,7 @@ class Telemetry(Message):
 
 COMMANDS: tuple[type[Message], ...] = (
     Hello, Status, Heartbeat, GetParam, SetParam, WaveBegin, WaveData,
-    WaveCommit, Arm, Start, Stop, ClearFault, Stream, CoilHeat,
+    WaveCommit, Arm, Start, Stop, ClearFault, Stream, CoilHeat, WaveCheck,
 )  # fmt: skip
 REPLIES: tuple[type[Message], ...] = (HelloReply, StatusReply, Ack, Nak, ParamReply, Telemetry)
 BY_TYPE: dict[int, type[Message]] = {m.TYPE: m for m in (*COMMANDS, *REPLIES)}

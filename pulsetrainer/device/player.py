@@ -13,8 +13,6 @@ import zlib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.session import AbandonedError, NoAnswerError, RefusedError, Session
@@ -33,11 +31,12 @@ from pulsetrainer.errors import DeviceError, PulsetrainerError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
+    from pulsetrainer.device.feed import Feed
 
 _BEATS = 5  # in the time that the device is patient, by the wall clock and by its own
 _DRAIN_S = 0.3  # for telemetry on its way after the end
 _RAMP_S = 1.0
+_CHECK_SAMPLES = 1000  # of an open-ended wave, between two questions whether they are what was sent
 _TAKER_S = 10.0  # nobody took the telemetry for so long: the program hangs
 
 
@@ -59,24 +58,23 @@ def _drives(status: m.StatusReply) -> bool:
 
 
 class Player:
-    """Plays one reference [100 uA, int16]; ``received`` grows by wire blocks until ``ended`` is set."""
+    """Plays one wave; ``received`` grows by wire blocks until ``ended`` is set."""
 
     def __init__(
         self,
         session: Session,
-        reference: NDArray[np.int16],
+        feed: Feed,
         ticks_per_sample: int,
         decimation: int,
         *,
         hello: m.HelloReply,
         seen: tuple[int, int],
         monotonic: Callable[[], float],
-        piece_s: float = np.inf,
+        piece_s: float = float("inf"),
     ) -> None:
         self._session = session
         self.seen = seen  # first and worst fault that whoever plays has been told of
-        self._samples = reference
-        self._wire = reference.astype("<i2").tobytes()
+        self._feed = feed
         self._ticks_per_sample = ticks_per_sample
         self.decimation = decimation
         self._hello = hello
@@ -84,6 +82,9 @@ class Player:
         self._piece_s = piece_s
         self._short = m.WaveData.MAX_ITEMS  # samples a frame while the buffer is well filled
         self._sent = 0
+        self._crc = 0  # of what was sent
+        self._checked = 0  # so many samples are known to have arrived as they were sent
+        self._told_end = not feed.is_open
         self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
         self._play_session = -1
         self._tick = 0  # latest known tick of the device
@@ -101,6 +102,11 @@ class Player:
         self.heat = -1  # of the coil after the play, -1: it could not be asked
         self.outcome: Outcome | None = None
         self.error: BaseException | None = None
+
+    @property
+    def played(self) -> int:
+        """Samples whose time has come, as far as is known."""
+        return self._tick // self._ticks_per_sample
 
     @property
     def last_tick(self) -> int:
@@ -136,7 +142,7 @@ class Player:
         if block.count:
             if block.first_tick <= self._recorded_tick or block.first_tick % self.decimation:
                 return  # a wire that repeats itself
-            if last_tick > (len(self._samples) - 1) * self._ticks_per_sample:
+            if last_tick > (self._feed.size - 1) * self._ticks_per_sample:
                 return  # no such sample was asked for: damage that happens to fit the checksum
             self._recorded_tick = last_tick
             self._tick = max(self._tick, last_tick)
@@ -170,7 +176,6 @@ class Player:
     # --- the steps of a play ---------------------------------------------------------------------
 
     def _upload(self) -> None:
-        n = len(self._samples)
         self._request(m.Stop())  # whatever an earlier program left half done
         deadline = self._monotonic() + _RAMP_S
         while self._ack.state == codes.State.RAMPING and self._monotonic() < deadline:
@@ -179,10 +184,11 @@ class Player:
         if self._ack.fault:
             self._clear(self._status())
         self._request(m.Stream(self.decimation))
-        self._request(m.WaveBegin(n, self._ticks_per_sample, zlib.crc32(self._wire)))
-        while self._sent < n and self._send_chunk(self._ack.credit):
+        self._request(m.WaveBegin(self._feed.total, self._ticks_per_sample, self._feed.crc32))
+        while self._send_chunk(self._ack.credit):
             pass
-        self._request(m.WaveCommit(self._sent, zlib.crc32(self._wire[: 2 * self._sent])))
+        self._request(m.WaveCommit(self._sent, self._crc))
+        self._checked = self._sent
 
     def _clear(self, status: m.StatusReply) -> None:
         """Clear the fault that has been told; one that nobody was told of is told now, and stays."""
@@ -198,19 +204,29 @@ class Player:
     def _send_chunk(self, credit: int) -> bool:
         """Send the next samples if the device has room for a whole frame of them."""
         most = self._short if credit < self._hello.wave_buffer // 2 else m.WaveData.MAX_ITEMS
-        count = min(most, len(self._samples) - self._sent)
+        count = min(most, self._feed.size - self._sent)
         if count == 0 or credit < count:
             return False
-        at = self._sent
-        self._request(m.WaveData(at, count, self._wire[2 * at : 2 * (at + count)]))
-        self._sent = at + count
+        piece = self._feed.piece(self._sent, count)
+        self._request(m.WaveData(self._sent, count, piece))
+        self._sent += count
+        self._crc = zlib.crc32(piece, self._crc)
+        return True
+
+    def _check_sent(self) -> bool:
+        """Ask now and then whether all samples of an open-ended wave have arrived as sent; tell its end."""
+        end = self._feed.ended and self._sent == self._feed.size
+        if self._told_end or (not end and self._sent - self._checked < _CHECK_SAMPLES):
+            return False
+        self._request(m.WaveCheck(self._sent, self._crc, int(end)))
+        self._checked, self._told_end = self._sent, end
         return True
 
     def _credit(self) -> int:
         """Room in the device's buffer by what telemetry says it has played; never more than there is."""
-        played = self._tick // self._ticks_per_sample
         return max(
-            self._ack.credit, min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + played)
+            self._ack.credit,
+            min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + self.played),
         )
 
     def _beat_due(self) -> bool:
@@ -231,7 +247,7 @@ class Player:
                 )
             if self._stop.is_set():
                 return
-            if self._send_chunk(self._credit()):
+            if self._send_chunk(self._credit()) or self._check_sent():
                 continue
             if self._beat_due():
                 self._request(self._session.next_beat())
@@ -291,7 +307,7 @@ class Player:
                 fault=f"the device restarted in mid-play (cause: {reset_text(status.reset_cause)})",
                 remedy="check its power supply and cable; nothing was started again",
             )
-        last_tick = (len(self._samples) - 1) * self._ticks_per_sample
+        last_tick = (self._feed.size - 1) * self._ticks_per_sample
         fault = describe_fault(status, self._hello.tick_rate_Hz)
         if not fault or self._stop_remedy:  # with a remedy it is a finding of the host, which came first
             fault = f"{self._stop_reason} (then: {fault})" if fault else self._stop_reason

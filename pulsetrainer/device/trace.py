@@ -65,6 +65,7 @@ class Trace:
     fault: str  # why not: the device's first cause, or "interrupted"; empty when complete
     samples: int  # received, also where they were not kept
     remedy: str = ""  # what to do about it, where that is known
+    underrun: bool = False  # the device had to stop because a sample came too late
 
     @property
     def time_s(self) -> FloatArray:

@@ -24,6 +24,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import cause_named
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
+from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
@@ -107,12 +108,12 @@ class Extended:
         terms = in_order([Term(cause_named(name), values) for name, values in extensions])
         return cls(upright, terms, sign)
 
-    def frame(self, u: FloatArray, dt_s: float) -> Frame:
-        """What the causes are told of an input."""
+    def frame(self, u: FloatArray, dt_s: float, past: Past | None = None) -> Frame:
+        """What the causes are told of an input, and of what came before it."""
         plane = self.static.plane
         middle, half = self.static.offset, self.static.total
         ends = (middle - half, middle + half)
-        return Frame(dt_s, u, 2.0 * half, plane.high - plane.low, low=plane.low, ends=ends)
+        return Frame(dt_s, u, 2.0 * half, plane.high - plane.low, low=plane.low, ends=ends, past=past)
 
     def __call__(self, u: FloatArray, dt_s: float) -> FloatArray:
         """Output (n,) for an input (n,) at even steps, from negative saturation and rest."""
@@ -139,7 +140,7 @@ class Extended:
         upright = Extended(self.static, self.terms)
         target = self.polarity * np.asarray(target)
         state = self.static.run(lead)[1] if lead.size else None
-        smooth = _low_pass(band_Hz, dt_s)
+        smooth = low_pass_of(band_Hz, dt_s)
         wanted, best = target, None
         for k in range(steps + 1):
             found = inversion.invert(self.static, wanted, state)
@@ -157,7 +158,7 @@ class Extended:
         return best
 
 
-def _low_pass(band_Hz: float | None, dt_s: float) -> Callable[[FloatArray], FloatArray]:
+def low_pass_of(band_Hz: float | None, dt_s: float) -> Callable[[FloatArray], FloatArray]:
     """A zero-phase low-pass, or nothing where the band is as wide as the samples allow."""
     if band_Hz is None or band_Hz * dt_s >= LIMITS.inverse_band:
         return lambda x: x

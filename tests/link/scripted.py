@@ -32,6 +32,7 @@ class ScriptedDevice:
         self.answer: Callable[[m.Message, m.Message], m.Message | None] = lambda _, usual: usual
         self.state, self.session = codes.State.IDLE, 0
         self.last_tick = 0
+        self.ticks_per_sample = 1
         self.started_s = 0.0
         self.hello: dict[str, object] = {}
         self.status: dict[str, object] = {}
@@ -104,6 +105,9 @@ class ScriptedDevice:
             return message(m.ParamReply, id=command.id, value=getattr(command, "value", 0))
         if isinstance(command, m.WaveBegin):
             self.last_tick = (command.total - 1) * command.ticks_per_sample
+            self.ticks_per_sample = command.ticks_per_sample
+        if isinstance(command, m.WaveCheck) and command.end:
+            self.last_tick = (command.count - 1) * self.ticks_per_sample
         if isinstance(command, m.Start):
             self.state, self.session, self.started_s = codes.State.RUNNING, self.session + 1, self.now_s
         if isinstance(command, m.Stop):

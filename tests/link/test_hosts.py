@@ -219,5 +219,5 @@ def test_a_greeting_of_another_layout_is_told_by_its_version(length):
             script._out = encode(Frame(m.HelloReply.TYPE, frame.seq, payload))
 
     script.write = answer
-    with pytest.raises(DeviceError, match=rf"protocol {major}\.0.*the program is older"):
+    with pytest.raises(DeviceError, match=rf"protocol {major}\.{codes.PROTOCOL_MINOR}.*the program is older"):
         script.open()

@@ -10,6 +10,7 @@ import tty
 import numpy as np
 import pytest
 
+from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import MAGIC, Fault, State
 from pulsetrainer.device.frames import Frame, encode
@@ -83,7 +84,9 @@ def test_another_protocol_major_is_named_with_the_remedy(wire):
     """Both versions and what to do are in the message."""
     newer = wire("bench:", firmware_executable(("-DPT_PROTOCOL_MAJOR=3u",)))
     with pytest.raises(
-        DeviceError, match=r"protocol 3\.0, this program 2\.0: the program is older"
+        DeviceError,
+        match=rf"protocol 3\.{codes.PROTOCOL_MINOR}, "
+        rf"this program 2\.{codes.PROTOCOL_MINOR}: the program is older",
     ) as caught:
         newer.session.hello()
     assert "pip install --upgrade" in caught.value.hint
@@ -104,7 +107,11 @@ def test_another_minor_version_is_fine(wire):
 def test_another_firmware_generation_is_named_with_the_remedy(wire):
     """The same protocol, but a firmware that this program does not come with."""
     newer = wire("bench:", firmware_executable(("-DPT_FIRMWARE_MAJOR=1u",)))
-    said = r"\(firmware 1\.2\.0\) is of another generation than .* firmware 0\.2\.0: the program is older"
+    patch = codes.FIRMWARE_PATCH
+    said = (
+        rf"\(firmware 1\.2\.{patch}\) is of another generation than .* firmware 0\.2\.{patch}: "
+        "the program is older"
+    )
     with pytest.raises(DeviceError, match=said) as caught:
         newer.session.hello()
     assert "pip install --upgrade" in caught.value.hint

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import signal
 
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ class Frame:
     records: int = 1
     low: float = 0.0  # end of the input's range
     ends: tuple[float, float] = (0.0, 1.0)  # output at both ends of the input's range
+    past: Past | None = None  # what the causes remember of the piece before; None: there was none
 
     @property
     def time_s(self) -> FloatArray:
@@ -61,8 +63,10 @@ class Frame:
     @cached_property
     def path(self) -> FloatArray:
         """Length of the input's path at each sample (n,), wiggles of noise left out."""
-        turned = settled(self.input, _NO_PATH * self.reach)
-        return np.append(0.0, np.cumsum(np.abs(np.diff(turned))))
+        before = remembered(self.past, "path", self.input[:1])
+        turned = settled(self.input, _NO_PATH * self.reach, float(before[0]))
+        remember(self.past, "path", turned[-1:])
+        return np.cumsum(np.abs(np.diff(turned, prepend=before[0])))
 
 
 class Cause:
@@ -121,8 +125,23 @@ class Cause:
         return []
 
 
-def low_pass(x: FloatArray, tau_s: float, dt_s: float) -> FloatArray:
+def remembered(past: Past | None, name: str, at_first: FloatArray) -> FloatArray:
+    """Return what was kept under a name of the piece before; ``at_first`` where there was none."""
+    return at_first if past is None else past.before.get(name, at_first)
+
+
+def remember(past: Past | None, name: str, values: FloatArray) -> None:
+    """Keep something for the piece that follows."""
+    if past is not None:
+        past.after[name] = values
+
+
+def low_pass(
+    x: FloatArray, tau_s: float, dt_s: float, past: Past | None = None, name: str = ""
+) -> FloatArray:
     """Solve tau x' + x = input for an input that is straight between samples, from rest at x[0].
+
+    With ``past`` it goes on from where the piece before, of the same ``name``, ended.
 
     Exact: y+ = a y + (1 - a) u + (1 - (tau/dt)(1 - a)) (u+ - u) with a = exp(-dt/tau).
     """
@@ -131,15 +150,17 @@ def low_pass(x: FloatArray, tau_s: float, dt_s: float) -> FloatArray:
     a = np.exp(-dt_s / tau_s)
     slope = 1.0 - tau_s / dt_s * (1.0 - a)
     b = np.asarray([slope, 1.0 - a - slope])
-    state = signal.lfiltic(b, np.asarray([1.0, -a]), y=[x[0]], x=[x[0]])
     # the filter's first step must see the first value as its past
+    last_in, last_out = remembered(past, f"lag {name}", np.repeat(x[:1], 2))
+    state = signal.lfiltic(b, np.asarray([1.0, -a]), y=[last_out], x=[last_in])
     filtered, _ = signal.lfilter(b, np.asarray([1.0, -a]), x, zi=state)
+    remember(past, f"lag {name}", np.asarray([x[-1], filtered[-1]]))
     return np.asarray(filtered)
 
 
-def settled(values: FloatArray, width: float) -> FloatArray:
+def settled(values: FloatArray, width: float, at: float | None = None) -> FloatArray:
     """Path (n,) of a point dragged by ``values`` with play ``width``: wiggles smaller than it are no path."""
-    at = float(values[0])
+    at = float(values[0]) if at is None else at
     path = []
     for value in values.tolist():
         at = min(max(at, value - width), value + width)

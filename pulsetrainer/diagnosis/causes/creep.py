@@ -48,7 +48,8 @@ class Creep(Cause):
 
 def _crept(y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
     """Creep with a share ``middle`` of its amplitude in the middle time constant."""
-    slow = middle * low_pass(y, values[1], frame.dt_s)
+    slow = middle * low_pass(y, values[1], frame.dt_s, frame.past, "creep")
     for ratio in _RATIOS:
-        slow = slow + 0.5 * (1.0 - middle) * low_pass(y, values[1] * ratio, frame.dt_s)
+        part = low_pass(y, values[1] * ratio, frame.dt_s, frame.past, f"creep {ratio:g}")
+        slow = slow + 0.5 * (1.0 - middle) * part
     return np.asarray((y + values[0] * slow) / (1.0 + values[0]))

@@ -6,12 +6,13 @@ of the two: an input interpolated between samples loses the tips of its loops, w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
 _TRIED_S = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
 
@@ -39,5 +40,8 @@ class Delay(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        t = frame.time_s
-        return np.interp(t - values[0], t, y)
+        before = remembered(frame.past, self.id, y[:0])
+        whole = np.concatenate((before, y))
+        t = frame.dt_s * (np.arange(whole.size) - before.size)
+        remember(frame.past, self.id, whole[-math.ceil(values[0] / frame.dt_s) - 1 :])
+        return np.interp(t[before.size :] - values[0], t, whole)

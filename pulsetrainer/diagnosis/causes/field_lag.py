@@ -31,4 +31,4 @@ class FieldLag(Cause):
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Input (n,) that the hysteresis sees."""
-        return low_pass(u, values[0], frame.dt_s)
+        return low_pass(u, values[0], frame.dt_s, frame.past, self.id)

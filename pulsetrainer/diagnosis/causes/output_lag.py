@@ -33,4 +33,4 @@ class OutputLag(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return low_pass(y, values[0], frame.dt_s)
+        return low_pass(y, values[0], frame.dt_s, frame.past, self.id)

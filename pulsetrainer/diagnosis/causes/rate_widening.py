@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
 _TRIED = (0.005, 0.015)  # of the root of the range
 _NONE = 1e-9  # a smaller coefficient widens nothing
@@ -41,11 +41,14 @@ class RateWidening(Cause):
         # v' = sgn(e) (e/k)^2 with e = u - v: exact over a part of a sample with u held at its middle value
         per_step = frame.dt_s / _PARTS / k**2
         parts = (np.arange(_PARTS) + 0.5) / _PARTS
-        middles = (u[:-1, None] + np.diff(u)[:, None] * parts).ravel().tolist()
-        inner = float(u[0])
+        begun, inner = remembered(frame.past, self.id, np.repeat(u[:1], 2)).tolist()
         path = [inner]
+        if frame.past is not None and frame.past.before:
+            u = np.append(begun, u)
+        middles = (u[:-1, None] + np.diff(u)[:, None] * parts).ravel().tolist()
         for middle in middles:
             excess = middle - inner
             inner = middle - excess / (1.0 + abs(excess) * per_step)
             path.append(inner)
-        return np.asarray(path[::_PARTS])
+        remember(frame.past, self.id, np.asarray([u[-1], inner]))
+        return np.asarray(path[::_PARTS])[-frame.input.size :]

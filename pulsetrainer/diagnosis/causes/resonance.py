@@ -8,7 +8,7 @@ import numpy as np
 from scipy import signal
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
 _TRIED_Hz = (3.0, 80.0, 20)  # from, to, how many
 _TRIED_DAMPING = (0.07, 0.25)  # rings long, rings short
@@ -47,5 +47,8 @@ class Resonance(Cause):
         # exact for an output that is straight between samples
         b, a, _ = signal.cont2discrete(oscillator, frame.dt_s, method="foh")
         b = b.ravel()
-        state = np.multiply.outer(signal.lfilter_zi(b, a), y[0])
-        return np.asarray(signal.lfilter(b, a, y, axis=0, zi=state)[0])
+        at_first = np.multiply.outer(signal.lfilter_zi(b, a), y[0])
+        state = remembered(frame.past, self.id, at_first)
+        moved, state = signal.lfilter(b, a, y, axis=0, zi=state)
+        remember(frame.past, self.id, state)
+        return np.asarray(moved)

@@ -49,5 +49,8 @@ class ThermalDrift(Cause):
 
 def _weakened(y: FloatArray, values: Values, frame: Frame, begin: float) -> FloatArray:
     """Output of a coil whose heat begins at ``begin``."""
-    heat = low_pass(np.append(begin, frame.input**2), values[1], frame.dt_s)[1:]
+    squared = frame.input**2
+    if frame.past is None or not frame.past.before:  # the first sample already heats
+        squared = np.append(begin, squared)
+    heat = low_pass(squared, values[1], frame.dt_s, frame.past, "heat")[-y.size :]
     return np.asarray(y * (1.0 - values[0] * heat))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
 _TRIED = 0.01  # of the span at the usual speed
 _NO_SPEED = 1e-12  # input units a second: an input at rest
@@ -36,4 +36,6 @@ class Viscous(Cause):
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
         # the rate before the sample, not around it: at a turn the output jumps after the turn
-        return y + values[0] * np.diff(frame.input, prepend=frame.input[0]) / frame.dt_s
+        before = remembered(frame.past, self.id, frame.input[:1])
+        remember(frame.past, self.id, frame.input[-1:])
+        return y + values[0] * np.diff(frame.input, prepend=before) / frame.dt_s
