@@ -20,6 +20,7 @@ class Shape:
     time_s: FloatArray  # (n,) from 0
     value: FloatArray  # (n,) any unit; 0..1 in the library
     source: str = ""
+    feet_s: tuple[float, ...] = (0.0,)  # where its beats begin, from the first sample on
 
     def __post_init__(self) -> None:
         t = finite_vector("time", self.time_s, at_least=4)
@@ -36,6 +37,13 @@ class Shape:
             raise ArgumentError(
                 f"the waveform {self.name} is too long or too high for numbers: {length:g} s, {span:g}",
                 hint="give its time in s and values of any usual size",
+            )
+        feet = np.append(self.feet_s, length)
+        if feet[0] != 0.0 or not np.all(np.diff(feet) > 0):
+            raise ArgumentError(
+                f"the beats of the waveform {self.name} must begin at 0 and rise within its {length:g} s, "
+                f"got {self.feet_s}",
+                hint="correct the comment `beats:` of the table",
             )
         if span == 0:
             raise ArgumentError(

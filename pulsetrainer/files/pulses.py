@@ -58,5 +58,12 @@ def read_pulse(name: str) -> Shape:
             hint="write two columns: t_s,p",
         )
     time_s, value = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
-    source = next((c.partition(":")[2].strip() for c in columns.comments if c.startswith("source:")), "")
-    return Shape(path.stem, time_s, value, source or path.name)
+    said = {c.partition(":")[0]: c.partition(":")[2].strip() for c in columns.comments}
+    try:
+        feet_s = tuple(float(foot) for foot in said.get("beats", "0").split())
+    except ValueError as error:
+        raise DataError(
+            f"{path}: the comment `beats:` is {said['beats']!r}, expected the times at which beats begin, s",
+            hint="write `# beats: 0 0.8` for two beats, or leave it out for one",
+        ) from error
+    return Shape(path.stem, time_s, value, said.get("source") or path.name, feet_s)
