@@ -32,6 +32,7 @@ FloatArray = NDArray[np.float64]
 
 DT_S = 0.001
 BEAT_S = 0.8  # 75 beats per minute
+FOOT_S = (-0.1, 0.1)  # of a beat, about the opening of the valve
 DECAYED_S = 8.0  # tails older than this are below the sixth decimal that is written
 
 
@@ -83,11 +84,7 @@ class Pulse:
     source: str
     mmHg: tuple[int, int]  # what 0 and 1 would be in such a patient; an example, not a measurement
     beats: tuple[Beat, ...]
-
-    @property
-    def period_s(self) -> float:
-        """Length of the record."""
-        return BEAT_S * len(self.beats)
+    period_s: float  # of the record
 
 
 NORMAL = (
@@ -110,6 +107,45 @@ TARDUS = (
     Lobe(0.85, 0.315, 0.36),
     RunOff(0.45, 0.25, 0.60),
 )
+# A weak heart: hardly a tidal wave, and the recoil after the notch is a second pulse.
+DICROTIC = (
+    Lobe(1.00, 0.112, 0.32),
+    Lobe(0.10, 0.230, 0.18),
+    Lobe(0.62, 0.440, 0.150),
+    RunOff(0.45, 0.12, 0.60),
+)
+# A large volume against an open runoff: up at once, down at once, no notch.
+COLLAPSING = (
+    Lobe(1.00, 0.098, 0.30),
+    Lobe(0.30, 0.215, 0.24),
+    RunOff(0.34, 0.10, 0.30),
+)
+# A narrow valve again, but the shoulder of the upstroke is a notch of its own.
+ANACROTIC = (
+    Lobe(0.62, 0.098, 0.42),
+    Lobe(1.00, 0.280, 0.28),
+    RunOff(0.50, 0.25, 0.60),
+)
+# Stiff arteries: the reflected wave is back before systole ends and tops the percussion wave; a steep runoff.
+STIFF = (
+    Lobe(0.86, 0.108, 0.32),
+    Lobe(0.78, 0.235, 0.25),
+    Lobe(0.10, 0.420, 0.14),
+    RunOff(0.80, 0.14, 0.50),
+)
+# A fast heart ejects a little faster, a slow one a little slower: by the root of the interval (Bazett 1920).
+FAST = (
+    Lobe(1.00, 0.090, 0.33),
+    Lobe(0.28, 0.188, 0.18),
+    Lobe(0.24, 0.322, 0.135),
+    RunOff(0.80, 0.09, 0.55),
+)
+SLOW = (
+    Lobe(1.00, 0.142, 0.35),
+    Lobe(0.38, 0.318, 0.19),
+    Lobe(0.27, 0.548, 0.145),
+    RunOff(0.85, 0.15, 0.85),
+)
 # A premature beat fills less and ejects for a shorter time: its waves come earlier.
 PREMATURE = (
     Lobe(1.00, 0.105, 0.33),
@@ -126,6 +162,26 @@ def _respiration(beats: int, fall: float) -> tuple[Beat, ...]:
     return tuple(Beat(BEAT_S * k, float(s), NORMAL) for k, s in enumerate(strengths))
 
 
+def _irregular(beats: int, mean_s: float, spread: float, seed: int) -> tuple[tuple[Beat, ...], float]:
+    """Return beats at irregular intervals, and how long they last together.
+
+    Intervals are independent, gamma distributed with a coefficient of variation ``spread`` and not under
+    0.4 s. A beat is as strong as the interval before it let the heart fill: 1 - exp(-interval / 0.35 s).
+    """
+    rng = np.random.default_rng(seed)
+    shape = spread**-2
+    drawn = np.maximum(rng.gamma(shape, mean_s / shape, beats), 0.4)
+    intervals = np.round(drawn * (mean_s * beats / drawn.sum()), 3)
+    onsets = np.cumsum(intervals) - intervals
+    strengths = 1.0 - np.exp(-np.roll(intervals, 1) / 0.35)
+    strengths /= strengths.max()
+    found = tuple(Beat(float(at), float(s), NORMAL) for at, s in zip(onsets.round(3), strengths, strict=True))
+    return found, float(intervals.sum().round(3))
+
+
+FIBRILLATING, FIBRILLATING_S = _irregular(20, 0.66, 0.24, 7)
+
+BAZETT = "Bazett HC, An analysis of the time-relations of electrocardiograms, Heart 1920, 7, 353-370"
 MCGEE = "McGee S, Evidence-Based Physical Diagnosis, 4th ed., Elsevier 2018, chapter 'Pulse Rate and Contour'"
 TRAUBE = (
     "Traube L, Ein Fall von Pulsus bigeminus nebst Bemerkungen ueber die Leberschwellungen bei "
@@ -139,6 +195,7 @@ LIBRARY = (
         source="Nichols WW, O'Rourke MF, Vlachopoulos C, McDonald's Blood Flow in Arteries, 6th ed., 2011",
         mmHg=(80, 120),
         beats=(Beat(0.0, 1.0, NORMAL),),
+        period_s=BEAT_S,
     ),
     Pulse(
         name="bifid",
@@ -148,6 +205,7 @@ LIBRARY = (
         "Pulse Reproduction, Sensors 2018, 18(5), 1631",
         mmHg=(60, 140),
         beats=(Beat(0.0, 1.0, BISFERIENS),),
+        period_s=BEAT_S,
     ),
     Pulse(
         name="alternans",
@@ -155,6 +213,7 @@ LIBRARY = (
         source=f"{TRAUBE}; {MCGEE}",
         mmHg=(80, 120),
         beats=(Beat(0.0, 1.0, NORMAL), Beat(BEAT_S, 0.62, NORMAL)),
+        period_s=2 * BEAT_S,
     ),
     Pulse(
         name="paradoxus",
@@ -164,6 +223,7 @@ LIBRARY = (
         f"Berliner klinische Wochenschrift 1873, 10, 433-435; {MCGEE}",
         mmHg=(75, 120),
         beats=_respiration(5, 0.45),
+        period_s=5 * BEAT_S,
     ),
     Pulse(
         name="parvus-et-tardus",
@@ -173,6 +233,7 @@ LIBRARY = (
         "severity and prediction of clinical outcome, American Heart Journal 1999, 137(2), 298-306",
         mmHg=(85, 107),
         beats=(Beat(0.0, 1.0, TARDUS),),
+        period_s=BEAT_S,
     ),
     Pulse(
         name="bigeminus",
@@ -181,12 +242,109 @@ LIBRARY = (
         source=TRAUBE,
         mmHg=(75, 125),
         beats=(Beat(0.0, 1.0, NORMAL), Beat(0.50, 0.50, PREMATURE)),
+        period_s=2 * BEAT_S,
+    ),
+    Pulse(
+        name="dicrotic",
+        meaning="dicrotic pulse, a second wave after the notch that a finger feels: low stroke volume with "
+        "soft arteries, as in cardiomyopathy, tamponade, fever",
+        source="Ewy GA, Rios JC, Marcus FI, The dicrotic arterial pulse, Circulation 1969, 39, 655-661; "
+        f"{MCGEE}",
+        mmHg=(70, 100),
+        beats=(Beat(0.0, 1.0, DICROTIC),),
+        period_s=BEAT_S,
+    ),
+    Pulse(
+        name="water-hammer",
+        meaning="hyperkinetic, collapsing or water-hammer pulse, up at once and down at once: aortic "
+        "regurgitation, fever, anaemia, thyrotoxicosis",
+        source="Corrigan DJ, On permanent patency of the mouth of the aorta, Edinburgh Medical and Surgical "
+        f"Journal 1832, 37, 225-245; {MCGEE}",
+        mmHg=(45, 165),
+        beats=(Beat(0.0, 1.0, COLLAPSING),),
+        period_s=BEAT_S,
+    ),
+    Pulse(
+        name="anacrotic",
+        meaning="anacrotic pulse, a notch on the slow upstroke: aortic stenosis",
+        source=MCGEE,
+        mmHg=(85, 115),
+        beats=(Beat(0.0, 1.0, ANACROTIC),),
+        period_s=BEAT_S,
+    ),
+    Pulse(
+        name="stiff",
+        meaning="the pulse of stiff arteries in old age, a late systolic peak above the early one and a "
+        "steep fall: the reflected wave returns within systole",
+        source="Murgo JP et al., Aortic input impedance in normal man: relationship to pressure wave forms, "
+        "Circulation 1980, 62, 105-116 (type A); Kelly R et al., Noninvasive determination of age-related "
+        "changes in the human arterial pulse, Circulation 1989, 80, 1652-1659",
+        mmHg=(75, 155),
+        beats=(Beat(0.0, 1.0, STIFF),),
+        period_s=BEAT_S,
+    ),
+    Pulse(
+        name="tachycardia",
+        meaning="a fast regular pulse, 130 a minute: exercise, fever, blood loss",
+        source=f"{BAZETT}; {MCGEE}",
+        mmHg=(75, 105),
+        beats=(Beat(0.0, 1.0, FAST),),
+        period_s=0.462,
+    ),
+    Pulse(
+        name="bradycardia",
+        meaning="a slow regular pulse, 45 a minute, large because the heart fills long: athletes, "
+        "heart block",
+        source=f"{BAZETT}; {MCGEE}",
+        mmHg=(70, 140),
+        beats=(Beat(0.0, 1.0, SLOW),),
+        period_s=1.333,
+    ),
+    Pulse(
+        name="atrial-fibrillation",
+        meaning="irregularly irregular, no two intervals alike, weak beats after short ones: "
+        "atrial fibrillation; 20 beats drawn once, 91 a minute",
+        source="Rawles JM, Rowland E, Is the pulse in atrial fibrillation irregularly irregular?, British "
+        f"Heart Journal 1986, 56, 4-11; {MCGEE}",
+        mmHg=(75, 120),
+        beats=FIBRILLATING,
+        period_s=FIBRILLATING_S,
+    ),
+    Pulse(
+        name="premature-atrial",
+        meaning="a regular pulse with one premature atrial beat in six, without a full compensatory pause: "
+        "the sinus node is reset and begins anew",
+        source=MCGEE,
+        mmHg=(80, 120),
+        beats=(
+            *(Beat(BEAT_S * k, 1.0, NORMAL) for k in range(5)),
+            Beat(4.0 * BEAT_S + 0.52, 0.62, PREMATURE),
+        ),
+        period_s=4.0 * BEAT_S + 0.52 + 0.90,
+    ),
+    Pulse(
+        name="alternans-mild",
+        meaning="pulsus alternans of little depth, 18 % between strong and weak beats: early failure of the "
+        "left ventricle, felt by a practised finger",
+        source=f"{TRAUBE}; {MCGEE}",
+        mmHg=(80, 120),
+        beats=(Beat(0.0, 1.0, NORMAL), Beat(BEAT_S, 0.82, NORMAL)),
+        period_s=2 * BEAT_S,
+    ),
+    Pulse(
+        name="alternans-severe",
+        meaning="pulsus alternans of great depth, the weak beat hardly felt: severe failure of the "
+        "left ventricle",
+        source=f"{TRAUBE}; {MCGEE}",
+        mmHg=(80, 120),
+        beats=(Beat(0.0, 1.0, NORMAL), Beat(BEAT_S, 0.32, NORMAL)),
+        period_s=2 * BEAT_S,
     ),
 )
 
 
-def draw(pulse: Pulse) -> FloatArray:
-    """Return one period of ``pulse``, shape (period / DT_S,), 0..1, from its lowest diastolic foot."""
+def _pressure(pulse: Pulse) -> FloatArray:
+    """Return one period of ``pulse``, shape (period / DT_S,), from the opening of its first valve."""
     t_s: FloatArray = DT_S * np.arange(round(pulse.period_s / DT_S), dtype=np.float64)
     p = np.zeros_like(t_s)
     for turn in range(int(np.ceil(DECAYED_S / pulse.period_s)) + 1):
@@ -194,9 +352,27 @@ def draw(pulse: Pulse) -> FloatArray:
             age_s = t_s + (turn * pulse.period_s - beat.onset_s)
             for wave in beat.waves:
                 p += beat.strength * wave.at(age_s)
+    return p
+
+
+def draw(pulse: Pulse) -> FloatArray:
+    """Return one period of ``pulse``, shape (period / DT_S,), 0..1, from its lowest diastolic foot."""
+    p = _pressure(pulse)
     p = np.roll(p, -int(np.argmin(p)))
     scaled: FloatArray = (p - p.min()) / np.ptp(p)
     return scaled
+
+
+def feet(pulse: Pulse) -> tuple[float, ...]:
+    """Return when the beats of the record begin, s: the lowest sample about each opening of the valve."""
+    p = _pressure(pulse)
+    start = int(np.argmin(p))
+    around = np.arange(round(FOOT_S[0] / DT_S), round(FOOT_S[1] / DT_S))
+    found = []
+    for beat in pulse.beats:
+        near = (around + round(beat.onset_s / DT_S)) % p.size
+        found.append(int(near[np.argmin(p[near])] - start) % p.size)
+    return tuple(round(at * DT_S, 3) for at in sorted(found))
 
 
 def table(pulse: Pulse) -> str:
@@ -207,6 +383,7 @@ def table(pulse: Pulse) -> str:
         f"# meaning: {pulse.meaning}",
         f"# source: {pulse.source}",
         f"# scale: p = 0 stands for {low} mmHg and p = 1 for {high} mmHg in an exemplary patient",
+        f"# beats: {' '.join(f'{at:g}' for at in feet(pulse))}",
         "# licence: MIT; drawn for this project by waveforms/make.py, not recorded from a patient",
         "t_s,p",
     ]

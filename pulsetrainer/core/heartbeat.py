@@ -1,7 +1,7 @@
 """Single beats of a pulse, drawn at any length: what a session is put together of.
 
-A shorter interval takes most from diastole. With T0 the beat's own interval and T the one asked for, time runs in
-the beat as
+A shorter interval takes most from diastole. With T0 the beat's own interval and T the one asked for,
+time runs in the beat as
 
     tau(t) / T0 = a x + (1 - a) x^2,    x = t / T,    a = sqrt(T / T0)
 

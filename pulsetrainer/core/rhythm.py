@@ -1,7 +1,7 @@
 """The rhythm of a heart: how long each beat lasts and how strong it is, from a seed.
 
-Every number depends on the seed and the number of the beat alone, so that a beat can be asked for twice. Of the
-beats' intervals, as a share of the even one:
+Every number depends on the seed and the number of the beat alone, so that a beat can be asked for twice. The
+intervals between beats, as a share of the even one:
 
     (1 + v g_k) (1 + r sin(2 pi f t))     v: variability, g_k: standard normal; r: respiration
 

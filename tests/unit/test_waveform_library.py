@@ -3,15 +3,34 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import sys
 
 import numpy as np
 import pytest
 
+from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.resources import waveforms_dir
 
 FOLDER = waveforms_dir()
-NAMES = ("normal", "bifid", "alternans", "paradoxus", "parvus-et-tardus", "bigeminus")
+NAMES = (
+    "normal",
+    "bifid",
+    "alternans",
+    "paradoxus",
+    "parvus-et-tardus",
+    "bigeminus",
+    "dicrotic",
+    "water-hammer",
+    "anacrotic",
+    "stiff",
+    "tachycardia",
+    "bradycardia",
+    "atrial-fibrillation",
+    "premature-atrial",
+    "alternans-mild",
+    "alternans-severe",
+)
 
 
 def _script():
@@ -42,7 +61,7 @@ def _turning_points(p):
 
 
 def test_library_is_complete():
-    """The script draws the six records, and the folder holds no other."""
+    """The script draws these records, and the folder holds no other."""
     assert tuple(pulse.name for pulse in MAKE.LIBRARY) == NAMES
     assert {path.stem for path in FOLDER.glob("*.csv")} == set(NAMES)
 
@@ -68,7 +87,7 @@ def test_comments_name_meaning_and_source(name):
     """A reader of the file alone learns what it is and where it comes from."""
     comments, _, _ = _read(name)
     fields = dict(line[2:].split(": ", 1) for line in comments)
-    assert list(fields) == ["name", "meaning", "source", "scale", "licence"]
+    assert list(fields) == ["name", "meaning", "source", "scale", "beats", "licence"]
     assert fields["name"] == name
     assert "drawn for this project" in fields["licence"]
 
@@ -79,7 +98,7 @@ def test_record_is_normalised_and_periodic(name):
     _, t_s, p = _read(name)
     assert p[0] == p.min() == 0.0
     assert p.max() == 1.0
-    assert np.isclose(t_s.size * MAKE.DT_S / 0.8 % 1, 0) or np.isclose(t_s.size * MAKE.DT_S / 0.8 % 1, 1)
+    assert t_s.size == round(next(x.period_s for x in MAKE.LIBRARY if x.name == name) / MAKE.DT_S)
     slope = np.diff(p, append=p[0]) / MAKE.DT_S
     bend = np.diff(slope, prepend=slope[-1]) / MAKE.DT_S
     assert abs(slope[0]) < 0.1
@@ -88,13 +107,27 @@ def test_record_is_normalised_and_periodic(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_mean_rate_is_75_beats_per_minute(name):
-    """Steepest rises counted: one per beat, 0.8 s on the average."""
-    _, t_s, p = _read(name)
-    slope = np.gradient(np.tile(p, 3))[p.size : 2 * p.size]
-    rising = slope > 0.3 * slope.max()
-    onsets = np.count_nonzero(rising & ~np.roll(rising, 1))
-    assert onsets == round(t_s.size * MAKE.DT_S / 0.8)
+def test_each_beat_begins_at_a_foot(name):
+    """One steep rise in each beat, after its foot, which is a low point of the record."""
+    shape = read_pulse(name)
+    p, feet = shape.value, np.round(np.asarray(shape.feet_s) / MAKE.DT_S).astype(int)
+    _, troughs = _turning_points(p)
+    for begin, end in zip(feet, [*feet[1:], p.size], strict=True):
+        assert np.abs(troughs - begin).min() <= 1 or begin == 0
+        beat = p[begin:end]
+        assert np.argmax(np.diff(beat)) < min(0.35, 0.5 * beat.size * MAKE.DT_S) / MAKE.DT_S
+        assert beat.max() > beat[0] + 0.2
+    assert len(feet) == len(next(x.beats for x in MAKE.LIBRARY if x.name == name))
+
+
+@pytest.mark.parametrize(
+    ("name", "bpm"),
+    [(n, 75) for n in NAMES[:10]] + [("tachycardia", 130), ("bradycardia", 45), ("atrial-fibrillation", 91)],
+)
+def test_mean_rates(name, bpm):
+    """As the table says."""
+    shape = read_pulse(name)
+    assert 60 * len(shape.feet_s) / shape.period_s == pytest.approx(bpm, abs=0.5)
 
 
 def test_normal_has_the_shape_of_a_recorded_beat():
@@ -162,3 +195,83 @@ def test_bigeminus_couples_a_premature_beat():
     assert coupling_s < 0.6
     assert 1.6 - coupling_s > 1.0
     assert 0.4 < p[second] < 0.8
+
+
+def test_dicrotic_has_a_second_wave_that_a_finger_feels():
+    """After a deep notch the second wave is over half as high as the first, and comes in diastole."""
+    _, t_s, p = _read("dicrotic")
+    peaks, troughs = _turning_points(p)
+    assert peaks.size == 2
+    assert t_s[peaks[1]] > 0.35
+    assert p[peaks[1]] > 0.5
+    assert p[peaks[1]] - p[troughs[1]] > 0.3
+
+
+def test_water_hammer_rises_and_falls_faster_than_normal():
+    """Half the time above half the height; the widest pulse pressure of the library; no second peak."""
+    _, _, p = _read("water-hammer")
+    _, _, normal = _read("normal")
+    assert np.count_nonzero(p > 0.5) < 0.65 * np.count_nonzero(normal > 0.5)
+    assert np.diff(p).max() > np.diff(normal).max()
+    assert np.diff(p).min() < 1.2 * np.diff(normal).min()
+    assert _turning_points(p)[0].size == 1
+    assert max(MAKE.LIBRARY, key=lambda x: x.mmHg[1] - x.mmHg[0]).name == "water-hammer"
+
+
+def test_anacrotic_has_its_notch_on_the_way_up():
+    """A small peak in the first half of the rise, then the late and higher one."""
+    _, t_s, p = _read("anacrotic")
+    peaks, troughs = _turning_points(p)
+    assert peaks.size == 2
+    assert t_s[peaks[0]] < 0.12
+    assert 0.2 < t_s[peaks[1]] < 0.35
+    assert 0.3 < p[peaks[0]] < 0.8
+    assert p[peaks[0]] - p[troughs[1]] > 0.02
+
+
+def test_stiff_arteries_peak_late():
+    """Type A of Murgo: the second systolic peak is higher by more than 12 % of the pulse."""
+    _, t_s, p = _read("stiff")
+    peaks, _ = _turning_points(p)
+    assert t_s[peaks[0]] < 0.13 < t_s[peaks[1]] < 0.25
+    assert p[peaks[1]] - p[peaks[0]] > 0.12
+
+
+def test_fast_and_slow_hearts_keep_the_root_of_the_interval():
+    """The peak comes at the root of the interval's change, as systole is shortened (Bazett)."""
+    _, t_s, normal = _read("normal")
+    for name in ("tachycardia", "bradycardia"):
+        _, t, p = _read(name)
+        expected = t_s[np.argmax(normal)] * np.sqrt(t.size / t_s.size)
+        assert t[np.argmax(p)] == pytest.approx(expected, rel=0.12)
+
+
+def test_atrial_fibrillation_is_irregularly_irregular():
+    """Intervals vary by a fifth, none is tied to the one before, and a beat is weaker after a short one."""
+    shape = read_pulse("atrial-fibrillation")
+    feet = np.append(shape.feet_s, shape.period_s)
+    intervals = np.diff(feet)
+    assert 0.15 < intervals.std() / intervals.mean() < 0.3
+    assert abs(np.corrcoef(intervals[1:], intervals[:-1])[0, 1]) < 0.45
+    at = np.round(feet / MAKE.DT_S).astype(int)
+    heights = np.array([shape.value[a:b].max() - shape.value[a] for a, b in itertools.pairwise(at)])
+    assert np.corrcoef(intervals, np.roll(heights, -1))[0, 1] > 0.7
+
+
+def test_premature_atrial_beat_resets_the_rhythm():
+    """Early and weaker; the interval after it is longer than usual, but together they are under two."""
+    shape = read_pulse("premature-atrial")
+    intervals = np.diff(np.append(shape.feet_s, shape.period_s))
+    coupling, pause = intervals[-2], intervals[-1]
+    assert coupling < 0.7 * 0.8
+    assert pause > 0.8
+    assert coupling + pause < 1.9 * 0.8
+
+
+def test_alternans_of_three_depths():
+    """18, 38 and 68 % between strong and weak beats, to what the run-off of the beat before adds."""
+    depths = []
+    for name in ("alternans-mild", "alternans", "alternans-severe"):
+        strong, weak = _systolic_peaks(_read(name)[2], 2)
+        depths.append(1.0 - weak / strong)
+    np.testing.assert_allclose(depths, [0.18, 0.38, 0.68], atol=0.08)
