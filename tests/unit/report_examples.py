@@ -39,7 +39,7 @@ def device(current):
 
 def pulse(name="normal", beats=3, dt_s=0.004):
     """Return (time, p) of a library pulse."""
-    rows = np.loadtxt(waveforms_dir() / f"{name}.csv", delimiter=",", skiprows=6)
+    rows = np.loadtxt(waveforms_dir() / f"{name}.csv", delimiter=",", skiprows=7)
     step = round(dt_s / 0.001)
     p = np.tile(rows[::step, 1], beats)
     return np.arange(p.size) * dt_s, p
