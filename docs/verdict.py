@@ -82,7 +82,8 @@ def _causes() -> Iterator[str]:
         lines = inspect.getsource(inspect.getmodule(type(cause))).splitlines()
         rows = [found for line in lines if line.startswith("_") and (found := _LINE.match(line))]
         if rows:
-            yield f"### {name}: {cause.title}\n\n`{cause.formula}`\n\n| name | value | what it guards |\n|---|---|---|"
+            title = cause.title.format(input="input", output="output")
+            yield f"### {name}: {title}\n\n`{cause.formula}`\n\n| name | value | what it guards |\n|---|---|---|"
             yield from map(_row, rows)
             yield ""
 

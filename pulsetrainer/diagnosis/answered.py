@@ -27,6 +27,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     given = state.question.given
     assert given is not None
     problem, model = state.problem, given.model
+    scale = state.scale
     percent = PERCENT / float(np.ptp(problem.measured))
     rms, extended = _rms_given(state, model), state.current if state.extends else state.baseline
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
@@ -36,7 +37,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         verdict=state.verdict,
         quick=state.question.quick,
         rms=rms,
-        rms_percent=rms * percent,
+        rms_percent=rms * percent / scale.span,
         noise_percent=state.floor.noise * percent,
         static_percent=state.baseline.rms * percent,
         extended_percent=extended.rms * percent,
@@ -45,11 +46,11 @@ def diagnosis_of(state: State) -> Diagnosis:
         evidence=tuple(wording.sentence(one, words) for one in state.evidence),
         next_experiment=wording.advice(state.advice),
         profiles=_profiles(state, words),
-        time_s=(problem.bins.time_s + ends[problem.bins.record])[thin],
-        input=problem.bins.average([r.input for r in problem.records])[thin],
-        output=sign * problem.measured[thin],
-        before=sign * (problem.measured - state.baseline.residual)[thin],
-        after=sign * (problem.measured - state.current.residual)[thin],
+        time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
+        input=scale.inputs(problem.bins.average([r.input for r in problem.records]))[thin],
+        output=sign * scale.outputs(problem.measured)[thin],
+        before=sign * scale.outputs(problem.measured - state.baseline.residual)[thin],
+        after=sign * scale.outputs(problem.measured - state.current.residual)[thin],
         extended=extended_model(state, model),
         input_unit=model.input_unit,
         output_unit=model.output_unit,
@@ -81,7 +82,7 @@ def _rms_given(state: State, model: Model) -> float:
     """Rms error of the model as it was given, over the samples with weight."""
     errors = [
         (predict(model, r.input, r.step) * model.polarity - r.output)[r.sample_weight > 0]
-        for r in state.problem.records
+        for r in map(state.scale.restored, state.problem.records)
     ]
     return root_mean_square(np.concatenate(errors))
 
@@ -108,12 +109,13 @@ def _cause(finding: Finding, words: Words) -> Cause:
 
 
 def _profiles(state: State, words: Words) -> tuple[Profile, ...]:
-    before, after, unit = state.baseline.residual, state.current.residual, words["y"]
+    scale, unit = state.scale, words["y"]
+    before, after = scale.span * state.baseline.residual, scale.span * state.current.residual
     found = [
         Profile(
             group.name,
             _unit(group.unit, words),
-            group.at,
+            scale.places(group.at, group.unit),
             residual.rms_by(group, before),
             residual.rms_by(group, after),
             unit,
@@ -122,7 +124,7 @@ def _profiles(state: State, words: Words) -> tuple[Profile, ...]:
     ]
     frequency, first = residual.spectrum(state.problem, before)
     second = residual.spectrum(state.problem, after)[1]
-    return (*found, Profile("frequency", "Hz", frequency, first, second, unit))
+    return (*found, Profile("frequency", "Hz", scale.places(frequency, "Hz"), first, second, unit))
 
 
 def extended_model(state: State, model: Model) -> Model | None:
@@ -136,11 +138,11 @@ def extended_model(state: State, model: Model) -> Model | None:
     lasting = state.extensions
     if not lasting:
         return None
-    low, high = float(model.edges[0]), float(model.edges[-1])
-    plane = Plane(model.edges)
+    plane, scale = Plane(model.edges), state.scale
     if plane.n_h > LIMITS.extended_levels or not _is_even(plane):
+        low, high = float(model.edges[0]), float(model.edges[-1])
         plane = Plane.uniform(low, high, min(plane.n_h, LIMITS.extended_levels))
-    problem = problem_for(state.problem.records, low, high, plane.n_h)
+    problem = problem_for(state.problem.records, 0.0, 1.0, plane.n_h)
     terms = state.current.terms
     operator = weights_for(problem, terms, None).simulator.operator
     seen = [
@@ -150,9 +152,9 @@ def extended_model(state: State, model: Model) -> Model | None:
     words = {"u": model.input_unit, "y": model.output_unit}
     return Model(
         edges=plane.edges,
-        weights=operator.weights,
-        offset=model.polarity * operator.offset,
-        covered=coverage(plane, seen),
+        weights=operator.weights * scale.span / scale.reach**2,
+        offset=model.polarity * (scale.zero + scale.span * operator.offset),
+        covered=coverage(problem.plane, seen),
         weights_unit=model.weights_unit,
         input_unit=model.input_unit,
         output_unit=model.output_unit,

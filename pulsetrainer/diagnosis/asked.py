@@ -1,10 +1,11 @@
-"""From runs and a model to the question: records on even time steps, of polarity 1, in the model's range."""
+"""From runs and a model to the question: records as measured, of polarity 1, in the model's range."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.initial_state import known_from
@@ -30,19 +31,22 @@ def question_of(
     ------
     DataError
         Runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is too
-        short, or has too many gaps or samples without a number.
+        short, or has too few samples with a number.
     """
     low, high = float(model.edges[0]), float(model.edges[-1])
     *called, model_name = names or (*(f"run {k}" for k in range(1, len(runs) + 1)), "the model")
     records, notes = [], []
+    stamps: list[FloatArray | None] = []
     for name, run in zip(called, runs, strict=True):
         _check_fits(name, run, model_name, model)
-        parts = run.parts(LIMITS.least_samples)
-        records += [measured_of(name, part, model.polarity, low, high) for part in parts]
+        for part in run.parts(LIMITS.least_samples):
+            record, times = measured_of(name, part, model.polarity, low, high)
+            records.append(record)
+            stamps.append(times)
         if not run.complete:
             notes.append(f"{name} is incomplete; diagnosing the {run.input.size} samples it has")
     given = Given(model, runs[0].input_quantity, runs[0].output_quantity)
-    return Question(records, low, high, rng, quick, progress, given, tuple(notes))
+    return Question(records, low, high, rng, quick, progress, given, tuple(notes), stamps)
 
 
 def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
@@ -70,65 +74,37 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
         )
 
 
-def measured_of(name: str, run: Run, polarity: int, low: float, high: float) -> Record:
-    """Return a run on even time steps; filled gaps and samples that are not numbers have no weight.
+def measured_of(
+    name: str, run: Run, polarity: int, low: float, high: float
+) -> tuple[Record, FloatArray | None]:
+    """Return the samples of a run that are numbers, and their times; None where the steps are even.
 
     Raises
     ------
     DataError
-        The run is too short, or has more gaps than samples.
+        The run is too short.
     """
-    if run.input.size < LIMITS.least_samples:
-        raise DataError(
-            f"{name} has only {run.input.size} samples, too few to tell causes apart", hint="record longer"
-        )
-    step = run.dt_s
-    if step is None or run.time_s is None:
-        return _untimed(name, run, polarity, low, high)
-    t = run.time_s - run.time_s[0]
-    count = round(float(t[-1]) / step) + 1
-    if count * LIMITS.least_present > t.size:
-        raise DataError(
-            f"{name} has {t.size} samples where even steps of {step:.4g} s would have {count}: "
-            "most of it is gaps",
-            hint="cut it into several runs at the gaps",
-        )
     good = np.isfinite(run.input) & np.isfinite(run.output)
+    if run.reference is not None:
+        good &= np.isfinite(run.reference)
     if good.sum() < LIMITS.least_samples:
-        raise DataError(f"{name} has only {good.sum()} samples with numbers in them", hint="record it again")
-    grid = np.arange(count) * step
-    following = np.clip(np.searchsorted(t[good], grid), 1, int(good.sum()) - 1)
-    hole = t[good][following] - t[good][following - 1] > LIMITS.gap_steps * step
-    u, y = np.interp(grid, t[good], run.input[good]), np.interp(grid, t[good], run.output[good])
-    reference = None if run.reference is None else np.interp(grid, t, run.reference)
-    weight = np.where(hole, 0.0, 1.0)
+        raise DataError(
+            f"{name} has only {good.sum()} samples with numbers in them, too few to tell causes apart",
+            hint="record longer",
+        )
+    u = run.input[good]
+    weight = np.ones(u.size)
     weight[: known_from(u, low, high)] = 0.0
-    return _slower(Record(u, polarity * y, weight, dt_s=step, reference=reference))
+    reference = None if run.reference is None else run.reference[good]
+    step, stamps = _time_of(run, good)
+    return Record(u, polarity * run.output[good], weight, dt_s=step, reference=reference), stamps
 
 
-def _slower(record: Record) -> Record:
-    """Return a record that is no faster than causes need, averaged down."""
-    per = max(1, round(1.0 / (LIMITS.fastest_Hz * record.step)))
-    if per == 1:
-        return record
-    cut = record.input.size // per * per
-
-    def averaged(x: FloatArray) -> FloatArray:
-        return np.asarray(x[:cut].reshape(-1, per).mean(axis=1))
-
-    return Record(
-        averaged(record.input),
-        averaged(record.output),
-        np.where(averaged(record.sample_weight) < 1.0, 0.0, 1.0),
-        dt_s=record.step * per,
-        reference=None if record.reference is None else averaged(record.reference),
-    )
-
-
-def _untimed(name: str, run: Run, polarity: int, low: float, high: float) -> Record:
-    """Return a run of which only the order of the samples is known."""
-    if not (np.isfinite(run.input).all() and np.isfinite(run.output).all()):
-        raise DataError(f"{name} has samples without a number", hint="record it again")
-    weight = np.ones(run.input.size)
-    weight[: known_from(run.input, low, high)] = 0.0
-    return Record(run.input, polarity * run.output, weight, reference=run.reference)
+def _time_of(run: Run, good: NDArray[np.bool_]) -> tuple[float | None, FloatArray | None]:
+    """Return the usual time step, and the times of the good samples where they are not even."""
+    if run.time_s is None or run.dt_s is None:
+        return None, None
+    stamps = run.time_s[good] - run.time_s[good][0]
+    mean = float(stamps[-1]) / (stamps.size - 1)
+    even = np.abs(stamps - np.arange(stamps.size) * mean) < LIMITS.even_within * mean
+    return (mean, None) if even.all() else (run.dt_s, stamps)

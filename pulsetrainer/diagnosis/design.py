@@ -119,7 +119,7 @@ def bins_of(records: Sequence[Record]) -> Bins:
         Hardly any sample has weight.
     """
     duration = sum(r.input.size * r.step for r in records)
-    width = max(LIMITS.bin_s, duration / LIMITS.most_rows)
+    width = max(min(LIMITS.bin_s, duration / LIMITS.enough_rows), duration / LIMITS.most_rows)
     numbers, record, time, widths, count = [], [], [], [], 0
     for k, r in enumerate(records):
         per_bin = max(1, round(width / r.step))

@@ -113,7 +113,8 @@ class Extended:
         plane = self.static.plane
         middle, half = self.static.offset, self.static.total
         ends = (middle - half, middle + half)
-        return Frame(dt_s, u, 2.0 * half, plane.high - plane.low, low=plane.low, ends=ends, past=past)
+        reach = plane.high - plane.low
+        return Frame(dt_s, u, 2.0 * half, reach, low=plane.low, ends=ends, zero=ends[0], past=past)
 
     def __call__(self, u: FloatArray, dt_s: float) -> FloatArray:
         """Output (n,) for an input (n,) at even steps, from negative saturation and rest."""

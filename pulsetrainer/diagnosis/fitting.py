@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import Frame, Quantity
 from pulsetrainer.diagnosis.design import Design, Projector
 from pulsetrainer.diagnosis.extended import Term, chain, in_order, shown_output
 from pulsetrainer.diagnosis.problem import Problem
@@ -67,9 +68,10 @@ class Fitted:
     def moves(self) -> list[tuple[list[Term], float]]:
         """The terms with each parameter moved by a small step, and that step."""
         found = []
+        frame = self.problem.frames[0]
         for k, term in enumerate(self.terms):
-            for j, quantity in enumerate(term.cause.parameters):
-                step = _difference(term, j)
+            for j, quantity in enumerate(term.cause.quantities(frame)):
+                step = _difference(quantity, term.values[j])
                 up = step if term.values[j] + step <= quantity.high else -step
                 moved = list(self.terms)
                 values = list(term.values)
@@ -84,6 +86,7 @@ class Simulator:
 
     def __init__(self, problem: Problem, operator: Preisach) -> None:
         self.problem, self.operator = problem, operator
+        self.frames = [frame.about(operator.offset - operator.total) for frame in problem.frames]
         self._static: dict[tuple[Term, ...], list[FloatArray]] = {}
 
     def inner(self, terms: Sequence[Term]) -> list[FloatArray]:
@@ -102,8 +105,7 @@ class Simulator:
     def full(self, terms: Sequence[Term]) -> list[FloatArray]:
         """Outputs of every record at the full rate."""
         return [
-            shown_output(terms, y, frame)
-            for y, frame in zip(self.inner(terms), self.problem.frames, strict=True)
+            shown_output(terms, y, frame) for y, frame in zip(self.inner(terms), self.frames, strict=True)
         ]
 
     def __call__(self, terms: Sequence[Term]) -> FloatArray:
@@ -161,9 +163,8 @@ def _rows(problem: Problem, terms: Sequence[Term]) -> Design:
     return Design.build(problem.plane, problem.bins, problem.paths(before), problem.smoothing, shown)
 
 
-def _difference(term: Term, j: int) -> float:
-    quantity = term.cause.parameters[j]
-    return max(quantity.small, LIMITS.difference * abs(term.values[j]))
+def _difference(quantity: Quantity, value: float) -> float:
+    return max(quantity.small, LIMITS.difference * abs(value))
 
 
 def refit(
@@ -192,7 +193,7 @@ def refit(
         for _ in range(LIMITS.step_tries):
             ridge = np.eye(normal.shape[0]) * (damping + LIMITS.ridge_steps)
             step = np.linalg.solve(normal + ridge, scaled.T @ fitted.residual) / size
-            trial = weights_for(problem, _moved(fitted.terms, step), fitted)
+            trial = weights_for(problem, _moved(fitted.terms, step, problem.frames[0]), fitted)
             if trial.squares < fitted.squares:
                 better = trial
                 damping *= LIMITS.damping_falls
@@ -207,12 +208,12 @@ def refit(
     return fitted
 
 
-def _moved(terms: Sequence[Term], step: FloatArray) -> tuple[Term, ...]:
+def _moved(terms: Sequence[Term], step: FloatArray, frame: Frame) -> tuple[Term, ...]:
     """Terms after a step, kept within their bounds and within a factor of three of where they were."""
     moved, at = [], 0
     for term in terms:
         values = []
-        for quantity, value in zip(term.cause.parameters, term.values, strict=True):
+        for quantity, value in zip(term.cause.quantities(frame), term.values, strict=True):
             new = value + float(step[at])
             at += 1
             if quantity.low >= 0 and value > 0:

@@ -62,11 +62,22 @@ class Floor:
         )
 
 
-def floor_of(records: Sequence[Record], firings: Sequence[Firing], problem: Problem) -> Floor:
-    """Return the floor of some records from their raw noise and steps, discretisation left out."""
+def floor_of(
+    measured: Sequence[Record], firings: Sequence[Firing], problem: Problem, span: float = 1.0
+) -> Floor:
+    """Return the floor of a problem from its raw noise and steps, discretisation left out.
+
+    Parameters
+    ----------
+    measured
+        The records as they were measured: time steps made even would hide the steps of the output.
+    span
+        What one is in the problem, output unit.
+    """
+    records = problem.records
     noise = float(np.sqrt(np.mean([noise_of(r.output, r.sample_weight) ** 2 for r in records])))
-    step = max(coarse_step(r.output) for r in records)
-    jump = max((f.value for f in firings if f.cause == "stick-slip"), default=0.0)
+    step = max(coarse_step(r.output) for r in measured) / span
+    jump = max((f.value for f in firings if f.cause == "stick-slip"), default=0.0) / span
     held = (step**2 + jump**2) / UNIFORM  # does not average out
     white = float(np.sqrt(noise**2 * np.mean(1.0 / problem.bins.sizes) + held))
     return Floor(problem.bins.count, float(np.ptp(problem.measured)), noise, white)

@@ -39,10 +39,10 @@ def estimates_of(
     aligned = LIMITS.aligned * floor.discretisation * np.sqrt(floor.count) / size
     half = LIMITS.student * np.sqrt(variance) + aligned + systematic
     found: dict[str, tuple[Estimate, ...]] = {}
-    at = 0
+    frame, at = fitted.problem.frames[0], 0
     for term in fitted.terms:
         rows = []
-        for quantity, value in zip(term.cause.parameters, term.values, strict=True):
+        for quantity, value in zip(term.cause.quantities(frame), term.values, strict=True):
             low, high = max(value - half[at], quantity.low), min(value + half[at], quantity.high)
             rows.append(Estimate(quantity.name, value, quantity.unit, float(low), float(high)))
             at += 1
@@ -58,7 +58,7 @@ def _late(fitted: Fitted) -> FloatArray:
 
 def _otherwise(fitted: Fitted) -> list[FloatArray]:
     """What other plausible formulas of the causes would change (count,), weights projected off."""
-    inner, frames = fitted.simulator.inner(fitted.terms), fitted.simulator.problem.frames
+    inner, frames = fitted.simulator.inner(fitted.terms), fitted.simulator.frames
     found = []
     for k, term in enumerate(fitted.terms):
         if term.cause.stage != "output":

@@ -24,6 +24,7 @@ class Raw:
     record: Record
     low: float
     high: float
+    second: float = 1.0  # s: what a second is for the search of causes, see ``scale``
     wild: BoolArray | None = None  # samples that are wrong one by one
 
     @property
@@ -75,9 +76,18 @@ def noise_of(y: FloatArray, weight: FloatArray | None = None) -> float:
     return float(np.median(np.abs(third - np.median(third))) / NORMAL_MAD / np.sqrt(THIRD_DIFFERENCE))
 
 
+def values_of(y: FloatArray) -> FloatArray:
+    """Distinct values (k,) of ``y`` (n,), in order; what only rounding tells apart is one value."""
+    values = np.unique(y)
+    if values.size == 0:
+        return values
+    apart = LIMITS.same_value * (values[-1] - values[0])
+    return np.asarray(values[np.append(True, np.diff(values) > apart)])
+
+
 def spacing_of(y: FloatArray) -> float:
     """Distance of the distinct values of ``y``: the step of its converter."""
-    values = np.unique(y)
+    values = values_of(y)
     return float(np.median(np.diff(values))) if values.size > 1 else 0.0
 
 

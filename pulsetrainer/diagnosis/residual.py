@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+from scipy import ndimage, signal
 
+from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.thresholds import LIMITS, THIRD
 
@@ -95,14 +97,23 @@ def excitation_limits(problem: Problem) -> list[str]:
     )
     if fast < LIMITS.one_rate * slow:
         lacks.append(RATES)
-    rest, longest = speed <= LIMITS.rate_edges[0], 0.0
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], rest.astype(np.int64), [0]))))
-    if edges.size:
-        inside = edges.reshape(-1, 2)
-        duration = problem.bins.time_s[inside[:, 1] - 1] - problem.bins.time_s[inside[:, 0]]
-        longest = float(duration.max())
-    if longest < LIMITS.hold_s:
+    if not any(_holds(record) for record in problem.records):
         lacks.append(HOLDS)
     if problem.bins.time_s.max() < LIMITS.short_s:
         lacks.append(LENGTH)
     return lacks
+
+
+def _holds(record: Record) -> bool:
+    """Whether the input rests somewhere: stays within a small share of its range, or within its noise."""
+    count = round(LIMITS.hold_s / record.step)
+    if count >= record.input.size:
+        return False
+    least = max(count, 1)
+    highest = ndimage.maximum_filter1d(record.input, least)
+    lowest = ndimage.minimum_filter1d(record.input, least)
+    inside = slice(least // 2, record.input.size - least // 2)
+    reach = float(np.ptp(record.input))
+    noise = input_noise.estimate(record.input)
+    band = max(LIMITS.hold_within * reach, LIMITS.hold_noise * noise if np.isfinite(noise) else 0.0)
+    return bool(np.any(highest[inside] - lowest[inside] <= band))

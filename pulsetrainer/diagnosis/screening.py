@@ -21,7 +21,7 @@ from scipy import linalg, signal
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Cause, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.problem import Problem
@@ -91,7 +91,7 @@ def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: in
         Score(
             block.cause,
             gain,
-            _start(block, residual),
+            _start(block, residual, problem.frames[0]),
             p_value(gain, largest),
             block.basis,
         )
@@ -149,16 +149,16 @@ def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Blo
     return found
 
 
-def _start(block: _Block, residual: FloatArray) -> Values:
+def _start(block: _Block, residual: FloatArray, frame: Frame) -> Values:
     """Parameter values scaled by the fitted strengths, within a factor of those tried."""
     strength = block.back @ (block.basis.T @ residual)
     values = list(block.values[0])
-    for j in range(block.cause.strengths):
+    for j, quantity in enumerate(block.cause.quantities(frame)[: block.cause.strengths]):
         tried = block.values[j][j]
         one = tried * float(strength[j])
-        if block.cause.parameters[j].low >= 0:
+        if quantity.low >= 0:
             one = min(max(one, LIMITS.start_falls * tried), LIMITS.start_rises * tried)
-        values[j] = min(max(one, block.cause.parameters[j].low), block.cause.parameters[j].high)
+        values[j] = min(max(one, quantity.low), quantity.high)
     return tuple(float(v) for v in values)
 
 

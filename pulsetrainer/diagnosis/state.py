@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pulsetrainer.artefacts import Model
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.evidence import Evidence
@@ -18,6 +19,7 @@ from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import Score, Screen
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -33,13 +35,13 @@ class Given:
 
 @dataclass(frozen=True)
 class Question:
-    """Records of one device; of polarity 1, at even steps.
+    """Records of one device as they were measured, of polarity 1.
 
     ``low`` and ``high`` are the range of the input that was identified; without ``given`` only the search for
     causes is made, which needs no model.
     """
 
-    records: Sequence[Record]
+    records: Sequence[Record]  # ``dt_s`` is the usual step
     low: float
     high: float
     rng: np.random.Generator
@@ -47,6 +49,7 @@ class Question:
     progress: Callable[[float], None] = lambda _share: None
     given: Given | None = None
     notes: tuple[str, ...] = ()  # what a person should know about the records
+    stamps: Sequence[FloatArray | None] = ()  # s, (n,) times of the samples of each record; None: even steps
 
     @property
     def timed(self) -> bool:
@@ -60,6 +63,7 @@ class State:
 
     question: Question
     firings: tuple[tuple[int, Firing], ...]  # gates that fired, with the number of their record
+    scale: Scale  # the units of the problem: those of the records themselves
     problem: Problem
     coarse: Problem  # the same on fewer levels
     baseline: Fitted  # no cause, weights refitted

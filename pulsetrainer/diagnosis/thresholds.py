@@ -13,19 +13,31 @@ from dataclasses import dataclass
 class Thresholds:
     """The numbers of the procedure; each line says what the number guards."""
 
+    # The units of a record: its own second, see ``scale``; all times below are in it
+    path_piece: float = 0.05  # ranges of the input: pieces of its path whose times are compared
+    crossings: float = 4.286  # of the range in one second: the diagnostic signal's, on which all was tuned
+    most_seconds: float = 3000.0  # of all records: with more the input hardly moves, and has no typical rate
+    span_quantiles: tuple[float, float] = (0.001, 0.999)  # of the output, that its span lies between
+
     # Preparing a record
-    fastest_Hz: float = 1000.0  # faster records are averaged down: no cause of the library is faster
+    fastest_Hz: float = 1000.0  # samples a second: faster records are averaged down ...
+    most_samples: int = 20_000  # ... but to no fewer samples than these
     least_samples: int = 100  # of a record: fewer can be followed by any cause
-    gap_steps: float = 1.5  # median time steps: a longer one is a gap, whose filled samples do not count
+    even_within: float = 0.1  # time steps: stamps that near to even ones are even
+    gap_steps: float = 1.5  # usual time steps: a longer one is a gap, whose filled samples do not count
+    usual_of: int = 31  # neighbouring time steps, whose median is the usual one: rates differ within a record
+    most_even: int = 2_000_000  # even steps that a record is brought to
     least_present: float = 0.5  # share of a record's even steps that must be there
     beyond_range: float = 0.02  # of the model's range: input farther out lies outside it
     least_inside: float = 0.5  # share of the input: with less inside it is another device
-    bin_s: float = 0.005  # length of an average: short enough for a resonance of 70 Hz
+    bin_s: float = 0.005  # length of an average: short enough for a resonance of 70 Hz ...
+    enough_rows: int = 4000  # ... and for so many averages, where there are as many samples
     most_rows: int = 20_000  # averages: longer records get longer averages, so that the fit fits in memory
     least_rows: int = 100  # averages: fewer tell no causes apart
     start_tau_s: tuple[float, ...] = (0.2, 0.8, 3.2)  # decays fitted from a record's start (decision 040)
     start_share: float = 6.0  # time constants of such a decay that a record must hold: else it is an offset
     rows_at_once: int = 2000  # rows brought to cell space in one piece: what fits the cache
+    same_value: float = 1e-9  # of the span: outputs nearer than this are one value, rounded
     noise_least: int = 8  # third differences: fewer tell no noise
     coarse_noise: float = 1.5  # times the noise: larger steps of the output do not average out
 
@@ -133,7 +145,9 @@ class Thresholds:
     fast_quantile: float = 0.9  # ... and the fast ones
     one_rate: float = 3.0  # fast over slow: below, the record has one single rate
     least_moving: int = 20  # averages in motion: fewer have no rates
-    hold_s: float = 0.8  # a rest must last so long to be a hold
+    hold_s: float = 0.8  # a rest must last so long to be a hold ...
+    hold_within: float = 0.02  # ... in which the input stays within this share of its range ...
+    hold_noise: float = 10.0  # ... or within so many standard deviations of its noise
     short_s: float = 20.0  # a shorter record is called short
 
     # The extended model

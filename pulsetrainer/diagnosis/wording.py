@@ -105,7 +105,9 @@ def text(one: Evidence, words: Mapping[str, str] | None = None) -> str:
 
 def cause_text(finding: Finding, words: Mapping[str, str]) -> str:
     """Return what a finding says of its cause."""
-    return finding.cause.title if finding.seen is None else text(finding.seen, words)
+    if finding.seen is not None:
+        return text(finding.seen, words)
+    return finding.cause.title.format(**{"input": "input", "output": "output", **words})
 
 
 def advice(one: Evidence) -> str:

@@ -113,7 +113,8 @@ def _oracle_share(case, answer: State) -> float:
         cause = library()[name]
         if cause.stage == "record" or any(q.name not in truth for q in cause.parameters):
             return float("nan")
-        terms.append(Term(cause, tuple(truth[q.name] for q in cause.parameters)))
+        values = (truth[q.name] / answer.scale.of_unit(q.unit) for q in cause.parameters)
+        terms.append(Term(cause, tuple(values)))
     if not terms or answer.current is answer.baseline:
         return float("nan") if not terms else 0.0
     held_out = HeldOut(answer.problem)

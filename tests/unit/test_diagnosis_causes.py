@@ -56,24 +56,27 @@ def test_creep_is_the_mean_of_three_lags():
 
 @pytest.mark.parametrize("cold", [True, False])
 def test_a_coil_heats_with_the_square_of_the_input(cold):
-    """From rest to 3 at once: h rises over one step, then relaxes to u^2; or it begins at a twentieth."""
+    """From rest to 3 above the low end at once: h rises, then relaxes to 9; or it begins at a twentieth.
+
+    What falls is the output above that of empty memory.
+    """
     k, tau, begin = 0.02, 0.7, 0.0 if cold else 0.05 * 9.0
     first = 9.0 - (9.0 - begin) * tau / DT * (1.0 - np.exp(-DT / tau))
     heat = 9.0 - (9.0 - first) * np.exp(-T / tau)
-    u, y = np.full(T.size, 3.0), 2.0 + T
+    y, frame = 2.0 + T, _frame(np.full(T.size, 4.0), low=1.0, zero=0.5)
     cause = CAUSE["thermal-drift"]
-    found = cause.on_output(y, (k, tau), _frame(u)) if cold else cause.variants(y, (k, tau), _frame(u))[0]
-    np.testing.assert_allclose(found, y * (1.0 - k * heat), atol=1e-12)
+    found = cause.on_output(y, (k, tau), frame) if cold else cause.variants(y, (k, tau), frame)[0]
+    np.testing.assert_allclose(found, y - k * heat * (y - 0.5), atol=1e-12)
 
 
 def test_a_widening_trails_by_the_root_of_the_rate():
     """On a steady ramp u - v = k sqrt(u'), falling as rising; a vanishing coefficient changes nothing."""
-    cause, k = CAUSE["rate-widening"], 0.05
+    cause, k, frame = CAUSE["rate-widening"], 0.05, _frame()
     for sign in (1.0, -1.0):
         u = sign * 4.0 * T
         assert (u - cause.on_input(u, u, (k,), _frame(u)))[-1] == pytest.approx(sign * k * 2.0, rel=0.01)
-    assert cause.on_input(T, T, (1e-9,), _frame()) is T
-    assert cause.on_input(T, T, (2e-9,), _frame()) is not T
+    assert cause.on_input(frame.input, T, (5e-9,), frame) is frame.input
+    assert cause.on_input(T, T, (7e-9,), _frame()) is not T
 
 
 def test_simple_formulas():
@@ -356,7 +359,7 @@ def test_every_text_of_a_gate_has_its_figures():
 
 # --- a new cause is one file
 TOY = '''
-"""A force that no other cause has: y + a sin(0.3 t^2)."""
+"""A force that no other cause has: y + a sin(270 (t/L)^2)."""
 
 import numpy as np
 
@@ -368,7 +371,7 @@ class Toy(Cause):
 
     id = "toy"
     title = "a chirp"
-    formula = "y + a sin(0.3 t^2)"
+    formula = "y + a sin(270 (t/L)^2)"
     signature = "it whistles"
     excitation = "any"
     source = "made up"
@@ -383,7 +386,7 @@ class Toy(Cause):
 
     def on_output(self, y, values, frame):
         """Add it."""
-        return y + values[0] * np.sin(0.3 * frame.time_s**2)
+        return y + values[0] * np.sin(270.0 * (frame.time_s / frame.length_s) ** 2)
 '''
 
 
@@ -401,7 +404,7 @@ def test_a_new_cause_is_one_file(tmp_path, monkeypatch):
         time = np.arange(u.size) / 100
         y = (
             operator(u)
-            + 0.3 * np.sin(0.3 * time**2)
+            + 0.3 * np.sin(270.0 * (time / 30.0) ** 2)
             + 0.01 * np.random.default_rng(6).standard_normal(u.size)
         )
         found = diagnose(Question([Record(u, y, dt_s=0.01)], 0.0, 1.5, np.random.default_rng(0)))

@@ -20,10 +20,14 @@ from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_f
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import p_value
+from pulsetrainer.diagnosis.stages import raw_data
 from pulsetrainer.errors import DataError
 
 CAUSE = library()
+RNG = np.random.default_rng(20260611)
+FRAME = Frame(1e-3, np.zeros(10_000), 1.0, 1.0)
 
 
 # --- the null
@@ -53,15 +57,15 @@ def test_the_gain_of_a_block_is_what_its_columns_can_take_away():
 def test_a_refit_starts_at_the_linearised_strength(along, start):
     """But within a fifth and five times the value that was tried."""
     block = _block("output-lag", ((0.01,),), [[1.0]], [[2.0]])
-    assert screening._start(block, np.asarray([along])) == pytest.approx((start,))
+    assert screening._start(block, np.asarray([along]), FRAME) == pytest.approx((start,))
 
 
 def test_a_signed_strength_stays_within_its_bounds_only():
     """A drift may be of either sign; an amplitude of creep has an upper bound."""
     drift = _block("offset-drift", ((0.01,),), [[1.0]], [[1.0]])
-    assert screening._start(drift, np.asarray([-30.0])) == pytest.approx((-0.3,))
+    assert screening._start(drift, np.asarray([-30.0]), FRAME) == pytest.approx((-0.3,))
     creep = _block("creep", ((0.03, 1.0),), [[1.0]], [[1.0]])
-    assert screening._start(creep, np.asarray([99.0])) == (0.6, 1.0)
+    assert screening._start(creep, np.asarray([99.0]), FRAME) == (0.6, 1.0)
 
 
 # --- the floor
@@ -97,12 +101,13 @@ def test_parameters_move_within_a_factor_of_three_and_their_bounds():
     """A signed one is bounded only by its bounds; the derivative takes two hundredths of the value."""
     lag, drift = Term(CAUSE["output-lag"], (0.01,)), Term(CAUSE["offset-drift"], (0.01,))
     for step, lags, drifts in ((1.0, 0.03, 1.01), (-1.0, 0.01 / 3, -0.99), (0.005, 0.015, 0.015)):
-        (one,), (other,) = (_moved([term], np.asarray([step])) for term in (lag, drift))
+        (one,), (other,) = (_moved([term], np.asarray([step]), FRAME) for term in (lag, drift))
         assert one.values == pytest.approx((lags,))
         assert other.values == pytest.approx((drifts,))
-    assert _moved([Term(CAUSE["output-lag"], (0.4,))], np.asarray([9.0]))[0].values == (0.5,)
-    assert _difference(Term(CAUSE["output-lag"], (0.1,)), 0) == pytest.approx(0.002)
-    assert _difference(Term(CAUSE["output-lag"], (0.001,)), 0) == 0.0005
+    assert _moved([Term(CAUSE["output-lag"], (0.4,))], np.asarray([9.0]), FRAME)[0].values == (0.5,)
+    (tau,) = CAUSE["output-lag"].parameters
+    assert _difference(tau, 0.1) == pytest.approx(0.002)
+    assert _difference(tau, 0.001) == 0.0005
 
 
 def _loops(rate: float = 100.0) -> np.ndarray:
@@ -155,7 +160,9 @@ def test_intervals_hold_noise_levels_moment_and_formula(monkeypatch, jackknife, 
     """2.26 standard deviations, the larger of the two, and the systematic parts beside them."""
     term = Term(CAUSE["output-lag"], (0.3,))
     column = np.asarray([[2.0], [0.0]])
-    fitted = SimpleNamespace(terms=(term,), slopes=column, projector=lambda x: x)
+    fitted = SimpleNamespace(
+        terms=(term,), slopes=column, projector=lambda x: x, problem=SimpleNamespace(frames=[FRAME])
+    )
     monkeypatch.setattr(intervals, "_late", lambda fitted: np.asarray([0.02, 0.0]))
     monkeypatch.setattr(intervals, "_otherwise", lambda fitted: [np.asarray([-0.04, 5.0])])
     noise = SimpleNamespace(draws=np.asarray([[0.4, -0.4], [0.0, 0.0]]))  # 0.2 of the parameter
@@ -198,18 +205,29 @@ def test_residuals_are_grouped():
 
 def test_averages_of_short_bins():
     """Five milliseconds; samples without weight are in none; the offset belongs to all records."""
-    weight = np.ones(1000)
+    weight = np.ones(10_000)
     weight[2] = 0.0
-    record = Record(np.arange(1000.0), np.arange(1000.0), weight, dt_s=1e-3)
+    record = Record(np.arange(10_000.0), np.arange(10_000.0), weight, dt_s=1e-3)
     bins = bins_of([record, record])
-    assert (bins.count, bins.width) == (400, (5, 5))
+    assert (bins.count, bins.width) == (4000, (5, 5))
     averaged = bins.average([record.output, record.output])
     np.testing.assert_allclose(averaged[:2], [(0 + 1 + 3 + 4) / 4, 7.0])
     np.testing.assert_allclose(bins.time_s[:2], [0.0025, 0.0075])
-    np.testing.assert_allclose(bins.even(averaged, 1), averaged[200:])
-    np.testing.assert_allclose(bins.settled(np.full(400, 7.0)), 0.0, atol=1e-12)
+    np.testing.assert_allclose(bins.even(averaged, 1), averaged[2000:])
+    np.testing.assert_allclose(bins.settled(np.full(4000, 7.0)), 0.0, atol=1e-12)
+
+
+def test_short_and_long_records_have_as_many_averages_as_they_can():
+    """A short one keeps its samples, a long one has 20 000 averages; fewer than 100 tell nothing."""
+
+    def bins(count: int, dt: float):
+        return bins_of([Record(np.arange(float(count)), np.arange(float(count)), dt_s=dt)])
+
+    assert bins(100, 1e-3).count == 100
+    assert bins(5000, 1e-3).count == 5000
+    assert bins(200_000, 1e-3).width == (10,)
     with pytest.raises(DataError):
-        bins_of([Record(np.arange(495.0), np.arange(495.0), dt_s=1e-3)])
+        bins(99, 1e-3)
 
 
 # --- the kind of model
@@ -245,7 +263,8 @@ def _model(**more) -> Model:
 
 
 def _measured(run: Run, polarity: int = 1) -> Record:
-    return asked.measured_of("a run", run, polarity, 0.0, 1.0)
+    record, stamps = asked.measured_of("a run", run, polarity, 0.0, 1.0)
+    return raw_data.evenly(record, stamps)
 
 
 def test_a_gap_is_filled_and_does_not_count():
@@ -260,13 +279,40 @@ def test_a_gap_is_filled_and_does_not_count():
     np.testing.assert_allclose(found.output, -2.0 * found.input, atol=1e-9)
 
 
+def test_samples_stay_as_they_are_until_the_gates_have_seen_them():
+    """Jittered stamps: the values of the record, bit by bit. Rounded stamps are even ones."""
+    t = np.arange(200) * 0.01
+    jittered = _run(t + 0.003 * RNG.uniform(-1, 1, 200))
+    record, stamps = asked.measured_of("a run", jittered, 1, 0.0, 1.0)
+    np.testing.assert_array_equal(record.output, jittered.output)
+    np.testing.assert_array_equal(stamps, jittered.time_s - jittered.time_s[0])
+    record, stamps = asked.measured_of("a run", _run(np.round(t / 3.0, 4)), 1, 0.0, 1.0)
+    assert stamps is None
+    assert record.dt_s == pytest.approx(0.01 / 3.0, rel=1e-3)
+
+
+def test_another_rate_is_no_gap_but_missing_samples_are():
+    """A hundred samples at 10 ms and a hundred at 50 ms: all count. More gaps than samples are refused."""
+    t = np.concatenate((np.arange(100) * 0.01, 1.0 + np.arange(100) * 0.05))
+    found = _measured(_run(t))
+    assert found.dt_s == pytest.approx(0.01)
+    assert np.mean(found.sample_weight[200:]) > 0.95  # but for the moment where the rate changes
+    with pytest.raises(DataError):
+        _measured(_run(np.concatenate((np.arange(100) * 0.01, 50.0 + np.arange(100) * 0.01))))
+
+
 def test_a_fast_record_is_averaged_down():
-    """To a thousand samples a second; a record of that rate is left alone."""
-    assert _measured(_run(np.arange(8000) * 2.5e-4)).dt_s == pytest.approx(1e-3)
-    assert _measured(_run(np.arange(2000) * 1e-3)).input.size == 2000
-    fast = _measured(_run(np.arange(8000) * 2.5e-4))
-    assert fast.input.size == 2000
-    assert fast.input[100] == pytest.approx(0.1 + 1.5 * 2.5e-4)
+    """To a thousand samples a second of its own, but not below 20 000; a slower record is left alone."""
+    scale = Scale(second=2.0)
+
+    def shrunk(count: int, dt: float) -> Record:
+        return scale.shrunk(Record(np.arange(float(count)), np.arange(float(count)), dt_s=dt))
+
+    assert shrunk(200_000, 4e-4).dt_s == pytest.approx(1e-3)
+    assert shrunk(20_000, 4e-4).dt_s == pytest.approx(2e-4)
+    fast = shrunk(200_000, 4e-4)
+    assert fast.input.size == 40_000
+    assert fast.input[100] == 502.0
 
 
 @pytest.mark.parametrize(("samples", "fits"), [(100, True), (99, False)])
@@ -343,11 +389,11 @@ def test_a_line_needs_strokes_periods_and_samples(strokes, periods, samples, kno
 @pytest.mark.parametrize(
     ("name", "starts"),
     [
-        ("output-lag", [(0.002,), (0.01,), (0.03,)]),
+        ("output-lag", [(0.01,), (0.03,)]),
         ("rate-widening", [(0.01,), (0.03,)]),
         ("viscous", [(0.01 * 8.0 / 0.5,)]),
-        ("creep", [(0.03, 0.1), (0.03, 0.3), (0.03, 1.0), (0.03, 3.0)]),
-        ("thermal-drift", [(0.01, 5.0), (0.01, 15.0), (0.01, 40.0)]),
+        ("creep", [(0.03, 0.1), (0.03, 0.408), (0.03, 10.0 / 6.0)]),
+        ("thermal-drift", [(0.02 / 16.0, 4.3)]),
         ("accommodation", [(0.05, 28.0), (0.05, 80.0), (0.05, 240.0)]),
         ("load-dependence", [(0.01 * 4.0 / 8.0,)]),
         ("offset-drift", [(0.01 * 8.0 / 10.0,)]),
@@ -355,7 +401,7 @@ def test_a_line_needs_strokes_periods_and_samples(strokes, periods, samples, kno
     ],
 )
 def test_start_values_scale_with_span_range_and_length(name, starts):
-    """A span of 8, a range of 4, ten seconds, and an input that moves at half a unit a second to and fro."""
+    """A span of 8, a range of 4, ten seconds in steps of 10 ms, and half a unit a second to and fro."""
     u = 0.5 * np.abs((np.arange(1000) * 0.01) % 5.0 - 2.5)
     frame = Frame(0.01, u, span=8.0, reach=4.0)
     found = [block[0] for block in CAUSE[name].starts([frame, Frame(0.01, 0.0 * u, 1.0, 1.0)], [])]
@@ -403,4 +449,6 @@ def test_evidence_names_its_cause_and_its_record():
     seen = Evidence("gate", "outliers", {"count": 3.0, "limit": 0.5}, record=1)
     assert wording.sentence(seen, {}).startswith("outliers: record 2: 3 ")
     assert wording.cause_text(Finding(CAUSE["outliers"], True, seen=seen), {}) == wording.text(seen)
-    assert wording.cause_text(Finding(CAUSE["creep"], True), {}) == CAUSE["creep"].title
+    assert wording.cause_text(Finding(CAUSE["creep"], True), {"output": "force"}) == (
+        "the force creeps on under a constant input"
+    )

@@ -14,9 +14,10 @@ from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.congruency import Contrast
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
-from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import Score, Screen
 from pulsetrainer.diagnosis.stages import (
     acceptance,
@@ -103,7 +104,7 @@ PROBLEM = SimpleNamespace(
 def _state(current: Fit, baseline: Fit | None = None, **more) -> State:
     first = baseline or _fit(1100.0)
     question = Question([], 0.0, 2.0, np.random.default_rng(0))
-    known = State(question, (), PROBLEM, "coarse", first, FLOOR, HeldOut(), (), current)
+    known = State(question, (), Scale(), PROBLEM, "coarse", first, FLOOR, HeldOut(), (), current)
     return replace(known, **more)
 
 
@@ -456,10 +457,14 @@ def test_what_equal_loops_show_comes_with_its_interval(monkeypatch):
 
 def test_the_interval_of_equal_loops_is_kept(monkeypatch):
     """The others have that of the joint fit."""
-    known = {"creep": ("joint",), "load-dependence": ("joint",)}
+    joint, loops = Estimate("tau", 2.0, "s", 1.0, 3.0), Estimate("coefficient", 5.0, "{u}/{y}", 4.0, 6.0)
+    known = {"creep": (joint,), "load-dependence": (joint,)}
     monkeypatch.setattr(parameters, "estimates_of", lambda *_: known)
-    after = parameters.stage(_state(_fit(100.0, "creep"), by_contrast={"load-dependence": ("loops",)}))
-    assert dict(after.estimates) == {"creep": ("joint",), "load-dependence": ("loops",)}
+    told = {"load-dependence": (loops,)}
+    scale = Scale(reach=3.0, span=2.0, second=10.0)  # both are told in the units of the record
+    after = parameters.stage(_state(_fit(100.0, "creep"), by_contrast=told, scale=scale))
+    assert after.estimates["creep"] == (Estimate("tau", 20.0, "s", 10.0, 30.0),)
+    assert after.estimates["load-dependence"] == (Estimate("coefficient", 7.5, "{u}/{y}", 6.0, 9.0),)
 
 
 # --- rivals, verdict

@@ -29,7 +29,7 @@ class Accommodation(Cause):
     needs_time = False
     parameters = (
         Quantity("amplitude", "1", -0.5, 1.0, 0.002),
-        Quantity("path", "{u}", 0.5, 1000.0, 0.5),
+        Quantity("path", "{u}", 0.3, 700.0, 0.3),
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:

@@ -9,7 +9,7 @@ values, gate, thresholds, flags and words.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -23,8 +23,9 @@ from pulsetrainer.diagnosis.raw import Firing, Raw
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.fitting import Fitted
 
-_NO_LAG_S = 1e-9  # a shorter time constant is none
+_NO_LAG = 1e-7  # of a time step: a shorter time constant is none
 _NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
+_STEPS = 20.0  # time steps: where samples are sparse a lag may be as long
 
 Stage = Literal["input", "output", "record"]
 Values = tuple[float, ...]
@@ -32,7 +33,11 @@ Values = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One parameter of a cause; units may name the output and input unit as ``{y}`` and ``{u}``."""
+    """One parameter of a cause; units may name the output and input unit as ``{y}`` and ``{u}``.
+
+    Its bounds are in the units of the record: the range of the input, the span of the output, the second of
+    ``scale``.
+    """
 
     name: str
     unit: str
@@ -53,7 +58,14 @@ class Frame:
     records: int = 1
     low: float = 0.0  # end of the input's range
     ends: tuple[float, float] = (0.0, 1.0)  # output at both ends of the input's range
+    zero: float = 0.0  # output of the hysteresis where its memory is empty: gains are about it
+    longest_s: float = 0.0  # of the records, the longest; 0: this one
     past: Past | None = None  # what the causes remember of the piece before; None: there was none
+
+    @property
+    def length_s(self) -> float:
+        """Length of the longest record."""
+        return self.longest_s or self.input.size * self.dt_s
 
     @property
     def time_s(self) -> FloatArray:
@@ -68,12 +80,18 @@ class Frame:
         remember(self.past, "path", turned[-1:])
         return np.cumsum(np.abs(np.diff(turned, prepend=before[0])))
 
+    def about(self, zero: float) -> Frame:
+        """Return the frame with another zero of the output; the path is followed once for all of them."""
+        one = replace(self, zero=zero)
+        one.__dict__["path"] = self.path
+        return one
+
 
 class Cause:
     """A reason why a static Preisach model is wrong, with the operator that repairs it."""
 
     id: ClassVar[str]
-    title: ClassVar[str]  # in words a technician understands
+    title: ClassVar[str]  # in words a technician understands; {input} and {output} are what was measured
     formula: ClassVar[str]
     signature: ClassVar[str]  # what it looks like, and what no other cause looks like
     excitation: ClassVar[str]  # what must be in a record for it to be told apart
@@ -105,6 +123,10 @@ class Cause:
         """Return what a fit with all other causes leaves of a cause of stage ``record``."""
         return None
 
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """Return the parameters with the bounds that a record sets."""
+        return self.parameters
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try; the columns of a block are fitted together.
 
@@ -123,6 +145,19 @@ class Cause:
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Outputs (n,) of an output cause under formulas that are as plausible as its own: for intervals."""
         return []
+
+
+def sampled(quantities: Sequence[Quantity], frame: Frame) -> tuple[Quantity, ...]:
+    """Return times that may be as long as some time steps, where these are longer than their bounds."""
+    return tuple(replace(one, high=max(one.high, _STEPS * frame.dt_s)) for one in quantities)
+
+
+def spread(low: float, high: float, ratio: float) -> list[float]:
+    """Return values from ``low`` to ``high``, about a factor ``ratio`` apart; ``high`` where it is lower."""
+    if high <= low:
+        return [high]
+    count = round(np.log(high / low) / np.log(ratio)) + 1
+    return [float(one) for one in np.geomspace(low, high, count)]
 
 
 def remembered(past: Past | None, name: str, at_first: FloatArray) -> FloatArray:
@@ -145,7 +180,7 @@ def low_pass(
 
     Exact: y+ = a y + (1 - a) u + (1 - (tau/dt)(1 - a)) (u+ - u) with a = exp(-dt/tau).
     """
-    if tau_s <= _NO_LAG_S:
+    if tau_s <= _NO_LAG * dt_s:
         return x
     a = np.exp(-dt_s / tau_s)
     slope = 1.0 - tau_s / dt_s * (1.0 - a)

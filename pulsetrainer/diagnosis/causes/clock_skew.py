@@ -16,7 +16,7 @@ class ClockSkew(Cause):
     """A relative error of the output's clock."""
 
     id = "clock-skew"
-    title = "the clocks of input and output run at different rates"
+    title = "the clocks of {input} and {output} run at different rates"
     formula = "y(t (1 + e))"
     signature = "the output runs ahead or behind ever more as the record goes on"
     excitation = "fast reversals at the beginning and at the end"

@@ -1,4 +1,6 @@
-"""gain or offset differs from record to record: y (1 + g) + b in all records but the first.
+"""gain or offset differs from record to record: y + b + g (y - y0) in all records but the first.
+
+y0 is the output of empty memory.
 
 The records may also differ from the model as given. The search for causes refits the weights, so it finds
 nothing wrong with a record that a Preisach model of its own describes well. Where the model as given is far
@@ -32,7 +34,7 @@ class ConditionChange(Cause):
 
     id = "condition-change"
     title = "gain or offset differs from record to record"
-    formula = "y (1 + g) + b in all records but the first"
+    formula = "y + b + g (y - y0) in all records but the first"
     signature = "records agree within themselves and differ between one another"
     excitation = "the same signal twice, in the two conditions"
     source = "Lei et al., Phil. Trans. R. Soc. A 378, 2020: one fit for each protocol"
@@ -42,7 +44,7 @@ class ConditionChange(Cause):
     needs_time = False
     strengths = 2
     parameters = (
-        Quantity("offset", "{y}", -1e6, 1e6, 1e-3),
+        Quantity("offset", "{y}", -1e6, 1e6, 1e-4),
         Quantity("gain", "1", -0.9, 0.9, 1e-4),
     )
     lasting = False
@@ -67,7 +69,7 @@ class ConditionChange(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return y if frame.record == 0 else y * (1.0 + values[1]) + values[0]
+        return y if frame.record == 0 else y + values[0] + values[1] * (y - frame.zero)
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass, spread
 
 _TRIED = 0.03  # amplitude
-_TRIED_S = (0.1, 0.3, 1.0, 3.0)  # middle time constants, a factor of three apart
+_FASTEST_S = 0.1  # the fastest middle time constant
+_SLOWEST = 1.0 / 30.0  # of the record: the slowest one ...
+_SHORT = (3.0, 1.0 / 6.0)  # s, or of the record: ... but in a short one as slow as these
+_RATIO = 10**0.5  # from one to the next
+_BOUND = 0.2  # of the record
 _RATIOS = (0.25, 4.0)  # of the outer time constants to the middle one
 _EQUAL = 1.0 / 3.0  # share of each time constant
 _OTHER = 0.5  # share of the middle one that is as plausible
@@ -20,7 +25,7 @@ class Creep(Cause):
     """Slow relaxation, as three low-passes on a logarithmic grid of time constants."""
 
     id = "creep"
-    title = "the output creeps on under a constant input"
+    title = "the {output} creeps on under a constant {input}"
     formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau"
     signature = "relaxation towards a new value during holds, over several decades of time"
     excitation = "holds of three time constants after reversals, on several levels"
@@ -33,9 +38,16 @@ class Creep(Cause):
         Quantity("tau", "s", 0.04, 20.0, 0.02),
     )
 
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """Return the parameters with the bounds that a record sets."""
+        strength, tau = self.parameters
+        return strength, replace(tau, high=max(_BOUND * frame.length_s, 2.0 * tau.low))
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(_TRIED, tau)] for tau in _TRIED_S]
+        length = frames[0].length_s
+        slowest = max(_SLOWEST * length, min(_SHORT[0], _SHORT[1] * length))
+        return [[(_TRIED, tau)] for tau in spread(_FASTEST_S, slowest, _RATIO)]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -12,16 +12,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
+from pulsetrainer.diagnosis.causes.base import (
+    Cause,
+    Frame,
+    Quantity,
+    Values,
+    remember,
+    remembered,
+    sampled,
+)
 
-_TRIED_S = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
+_TRIED_S = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's; no shorter than a time step
 
 
 class Delay(Cause):
     """A pure transport delay."""
 
     id = "delay"
-    title = "the output is late by a fixed time"
+    title = "the {output} is late by a fixed time"
     formula = "P[u(t - d)]"
     signature = (
         "dead time after every stop or jump, then an exact copy; the phase falls in proportion to frequency"
@@ -34,9 +42,13 @@ class Delay(Cause):
     widens = True
     parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005),)
 
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """Return the parameters with the bounds that a record sets."""
+        return sampled(self.parameters, frame)
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(one,)] for one in _TRIED_S]
+        return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in _TRIED_S})]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -21,7 +21,7 @@ class LoadDependence(Cause):
     """The moving Preisach model."""
 
     id = "load-dependence"
-    title = "the output feeds back into the input"
+    title = "the {output} feeds back into the {input}"
     formula = "P[u + k y]"
     signature = "equal minor loops at different bias are not congruent"
     excitation = "equal minor loops, entered from below and from above"
@@ -30,7 +30,7 @@ class LoadDependence(Cause):
     order = 40
     family = "load"
     needs_time = False
-    parameters = (Quantity("coefficient", "{u}/{y}", -0.1, 0.1, 2e-4),)
+    parameters = (Quantity("coefficient", "{u}/{y}", -0.9, 0.9, 2e-3),)
     feeds_back = True
     by_contrast = True
 

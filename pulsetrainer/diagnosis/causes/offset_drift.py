@@ -14,7 +14,7 @@ class OffsetDrift(Cause):
     """A zero that moves in proportion to time."""
 
     id = "offset-drift"
-    title = "the zero drifts slowly with time"
+    title = "the zero of the {output} drifts slowly with time"
     formula = "y + b t"
     signature = "equal states give different outputs, and the difference grows with time"
     excitation = "the same loop at the beginning, in the middle and at the end"
@@ -22,7 +22,7 @@ class OffsetDrift(Cause):
     stage = "output"
     order = 140
     family = "drift"
-    parameters = (Quantity("rate", "{y}/s", -1e6, 1e6, 1e-4),)
+    parameters = (Quantity("rate", "{y}/s", -1e6, 1e6, 1e-5),)
     lasting = False
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:

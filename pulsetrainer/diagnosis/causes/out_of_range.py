@@ -18,7 +18,7 @@ class OutOfRange(Cause):
     """The input leaves the identified range."""
 
     id = "out-of-range"
-    title = "the input leaves the identified range"
+    title = "the {input} leaves the identified range"
     formula = "u outside the levels"
     signature = "samples beyond the model's first or last level"
     excitation = "any"

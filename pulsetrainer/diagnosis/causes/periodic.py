@@ -11,7 +11,8 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 from pulsetrainer.diagnosis.thresholds import TINY
 
-_SLOWEST_Hz = 0.4  # slower lines are drift
+_SLOWEST_Hz = 0.4  # slower lines are drift ...
+_PERIODS = 8.0  # ... as are lines of which the record holds fewer periods
 _LINES = 61  # lines of the spectrum whose median is what surrounds a line
 _FLOOR = 1e-12  # of the highest line: keeps the ratio finite where the spectrum is empty
 _LEAST = 0.02  # of the highest line: lower ones are noise, however far above their surroundings
@@ -33,9 +34,9 @@ class Periodic(Cause):
     family = "periodic"
     strengths = 2
     parameters = (
-        Quantity("sine", "{y}", -1e6, 1e6, 1e-3),
-        Quantity("cosine", "{y}", -1e6, 1e6, 1e-3),
-        Quantity("frequency", "Hz", 0.3, 500.0, 1e-4),
+        Quantity("sine", "{y}", -1e6, 1e6, 1e-4),
+        Quantity("cosine", "{y}", -1e6, 1e6, 1e-4),
+        Quantity("frequency", "Hz", 0.0, 1e6, 1e-4),
     )
     lasting = False
 
@@ -45,7 +46,9 @@ class Periodic(Cause):
         power = np.abs(np.fft.rfft(one * np.hanning(one.size))) ** 2
         dt_s = frame.dt_s * round(frame.input.size / one.size)
         frequency = np.fft.rfftfreq(one.size, dt_s)
-        power[frequency < _SLOWEST_Hz] = 0.0
+        power[frequency < max(_SLOWEST_Hz, _PERIODS / (one.size * dt_s))] = 0.0
+        if not power.any():
+            return []
         # against its surroundings: a line, not the slope of a spectrum
         around = ndimage.median_filter(power, size=_LINES) + _FLOOR * power.max(initial=0.0) + TINY
         k = int(np.argmax(power / around * (power > _LEAST * power.max(initial=0.0))))

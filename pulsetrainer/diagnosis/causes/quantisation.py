@@ -20,7 +20,7 @@ class Quantisation(Cause):
     """The output comes in coarse steps."""
 
     id = "quantisation"
-    title = "the output comes in coarse steps"
+    title = "the {output} comes in coarse steps"
     formula = "q round(y / q)"
     signature = "the distinct values are evenly spaced"
     excitation = "slow ramps"

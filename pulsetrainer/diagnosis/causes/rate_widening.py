@@ -10,7 +10,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
 _TRIED = (0.005, 0.015)  # of the root of the range
-_NONE = 1e-9  # a smaller coefficient widens nothing
+_NONE = 3e-8  # of the root of range and time step: a smaller coefficient widens nothing
 _PARTS = 4  # of a sample: after a turn the excess moves fast
 
 
@@ -27,7 +27,7 @@ class RateWidening(Cause):
     order = 30
     family = "lag"
     widens = True
-    parameters = (Quantity("coefficient", "({u} s)^0.5", 0.0, 0.2, 5e-4),)
+    parameters = (Quantity("coefficient", "({u} s)^0.5", 0.0, 0.16, 4e-4),)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
@@ -36,7 +36,7 @@ class RateWidening(Cause):
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Input (n,) that the hysteresis sees."""
         k = values[0]
-        if k <= _NONE:
+        if k <= _NONE * (frame.reach * frame.dt_s) ** 0.5:
             return u
         # v' = sgn(e) (e/k)^2 with e = u - v: exact over a part of a sample with u held at its middle value
         per_step = frame.dt_s / _PARTS / k**2

@@ -1,4 +1,4 @@
-"""the mechanics ring after a sudden change: y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f."""
+"""the output rings after a sudden change: y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Resonance(Cause):
     """A second-order oscillator driven by the output."""
 
     id = "resonance"
-    title = "the mechanics ring after a sudden change"
+    title = "the {output} rings after a sudden change"
     formula = "y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f"
     signature = "a decaying oscillation of one frequency after every stop, whatever the rate before it"
     excitation = "fast stops"

@@ -26,7 +26,7 @@ class Saturation(Cause):
     """The output is clipped at the end of its range."""
 
     id = "saturation"
-    title = "the output is clipped at the end of its range"
+    title = "the {output} is clipped at the end of its range"
     formula = "min(y, y_max)"
     signature = "exactly repeated maxima, on one side"
     excitation = "the whole range"

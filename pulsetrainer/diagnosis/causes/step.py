@@ -1,4 +1,4 @@
-"""the offset or the gain changed suddenly: y (1 + g) + b after t0."""
+"""the offset or the gain changed suddenly: y + b + g (y - y0) after t0, y0 the output of empty memory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Step(Cause):
 
     id = "step"
     title = "the offset or the gain changed suddenly"
-    formula = "y (1 + g) + b after t0"
+    formula = "y + b + g (y - y0) after t0"
     signature = "all loops after one moment differ from those before by one gain and offset"
     excitation = "the same loop in every tenth of the record"
     source = "Basseville and Nikiforov, Detection of Abrupt Changes, 1993, chapter 2"
@@ -31,7 +31,7 @@ class Step(Cause):
     needs_time = False
     strengths = 2
     parameters = (
-        Quantity("offset", "{y}", -1e6, 1e6, 1e-3),
+        Quantity("offset", "{y}", -1e6, 1e6, 1e-4),
         Quantity("gain", "1", -0.9, 0.9, 1e-4),
         Quantity("time", "s", 0.0, 1e6, 0.01),
     )
@@ -51,7 +51,7 @@ class Step(Cause):
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
         after = np.clip((frame.time_s - values[2]) / (_SHARED * frame.dt_s) + 0.5, 0.0, 1.0)
-        return y + after * (values[0] + values[1] * y)
+        return y + after * (values[0] + values[1] * (y - frame.zero))
 
 
 def _split(residual: FloatArray, begin: int, end: int) -> int:

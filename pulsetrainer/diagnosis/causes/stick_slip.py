@@ -62,7 +62,7 @@ class StickSlip(Cause):
     """Flat runs and jumps of one size."""
 
     id = "stick-slip"
-    title = "the output sticks, then jumps"
+    title = "the {output} sticks, then jumps"
     formula = "y is held until |P[u] - y| > F, then jumps"
     signature = "flat stretches and then jumps of about equal size while the input moves slowly"
     excitation = "slow ramps"
@@ -82,14 +82,15 @@ class StickSlip(Cause):
     def gate(self, raw: Raw) -> Firing | None:
         """Jumps that last, while the input moves slowly: far more than noise or a smooth branch makes."""
         record = raw.calm
-        wide = max(_WIDE_LEAST, round(_WIDE_S / record.step))
+        dt_s = record.step / raw.second
+        wide = max(_WIDE_LEAST, round(_WIDE_S / dt_s))
         if record.output.size < _SHORTEST * wide or coarse_step(record.output) > 0:
             return None
         size = _jumps(record.output, wide)
         around = ndimage.median_filter(size[::wide], _AROUND, mode="nearest").repeat(wide)[: size.size]
         least = _SIGMAS * np.sqrt(2.0 / wide) * noise_of(record.output)
         peak = (size == ndimage.maximum_filter1d(size, 2 * wide + 1)) & (size > least)
-        found = _slow(record.input, record.step, wide, raw.reach) & peak & (size > _SHARPER * around)
+        found = _slow(record.input, dt_s, wide, raw.reach) & peak & (size > _SHARPER * around)
         count = np.count_nonzero(found)
         if count < _JUMPS:
             return None

@@ -1,16 +1,24 @@
-"""the force falls as the coil heats: y (1 - k h), tau h' = u^2 - h."""
+"""the output falls with heat: y - k h (y - y0), tau h' = (u - u0)^2 - h.
+
+u0 is the lower end of the input's range and y0 the output of empty memory, so that the zeros of both do not
+matter.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass, spread
 
-_TRIED = 0.01  # coefficient
-_TRIED_S = (5.0, 15.0, 40.0)  # a wire's, a coil's, an iron core's
+_TRIED = 0.02  # coefficient
+_FASTEST_S = 5.0  # a wire's: what is faster is creep
+_SLOWEST = 0.43  # of the record: what is slower is drift
+_RATIO = 3.0  # from one time constant to the next: a wire's, a coil's, an iron core's
+_BOUNDS = (0.01, 3.2)  # of the record
 _NOT_COLD = 0.05  # of the heat that the largest input would lead to
 
 
@@ -18,25 +26,34 @@ class ThermalDrift(Cause):
     """A gain that falls with heat."""
 
     id = "thermal-drift"
-    title = "the force falls as the coil heats"
-    formula = "y (1 - k h), tau h' = u^2 - h"
+    title = "the {output} falls with heat, a slow average of the squared {input}"
+    formula = "y - k h (y - y0), tau h' = (u - u0)^2 - h"
     signature = (
-        "the error is proportional to the output, follows the filtered square of the input "
-        "and recovers on cooling"
+        "the error is proportional to the output, follows a slow average of the squared input "
+        "and recovers at rest"
     )
-    excitation = "a long heating, a long rest, and the same loop before and after"
+    excitation = "a long time at the top, a long rest, and the same loop before and after"
     source = "Incropera, Fundamentals of Heat and Mass Transfer, chapter 5: lumped capacitance"
     stage = "output"
     order = 50
     family = "slow gain"
     parameters = (
-        Quantity("coefficient", "1/({u})^2", -0.5, 0.5, 0.001),
+        Quantity("coefficient", "1/({u})^2", -1.1, 1.1, 0.002),
         Quantity("tau", "s", 1.0, 300.0, 0.5),
     )
 
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """Return the parameters with the bounds that a record sets."""
+        strength, tau = self.parameters
+        low, high = (share * frame.length_s for share in _BOUNDS)
+        return strength, replace(tau, low=min(tau.low, low), high=high)
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(_TRIED, tau)] for tau in _TRIED_S]
+        slowest = _SLOWEST * frames[0].length_s
+        # heat of an input that uses all of its range is of the size of that range squared
+        strength = _TRIED / frames[0].reach ** 2
+        return [[(strength, tau)] for tau in spread(_FASTEST_S, slowest, _RATIO)]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
@@ -44,13 +61,18 @@ class ThermalDrift(Cause):
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """A coil that was not quite cold: no record tells what was played before it."""
-        return [_weakened(y, values, frame, _NOT_COLD * float(np.max(frame.input**2)))]
+        return [_weakened(y, values, frame, _NOT_COLD * float(np.max(_power(frame))))]
 
 
 def _weakened(y: FloatArray, values: Values, frame: Frame, begin: float) -> FloatArray:
     """Output of a coil whose heat begins at ``begin``."""
-    squared = frame.input**2
+    squared = _power(frame)
     if frame.past is None or not frame.past.before:  # the first sample already heats
         squared = np.append(begin, squared)
     heat = low_pass(squared, values[1], frame.dt_s, frame.past, "heat")[-y.size :]
-    return np.asarray(y * (1.0 - values[0] * heat))
+    return np.asarray(y - values[0] * heat * (y - frame.zero))
+
+
+def _power(frame: Frame) -> FloatArray:
+    """What heats: (n,) squared input above the lower end of its range, input unit squared."""
+    return np.asarray((frame.input - frame.low) ** 2)

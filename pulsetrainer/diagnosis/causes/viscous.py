@@ -1,4 +1,4 @@
-"""a force proportional to the speed of the input: y + c u'."""
+"""the output has a part proportional to the speed of the input: y + c u'."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
 _TRIED = 0.01  # of the span at the usual speed
-_NO_SPEED = 1e-12  # input units a second: an input at rest
+_NO_SPEED = 1e-12  # ranges a second: an input at rest
 
 
 class Viscous(Cause):
     """A term proportional to the rate of the input."""
 
     id = "viscous"
-    title = "a force proportional to the speed of the input"
+    title = "the {output} has a part proportional to the speed of the {input}"
     formula = "y + c u'"
     signature = "the output jumps at once when the rate changes at equal input, without a tail"
     excitation = "changes of rate at equal input"
@@ -26,7 +26,7 @@ class Viscous(Cause):
     order = 90
     family = "viscous"
     widens = True
-    parameters = (Quantity("coefficient", "{y} s/{u}", -1e6, 1e6, 1e-4),)
+    parameters = (Quantity("coefficient", "{y} s/{u}", -1e6, 1e6, 1e-5),)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""

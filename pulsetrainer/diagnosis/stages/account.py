@@ -51,5 +51,6 @@ def _largest(state: State) -> Iterator[Evidence]:
         rms = residual.rms_by(group, state.current.residual)
         most, least = float(np.nanmax(rms)), float(np.nanmin(rms))
         if most > LIMITS.largest_at * least:
-            figures = {"at": float(group.at[int(np.nanargmax(rms))]), "times": most / least}
+            at = state.scale.places(group.at, group.unit)
+            figures = {"at": float(at[int(np.nanargmax(rms))]), "times": most / least}
             yield Evidence("largest", figures=figures, names=(group.name,))

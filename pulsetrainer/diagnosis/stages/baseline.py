@@ -28,10 +28,14 @@ def stage(masked: Masked) -> State:
     DataError
         The data do not suffice for any statement.
     """
-    question, records, firings = masked.question, masked.records, masked.firings
-    problem = problem_for(records, question.low, question.high)
-    coarse = problem_for(records, question.low, question.high, LIMITS.coarse_levels)
+    records, firings = masked.records, masked.firings
+    problem = problem_for(records, 0.0, 1.0)
+    coarse = problem_for(records, 0.0, 1.0, LIMITS.coarse_levels)
     fitted = weights_for(problem, (), None)
-    floor = floor_of(records, [firing for _, firing in firings], problem).at(coarse, fitted)
+    fired = [firing for _, firing in firings]
+    floor = floor_of(masked.question.records, fired, problem, masked.scale.span).at(coarse, fitted)
     lacks = tuple(excitation_limits(problem))
-    return State(question, firings, problem, coarse, fitted, floor, HeldOut(problem), lacks, fitted)
+    held_out = HeldOut(problem)
+    return State(
+        masked.question, firings, masked.scale, problem, coarse, fitted, floor, held_out, lacks, fitted
+    )

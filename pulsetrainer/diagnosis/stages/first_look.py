@@ -30,7 +30,9 @@ def _finding(state: State, score: Score) -> Finding:
         found=best and state.significant(score),
         p_value=score.p_value,
         explains_percent=state.explains(score.gain),
-        parameters=tuple(Estimate(q.name, value, q.unit, unsure, unsure) for q, value in pairs),
+        parameters=tuple(
+            state.scale.estimate(Estimate(q.name, value, q.unit, unsure, unsure)) for q, value in pairs
+        ),
         confounded_with=_alike(state, score) if best else (),
         held_out_gain_percent=unsure,
     )

@@ -59,13 +59,15 @@ def stage(state: State) -> State:
     if not state.question.timed:
         told = tuple(c.id for c in library().values() if c.stage != "record" and not c.needs_time)
         said.append(Evidence("untimed", names=told))
+    span = state.scale.span
+    noise = span * state.floor.noise
     if judged.speed.wrong:
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
-    elif left_by(judged.measured, judged.predicted, state.floor.noise) <= state.current.rms:
+    elif left_by(judged.measured, judged.predicted, noise) <= span * state.current.rms:
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
-    changed = against_model(judged.measured, judged.predicted, state.baseline.rms, state.floor.noise)
+    changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
     if changed is not None:
         state, more = _in_another_condition(state, changed, judged.polarity)
         said += more
@@ -75,6 +77,7 @@ def stage(state: State) -> State:
 def _judged(state: State, given: Given) -> _Judged:
     """Predict the records; noise in the input is no motion."""
     question, model = state.question, given.model
+    records = [state.scale.restored(record) for record in state.problem.records]
     core = [
         Record(
             input_noise.clean(r.input).input,
@@ -82,9 +85,9 @@ def _judged(state: State, given: Given) -> _Judged:
             r.sample_weight,
             start_of(r.input, question.low, question.high),
         )
-        for r in question.records
+        for r in records
     ]
-    steps = [r.dt_s for r in question.records]
+    steps = [r.dt_s for r in records]
     # records have polarity 1: what the model says is turned alike
     said = [
         model.polarity * predict(model, one.input, step, one.start)
@@ -141,7 +144,7 @@ def _in_another_condition(state: State, changed: Change, polarity: int) -> tuple
         pairs = zip(state.findings, cleared.findings, strict=True)
         gone = tuple(before.cause.id for before, after in pairs if before.found and not after.found)
         if gone:
-            left = PERCENT * state.baseline.rms / changed.span
+            left = PERCENT * state.scale.span * state.baseline.rms / changed.span
             figures = {"share": PERCENT * changed.explains, "left": left}
             said.append(Evidence("overshadowed", figures=figures, names=gone))
             state = cleared

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.raw import Firing, Raw
+from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.state import State
 
 
@@ -22,7 +23,15 @@ def stage(state: State) -> State:
     if state.current.squares - state.floor.squares <= state.floor.relevant or state.jagged:
         return state
     left = [cause.gate_left(state.current) for cause in library().values() if cause.stage == "record"]
-    return replace(state, firings=(*kept, *((0, firing) for firing in left if firing is not None)))
+    seen = [(0, _in_its_unit(firing, state.scale)) for firing in left if firing is not None]
+    return replace(state, firings=(*kept, *seen))
+
+
+def _in_its_unit(firing: Firing, scale: Scale) -> Firing:
+    """A finding in what a model leaves, whose figures are all sizes, in the unit of the record."""
+    factor = scale.of_unit(firing.unit)
+    figures = {name: factor * size for name, size in firing.figures.items()}
+    return replace(firing, value=factor * firing.value, figures=figures)
 
 
 def _explained(state: State, k: int, firing: Firing) -> bool:

@@ -1,10 +1,14 @@
 """Gates on the raw data.
 
-Before any model, each record is looked at for what no model can repair: an output cut off by its range,
-single wild samples, coarse steps, jumps, a driver that does not follow its reference, an input outside the
-range that was identified. Each gate stands in the file of its cause. A gate that fires is a finding, and the
-samples it names are left out of everything that follows: filled in, since causes filter the output and wild
-samples must not reach the filters.
+Before any model, each record is looked at, sample by sample as it was measured, for what no model can
+repair: an output cut off by its range, single wild samples, coarse steps, jumps, a driver that does not
+follow its reference, an input outside the range that was identified. Each gate stands in the file of its
+cause. A gate that fires is a finding, and the samples it names are left out of everything that follows:
+filled in, since causes filter the output and wild samples must not reach the filters.
+
+Only then are the records brought to even time steps, and to units of their own: the range of the input, the
+span of the output, and a second that follows from how fast the input moves. Nothing that is decided from
+here on knows a second, an ampere or a newton.
 """
 
 from __future__ import annotations
@@ -13,27 +17,45 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
 from pulsetrainer.diagnosis.state import Question
+from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.errors import DataError
 
 
 @dataclass(frozen=True)
 class Masked:
-    """What the gates leave of the records, and which gates fired on which record."""
+    """What the gates leave of the records, in their own units, and which gates fired on which record."""
 
     question: Question
     records: tuple[Record, ...]
     firings: tuple[tuple[int, Firing], ...]
+    scale: Scale
 
 
 def stage(question: Question) -> Masked:
-    """Return the records with bad samples masked, and the gates that fired."""
-    found = [gates.check(record, question.low, question.high) for record in question.records]
-    masked = tuple(masked_by(record, fired) for record, fired in zip(question.records, found, strict=True))
-    return Masked(question, masked, tuple((k, one) for k, fired in enumerate(found) for one in fired))
+    """Return the records with bad samples masked, and the gates that fired.
+
+    Raises
+    ------
+    DataError
+        A record has more gaps than samples.
+    """
+    low, high = question.low, question.high
+    stamps = question.stamps or [None] * len(question.records)
+    second = second_of(question.records, stamps, low, high)
+    found = [gates.check(record, low, high, second) for record in question.records]
+    masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
+    even = [evenly(record, times) for record, times in zip(masked, stamps, strict=True)]
+    scale = scale_of(even, low, high, second)
+    firings = tuple((k, one) for k, fired in enumerate(found) for one in fired)
+    return Masked(question, tuple(scale.shrunk(record) for record in even), firings, scale)
 
 
 def masked_by(record: Record, firings: Sequence[Firing]) -> Record:
@@ -48,3 +70,36 @@ def masked_by(record: Record, firings: Sequence[Firing]) -> Record:
         output = output.copy()
         output[bad] = np.interp(np.flatnonzero(bad), good, output[good])
     return replace(record, sample_weight=weight, output=output)
+
+
+def evenly(record: Record, stamps: FloatArray | None) -> Record:
+    """Return a record at even time steps, straight between samples; what fills a gap has no weight.
+
+    Raises
+    ------
+    DataError
+        More of the record is gaps than samples.
+    """
+    if stamps is None or record.dt_s is None:
+        return record
+    step = max(record.dt_s, float(stamps[-1]) / LIMITS.most_even)
+    grid = np.arange(round(float(stamps[-1]) / step) + 1) * step
+    steps = np.diff(stamps)
+    usual = np.maximum(ndimage.median_filter(steps, LIMITS.usual_of, mode="nearest"), step)
+    following = np.clip(np.searchsorted(stamps, grid), 1, stamps.size - 1)
+    hole = (steps > LIMITS.gap_steps * usual)[following - 1]
+    if np.mean(hole) > LIMITS.least_present:
+        raise DataError(
+            f"a record has {stamps.size} samples where even steps of {step:.4g} s would have {grid.size}: "
+            "most of it is gaps",
+            hint="cut it into several runs at the gaps",
+        )
+    known = np.interp(grid, stamps, record.sample_weight) >= 0.5  # of two neighbours the nearer one
+    reference = None if record.reference is None else np.interp(grid, stamps, record.reference)
+    return Record(
+        np.interp(grid, stamps, record.input),
+        np.interp(grid, stamps, record.output),
+        np.where(hole, 0.0, known.astype(np.float64)),
+        dt_s=step,
+        reference=reference,
+    )

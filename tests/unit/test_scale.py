@@ -1,0 +1,106 @@
+"""The units of the record itself: what a second is, and that nothing but the record decides it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pulsetrainer.core import excitations
+from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.finding import Estimate
+from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
+
+SIGNAL = excitations.diagnostic(0.0, 1.5, rate_Hz=200.0).value
+FACTORS = st.floats(-9, 6).map(lambda power: 10.0**power)
+
+
+def _second(u, dt: float, low: float = 0.0, high: float = 1.5, stamps=None) -> float:
+    return second_of([Record(u, u, dt_s=dt)], [stamps], low, high)
+
+
+def test_a_second_of_the_diagnostic_signal_is_a_second():
+    """All numbers of the diagnosis were tuned on it."""
+    assert _second(SIGNAL, 1 / 200) == pytest.approx(1.0, rel=0.01)
+
+
+@settings(max_examples=30, deadline=None)
+@given(FACTORS, FACTORS, st.floats(-1e3, 1e3))
+def test_a_second_goes_with_the_time_and_with_nothing_else(k, a, b):
+    """Time t -> k t multiplies it by k; an input u -> a u + b leaves it.
+
+    Within a thousandth: rounding in an input without noise is noise of its own.
+    """
+    shift = a * b
+    moved = _second(a * SIGNAL + shift, k / 200, shift, 1.5 * a + shift)
+    assert moved == pytest.approx(k * _second(SIGNAL, 1 / 200), rel=1e-3)
+
+
+@pytest.mark.parametrize("power", [-30, -1, 1, 20])
+def test_powers_of_two_change_no_digit(power):
+    """Of the time and of the input: exactly the same second."""
+    factor = 2.0**power
+    assert _second(SIGNAL, factor / 256) == factor * _second(SIGNAL, 1 / 256)
+    assert _second(factor * SIGNAL, 1 / 256, 0.0, 1.5 * factor) == _second(SIGNAL, 1 / 256)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.0005, 0.003])
+@pytest.mark.parametrize("faster", [1, 10])
+def test_neither_noise_nor_more_samples_change_a_second(noise, faster):
+    """Ten samples for one, and noise of up to 0.3 % of the range, by less than 2 %."""
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=200.0 * faster).value
+    u = u + 1.5 * noise * np.random.default_rng(3).standard_normal(u.size)
+    assert _second(u, 1 / 200 / faster) == pytest.approx(_second(SIGNAL, 1 / 200), rel=0.02)
+
+
+def test_holds_do_not_count_and_uneven_stamps_do():
+    """Ten minutes of rest at the end; the same path at other moments."""
+    rested = np.append(SIGNAL, np.zeros(200 * 600))
+    assert _second(rested, 1 / 200) == pytest.approx(_second(SIGNAL, 1 / 200), rel=0.03)
+    slow = np.arange(SIGNAL.size) * 0.02
+    assert _second(SIGNAL, 1 / 200, stamps=slow) == pytest.approx(4 * _second(SIGNAL, 1 / 200), rel=1e-6)
+
+
+def test_a_step_and_a_hold_have_a_share_of_their_length():
+    """Where the input hardly moves there is no typical rate."""
+    u = np.append(np.zeros(10), np.ones(89_990))
+    assert _second(u, 0.1, high=1.0) == pytest.approx(3.0, rel=1e-3)
+
+
+def test_records_without_time_count_samples():
+    """Their second is one sample."""
+    assert second_of([Record(SIGNAL, SIGNAL)], [None], 0.0, 1.5) == 1.0
+
+
+def test_every_unit_of_the_library_is_known():
+    """And is what it says."""
+    scale = Scale(reach=4.0, span=3.0, second=25.0)
+    for cause in library().values():
+        for quantity in cause.parameters:
+            assert scale.of_unit(quantity.unit) > 0
+    assert scale.of_unit("{y} s/{u}") == pytest.approx(3.0 * 25.0 / 4.0)
+    assert scale.of_unit("({u} s)^0.5") == pytest.approx(10.0)
+    assert scale.of_unit("1/({u})^2") == pytest.approx(1 / 16)
+    assert scale.of_unit("Hz") == pytest.approx(0.04)
+    assert scale.estimate(Estimate("tau", 2.0, "s", 1.0, 3.0)) == Estimate("tau", 50.0, "s", 25.0, 75.0)
+
+
+def test_there_and_back():
+    """A record in its own units and again in those it was measured in."""
+    t = np.arange(500) * 0.1
+    record = Record(3.0 + np.sin(t), 1e3 + 5.0 * np.cos(t), dt_s=0.1, reference=3.0 + np.sin(t))
+    scale = scale_of([record], 2.0, 4.0, 7.0)
+    own = scale.shrunk(record)
+    assert own.dt_s == pytest.approx(0.1 / 7.0)
+    assert (own.input.min(), own.input.max()) == pytest.approx((0.0, 1.0), abs=1e-3)
+    assert np.ptp(own.output) == pytest.approx(1.0, abs=0.01)
+    assert np.mean(own.output) == pytest.approx(0.0, abs=1e-9)
+    back = scale.restored(own)
+    np.testing.assert_allclose(back.input, record.input)
+    np.testing.assert_allclose(back.output, record.output)
+    np.testing.assert_allclose(back.reference, record.reference)
+    assert back.dt_s == pytest.approx(0.1)
+    np.testing.assert_allclose(scale.places(np.asarray([0.0, 1.0]), "{u}"), [2.0, 4.0])
+    np.testing.assert_allclose(scale.places(np.asarray([7.0]), "1/s"), [1.0])
