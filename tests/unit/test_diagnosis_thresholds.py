@@ -19,7 +19,7 @@ FOLDER = ROOT / "pulsetrainer" / "diagnosis"
 PAGE = ROOT / "docs" / "how-a-verdict-is-reached.md"
 TRIVIAL = {-1, 0, 1, 2, 0.5}
 # Declarations: the thresholds, the causes' own (at the top of their files), signals on paper, shares of a bar
-DECLARED = ("thresholds.py", "causes/", "experiment.py", "procedure.py")
+DECLARED = ("thresholds.py", "causes/", "experiment.py", "procedure.py", "piecewise.py")
 
 
 def _numbers(tree: ast.AST, *, inside: bool) -> list[ast.Constant]:
