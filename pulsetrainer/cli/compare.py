@@ -73,8 +73,7 @@ def compare(
             for m in metrics
         ],
     )
-    if out is not None:
-        job.screen.whole(f"wrote {out}")
+    job.wrote(out)
 
 
 def _csv(files: Sequence[Path], metrics: Sequence[Metric]) -> str:

@@ -47,20 +47,11 @@ def diagnose(
         if html is not None:
             from pulsetrainer.report.diagnosis_html import render_diagnosis
 
-            page = render_diagnosis(
-                found,
-                title=header.title,
-                created=header.created,
-                provenance_json=header.provenance.to_json(),
-                history=header.history,
-            )
-            job.write(html, page)
+            job.page(html, render_diagnosis, found, header)
     job.notes(found.notes)
     job.screen.result(_payload(found) | {"output": out, "html": html, "seconds": job.seconds})
     _show(job, found)
-    for path in (out, html):
-        if path is not None:
-            job.screen.whole(f"wrote {path}")
+    job.wrote(out, html)
 
 
 def _show(job: Job, found: Diagnosis) -> None:

@@ -65,14 +65,7 @@ def evaluate(
         if html is not None:
             from pulsetrainer.report.html import render_evaluation
 
-            page = render_evaluation(
-                evaluation,
-                title=header.title,
-                created=header.created,
-                provenance_json=header.provenance.to_json(),
-                history=header.history,
-            )
-            job.write(html, page)
+            job.page(html, render_evaluation, evaluation, header)
     broken = breaches(evaluation, limits)
     problem = ""
     if broken:
@@ -85,9 +78,7 @@ def evaluate(
         | ({"error": {"kind": QualityError.kind, "message": problem, "hint": _HINT}} if problem else {})
     )
     show_tables(job.screen, evaluation)
-    for path in (out, html):
-        if path is not None:
-            job.screen.whole(f"wrote {path}")
+    job.wrote(out, html)
     if problem:
         typer.echo(f"error: {problem}\n  try: {_HINT}", err=True)
         raise typer.Exit(QualityError.exit_code)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -144,6 +144,17 @@ class Job:
 
         with replacing(path, overwrite=self.overwrite) as temporary:
             temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+    def page(self, path: Path, render: Callable[..., str], noun: Any, header: Header) -> None:
+        """Write the page about an artefact."""
+        said = {name: getattr(header, name) for name in ("title", "created", "history")}
+        self.write(path, render(noun, provenance_json=header.provenance.to_json(), **said))
+
+    def wrote(self, *paths: Path | None) -> None:
+        """Say which files there are now."""
+        for path in paths:
+            if path is not None:
+                self.screen.whole(f"wrote {path}")
 
     def notes(self, lines: Sequence[str]) -> None:
         """Say what a verb has to tell, a line each, on stderr."""

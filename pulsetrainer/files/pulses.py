@@ -48,16 +48,10 @@ def read_pulse(name: str) -> Shape:
         As ``pulse_file``; or the table cannot be used.
     """
     from pulsetrainer.core.pulses import Shape  # noqa: PLC0415 - so that a mistyped name is answered at once
-    from pulsetrainer.files import run_from_table, table  # noqa: PLC0415
+    from pulsetrainer.files.signal_table import first_two  # noqa: PLC0415
 
     path = pulse_file(name)
-    columns = table.read_table(path)
-    if len(columns.names) < 2:
-        raise DataError(
-            f"{path} has {len(columns.names)} column; a pulse needs a time and a value",
-            hint="write two columns: t_s,p",
-        )
-    time_s, value = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
+    columns, time_s, value = first_two(path, "a pulse needs a time and a value", names="t_s,p")
     said = {c.partition(":")[0]: c.partition(":")[2].strip() for c in columns.comments}
     try:
         feet_s = tuple(float(foot) for foot in said.get("beats", "0").split())

@@ -10,7 +10,9 @@ from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.input_file import check_file
 
 if TYPE_CHECKING:
+    from pulsetrainer.artefacts import FloatArray
     from pulsetrainer.core.excitations import Signal
+    from pulsetrainer.files.table import Table
 
 
 def signal_file(signal: str, known: Sequence[str]) -> Path | None:
@@ -47,15 +49,8 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
     import numpy as np  # noqa: PLC0415
 
     from pulsetrainer.core import excitations  # noqa: PLC0415
-    from pulsetrainer.files import run_from_table, table  # noqa: PLC0415
 
-    columns = table.read_table(path)
-    if len(columns.names) < 2:
-        raise DataError(
-            f"{path} has {len(columns.names)} column; a reference needs a time and a current",
-            hint="write two columns: t_s,current_A",
-        )
-    time, current = run_from_table.seconds(columns, columns.names[0]), columns.check_finite(columns.names[1])
+    _, time, current = first_two(path, "a reference needs a time and a current", names="t_s,current_A")
     seconds = float(time[-1]) - float(time[0])
     lasts = seconds * rate_Hz
     if not lasts <= excitations.MOST_SAMPLES:
@@ -67,3 +62,20 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
     count = int(np.floor(lasts + 1e-9)) + 1
     value = np.interp(time[0] + np.arange(count) / rate_Hz, time, current)
     return excitations.Signal(value, rate_Hz, path.name)
+
+
+def first_two(path: Path, what: str, *, names: str) -> tuple[Table, FloatArray, FloatArray]:
+    """Return a table, its first column as seconds (n,), and its second one (n,).
+
+    Raises
+    ------
+    DataError
+        The table cannot be used.
+    """
+    from pulsetrainer.files.run_from_table import seconds  # noqa: PLC0415
+    from pulsetrainer.files.table import read_table  # noqa: PLC0415
+
+    table = read_table(path)
+    if len(table.names) < 2:
+        raise DataError(f"{path} has {len(table.names)} column; {what}", hint=f"write two columns: {names}")
+    return table, seconds(table, table.names[0]), table.check_finite(table.names[1])
