@@ -31,7 +31,7 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
             return
         pair = node if isinstance(node, list) else []
         numbers = [v for v in pair if isinstance(v, int | float) and not isinstance(v, bool)]
-        if len(pair) != 2 or len(numbers) != 2 or numbers[0] > numbers[1]:
+        if len(pair) != 2 or len(numbers) != 2 or not numbers[0] <= numbers[1]:
             raise DataError(
                 f"the bound {prefix} in {path} must be a pair [low, high], got {node!r}",
                 hint=f"write {prefix.rpartition('.')[2]} = [0.0, 1.0]",

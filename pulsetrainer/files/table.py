@@ -45,7 +45,7 @@ class Table:
     comments: tuple[str, ...]
     text_names: frozenset[str] = frozenset()  # columns of text
     # (row, line) wherever their distance changes; empty where the file has no lines
-    shifts: Sequence[tuple[int, int]] = ((0, 1),)
+    shifts: Sequence[tuple[int, int]] = ()
     rate_Hz: float | None = None  # where the file itself says one
 
     @property
@@ -215,7 +215,7 @@ def _of_arrays(path: Path, columns: Columns) -> Table:
     names = tuple(columns.values)
     units = {name: symbol_of(columns.units.get(name) or split_unit(name)[1]) for name in names}
     named = {name: unit for name, unit in units.items() if unit}
-    return Table(path, names, columns.values, named, (), shifts=(), rate_Hz=columns.rate_Hz)
+    return Table(path, names, columns.values, named, (), rate_Hz=columns.rate_Hz)
 
 
 def _units(dialect: Dialect) -> dict[str, str]:

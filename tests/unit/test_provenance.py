@@ -140,12 +140,12 @@ def test_history_tells_the_whole_ancestry_once_and_in_order():
     capture = make_header("c", argv=["capture", "identification", "-o", "my run.h5"], now=NOW)
     later = NOW + timedelta(minutes=1)
     model = make_header("m", argv=["identify", "my run.h5"], now=later, ancestors=[capture])
-    drive = make_header("d", argv=["invert", "normal"], now=later, ancestors=[model])
+    drive = make_header("d", argv=["aim", "normal"], now=later + timedelta(seconds=1), ancestors=[model])
     both = make_header("p", argv=["play", "a\nb"], now=later + timedelta(minutes=1), ancestors=[model, drive])
     assert both.history == (
         "2026-01-02T03:04:05Z pulsetrainer capture identification -o 'my run.h5'",
         "2026-01-02T03:05:05Z pulsetrainer identify 'my run.h5'",
-        "2026-01-02T03:05:05Z pulsetrainer invert normal",
+        "2026-01-02T03:05:06Z pulsetrainer aim normal",
         "2026-01-02T03:06:05Z pulsetrainer play 'a\\x0ab'",
     )
 

@@ -281,6 +281,7 @@ def test_a_cut_journal_keeps_every_whole_block(partial):
     rng = random.Random(SEED)
     print("seed", SEED)
     first = ends[0][0]
+    assert next(blocks(partial)).dropped == 0
     for size in [first, ends[1][0] - 1, *(rng.randrange(first, len(content)) for _ in range(40))]:
         partial.write_bytes(content[:size])
         run = read(partial, Run)

@@ -23,6 +23,7 @@ from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.next_step import next_step
 from pulsetrainer.errors import DataError, ExistsError, NotAnArtefactError, UsageError, WrongKindError
 from pulsetrainer.files import atomic_write, store
+from pulsetrainer.files.atomic_write import cannot_write
 from pulsetrainer.files.checksum import CHECKSUM_LENGTH
 from pulsetrainer.files.store import check_output, read, read_any, read_header, write
 
@@ -409,6 +410,26 @@ def _writer(path, limit):
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
     command = [sys.executable, "-c", _WRITER, str(path), str(limit)]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+@pytest.mark.parametrize(
+    ("error", "reason", "word"),
+    [
+        (OSError(28, "No space left on device"), "No space left on device", "space"),
+        (OSError(5, "Input/output error"), "Input/output error", "permissions"),
+        (
+            RuntimeError("Can't write (error message = 'File too large', errno = 27)"),
+            "File too large",
+            "space",
+        ),
+        (RuntimeError("a bad day"), "a bad day", "permissions"),
+    ],
+)
+def test_the_reason_of_the_system_is_told(error, reason, word):
+    """Without the wrapping of HDF5 and of Python; a full disk has a remedy of its own."""
+    told = cannot_write("a.h5", error)
+    assert str(told).endswith(f": {reason}")
+    assert word in told.hint
 
 
 @pytest.mark.parametrize("limit", [1000, 60_000])

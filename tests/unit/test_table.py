@@ -208,6 +208,12 @@ def test_an_oscilloscope_that_writes_its_step_beside_the_names(table, end):
     np.testing.assert_allclose(run.time_s, 2e-3 * np.arange(20), rtol=1e-12)
 
 
+def test_a_line_of_text_above_numbers_is_a_comment(table):
+    """One cell is no heading of two columns: they are numbered."""
+    read = table("my instrument\n" + "".join(f"{k};{k / 8}\n" for k in range(14)))
+    assert (read.names, read.rows, read.comments) == (("column1", "column2"), 14, ("my instrument",))
+
+
 def test_a_header_of_another_count_is_still_an_error(table):
     """However many rows follow."""
     _refused(table, "t,u\n" + _POINT, "2 column names", "3 columns in line 2")
@@ -454,6 +460,13 @@ def test_without_time_only_the_order_counts(table):
     read = table("u,y,t\n1,2,0\n2,3,1\n")
     assert read_run(read.path, **COLUMNS).time_s is None
     np.testing.assert_array_equal(read_run(read.path, **COLUMNS, time="t").time_s, [0, 1])
+
+
+@pytest.mark.parametrize(("first", "counts"), [(0, True), (1, True), (2, False), (0.5, False)])
+def test_a_column_that_just_counts_is_no_time(table, first, counts):
+    """From 0 or 1 in steps of 1; one that begins elsewhere is time."""
+    read = table("n,u,y\n" + "".join(f"{first + k},{k % 5},{k % 3}\n" for k in range(20)))
+    assert (read_run(read.path, **COLUMNS).time_s is None) == counts
 
 
 def test_time_that_does_not_increase_names_the_line(table):

@@ -1,0 +1,56 @@
+"""Small tables that a user writes by hand: a signal to be played, bounds to be held."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pulsetrainer.core.excitations import MOST_SAMPLES
+from pulsetrainer.errors import DataError
+from pulsetrainer.files.bounds import read_bounds
+from pulsetrainer.files.signal_table import read_signal
+
+
+def test_a_signal_is_read_at_even_steps(tmp_path):
+    """Whatever time it begins at: straight lines between its points, both ends included."""
+    path = tmp_path / "mine.csv"
+    path.write_text("t_s,current_A\n10.0,0\n10.5,1\n12.0,0.25\n")
+    signal = read_signal(path, 10.0)
+    t = 10.0 + np.arange(21) / 10.0
+    np.testing.assert_allclose(signal.value, np.interp(t, [10.0, 10.5, 12.0], [0.0, 1.0, 0.25]), atol=1e-12)
+    assert (signal.rate_Hz, signal.name) == (10.0, "mine.csv")
+    with pytest.raises(DataError) as caught:
+        read_signal(path, MOST_SAMPLES)
+    assert str(MOST_SAMPLES) in str(caught.value)
+
+
+def test_a_signal_needs_two_columns(tmp_path):
+    """The columns that it should have are in the remedy."""
+    path = tmp_path / "one.csv"
+    path.write_text("t_s\n0\n1\n")
+    with pytest.raises(DataError) as caught:
+        read_signal(path, 10.0)
+    assert "t_s,current_A" in caught.value.hint
+
+
+def test_bounds_are_named_by_their_tables(tmp_path):
+    """A pair of numbers a metric; tables in tables are joined by dots."""
+    path = tmp_path / "bounds.toml"
+    path.write_text("top = [1, 2]\n[normal.relay]\nrms = [0.5, 0.5]\n[normal.exact]\nrms = [-1, 0]\n")
+    assert read_bounds(path) == {
+        "top": (1.0, 2.0),
+        "normal.relay.rms": (0.5, 0.5),
+        "normal.exact.rms": (-1.0, 0.0),
+    }
+
+
+@pytest.mark.parametrize("bound", ["[2, 1]", "[1]", "[1, 2, 3]", "1", "[1, true]", "[1, 'a']", "[nan, 1]"])
+def test_what_is_no_bound_is_named(tmp_path, bound):
+    """Its key and its file; nothing is held against half a bound."""
+    path = tmp_path / "bounds.toml"
+    path.write_text(f"[normal]\nrms = {bound}\n")
+    with pytest.raises(DataError) as caught:
+        read_bounds(path)
+    assert "normal.rms" in str(caught.value)
+    assert "bounds.toml" in str(caught.value)
+    assert caught.value.hint.startswith("write rms =")
