@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from typing import Any
 
 _TIME = r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:[.,]\d+)?))?(?: ?([AaPp])[Mm])?"
 _CLOCK = re.compile(_TIME)
@@ -61,16 +62,16 @@ def _month_and_day(found: re.Match[str], day_comes_first: bool) -> tuple[str, st
     return (found[2], found[1]) if day_comes_first else (found[1], found[2])
 
 
-def _of_day(time: tuple[str | None, ...]) -> float:
+def _of_day(time: tuple[str | Any, ...]) -> float:
     """Return the seconds since midnight of hour, minute, second and the letter of a half of the day."""
     hour, minute, second, half = time
-    count = int(hour or 0)
+    count = int(hour)
     if half is not None:
         count = count % 12 + 12 * (half in "Pp")
-    return 3600.0 * count + 60.0 * int(minute or 0) + float((second or "0").replace(",", "."))
+    return 3600.0 * count + 60.0 * int(minute) + float((second or "0").replace(",", "."))
 
 
-def _stamp(year: str, month: str, day: str, time: tuple[str | None, ...]) -> float | None:
+def _stamp(year: str, month: str, day: str, time: tuple[str | Any, ...]) -> float | None:
     midnight = _since_1970(f"{year}-{int(month):02}-{int(day):02}")
     of_day = _of_day(time)
     return None if midnight is None or of_day >= 86_401 else midnight + of_day

@@ -20,6 +20,12 @@ def test_a_path_goes_through_its_points():
     assert between == pytest.approx([0.0, 3 / 7, 1.0, 1 - 2 / 7, 2 - 12 / 7, 0.0], abs=1e-12)
 
 
+def test_a_first_stroke_shorter_than_a_sample_is_kept():
+    """Its turn comes one sample after the beginning."""
+    path = excitations.through([0.0, 0.001, -1.0], 10.0, 100.0)
+    assert path[:2] == pytest.approx([0.0, 0.001], abs=0)
+
+
 @pytest.mark.parametrize("n_h", [2, 5, 12])
 def test_identification_visits_every_edge(n_h):
     """Down from the top to each edge in turn, the finest loop first: 2 n_h reversals with the last."""
@@ -41,6 +47,8 @@ def test_a_signal_must_not_jump_over_its_range():
     assert excitations.identification(0.0, 1.0, n_h=2, speed=10.0, rate_Hz=10.0).value.max() == 1.0
     with pytest.raises(ArgumentError, match="its range is 1"):
         excitations.identification(0.0, 1.0, n_h=2, speed=10.1, rate_Hz=10.0)
+    with pytest.raises(ArgumentError, match="its range is 1"):
+        excitations.diagnostic(1.0, 2.0, rate_Hz=0.99 * max(excitations._RATES))
     for rate in (0.0, -0.5):
         with pytest.raises(ArgumentError, match="rate must be positive"):
             excitations.identification(0.0, 1.0, n_h=2, speed=1.0, rate_Hz=rate)

@@ -99,6 +99,9 @@ def test_normal_equations_equal_the_design_matrix():
     masses = np.abs(np.random.default_rng(6).normal(size=PLANE.n_q))
     residual = record.output - 0.2 - matrix @ masses
     assert sums.sum_of_squares(masses, 0.2) == pytest.approx(residual @ residual, rel=1e-10)
+    small = equations.normal_equations(PLANE, [Record(record.input, 1e-3 * record.output)], "continuous")
+    expected = 1e-3 * np.sqrt(np.mean(residual**2))
+    assert small.rms(1e-3 * masses, 2e-4) == pytest.approx(expected, rel=1e-9)
 
 
 def test_masked_samples_do_not_count():
@@ -109,6 +112,8 @@ def test_masked_samples_do_not_count():
     spoilt[100:150], mask[100:150] = np.nan, 0.0
     left_out = identify([Record(record.input, spoilt, mask)], PLANE)
     assert np.all(np.isfinite(left_out.operator.weights))
+    counted = np.ptp(record.output[mask > 0])
+    assert identification._span([Record(record.input, spoilt, mask)]) == pytest.approx(counted, rel=1e-12)
     twice = identify([record, record], PLANE)
     double = identify([Record(record.input, record.output, np.full(mask.size, 2.0))], PLANE)
     assert np.allclose(twice.operator.masses, double.operator.masses, atol=1e-9)
