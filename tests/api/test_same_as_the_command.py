@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import pytest
 
 import pulsetrainer as pt
 from program import pulsetrainer
+from pulsetrainer.diagnosis.causes.base import low_pass
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 KEPT = DATA / "files-0.1"
@@ -96,11 +97,20 @@ def test_capture(tmp_path):
     same(by_command(tmp_path, *words), stored(run, tmp_path))
 
 
-def test_diagnose_and_extend(tmp_path):
-    """What a quick screen finds, and what a model becomes by a whole diagnosis."""
-    run, model = KEPT / "run.h5", KEPT / "model.h5"
-    found = pt.diagnose([pt.load(run)], pt.load(model), quick=True, names=["run", "model"])
-    same(by_command(tmp_path, "diagnose", run, "--model", model, "--quick"), stored(found, tmp_path))
+@pytest.mark.parametrize("quick", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_diagnose_and_extend(tmp_path, quick):
+    """What a screen finds; what the whole diagnosis finds of a slow sensor, and what a model becomes by it."""
+    run, model = pt.load(KEPT / "run.h5"), KEPT / "model.h5"
+    slow = replace(run, output=low_pass(run.output, 0.03, run.time_s[1] - run.time_s[0]))
+    pt.save(slow, tmp_path / "slow.h5")
+    found = pt.diagnose([slow], pt.load(model), quick=quick, seed=2, names=["slow.h5", str(model)])
+    words = ("diagnose", "slow.h5", "--model", model, "--seed", 2, *(["--quick"] if quick else []))
+    same(by_command(tmp_path, *words), stored(found, tmp_path))
+    if not quick:
+        pt.save(found, tmp_path / "diagnosis.h5")
+        extended = pt.extend(pt.load(model), pt.load(tmp_path / "diagnosis.h5"))
+        words = ("extend", "diagnosis.h5", "--model", model)
+        same(by_command(tmp_path, *words), stored(extended, tmp_path))
 
 
 def test_compare(tmp_path):
