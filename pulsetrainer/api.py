@@ -126,7 +126,7 @@ def read_table(
 
     Several files are parts of one run. ``columns`` are those of ``files.run_from_table.run_from_table``:
     ``input`` and ``output`` (names of columns), and ``time``, ``reference``, ``input_unit``, ``output_unit``,
-    ``rate`` (Hz) or ``no_time`` where the file does not say it. ``resample`` makes the time steps even.
+    ``rate_Hz`` or ``no_time`` where the file does not say it. ``resample`` makes the time steps even.
 
     Raises
     ------

@@ -95,7 +95,7 @@ def import_(
                     reference=reference_column,
                     input_unit=input_unit,
                     output_unit=output_unit,
-                    rate=rate,
+                    rate_Hz=rate,
                     no_time=no_time,
                 )
                 for path in group

@@ -40,12 +40,12 @@ def run_from_table(
     reference: str | None = None,
     input_unit: str | None = None,
     output_unit: str | None = None,
-    rate: float | None = None,
+    rate_Hz: float | None = None,
     no_time: bool = False,
 ) -> TableRun:
     """Read a run out of a file: named columns, and no more of it than these in memory.
 
-    Without ``time`` and ``rate`` (Hz) the time is the file's own rate, a column named so, or, in a text, the
+    Without ``time`` and ``rate_Hz`` the time is the file's own rate, a column named so, or, in a text, the
     first column where that is neither input, output nor reference; otherwise the run has no time and only
     its order counts. A first column that just counts its rows is not used as time. Time may be in ms or us.
 
@@ -57,9 +57,10 @@ def run_from_table(
         The file is no table, a column is missing or not finite, a unit is not known, there are fewer than
         two rows, or time does not increase (the line is named).
     """
-    check_timing(time, rate, no_time=no_time)
+    check_timing(time, rate_Hz, no_time=no_time)
     wanted = [name for name in (input, output, reference) if name is not None]
-    table = read_table(path, lambda head: _needed(head, wanted, time, automatic=rate is None and not no_time))
+    automatic = rate_Hz is None and not no_time
+    table = read_table(path, lambda head: _needed(head, wanted, time, automatic=automatic))
     columns = {name: np.ascontiguousarray(table.check_finite(name)) for name in wanted}
     rows = table.rows
     notes: tuple[str, ...] = ()
@@ -68,8 +69,8 @@ def run_from_table(
             f"{table.path} has {rows} row, a run needs two or more", hint="export the record again"
         )
     time_s: FloatArray | None = None
-    if rate is not None:
-        time_s = np.arange(rows) / rate
+    if rate_Hz is not None:
+        time_s = np.arange(rows) / rate_Hz
     elif time is not None:
         time_s = seconds(table, time)
     elif not no_time:
@@ -124,7 +125,7 @@ def _own_time(table: Table, used: Collection[int]) -> tuple[FloatArray | None, t
         return np.arange(table.rows) / table.rate_Hz, ()
     free = _free(table, used)
     if not free:
-        note = f"{table.path} has no time column: its samples have an order only (give `time` or `rate`)"
+        note = f"{table.path} has no time column: its samples have an order only (give `time` or `rate_Hz`)"
         return None, (note,)
     name = table.names[free[0]]
     if _just_counts(table.columns[name]):
@@ -158,7 +159,7 @@ def seconds(table: Table, name: str) -> FloatArray:
     if unit not in SECONDS:
         raise DataError(
             f"the time column {name} of {table.path} is in {unit!r}, expected s, ms, us, min or h",
-            hint="convert it to seconds, choose another `time` column, or give a `rate`",
+            hint="convert it to seconds, choose another `time` column, or give a `rate_Hz`",
         )
     time_s = table.check_finite(name)
     if SECONDS[unit] != 1.0:
@@ -170,8 +171,8 @@ def seconds(table: Table, name: str) -> FloatArray:
         raise DataError(
             f"the time in {table.path}, column {name}, does not increase at {table.place(row)}: "
             f"{time_s[row]:g} s after {time_s[row - 1]:g} s ({back.size} such rows)",
-            hint="drop the repeated rows, or give a `rate` instead of the time"
+            hint="drop the repeated rows, or give a `rate_Hz` instead of the time"
             if same
-            else "sort the rows, choose another `time` column, give a `rate`, or cut the file into parts",
+            else "sort the rows, choose another `time` column, give a `rate_Hz`, or cut the file into parts",
         )
     return time_s

@@ -7,7 +7,7 @@ import math
 from pulsetrainer.errors import UsageError
 
 
-def check_timing(time: str | None, rate: float | None, *, no_time: bool, resampled: bool = False) -> None:
+def check_timing(time: str | None, rate_Hz: float | None, *, no_time: bool, resampled: bool = False) -> None:
     """Refuse what contradicts itself, before a long table is read.
 
     Raises
@@ -16,15 +16,17 @@ def check_timing(time: str | None, rate: float | None, *, no_time: bool, resampl
         More than one of a time column, a rate and no time; a rate that is not positive; no time, but
         even steps of it.
     """
-    if time is not None and rate is not None:
+    if time is not None and rate_Hz is not None:
         raise UsageError(
-            f"both a time column ({time}) and a rate ({rate:g} Hz) were given",
-            hint="give `time` or `rate`, not both",
+            f"both a time column ({time}) and a rate ({rate_Hz:g} Hz) were given",
+            hint="give `time` or `rate_Hz`, not both",
         )
-    if no_time and (time is not None or rate is not None):
-        raise UsageError("`no_time` was given together with `time` or `rate`", hint="give one of the three")
-    if rate is not None and not 0 < rate < math.inf:
-        raise UsageError(f"the rate must be positive, got {rate:g} Hz", hint="for instance `rate` 1000")
+    if no_time and (time is not None or rate_Hz is not None):
+        raise UsageError(
+            "`no_time` was given together with `time` or `rate_Hz`", hint="give one of the three"
+        )
+    if rate_Hz is not None and not 0 < rate_Hz < math.inf:
+        raise UsageError(f"the rate must be positive, got {rate_Hz:g} Hz", hint="for instance `rate_Hz` 1000")
     if no_time and resampled:
         raise UsageError(
             "a run without time cannot be resampled", hint="leave out either `no_time` or `resample`"

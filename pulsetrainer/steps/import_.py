@@ -146,7 +146,7 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
         The run has no time, or the rate is not positive or would make too many samples.
     """
     if run.time_s is None:
-        raise UsageError("a run without time cannot be resampled", hint="give `time` or `rate`")
+        raise UsageError("a run without time cannot be resampled", hint="give `time` or `rate_Hz`")
     if rate_Hz is not None and not 0 < rate_Hz < np.inf:
         raise UsageError(
             f"the rate must be positive, got {rate_Hz:g} Hz", hint="for instance `resample` 1000"
@@ -190,7 +190,7 @@ def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
             if (getattr(part, name) is None) != (getattr(first, name) is None):
                 raise DataError(
                     f"of {first.signal} and {part.signal} only one has a {name.removesuffix('_s')}",
-                    hint="give `rate` or `no_time` for all, or import them one by one",
+                    hint="give `rate_Hz` or `no_time` for all, or import them one by one",
                 )
     times, seams, notes = _joined_time(parts)
     starts = np.cumsum([part.input.size for part in parts])[:-1]

@@ -99,7 +99,7 @@ def test_capture(tmp_path):
 
 @pytest.mark.parametrize("quick", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_diagnose_and_extend(tmp_path, quick):
-    """What a screen finds; what the whole diagnosis finds of a slow sensor, and what a model becomes by it."""
+    """What a screen finds of a slow sensor, what the whole diagnosis finds, and what extends a model."""
     run, model = pt.load(KEPT / "run.h5"), KEPT / "model.h5"
     slow = replace(run, output=low_pass(run.output, 0.03, run.time_s[1] - run.time_s[0]))
     pt.save(slow, tmp_path / "slow.h5")

@@ -449,8 +449,8 @@ def test_units_given_win(table):
 def test_a_rate_instead_of_a_time(table):
     """Samples a second; both a rate and a time column are too much, a rate of nothing too little."""
     read = table("t,u,y\n9,1,2\n8,2,3\n")
-    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, rate=4).time_s, [0, 0.25])
-    for bad in ({"rate": 4, "time": "t"}, {"rate": 0}, {"rate": np.nan}, {"rate": np.inf}):
+    np.testing.assert_array_equal(read_run(read.path, **COLUMNS, rate_Hz=4).time_s, [0, 0.25])
+    for bad in ({"rate_Hz": 4, "time": "t"}, {"rate_Hz": 0}, {"rate_Hz": np.nan}, {"rate_Hz": np.inf}):
         with pytest.raises(UsageError, match="rate"):
             read_run(read.path, **COLUMNS, **bad)
 
