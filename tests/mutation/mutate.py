@@ -53,12 +53,15 @@ PACKAGES = {  # the tests that answer for a package
         "tests/blind/test_p*.py",
     ),
     "files": tuple(
-        f"{UNIT}{one}*.py" for one in ("store", "table", "recorder", "provenance", "units", "file")
+        f"{UNIT}{one}*.py" for one in ("store", "table", "recorder", "provenance", "units", "file", "signal")
     ),
     "device": ("tests/link",),
     "simulation": ("tests/link",),
     "report": (*(f"{UNIT}{one}*.py" for one in ("figures", "html")), "tests/api", "tests/cli"),
-    "artefacts": (*(f"{UNIT}{one}*.py" for one in ("store", "units", "figures", "table")), "tests/api"),
+    "artefacts": (
+        *(f"{UNIT}{one}*.py" for one in ("artefacts", "store", "units", "figures", "table")),
+        "tests/api",
+    ),
     "steps": ("tests/api", "tests/cli"),
     "cli": ("tests/cli",),
 }

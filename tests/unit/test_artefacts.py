@@ -1,0 +1,87 @@
+"""The artefacts themselves: what they check, and what they say of themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import store_examples as examples
+
+from pulsetrainer.artefacts import ModelEvaluation, Run
+from pulsetrainer.artefacts.time_steps import steps_of
+from pulsetrainer.errors import DataError
+
+
+def _seams(*places: int) -> np.ndarray:
+    return np.isin(np.arange(50), places)
+
+
+def test_parts_of_a_run_lie_between_its_seams():
+    """A seam is the first sample after a pause; the parts together are the run, and have no seam."""
+    run = examples.run(50, seam=_seams(10, 30))
+    parts = run.parts()
+    assert [part.input.size for part in parts] == [10, 20, 20]
+    assert [part.time_s[0] for part in parts] == pytest.approx(run.time_s[[0, 10, 30]], abs=0)
+    for name in ("time_s", "input", "output", "reference"):
+        whole = np.concatenate([getattr(part, name) for part in parts])
+        np.testing.assert_array_equal(whole, getattr(run, name))
+    assert all(part.seam is None for part in parts)
+    assert [part.input.size for part in run.parts(11)] == [20, 20]
+    assert run.parts(51) == (run,)
+    for whole in (examples.run(50), examples.run(50, seam=_seams())):
+        assert whole.parts() == (whole,)
+
+
+def test_arrays_along_time_have_one_length():
+    """Which array is how long is said."""
+    with pytest.raises(DataError) as caught:
+        Run(np.arange(3.0), np.zeros(3), np.zeros(2))
+    assert "output has 2" in str(caught.value)
+
+
+def test_time_that_is_none_is_found_at_its_first_sample():
+    """Not a number, and not increasing."""
+    for bad, sample in ((np.nan, "sample 3"), (-1.0, "sample 3")):
+        time = np.arange(8.0)
+        time[[3, 5]] = bad
+        with pytest.raises(DataError) as caught:
+            Run(time, np.zeros(8), np.zeros(8))
+        assert sample in str(caught.value)
+
+
+def test_the_median_step_of_a_run():
+    """Of a run with a time, and of two samples at least."""
+    assert examples.run(50).dt_s == pytest.approx(1e-3)
+    assert examples.run(50, time_s=None).dt_s is None
+    assert examples.run(1).dt_s is None
+
+
+def test_what_nobody_says_is_nothing():
+    """An artefact that is made with the least of arguments has lost nothing and changed nothing."""
+    assert (examples.run().dropped_samples, examples.run().complete) == (0, True)
+    played = examples.playback()
+    assert (played.dropped_samples, played.complete, played.fault) == (0, True, "")
+
+
+def test_steps_are_even_within_two_percent_and_gaps_count_apart():
+    """A step of half as much again is a gap, a bit less is an uneven step."""
+    even = np.arange(100.0)
+    assert steps_of(even) == (steps_of(even + 1e3)) == type(steps_of(even))(1.0, 1.0, 1.0, 0, 0.0)
+    for stretch, is_even in (
+        (0.9 * EVEN, True),
+        (1.1 * EVEN, False),
+        (-0.9 * EVEN, True),
+        (-1.1 * EVEN, False),
+    ):
+        time = even + np.where(even > 50, stretch, 0.0)
+        assert steps_of(time).even == is_even
+    pause = even + np.where(even > 50, 0.51, 0.0) + np.where(even > 70, 0.49, 0.0)
+    found = steps_of(pause)
+    assert (found.gaps, found.longest_gap, found.longest) == (1, pytest.approx(1.51), pytest.approx(1.49))
+    many = steps_of(np.concatenate((np.arange(300_000.0), [300_007.0, 300_010.0])))
+    assert (many.gaps, many.longest_gap, many.median, many.shortest) == (2, 8.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize("name", ["models/best.h5", "C:\\models\\best.h5", "best.h5", "best"])
+def test_the_short_name_of_a_model(name):
+    """Without folder and ending, whatever the system."""
+    assert ModelEvaluation(name, 0.0, 0.0, 0.0, 0.0, None, np.zeros(1), np.zeros(1)).short_name == "best"
