@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import store_examples as examples
 
-from pulsetrainer.artefacts import ModelEvaluation, Run
+from pulsetrainer.artefacts import ModelEvaluation, Run, Waveform
 from pulsetrainer.artefacts.time_steps import steps_of
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import DataError
 
 
@@ -79,3 +80,20 @@ def test_steps_are_even_within_two_percent_and_gaps_count_apart():
 def test_the_short_name_of_a_model(name):
     """Without folder and ending, whatever the system."""
     assert ModelEvaluation(name, 0.0, 0.0, 0.0, 0.0, None, np.zeros(1), np.zeros(1)).short_name == "best"
+
+
+def test_errors_of_a_drive_are_of_its_scored_force():
+    """In percent of the largest target, either sign; what is not scored does not count."""
+    target, scored = np.array([9.0, -4.0, 2.0, 0.0]), np.array([False, True, True, True])
+    time = np.arange(4) / 100.0
+    predicted = np.array([12.0, -4.0, 1.5, 0.25])
+    drive = Waveform(time, target, target, target, predicted, scored, *"abc", 0)
+    assert drive.full_force == 4.0
+    assert drive.predicted_max_error_percent == pytest.approx(12.5)
+    assert drive.rate_Hz == pytest.approx(100.0)
+
+
+def test_a_record_without_time_has_steps_of_one():
+    """Its samples have an order only."""
+    assert (Record([0.0, 1.0], [0.0, 1.0]).step, Record([0.0, 1.0], [0.0, 1.0]).timed) == (1.0, False)
+    assert (Record([0.0, 1.0], [0.0, 1.0], dt_s=0.25).step) == 0.25

@@ -222,6 +222,13 @@ BAD = {
         ["low < high", "1"],
     ),
     "path at no speed": (lambda: excitations.through(np.arange(3.0), 0.0, 100.0), ["speed", "positive", "0"]),
+    **{
+        f"record with a time step of {step}": (
+            lambda step=step: Record(FIVE, FIVE, dt_s=step),
+            ["dt_s", "positive", f"{step:g}"],
+        )
+        for step in (0.0, -1.0, INF)
+    },
     "path in steps beyond every float": (
         lambda: excitations.through(np.arange(3.0), 1e300, 1e-300),
         ["path", "speed", "1e+300"],
