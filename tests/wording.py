@@ -7,9 +7,14 @@ own names in braces. A part that does not apply is left out, but every row says 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
 
+import pytest
+
 from program import Ran
+from pulsetrainer.errors import PulsetrainerError
 
 KINDS = {
     1: {"quality"},
@@ -44,6 +49,14 @@ MESSAGES = {
     "not HDF5": Message("not an HDF5 file", "pulsetrainer import", "{file}"),
     "another program's": Message("another program", "pulsetrainer import", "{file}", "kind"),
     "name too long": Message("too long", "", "x" * 20),
+    "nothing recorded": Message("nothing was recorded", ""),
+    "kept elsewhere": Message("kept in", "", "{file}"),
+    "recording is finished": Message("finished", "a new run"),
+    "disk is full": Message("is full", "kept", "{folder}", got="bytes are left"),
+    "no folder": Message("does not exist", "", "{folder}"),
+    "no sound provenance": Message("the provenance is not", "", "{file}"),
+    "no provenance": Message("'provenance' is missing", "", "{file}"),
+    "not writable": Message("not writable", "", "{folder}"),
     "no such figure": Message("png, svg or pdf", "model.png", "{file}", got="h5"),
     # --- tables ------------------------------------------------------------------------------------------
     "no such column": Message("no column", "current_A", "{file}", "force_N", "t_s, current_A"),
@@ -83,6 +96,13 @@ MESSAGES = {
     # --- device ------------------------------------------------------------------------------------------
     "no such port": Message("no port", "pulsetrainer ports", "{port}"),
     "no compiler": Message("C compiler", "pip install ziglang"),
+    "several devices": Message("2 devices", "--port", got="/dev/ttyUSB1, /dev/ttyUSB2"),
+    "no device": Message("no device", "bench:", expected="0403:6015", got="/dev/ttyUSB0"),
+    "no permission": Message("no permission", "dialout", "{port}"),
+    "not a serial port": Message("not a serial port", "pulsetrainer ports", "{port}"),
+    "not a port": Message("not a port", "", "{port}"),
+    "out of reach": Message("cannot reach", "port number", "{port}"),
+    "not in so long": Message("s long", "", expected="at most 2 s", got="2.999 s"),
     "port is busy": Message("busy", "close the other program", "{port}"),
     "not our device": Message("not a pulsetrainer device", "pulsetrainer ports", "{port}"),
     "nobody answers": Message("nobody answers", "has power", "{port}"),
@@ -144,3 +164,25 @@ def refusal(done: Ran, code: int, name: str, **names: object) -> None:
     for field in fields(Message):
         part = (getattr(row, field.name) or "").format(**names)
         assert part in (tried if field.name == "next" else said), (name, field.name, part, done.err)
+
+
+@contextmanager
+def raises(kind: type[PulsetrainerError], name: str, **names: object) -> Iterator[pytest.ExceptionInfo]:
+    """Hold that an error of this kind is raised, and that it says each part of its row."""
+    with pytest.raises(kind) as caught:
+        yield caught
+    told(caught.value, name, **names)
+
+
+def told(error: PulsetrainerError, name: str, **names: object) -> None:
+    """Hold that an error says each part of its row, and what to do next."""
+    row = MESSAGES[name]
+    assert bool(error.hint) == (row.next is not None), f"what to do next: {error.hint!r}"
+    for field in fields(Message):
+        part = (getattr(row, field.name) or "").format(**names)
+        assert part in (error.hint if field.name == "next" else error.message), (
+            name,
+            field.name,
+            part,
+            error,
+        )

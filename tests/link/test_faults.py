@@ -16,6 +16,7 @@ from pulsetrainer.device.device import open_device
 from pulsetrainer.device.frames import Frame, encode
 from pulsetrainer.device.session import RefusedError
 from pulsetrainer.errors import ArgumentError
+from wording import raises
 
 HALF_AMP = np.full(3000, 0.5)
 
@@ -80,14 +81,15 @@ def test_too_long_an_on_time_is_refused(wire):
     """A reference longer than the on-time is refused by the program, and by the device itself."""
     with open_device("bench:") as device:
         device.set_parameter("on_time", 2)
-        with pytest.raises(ArgumentError, match=r"2\.999 s long; the device stays on for at most 2 s"):
+        with raises(ArgumentError, "not in so long"):
             device.play(HALF_AMP, 1000)
         assert device.play(HALF_AMP[:1890], 1000).complete
     one = wire("bench:")
     one.session.hello()
     one.ask(m.WaveBegin(899_900, 10, 0))
-    with pytest.raises(RefusedError, match="refused WaveBegin: a value is outside its limits"):
+    with pytest.raises(RefusedError) as caught:
         one.ask(m.WaveBegin(899_901, 10, 0))
+    assert caught.value.nak.code == NakCode.RANGE
 
 
 @pytest.mark.parametrize("speed", ["real", "max"])
@@ -126,8 +128,9 @@ def test_an_armed_device_left_alone_disarms(wire):
     hello = one.session.hello()
     one.ask(m.WaveBegin(1, 10, 0))
     one.ask(m.WaveData(0, 1, b"\1\0"))
-    with pytest.raises(RefusedError, match="checksum"):
+    with pytest.raises(RefusedError) as caught:
         one.ask(m.WaveCommit(1, 0))
+    assert caught.value.nak.code == NakCode.CRC
     one.ask(m.WaveCommit(1, zlib.crc32(b"\1\0")))
     one.ask(m.Arm(hello.boot_nonce))
     time.sleep(0.5)
@@ -159,8 +162,9 @@ def test_credit_is_never_exceeded(wire):
         ack = one.ask(m.WaveData(sent, 61, bytes(122)))
         sent += 61
         assert ack.credit == 1024 - sent
-    with pytest.raises(RefusedError, match="room"):
+    with pytest.raises(RefusedError) as caught:
         one.ask(m.WaveData(sent, 61, bytes(122)))
+    assert caught.value.nak.code == NakCode.CREDIT
 
 
 def test_a_reset_in_mid_play_is_told_and_nothing_restarts():
@@ -205,7 +209,7 @@ def test_a_fault_left_by_an_earlier_program_is_reported(wire):
     with pytest.raises(RefusedError) as caught:
         one.ask(m.WaveBegin(10, 10, 0))
     assert caught.value.nak.code == NakCode.FAULT
-    assert "heard nothing from the host" in caught.value.message
+    assert "heard nothing" in caught.value.message
 
 
 def test_a_host_that_does_not_read_loses_counted_samples(wire):

@@ -26,6 +26,7 @@ from pulsetrainer.files import atomic_write, store
 from pulsetrainer.files.atomic_write import cannot_write
 from pulsetrainer.files.checksum import CHECKSUM_LENGTH
 from pulsetrainer.files.store import check_output, read, read_any, read_header, write
+from wording import raises
 
 SEED = 20260102
 
@@ -208,10 +209,10 @@ def test_damaged_size_does_not_fill_the_memory(run_file):
 def test_broken_header(run_file):
     """A header that is missing or broken is an error of read_header only."""
     _edit(run_file, _attribute("provenance", "{"))
-    with pytest.raises(DataError, match=r"run\.h5: the provenance is not"):
+    with raises(DataError, "no sound provenance", file="run.h5"):
         read_header(run_file)
     _edit(run_file, lambda file: file.attrs.__delitem__("provenance"))
-    with pytest.raises(DataError, match="'provenance' is missing"):
+    with raises(DataError, "no provenance", file="run.h5"):
         read_header(run_file)
     assert examples.equal(read_any(run_file), examples.run())
 
@@ -320,7 +321,7 @@ def test_outputs_that_cannot_be(tmp_path, monkeypatch):
             check_output(path, overwrite=True)
         assert caught.value.hint
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
-    with pytest.raises(UsageError, match="not writable"):
+    with raises(UsageError, "not writable", folder=tmp_path):
         check_output(tmp_path / "a.h5")
 
 
