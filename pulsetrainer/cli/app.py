@@ -14,6 +14,7 @@ from pulsetrainer.cli import (
     diagnose,
     doctor,
     evaluate,
+    export,
     extend,
     guard,
     identify,
@@ -45,6 +46,7 @@ app.command("evaluate")(evaluate.evaluate)
 app.command("compare")(compare.compare)
 app.command("diagnose")(diagnose.diagnose)
 app.command("extend")(extend.extend)
+app.command("export")(export.export)
 app.command("show")(show.show)
 app.command("plot")(plot.plot)
 app.command("ports")(ports.ports)

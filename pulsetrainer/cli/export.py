@@ -1,0 +1,47 @@
+"""``pulsetrainer export``: the series of a file as a table for any other program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, Overwrite
+from pulsetrainer.errors import UsageError
+
+_TABLES = (".csv", ".txt")
+
+
+def export(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Table to write, as CSV.", metavar="FILE.csv")],
+    overwrite: Overwrite = False,
+    json: AsJson = False,
+) -> None:
+    """Write the series of an artefact as a table, with units in its header.
+
+    A run, a waveform and a diagnosis have a row a sample, a model a row a cell of its density, a playback
+    its repeats and an evaluation its waveforms or models one below another.
+
+    Example: pulsetrainer export run.h5 -o run.csv
+    """
+    if out.suffix.lower() not in _TABLES:
+        raise UsageError(
+            f"a table is written as CSV, but {out} ends in {out.suffix!r}", hint=f"name it {out.stem}.csv"
+        )
+    job = Job(context, inputs=(file,), outputs=(out,), overwrite=overwrite, as_json=json)
+    artefact = job.load_any(file)
+    from pulsetrainer.files import store
+    from pulsetrainer.files.series import series_of
+    from pulsetrainer.files.table import write_table
+
+    with job.working(f"exporting {file.name}"):
+        columns = series_of(artefact)
+        title = f"{artefact.kind}: {store.read_header(file).title}"
+        write_table(out, columns, comments=(title,), overwrite=overwrite)
+    rows = next(iter(columns.values())).size
+    job.screen.result({"output": out, "kind": artefact.kind, "columns": list(columns), "rows": rows})
+    job.screen.whole(f"wrote {out}: {artefact.kind}, {rows} rows of {', '.join(columns)}")
