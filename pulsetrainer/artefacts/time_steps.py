@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from pulsetrainer.artefacts.data import FloatArray
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts.run import Run
 
 # Steps within this share of the median are even: time stamps are written with few digits.
 EVEN = 0.02
@@ -30,6 +35,19 @@ class Steps:
         """True where no step differs from the median by more than ``EVEN``; gaps count apart."""
         low, high = (1.0 - EVEN) * self.median, (1.0 + EVEN) * self.median
         return low <= self.shortest and self.longest <= high
+
+
+class Gaps(NamedTuple):
+    """How many gaps there are in some parts of a run, and the longest, s."""
+
+    number: int
+    longest_s: float  # 0 where there is none
+
+
+def gaps_of(parts: Sequence[Run]) -> Gaps:
+    """Return the gaps within the parts of a run: a pause between two of them is none."""
+    steps = [steps_of(part.time_s) for part in parts if part.time_s is not None and part.time_s.size > 1]
+    return Gaps(sum(one.gaps for one in steps), max((one.longest_gap for one in steps), default=0.0))
 
 
 def steps_of(time_s: FloatArray) -> Steps:

@@ -14,7 +14,7 @@ import re
 from pulsetrainer.errors import DataError
 
 _PREFIXES = ("da", *"YZEPTGMkhdcmunpfazyµμ")
-_PREFIXED_SYMBOLS = "A V N T m g s Pa Hz W J K C F H S rad bar ohm Ω Wb L l eV Oe G emu gf cd mol"
+_PREFIXED_SYMBOLS = "A V N T m g s Pa Hz W J K C F H S rad bar ohm Ohm Ω Wb L l eV Oe G emu gf cd mol"
 _BARE_SYMBOLS = """
     1 % percent ppm ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev atm
     counts count ct LSB digit digits steps step px a.u. arb au norm dB
@@ -32,6 +32,7 @@ _SPELLED = {
     **dict.fromkeys(["volt", "volts"], "V"),
     **dict.fromkeys(["amp", "amps", "ampere", "amperes"], "A"),
     **dict.fromkeys(["newton", "newtons"], "N"),
+    **dict.fromkeys(["ohm", "ohms"], "ohm"),
 }
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
 
@@ -116,6 +117,15 @@ def shown(unit: str) -> str:
         digits = len(power) - len(power.lstrip("-0123456789"))
         head += power[:digits].translate(_POWERS) + power[digits:]
     return head.replace("*", "·")
+
+
+def with_seconds(seconds: float) -> str:
+    """Return a time in the unit in which it is easily read: ``2.5 ms``, ``20 ns``, ``173 s``."""
+    size = abs(seconds)
+    for unit, one in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("ps", 1e-12)):
+        if size >= one:
+            return f"{seconds / one:.3g} {unit}"
+    return f"{seconds:.3g} s"
 
 
 def with_unit(number: str, unit: str) -> str:

@@ -15,6 +15,7 @@ from pulsetrainer.errors import UsageError
 if TYPE_CHECKING:
     from pulsetrainer.steps.import_ import Imported
 
+_HARDLY = 50.0  # % of the cells: with fewer a person should know what the coverage does not say
 _NAME = "{name}"  # in the output: one run for each file
 
 
@@ -65,6 +66,10 @@ def import_(
             show_default=False,
         ),
     ] = None,
+    skip_bad_rows: Annotated[
+        bool,
+        typer.Option("--skip-bad-rows", help="Leave out rows with a blank cell or NaN; they are counted."),
+    ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
@@ -97,6 +102,7 @@ def import_(
                     output_unit=output_unit,
                     rate_Hz=rate,
                     no_time=no_time,
+                    skip_bad_rows=skip_bad_rows,
                 )
                 for path in group
             ]
@@ -139,6 +145,9 @@ def _facts(imported: Imported) -> dict[str, Any]:
     direction = "unclear, identify tries both" if report.polarity == "unclear" else report.polarity
     shown["loop"] = f"{direction} (correlation {report.correlation:+.2f})"
     shown["coverage_percent"] = report.coverage_percent
+    shown["told apart by minor loops"] = f"{report.minor_percent:.0f} % of the cells" + (
+        "; the rest only the major loop has switched" if report.minor_percent < _HARDLY else ""
+    )
     stamps = {True: "even", False: "uneven", None: "none: only the order counts"}[report.even]
     shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps
     for name in ("signal", "complete", "dropped_samples"):  # the title; of a device, not of a file

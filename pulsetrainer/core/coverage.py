@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pulsetrainer.core.plane import Plane, finite_vector
+from pulsetrainer.core.memory import turning_points
+from pulsetrainer.core.plane import FloatArray, Plane, finite_vector
 from pulsetrainer.errors import ArgumentError
 
 
@@ -65,6 +66,52 @@ def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:
         lowest_after = np.append(np.minimum.accumulate(u[::-1])[::-1], np.inf)[first]
         done |= lowest_after[i] < plane.thresholds[j]
     return done
+
+
+def minor_coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> float:
+    """Share of the cells within the plane that minor loops tell apart; the major loop alone tells none.
+
+    A record tells the weight of a cell where the corner (alpha, beta) of its remembered extremes passes
+    through it: from a maximum in band i down to band j, or from a minimum in band j up to band i. Corners on
+    the two outer edges of the plane are those of the major loop; their cells are not counted.
+
+    Raises
+    ------
+    ArgumentError
+        An input is no finite vector.
+    """
+    passed = np.zeros((plane.n_h, plane.n_h), dtype=bool)
+    for values in inputs:
+        path = np.concatenate(([plane.low], finite_vector("input", values)))
+        _mark_corners(plane, path[turning_points(path)], passed)
+    i, j = plane.cell_indices
+    within = (i < plane.n_h - 1) & (j > 0)
+    return float(np.mean(passed[i, j][within])) if within.any() else 0.0
+
+
+def _mark_corners(plane: Plane, turns: FloatArray, passed: NDArray[np.bool_]) -> None:
+    """Mark the cells (n_h, n_h) that corners of the memory pass, rising first, from negative saturation."""
+    bands = np.clip(np.searchsorted(plane.edges, turns, side="right") - 1, 0, plane.n_h - 1).tolist()
+    last = plane.n_h - 1
+    # remembered extremes and their bands; the outermost of both kinds are those of saturation
+    maxima, minima = [(np.inf, last)], [(-np.inf, 0)]
+    at = 0  # band that has been reached
+    for k, one in enumerate(zip(turns.tolist(), bands, strict=True)):
+        if k % 2 == 0:
+            while one >= maxima[-1] and len(maxima) > 1:  # wiped out, with the minimum after it
+                passed[at : maxima[-1][1] + 1, minima[-1][1]] = True
+                at = maxima.pop()[1]
+                minima.pop()
+            passed[at : one[1] + 1, minima[-1][1]] = True
+            maxima.append(one)
+        else:
+            while one <= minima[-1] and len(minima) > 1:
+                passed[maxima[-1][1], minima[-1][1] : at + 1] = True
+                at = minima.pop()[1]
+                maxima.pop()
+            passed[maxima[-1][1], one[1] : at + 1] = True
+            minima.append(one)
+        at = one[1]
 
 
 def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:

@@ -6,14 +6,16 @@ Time stamps are taken as they are. What a file says about its time, and what was
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.units import SECONDS, check_unit, split_unit
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.table import Table, read_table
 from pulsetrainer.files.timing import check_timing
 
@@ -42,6 +44,7 @@ def run_from_table(
     output_unit: str | None = None,
     rate_Hz: float | None = None,
     no_time: bool = False,
+    skip_bad_rows: bool = False,
 ) -> TableRun:
     """Read a run out of a file: named columns, and no more of it than these in memory.
 
@@ -49,10 +52,13 @@ def run_from_table(
     first column where that is neither input, output nor reference; otherwise the run has no time and only
     its order counts. A first column that just counts its rows is not used as time. Time may be in ms or us.
 
+    ``skip_bad_rows`` leaves out rows in which a number is missing or not finite; the notes say how many.
+
     Raises
     ------
     UsageError
-        More than one of a time column, a rate and ``no_time`` is given, or the rate is not positive.
+        More than one of a time column, a rate and ``no_time`` is given, the rate is not positive, or one
+        column is given two meanings.
     DataError
         The file is no table, a column is missing or not finite, a unit is not known, there are fewer than
         two rows, or time does not increase (the line is named).
@@ -61,9 +67,12 @@ def run_from_table(
     wanted = [name for name in (input, output, reference) if name is not None]
     automatic = rate_Hz is None and not no_time
     table = read_table(path, lambda head: _needed(head, wanted, time, automatic=automatic))
+    _check_distinct(table, input=input, output=output, reference=reference)
+    notes: tuple[str, ...] = ()
+    if skip_bad_rows:
+        table, notes = _without_bad_rows(table, counted=rate_Hz is not None)
     columns = {name: np.ascontiguousarray(table.check_finite(name)) for name in wanted}
     rows = table.rows
-    notes: tuple[str, ...] = ()
     if rows < 2:
         raise DataError(
             f"{table.path} has {rows} row, a run needs two or more", hint="export the record again"
@@ -73,8 +82,10 @@ def run_from_table(
         time_s = np.arange(rows) / rate_Hz
     elif time is not None:
         time_s = seconds(table, time)
+        _check_distinct(table, input=input, output=output, reference=reference, time=time)
     elif not no_time:
-        time_s, notes = _own_time(table, [table.index(name) for name in wanted])
+        time_s, more = _own_time(table, [table.index(name) for name in wanted])
+        notes += more
     run = Run(
         time_s=time_s,
         input=columns[input],
@@ -87,6 +98,55 @@ def run_from_table(
         signal=table.path.name,
     )
     return TableRun(run, notes)
+
+
+def _check_distinct(table: Table, **meanings: str | None) -> None:
+    """Raise UsageError where one column is given two meanings."""
+    places: dict[int, str] = {}
+    for meaning, name in meanings.items():
+        if name is None:
+            continue
+        place = table.index(name)
+        if place in places:
+            others = [own for k, own in enumerate(table.names) if k != place]
+            raise UsageError(
+                f"the {places[place]} and the {meaning} are both the column {table.names[place]} of "
+                f"{table.path}",
+                hint=f"name another column; the others are {', '.join(others) or 'none'}",
+            )
+        places[place] = meaning
+
+
+def _without_bad_rows(table: Table, *, counted: bool) -> tuple[Table, tuple[str, ...]]:
+    """Return a table without the rows in which a number is missing, and a note of how many there were.
+
+    Raises
+    ------
+    UsageError
+        The rows are ``counted`` to tell the time: none may be left out.
+    """
+    bad = ~np.all([np.isfinite(column) for column in table.columns.values()], axis=0)
+    count = int(np.count_nonzero(bad))
+    if count == 0:
+        return table, ()
+    if counted or table.rate_Hz is not None:
+        raise UsageError(
+            f"{count} rows of {table.path} lack a number, and its rows are counted to tell the time",
+            hint="name a `time` column, or give `no_time`, so that rows can be left out",
+        )
+    columns = {name: column[~bad] for name, column in table.columns.items()}
+    note = f"{count} of {bad.size} rows of {table.path} lack a number and were left out"
+    return replace(table, columns=columns, shifts=_shifts_of(table, np.flatnonzero(~bad))), (note,)
+
+
+def _shifts_of(table: Table, kept: NDArray[np.int64]) -> Sequence[tuple[int, int]]:
+    """Where the distance between a row and its line changes, when only some rows (k,) are kept."""
+    if not table.shifts:
+        return ()
+    jumps = np.flatnonzero(np.diff(kept) > 1) + 1
+    known = np.searchsorted(kept, [row for row, _ in table.shifts])
+    places = np.unique(np.concatenate(([0], jumps, known)))
+    return tuple((k, table.line_of(int(kept[k]))) for k in places.tolist() if k < kept.size)
 
 
 def _unit(table: Table, column: str, given: str | None, what: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Parameter, Playback, Run, Waveform
-from pulsetrainer.artefacts.time_steps import steps_of
+from pulsetrainer.artefacts.time_steps import gaps_of, steps_of
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray
@@ -51,14 +51,14 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
     if reversals is None:
         turns = turning_points(run.input if run.reference is None else run.reference)
         reversals = max(turns.size - 1, 0)
-    parts = len(run.parts())
+    parts = run.parts()
     return {
         "signal": run.signal,
         "samples": run.input.size,
         "seconds": float(run.time_s[-1] - run.time_s[0]) if run.time_s is not None and steps else None,
         "rate_Hz": 1.0 / steps.median if steps else None,
-        "gaps": steps.gaps - (parts - 1) if steps else None,
-        **({"parts": parts} if parts > 1 else {}),
+        "gaps": gaps_of(parts).number if steps else None,
+        **({"parts": len(parts)} if len(parts) > 1 else {}),
         f"input ({run.input_quantity})": _span(run.input, run.input_unit),
         f"output ({run.output_quantity})": _span(run.output, run.output_unit),
         "reversals": reversals,

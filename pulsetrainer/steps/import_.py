@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Run
-from pulsetrainer.artefacts.time_steps import GAP, steps_of
+from pulsetrainer.artefacts.time_steps import GAP, gaps_of, steps_of
+from pulsetrainer.artefacts.units import with_seconds
 from pulsetrainer.core import input_noise
-from pulsetrainer.core.coverage import coverage
+from pulsetrainer.core.coverage import coverage, minor_coverage
 from pulsetrainer.core.excitations import MOST_SAMPLES
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
@@ -45,6 +46,9 @@ class Report:
     false_reversals: int
     input_noise: float | None  # standard deviation, input unit; None where the record cannot tell
     coverage_percent: float  # cells of 48 levels over its own range, switched on and off
+    minor_percent: (
+        float  # of those within the range, told apart by minor loops: the rest by the major loop only
+    )
     every: int  # the last six figures are those of every so many samples: 1 below a million
 
 
@@ -87,13 +91,15 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
     """Return what a run holds, in numbers."""
     timed = whole.time_s is not None
     steps = steps_of(whole.time_s) if whole.time_s is not None else None
+    gaps = gaps_of(whole.parts())
     low, high = float(whole.input.min()), float(whole.input.max())
     every = -(-whole.input.size // _LOOKED_AT)
     u, y = whole.input[::every], whole.output[::every]
     cleaned = input_noise.clean(u)
     correlation = correlation_of([Record(u, y)])
     direction = "rising" if correlation > 0 else "falling"
-    covered = coverage(Plane.uniform(low, high, LEVELS), [cleaned.input]) if high > low else np.zeros(1)
+    plane = Plane.uniform(low, high, LEVELS) if high > low else None
+    covered = np.zeros(1) if plane is None else coverage(plane, [cleaned.input])
     return Report(
         samples=whole.input.size,
         seconds=float(whole.time_s[-1] - whole.time_s[0]) if whole.time_s is not None else None,
@@ -101,8 +107,8 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
         even=steps.even if steps else None,
         shortest_step_s=steps.shortest if steps else None,
         longest_step_s=steps.longest if steps else None,
-        gaps=steps.gaps if steps else None,
-        longest_gap_s=steps.longest_gap if steps else None,
+        gaps=gaps.number if steps else None,
+        longest_gap_s=gaps.longest_s if steps else None,
         resampled=resampled and timed,
         input_unit=whole.input_unit,
         input_range=(low, high),
@@ -114,6 +120,7 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
         false_reversals=cleaned.removed,
         input_noise=cleaned.sigma if np.isfinite(cleaned.sigma) else None,
         coverage_percent=100.0 * float(np.mean(covered)),
+        minor_percent=0.0 if plane is None else 100.0 * minor_coverage(plane, [cleaned.input]),
         every=every,
     )
 
@@ -123,7 +130,9 @@ def _notes_on_time(name: str, report: Report) -> list[str]:
     notes = []
     if report.gaps:
         filled = ", filled with straight lines" if report.resampled else ""
-        notes.append(f"{name} has {report.gaps} gaps, the longest of {report.longest_gap_s:.3g} s{filled}")
+        plural = "s" if report.gaps > 1 else ""
+        longest = with_seconds(report.longest_gap_s or 0.0)
+        notes.append(f"{name} has {report.gaps} gap{plural}, the longest of {longest}{filled}")
     if (
         report.even is False
         and not report.resampled
@@ -131,8 +140,8 @@ def _notes_on_time(name: str, report: Report) -> list[str]:
         and report.longest_step_s is not None
     ):
         notes.append(
-            f"the time stamps of {name} are uneven, steps of {1e3 * report.shortest_step_s:.3g} to "
-            f"{1e3 * report.longest_step_s:.3g} ms; kept as they are (`resample` even makes them even)"
+            f"the time stamps of {name} are uneven, steps of {with_seconds(report.shortest_step_s)} to "
+            f"{with_seconds(report.longest_step_s)}; kept as they are (`resample` even makes them even)"
         )
     return notes
 
@@ -229,8 +238,8 @@ def _joined_time(parts: Sequence[Run]) -> tuple[FloatArray | None, list[bool], t
             seams.append(not goes_on)
             if time_s[0] <= end:
                 notes.append(
-                    f"the clock starts again in {part.signal}: its first sample is set {step:.3g} s after "
-                    "the end of the part before"
+                    f"the clock starts again in {part.signal}: its first sample is set {with_seconds(step)} "
+                    "after the end of the part before"
                 )
                 time_s = time_s + (end + step - float(time_s[0]))
         times.append(time_s)

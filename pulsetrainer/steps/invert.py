@@ -146,6 +146,7 @@ def _one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Sha
     """Return the beat that is asked for, out of a recording of several."""
     check_beat(beat)
     if beat is None:
+        _say_if_several(recording, notes)
         return recording
     found = find_beats(recording)
     lengths = found.periods_s
@@ -154,6 +155,21 @@ def _one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Sha
         f"{lengths.min():.3f} to {lengths.max():.3f} s ({60.0 / float(np.mean(lengths)):.0f} a minute)"
     )
     return found.mean() if beat == "mean" else found.single(int(beat))
+
+
+def _say_if_several(recording: Shape, notes: list[str]) -> None:
+    """Say it where a recording of several beats is about to be played as one period."""
+    if len(recording.feet_s) > 1:  # it says itself where its beats begin
+        return
+    try:
+        count = find_beats(recording).count
+    except DataError:  # it holds no whole beat
+        return
+    if count > 1:
+        notes.append(
+            f"{recording.name} holds {count} whole beats, and all of it is played as one period of "
+            f"{recording.period_s:.3g} s: give `beat` 1 .. {count} or mean to play a single one"
+        )
 
 
 def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:

@@ -9,8 +9,25 @@ from pulsetrainer.artefacts.units import check_unit, is_unit
 from pulsetrainer.errors import DataError
 
 SI = ["A", "mA", "N", "kN", "A/m", "T", "mT", "nm", "V", "Pa", "bar", "mbar", "N*m", "m/s", "m/s^2", "nA*m^2"]
-SI += ["1/s", "Hz", "deg", "rad", "K", "ms", "kg", "J/kg", "rad/s", "ohm", "eV", "N·m", "m/s²", "s^-1"]
-OTHER = ["1", "%", "°C", "mmHg", "a.u.", "LSB", "counts", "µm", "emu", "Oe", "psi"]
+SI += [
+    "1/s",
+    "Hz",
+    "deg",
+    "rad",
+    "K",
+    "ms",
+    "kg",
+    "J/kg",
+    "rad/s",
+    "ohm",
+    "eV",
+    "N·m",
+    "m/s²",
+    "s^-1",
+    "kohm",
+    "MΩ",
+]
+OTHER = ["kOhm", "MOhm", "1", "%", "°C", "mmHg", "a.u.", "LSB", "counts", "µm", "emu", "Oe", "psi"]
 NONE = ["measured", "Newtons per mm", "xyz", "", "??", "m//s", "3", "N N N x", "A/", "force"]
 
 

@@ -1,0 +1,113 @@
+"""Tables that are not quite right: blank cells, parts, one column twice, times that make no sense."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from program import pulsetrainer
+from pulsetrainer.artefacts import Run
+from pulsetrainer.files import store
+
+TRIANGLE = np.abs((np.arange(300) % 100) - 50.0)
+COLUMNS = ("--input", "u", "--output", "y")
+
+
+def _written(path, rows, header="t_s,u (kOhm),y (mm)") -> None:
+    lines = [",".join("" if value is None else repr(float(value)) for value in row) for row in rows]
+    path.write_text("\n".join([header, *lines, ""]))
+
+
+def _rows(step: float = 2e-8):
+    return [[k * step, u, u + k % 3] for k, u in enumerate(TRIANGLE)]
+
+
+def test_rows_with_a_blank_cell_are_left_out_when_asked_and_counted(tmp_path):
+    """Not by themselves: the line is named, and the option that leaves them out."""
+    rows = _rows()
+    for k in (5, 6, 200):
+        rows[k][2] = None
+    _written(tmp_path / "a.csv", rows)
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
+    assert done.code == 3
+    assert "--skip-bad-rows" in done.err
+    assert "line 7" in done.err
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "--skip-bad-rows", "-o", "a.h5")
+    assert done.code == 0, done
+    assert "3 of 300 rows" in done.err
+    run = store.read(tmp_path / "a.h5", Run)
+    np.testing.assert_array_equal(run.time_s, np.delete([row[0] for row in rows], [5, 6, 200]))
+    # where rows are counted to tell the time, none may go
+    words = ("--rate", "1000", "--skip-bad-rows")
+    assert pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, *words, "-o", "b.h5").code == 2
+
+
+def test_a_line_is_still_named_when_rows_were_left_out(tmp_path):
+    """The time that does not increase stands behind a blank row and a comment."""
+    rows = _rows()
+    rows[3][1] = None
+    rows[20][0] = rows[19][0]
+    _written(tmp_path / "a.csv", rows)
+    text = (tmp_path / "a.csv").read_text().split("\n")
+    (tmp_path / "a.csv").write_text("\n".join([*text[:10], "# a remark", *text[10:]]))
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "--skip-bad-rows", "-o", "a.h5")
+    assert done.code == 3
+    assert "line 23" in done.err
+
+
+def test_parts_have_their_own_gaps_and_no_other(tmp_path):
+    """Two files with a pause between them, one with two missing rows: one gap, two parts."""
+    _written(tmp_path / "a.csv", _rows())
+    _written(tmp_path / "b.csv", [row for k, row in enumerate(_rows()) if k not in (70, 71)])
+    done = pulsetrainer(tmp_path, "import", "a.csv", "b.csv", *COLUMNS, "-o", "r.h5", "--json")
+    assert done.code == 0, done
+    report = done.json["runs"][0]["report"]
+    assert report["gaps"] == 1
+    assert report["longest_gap_s"] == pytest.approx(6e-8)
+    assert done.json["facts"]["gaps"] == 1
+    assert done.json["facts"]["parts"] == 2
+    assert pulsetrainer(tmp_path, "show", "r.h5", "--json").json["facts"]["gaps"] == 1
+
+
+@pytest.mark.parametrize(
+    "words", [("--input", "u", "--output", "u"), ("--input", "y", "--output", "y", "--no-time"),
+              (*COLUMNS, "--time", "plain"), (*COLUMNS, "--reference", "y")],
+)  # fmt: skip
+def test_one_column_has_one_meaning(tmp_path, words):
+    """The same column twice is a mistake of the command line."""
+    names = "t_s,u (kOhm),y (mm)" if "plain" not in words else "t_s,plain,y (mm)"
+    words = tuple("plain" if word == "u" and "plain" in words else word for word in words)
+    _written(tmp_path / "a.csv", [[row[0], k, row[2]] for k, row in enumerate(_rows())], names)
+    done = pulsetrainer(tmp_path, "import", "a.csv", *words, "-o", "r.h5", "--json")
+    assert done.code == 2
+    assert done.json["error"]["kind"] == "usage"
+    assert not (tmp_path / "r.h5").exists()
+
+
+def test_one_loop_is_said_to_be_one_loop(tmp_path):
+    """It switches every cell and tells none apart."""
+    _written(tmp_path / "a.csv", _rows())
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "r.h5", "--json")
+    report = done.json["runs"][0]["report"]
+    assert report["coverage_percent"] == 100.0
+    assert report["minor_percent"] == 0.0
+    assert report["input_unit"] == "kOhm"
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[0.0, 1.0, 2.0]],
+        [[0.0, k, k] for k in range(200)],
+        [[-k, k, k] for k in range(200)],
+        [[k if k < 100 else k - 50, k, k] for k in range(200)],
+    ],
+    ids=["one sample", "no time passes", "backwards", "back once"],
+)
+def test_a_time_that_makes_no_sense_is_refused(tmp_path, rows):
+    """A clear error, and nothing written."""
+    _written(tmp_path / "a.csv", rows)
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "r.h5", "--json")
+    assert done.code == 3
+    assert done.json["error"]["hint"]
+    assert not (tmp_path / "r.h5").exists()

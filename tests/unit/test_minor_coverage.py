@@ -1,0 +1,84 @@
+"""What minor loops tell of the plane, and what only the major loop does."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pulsetrainer.core import excitations
+from pulsetrainer.core.coverage import coverage, minor_coverage
+from pulsetrainer.core.plane import Plane
+
+PLANE = Plane.uniform(0.0, 1.0, 12)
+
+
+def _major() -> np.ndarray:
+    return np.concatenate((np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.0, 50)))
+
+
+def test_one_loop_switches_every_cell_and_tells_none_apart():
+    """Which is why a coverage of 100 % alone says too much."""
+    assert coverage(PLANE, [_major()]).all()
+    assert minor_coverage(PLANE, [_major()]) == 0.0
+    assert minor_coverage(PLANE, [_major(), _major()]) == 0.0
+
+
+def test_reversal_curves_and_the_diagnostic_signal_tell_all_apart():
+    """Curves from turns in every band; nested loops at many levels."""
+    middles = PLANE.thresholds
+    curves = [
+        x
+        for low in middles
+        for x in (np.linspace(0, 1, 30), np.linspace(1, low, 30), np.linspace(low, 1, 30))
+    ]
+    assert minor_coverage(PLANE, [np.concatenate(curves)]) == 1.0
+    assert minor_coverage(PLANE, [excitations.diagnostic(0.0, 1.0, rate_Hz=200.0).value]) == 1.0
+
+
+def test_a_small_loop_tells_its_own_cells_apart():
+    """From 0.75 down to 0.3 and back: row and column of its turns, no cell beside them."""
+    u = np.concatenate((np.linspace(0, 0.7, 40), np.linspace(0.7, 0.3, 40), np.linspace(0.3, 0.7, 40)))
+    i, j = PLANE.cell_indices
+    within = np.count_nonzero((i < 11) & (j > 0))
+    # up at 0.7 is band 8, down at 0.3 band 3: cells (8, 3..8) and (3..8, 3), one of them in both
+    assert minor_coverage(PLANE, [u]) == (6 + 6 - 1) / within
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(0.0, 1.0), min_size=2, max_size=12))
+def test_the_corners_are_those_of_a_memory_followed_step_by_step(turns):
+    """Against the slow obvious way: the last remembered extreme and the input, a step at a time."""
+    path = np.interp(np.arange(0, len(turns) - 1 + 1e-9, 1 / 64), np.arange(len(turns)), turns)
+    u = np.concatenate((np.linspace(0.0, path[0], 64), path))
+    assert minor_coverage(PLANE, [u]) == _slowly(u)
+
+
+def _slowly(u: np.ndarray) -> float:
+    """Share of the cells that the corner passes, by wiping a list of extremes out at every step."""
+
+    def band(value: float) -> int:
+        return int(np.clip(np.searchsorted(PLANE.edges, value, side="right") - 1, 0, 11))
+
+    passed = np.zeros((12, 12), bool)
+    maxima, minima, at, rising = [np.inf], [-np.inf], 0.0, True
+    for value in u.tolist():
+        if value == at:
+            continue
+        if (value > at) != rising:
+            (maxima if rising else minima).append(at)
+            rising = value > at
+        for level in range(min(band(at), band(value)), max(band(at), band(value)) + 1):
+            edge = PLANE.edges[level] if rising else PLANE.edges[level + 1]
+            here = min(max(edge, min(at, value)), max(at, value))
+            while rising and len(maxima) > 1 and here >= maxima[-1]:
+                maxima.pop()
+                minima.pop()
+            while not rising and len(minima) > 1 and here <= minima[-1]:
+                minima.pop()
+                maxima.pop()
+            row, column = (level, band(minima[-1])) if rising else (band(maxima[-1]), level)
+            passed[row, column] = True
+        at = value
+    i, j = PLANE.cell_indices
+    return float(np.mean(passed[i, j][(i < 11) & (j > 0)]))
