@@ -20,7 +20,6 @@ def positive(value: float | None) -> float | None:
 
 Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.", show_default=False)]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing output.")]
-Force = Overwrite
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 Port = Annotated[
     str | None,

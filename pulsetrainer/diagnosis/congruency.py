@@ -50,8 +50,6 @@ class Contrast:
     value: float  # its strength
     error: float  # standard error
     p_value: float
-    loops: int
-    kinds: int
     at_bound: bool = False  # the strength ran away
 
     def estimate(self, cause: Cause) -> Estimate:
@@ -174,7 +172,7 @@ def fitted_contrast(
         if p > LIMITS.contrast_hopeless or abs(change) < LIMITS.contrast_settled * error:
             break
     at_bound = value in (quantity.low, quantity.high)
-    return Contrast(value, error, p, kind.size, np.unique(kind).size, at_bound)
+    return Contrast(value, error, p, at_bound)
 
 
 def _movable(loops: Sequence[Loop], fitted: Fitted) -> FloatArray:

@@ -415,7 +415,7 @@ def test_jumps_that_the_causes_found_make_are_withdrawn(monkeypatch, again):
 
 
 def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firings=(), none=False):
-    held = None if none else Contrast(0.003, 0.001, p, 12, 3, at_bound)
+    held = None if none else Contrast(0.003, 0.001, p, at_bound)
     monkeypatch.setattr(equal_loops.congruency, "fitted_contrast", lambda *_: held)
     monkeypatch.setattr(
         equal_loops,
