@@ -48,7 +48,6 @@ class Firing:
 
     cause: str
     kind: str  # which of the cause's texts says it
-    share: float  # of the samples
     value: float  # the size of it
     unit: str  # "{y}", "{u}" or "1"
     figures: Mapping[str, float] = field(default_factory=dict)  # for the text

@@ -374,12 +374,12 @@ def test_a_cause_that_is_not_missed_is_dropped(monkeypatch, without, kept):
 
 
 # --- raw data again, equal loops
-FIRED = Firing("stick-slip", "gate", 0.1, 0.5, "{y}", {"count": 20.0, "size": 0.5})
+FIRED = Firing("stick-slip", "gate", 0.5, "{y}", {"count": 20.0, "size": 0.5})
 
 
 @pytest.mark.parametrize(
     ("left", "firings", "found"),
-    [(109.1, (), 1), (109.0, (), 0), (109.1, ((0, Firing("quantisation", "gate", 1.0, 0.1, "{y}")),), 1)],
+    [(109.1, (), 1), (109.0, (), 0), (109.1, ((0, Firing("quantisation", "gate", 0.1, "{y}")),), 1)],
 )
 def test_small_sticking_is_sought_where_something_is_left(monkeypatch, left, firings, found):
     """Above the floor by a relevant amount, and nothing jagged known yet."""
@@ -405,7 +405,7 @@ def test_jumps_that_the_causes_found_make_are_withdrawn(monkeypatch, again):
     )
     current = SimpleNamespace(terms=(_term("periodic"),), simulator=simulator, squares=0.0)
     problem = SimpleNamespace(records=[Recorded(np.asarray([10.0, 10.0]))], plane=PROBLEM.plane)
-    tracking = Firing("current-tracking", "gate", 0.1, 0.5, "{u}")
+    tracking = Firing("current-tracking", "gate", 0.5, "{u}")
     state = replace(_state(_fit(0.0)), firings=((0, FIRED), (0, tracking)), current=current, problem=problem)
     assert [one.cause for _, one in jumps.stage(state).firings] == (["stick-slip"] if again else []) + [
         "current-tracking"
@@ -435,7 +435,7 @@ def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firin
         ({"none": True}, False),
         ({"left": 700.0}, False),
         ({"firings": ((0, FIRED),)}, False),
-        ({"firings": ((0, Firing("outliers", "gate", 0.1, 1.0, "{y}")),)}, True),
+        ({"firings": ((0, Firing("outliers", "gate", 1.0, "{y}")),)}, True),
     ],
 )
 def test_equal_loops_show_a_feedback_or_do_not(monkeypatch, how, found):
@@ -574,8 +574,8 @@ def _finding(name: str, explains: float, found=True, **more) -> Finding:
     return Finding(CAUSE[name], found, 0.005, explains, **more)
 
 
-QUANTISED = Firing("quantisation", "gate", 1.0, 0.1, "{y}", {"step": 0.1, "percent": 2.0}, spread=0.01)
-WILD = Firing("outliers", "gate", 0.1, 3.0, "{y}", {"count": 5.0, "limit": 1.0})
+QUANTISED = Firing("quantisation", "gate", 0.1, "{y}", {"step": 0.1, "percent": 2.0}, spread=0.01)
+WILD = Firing("outliers", "gate", 3.0, "{y}", {"count": 5.0, "limit": 1.0})
 
 
 @pytest.mark.parametrize(

@@ -39,5 +39,4 @@ class CurrentTracking(Cause):
         worst = float(np.quantile(error, _WORST))
         if worst <= _SHARE * raw.reach:
             return None
-        share = float(np.mean(error > _SHARE * raw.reach))
-        return Firing(self.id, "gate", share, worst, "{u}", {"worst": worst})
+        return Firing(self.id, "gate", worst, "{u}", {"worst": worst})

@@ -44,7 +44,7 @@ class OutOfRange(Cause):
         mask = lasting if weight[~lasting].sum() > _LEFT_OVER * weight.sum() else outside
         count = float(np.count_nonzero(outside))
         figures = {"count": count, "low": raw.low, "high": raw.high, "beyond": beyond}
-        return Firing(self.id, "gate", float(outside.mean()), beyond, "{u}", figures, mask)
+        return Firing(self.id, "gate", beyond, "{u}", figures, mask)
 
 
 def _lasting(begins: BoolArray, ends: BoolArray) -> BoolArray:

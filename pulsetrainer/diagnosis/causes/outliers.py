@@ -53,7 +53,7 @@ class Outliers(Cause):
         if count < _LEAST:
             return None
         figures = {"count": float(count), "limit": float(limit)}
-        return Firing(self.id, "gate", float(wild.mean()), float(apart[wild].max()), "{y}", figures, wild)
+        return Firing(self.id, "gate", float(apart[wild].max()), "{y}", figures, wild)
 
 
 def _off_line(y: FloatArray, at: int, side: int) -> float:

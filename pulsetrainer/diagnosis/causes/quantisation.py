@@ -43,4 +43,4 @@ class Quantisation(Cause):
             return None
         figures = {"step": step, "percent": PERCENT * step / span}
         spread = 0.5 * float(np.ptp(np.quantile(np.diff(values), _MOST)))
-        return Firing(self.id, "gate", 1.0, step, "{y}", figures, spread=spread)
+        return Firing(self.id, "gate", step, "{y}", figures, spread=spread)

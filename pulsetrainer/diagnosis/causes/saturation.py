@@ -52,4 +52,4 @@ class Saturation(Cause):
         mask = ndimage.binary_dilation(at, iterations=_BESIDE)
         mask |= ndimage.uniform_filter1d(y, _AROUND) > rail - _NEAR * noise
         figures = {"count": float(count), "rail": rail}
-        return Firing(self.id, "gate", float(at.mean()), rail, "{y}", figures, mask, spread=step)
+        return Firing(self.id, "gate", rail, "{y}", figures, mask, spread=step)

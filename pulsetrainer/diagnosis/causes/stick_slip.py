@@ -96,7 +96,7 @@ class StickSlip(Cause):
             return None
         typical = float(np.median(size[found]))
         figures = {"count": float(count), "size": typical}
-        return Firing(self.id, "gate", float(found.mean()), typical, "{y}", figures)
+        return Firing(self.id, "gate", typical, "{y}", figures)
 
     def gate_left(self, fitted: Fitted) -> Firing | None:
         """Return the size of the jumps if what a model leaves is a sawtooth of its own output."""
@@ -116,7 +116,7 @@ class StickSlip(Cause):
         if not sharp or not _LIKE[0] < amplitude[best] * np.pi / period[best] < _LIKE[1]:
             return None
         size = float(period[best])
-        return Firing(self.id, "left", 1.0, size, "{y}", {"size": size})
+        return Firing(self.id, "left", size, "{y}", {"size": size})
 
 
 def _jumps(y: FloatArray, wide: int) -> FloatArray:
