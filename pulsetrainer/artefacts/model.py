@@ -13,6 +13,8 @@ from pulsetrainer.artefacts.data import Attribute, BoolArray, Data, FloatArray
 from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.errors import DataError
 
+FORMS = ("direct", "dual", "signed")
+
 
 @dataclass(frozen=True, slots=True)
 class Fit:
@@ -53,6 +55,7 @@ class Fit:
     spacing: str = "even"  # of the levels: "even", or "crowded" where the loop is steep
     stiffness: float = 0.0  # t, how alike the loops are along the diagonal; 0: the density is free
     warning: str = ""  # that this kind of model is the wrong one, in words; empty where it is not
+    loop: str = ""  # "counterclockwise" | "clockwise" | "butterfly" | "none"; empty in files of 0.1
     notes: tuple[str, ...] = ()  # what a person should know about the fit
 
     @property
@@ -84,18 +87,22 @@ class Extension:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Model(Shown):
-    """An identified Preisach model: weights mu-hat per cell and offset y0-hat (Carneiro 2018, eq. 2)."""
+    """An identified Preisach model: weights mu-hat per cell and offset y0-hat (Carneiro 2018, eq. 2).
+
+    ``form`` says what the weights are of: "direct", y = P[u] with mu >= 0; "dual", u = P[y] with mu >= 0,
+    where edges are of the output and the offset is of the input; "signed", y = P[u] with mu of either sign.
+    """
 
     kind: ClassVar[str] = "model"
 
     edges: Annotated[
         FloatArray,
-        Data("@input_unit", "input levels: edges of the cells", "level", path="levels", finite=True),
+        Data("@edges_unit", "levels: edges of the cells", "level", path="levels", finite=True),
     ]  # (L,)
     weights: Annotated[
         FloatArray, Data("@weights_unit", "Preisach weights mu", "cell", finite=True)
     ]  # (q,), order of core.plane
-    offset: Annotated[float, Data("@output_unit", "output offset y0", finite=True)]
+    offset: Annotated[float, Data("@offset_unit", "offset y0", finite=True)]
     covered: Annotated[BoolArray, Data("1", "cell was switched on and off", "cell")]  # (q,)
     weights_unit: str = "N/A^2"
     input_unit: str = "A"
@@ -113,8 +120,15 @@ class Model(Shown):
     ] = None
     fit: Fit | None = None
     extensions: tuple[Extension, ...] = ()
+    form: str = "direct"  # "direct" | "dual" | "signed"
+    captured: bool = True  # on our own device; files of 0.1 do not say, and were
 
     def __post_init__(self) -> None:
+        if self.form not in FORMS:
+            raise DataError(
+                f"the form of a model is one of {', '.join(FORMS)}, this one has {self.form!r}",
+                hint="identify the model again: pulsetrainer identify RUN.h5 -o model.h5",
+            )
         n_h = np.size(self.edges) - 1
         if np.size(self.weights) != n_h * (n_h + 1) // 2:
             raise DataError(
@@ -122,6 +136,21 @@ class Model(Shown):
                 f"but weights holds {np.size(self.weights)}",
                 hint="identify the model again: pulsetrainer identify RUN.h5 -o model.h5",
             )
+
+    @property
+    def edges_unit(self) -> str:
+        """Unit of the edges: that of the input, of a dual model that of the output."""
+        return self.output_unit if self.form == "dual" else self.input_unit
+
+    @property
+    def edges_quantity(self) -> str:
+        """Quantity of the edges: the input's, of a dual model the output's."""
+        return self.output_quantity if self.form == "dual" else self.input_quantity
+
+    @property
+    def offset_unit(self) -> str:
+        """Unit of the offset: that of the output, of a dual model that of the input."""
+        return self.input_unit if self.form == "dual" else self.output_unit
 
     @property
     def levels(self) -> int:

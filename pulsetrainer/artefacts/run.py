@@ -34,6 +34,7 @@ class Run(Shown):
     signal: str = ""  # name of the excitation, or the imported file
     complete: bool = True
     dropped_samples: int = 0  # lost on the wire; the samples that are here are right
+    captured: bool = False  # on our own device; files of 0.1 do not say
 
     def __post_init__(self) -> None:
         check_equal_length(self, ("time_s", "input", "output", "reference", "seam"))

@@ -23,6 +23,15 @@ class Reading(StrEnum):
     relay = "relay"
 
 
+class FormChoice(StrEnum):
+    """Which form the model has."""
+
+    auto = "auto"
+    direct = "direct"
+    dual = "dual"
+    signed = "signed"
+
+
 class Method(StrEnum):
     """How weights and offset are found."""
 
@@ -43,6 +52,13 @@ def identify(
             min=2, max=_MOST_LEVELS, help="Levels of the Preisach plane.", envvar=variable("levels")
         ),
     ] = 48,
+    form: Annotated[
+        FormChoice,
+        typer.Option(
+            help="direct: the output lags; dual: it leads, roles exchanged; signed: weights of either sign; "
+            "auto: by held-out blocks."
+        ),
+    ] = FormChoice.auto,
     reading: Annotated[
         Reading,
         typer.Option("--reading", help="How the weights are read: continuous, or relay as in the paper."),
@@ -80,6 +96,7 @@ def identify(
         model = fit(
             [job.load(path, Run) for path in runs],
             levels=levels,
+            form=form.value,
             reading=(operator or reading).value,
             method=method.value,
             smoothing=length,
@@ -94,21 +111,25 @@ def identify(
 
 def _show(job: Job, out: Path, model: Model) -> None:
     from pulsetrainer.artefacts.units import with_unit
+    from pulsetrainer.report.facts import loop_words
 
     fit, unit = model.fit, model.output_unit
     assert fit is not None
     job.notes(fit.notes)
     job.screen.result(_payload(out, model, job.seconds))
+    if fit.warning:
+        job.screen.line("warning: ", fit.warning)
     band = fit.output_uncertainty
     job.screen.facts(
         f"{out}: Preisach model of {model.levels} levels, {model.weights.size} cells",
         {
             "fit": f"{fit.rms_percent:.3f} % rms, {fit.max_percent:.2f} % max, of the span",
             "fit rms": with_unit(f"{fit.rms:.4g}", unit),
-            "offset y0": with_unit(f"{model.offset:.4g}", unit),
+            "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
             "cells switched": f"{fit.coverage_percent:.1f} %",
             "smoothing": f"{fit.smoothing:.3g} of the range" if fit.smoothing else "none",
-            "loop": "falling" if model.polarity < 0 else "rising",
+            "loop": loop_words(model),
+            "form": model.form,
             **({"output known within": with_unit(f"{band:.2g}", unit) + " (90 % band)"} if band else {}),
             "took": f"{job.seconds:.2f} s, {fit.iterations} iterations",
         },
@@ -120,7 +141,7 @@ def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
     assert fit is not None
     same = (
         "coverage_percent", "smoothing", "input_noise", "false_reversals", "output_uncertainty", "offsets",
-        "spacing", "stiffness", "warning", "iterations",
+        "spacing", "stiffness", "loop", "warning", "iterations",
     )  # fmt: skip
     return {
         "output": out,
@@ -132,6 +153,7 @@ def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
         "fit_rms_percent": fit.rms_percent,
         "fit_max_percent": fit.max_percent,
         "polarity": model.polarity,
+        "form": model.form,
         **{name: getattr(fit, name) for name in same},
         "seconds": seconds,
     }

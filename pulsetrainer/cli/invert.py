@@ -57,14 +57,20 @@ def invert(
         int, typer.Option(min=1, help="Periods to play; the first is not scored.", envvar=variable("periods"))
     ] = 4,
     slew_A_per_s: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--slew",
             callback=positive,
-            help="Fastest the drive may move, A/s.",
+            help="Fastest the drive may move, input unit a second; default: 30 A/s for a model of our own "
+            "device, none for any other.",
             envvar=variable("slew_A_per_s"),
+            show_default=False,
         ),
-    ] = 30.0,
+    ] = None,
+    despite_warning: Annotated[
+        bool,
+        typer.Option("--despite-warning", help="Invert a model that does not describe its own record."),
+    ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
@@ -94,7 +100,8 @@ def invert(
             force_max=force_max,
             beat=beat,
             periods=periods,
-            slew_A_per_s=slew_A_per_s,
+            slew=slew_A_per_s,
+            despite_warning=despite_warning,
             name=str(model),
             progress=progress,
         )

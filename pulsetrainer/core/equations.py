@@ -60,16 +60,23 @@ class NormalEquations:
         """Rms error sqrt(sum v (y - y0 - r . m)^2 / sum v) of masses (n_q,) and an offset, output unit."""
         return float(np.sqrt(max(self.sum_of_squares(masses, offset), 0.0) / self.weight_sum))
 
+    def __add__(self, part: NormalEquations) -> NormalEquations:
+        """Sums over both sets of samples."""
+        return self._with(part, 1.0)
+
     def __sub__(self, part: NormalEquations) -> NormalEquations:
         """Sums over the samples that are not in ``part``."""
+        return self._with(part, -1.0)
+
+    def _with(self, part: NormalEquations, sign: float) -> NormalEquations:
         return NormalEquations(
             self.plane,
-            self.gram - part.gram,
-            self.moment - part.moment,
-            self.row_sum - part.row_sum,
-            self.weight_sum - part.weight_sum,
-            self.output_sum - part.output_sum,
-            self.output_square - part.output_square,
+            self.gram + sign * part.gram,
+            self.moment + sign * part.moment,
+            self.row_sum + sign * part.row_sum,
+            self.weight_sum + sign * part.weight_sum,
+            self.output_sum + sign * part.output_sum,
+            self.output_square + sign * part.output_square,
         )
 
 

@@ -1,18 +1,21 @@
-"""From the records of one device to one operator: levels placed for them, offsets between them, the weights.
+"""From the records of one device to one operator: its form, its levels, offsets between records, the weights.
 
-``identification`` solves for weights on given levels. Here it is decided what it is given: the levels lie
-evenly, or closer where the loop is steep (``levels``), and records whose outputs are shifted against each
-other get an offset each.
+``identification`` solves for weights on given levels. Here it is decided what it is given: which form the
+records ask for (``forms``), the levels lie evenly, or closer where the loop is steep (``edges``), and records
+whose outputs are shifted against each other get an offset each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
+from pulsetrainer.core.dual import Dual, exchanged
 from pulsetrainer.core.edges import plane_for
+from pulsetrainer.core.forms import Form, Signals, Static, asked_form
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify, offsets_between
 from pulsetrainer.core.initial_state import record_of
 from pulsetrainer.core.metrics import root_mean_square
@@ -22,19 +25,30 @@ from pulsetrainer.core.record import Record
 CROWDED_MISFIT = 0.02  # of the span, rms: above it, what looks steep is nothing that the operator can follow
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Fitted:
     """An operator, the records as they were fitted, and the offset of each record (k,) against their mean."""
 
-    identified: Identified
-    records: tuple[Record, ...]
+    identified: Identified  # of the dual form: from the output to the input
+    records: tuple[Record, ...]  # from input to output, in every form
     offsets: FloatArray
+    form: Form = "direct"
+
+    @cached_property
+    def operator(self) -> Static:
+        """The operator from input to output."""
+        found = self.identified.operator
+        return Dual(found) if self.form == "dual" else found
+
+    @cached_property
+    def predicted(self) -> list[FloatArray]:
+        """Fitted output (n,) of each record."""
+        return [self.operator(r.input, r.start) for r in self.records]
 
     @property
     def residuals(self) -> list[FloatArray]:
         """Measured less fitted output (n,) of each record."""
-        operator = self.identified.operator
-        return [r.output - operator(r.input, r.start) for r in self.records]
+        return [r.output - y for r, y in zip(self.records, self.predicted, strict=True)]
 
     @property
     def misfit(self) -> float:
@@ -52,7 +66,7 @@ class Fitted:
 
 
 def fit(
-    signals: Sequence[tuple[FloatArray, FloatArray]],
+    signals: Signals,
     low: float,
     high: float,
     n_h: int,
@@ -60,16 +74,24 @@ def fit(
     reading: Reading = "continuous",
     method: Method = "joint",
     smoothing: Smoothing = "auto",
+    form: Form | Literal["auto"] = "direct",
 ) -> Fitted:
     """Fit one operator with ``n_h`` levels on [low, high] to measured inputs and outputs, pairs of (n,).
 
-    For relays the levels lie evenly, as in the paper.
+    For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output.
 
     Raises
     ------
     ArgumentError, ConvergenceError
-        As ``identification.identify``.
+        As ``identification.identify``; or relays, or the alternating method, with another form than direct.
     """
+    chosen = asked_form(form, signals, low, high, plain=reading == "continuous" and method == "joint")
+    if chosen == "dual":
+        return _dual(signals, low, high, n_h, smoothing)
+    if chosen == "signed":
+        records = [record_of(u, y, low, high) for u, y in signals]
+        found = identify(records, plane_for(records, low, high, n_h), smoothing=smoothing, signed=True)
+        return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
     records = [record_of(u, y, low, high) for u, y in signals]
     even = Plane.uniform(low, high, n_h)
     plane = even if reading == "relay" else plane_for(records, low, high, n_h)
@@ -85,3 +107,12 @@ def fit(
     if not fitted.evenly_spaced and fitted.misfit > CROWDED_MISFIT:
         return on(even)
     return fitted
+
+
+def _dual(signals: Signals, low: float, high: float, n_h: int, smoothing: Smoothing) -> Fitted:
+    """Fit the operator from output to input."""
+    swapped = exchanged(signals)
+    bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
+    within = fit(swapped, bottom, top, n_h, smoothing=smoothing)
+    records = tuple(record_of(u, y, low, high) for u, y in signals)
+    return Fitted(within.identified, records, np.zeros(len(records)), "dual")

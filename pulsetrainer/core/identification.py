@@ -29,6 +29,7 @@ from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
 __all__ = [
+    "LEAST_SIGNED",
     "Identified",
     "Method",
     "NormalEquations",
@@ -52,6 +53,8 @@ _DENSE_COPIES = 10
 CLEAR = 0.5
 _SIGN_LEVELS = 24
 _SIGN_SMOOTHING = 0.05
+# Weights of either sign are not determined without some smoothing.
+LEAST_SIGNED = 0.0125
 # Below this share of the output's span the fit is good, and no stiffer density is tried.
 _POOR = 0.02
 # Records get an offset each where that lowers the rms error by at least this share.
@@ -121,6 +124,7 @@ def identify(
     method: Method = "joint",
     polarity: int | None = None,
     smoothing: Smoothing = 0.0,
+    signed: bool = False,
 ) -> Identified:
     """Fit weights mu >= 0 and a free offset to one or several records.
 
@@ -138,17 +142,21 @@ def identify(
     smoothing
         Length s, share of the input's range, below which features of the density are smoothed away; 0 for
         none; "auto" to choose it by held-out blocks (see ``core.smoothing``).
+    signed
+        Weights may be of either sign: plain regularised least squares, at least ``LEAST_SIGNED`` smooth.
 
     Raises
     ------
     ArgumentError
         No records, no sample that counts, an input or an output that does not vary, fewer samples than
         levels, an unknown method, a smoothing out of range, or ``method="alternating"`` on a plane too
-        large for it.
+        large for it; signed weights of relays, on a plane too large for dense matrices, or not "joint".
     ConvergenceError
         The fit did not settle.
     """
     samples = _check(records, plane, method, smoothing)
+    if signed:
+        return _signed(records, plane, reading, method, smoothing, samples)
     sign = polarity_of(records, plane, reading) if polarity is None else polarity
     turned, zero = levelled(records, sign)
     tried: tuple[tuple[float, float], ...] = ()
@@ -168,6 +176,39 @@ def identify(
             masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, stiffness)
     operator = Preisach(plane, masses / plane.areas, sign * (offset + zero), reading, polarity=sign)
     return Identified(operator, method, iterations, kkt, smoothing, tried, stiffness, samples)
+
+
+def _signed(
+    records: Sequence[Record],
+    plane: Plane,
+    reading: Reading,
+    method: Method,
+    smoothing: Smoothing,
+    samples: int,
+) -> Identified:
+    """Fit weights of either sign."""
+    if reading != "continuous" or method != "joint" or not fits_dense(plane):
+        raise ArgumentError(
+            f"signed weights are fitted jointly, in the continuous reading, on planes of at most "
+            f"{_most_dense()} levels, got {method}, {reading} and {plane.n_h}",
+            hint="leave method and reading out, and use fewer levels",
+        )
+    upright, zero = levelled(records)
+    tried: tuple[tuple[float, float], ...] = ()
+    if smoothing == "auto":
+        choice = choose(upright, plane, reading, signed=True)
+        smoothing, tried = choice.smoothing, choice.tried
+    length = max(float(smoothing), LEAST_SIGNED)
+    equations = normal_equations(plane, upright, reading)
+    masses = nnls.solve_signed(*smoothed(equations, length))
+    offset = equations.offset(masses) + zero
+    operator = Preisach(plane, masses / plane.areas, offset, reading, signed=True)
+    return Identified(operator, method, 1, 0.0, length, tried, 0.0, samples)
+
+
+def _most_dense() -> int:
+    """Most levels whose dense matrices stay within ``DENSE_BYTES``."""
+    return int(np.sqrt(2.0 * np.sqrt(DENSE_BYTES / (8 * _DENSE_COPIES))))
 
 
 def _span(records: Sequence[Record]) -> float:

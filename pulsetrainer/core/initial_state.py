@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
@@ -71,14 +72,14 @@ def record_of(inputs: FloatArray, outputs: FloatArray, low: float, high: float) 
 
 
 def estimated_start(
-    operator: Preisach, records: Sequence[tuple[FloatArray, FloatArray]]
+    operator: Preisach | Dual, records: Sequence[tuple[FloatArray, FloatArray]]
 ) -> tuple[State | None, str]:
     """Return the state from which records, pairs of input and output (n,), are followed, and its name.
 
     Records that never reach an end of the operator's range leave open what came before them. Tried are both
     saturations and the demagnetised state; the one with the least sum of squared errors is taken.
     """
-    low, high = operator.plane.low, operator.plane.high
+    low, high = operator.low, operator.high
     if any(reaches_an_end(u, low, high) for u, _ in records):
         return None, "known"
     states = {

@@ -119,13 +119,20 @@ def clean(values: ArrayLike, sigma: float | None = None) -> Cleaned:
     turns = real_turns(u, band)
     if turns.size >= reversals:  # every turn is a real one
         return Cleaned(u, noise, band, 0, reversals)
-    smooth = _smooth_between(u, turns, noise)
+    smooth = monotone_between(u, turns, noise)
     left = max(turning_points(smooth).size - 1, 0)  # monotone between real turns, so fewer than before
     return Cleaned(smooth, noise, band, reversals - left, left)
 
 
-def _smooth_between(u: FloatArray, turns: IntArray, sigma: float) -> FloatArray:
+def monotone_between(u: FloatArray, turns: IntArray, sigma: float) -> FloatArray:
     """Replace each piece between turns by a smooth monotone path; a turn gets the mean of its two sides.
+
+    Parameters
+    ----------
+    u
+        Noisy values (n,), of a standard deviation ``sigma``; where that is zero or NaN nothing is smoothed.
+    turns
+        Places (k,) of the turns, rising.
 
     Pieces are filtered one by one, so that a turn is never rounded off: at its end a piece is continued by
     the polynomial of its own last samples.
@@ -133,7 +140,8 @@ def _smooth_between(u: FloatArray, turns: IntArray, sigma: float) -> FloatArray:
     total, count = np.zeros(u.size), np.zeros(u.size)
     ends = np.unique(np.concatenate(([0], turns, [u.size - 1]))).tolist()
     for a, b in pairwise(ends):
-        total[a : b + 1] += _local_polynomial(u[a : b + 1], sigma, u.size)
+        piece = u[a : b + 1]
+        total[a : b + 1] += _local_polynomial(piece, sigma, u.size) if sigma > 0 else piece
         count[a : b + 1] += 1.0
     smooth = total / count
     for a, b in pairwise(ends):

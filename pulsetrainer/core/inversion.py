@@ -49,6 +49,10 @@ class _Branches:
     def __init__(self, operator: Preisach) -> None:
         self.plane = operator.plane
         self.rises = 2.0 * (operator.grid + operator.grid.T)
+        if operator.signed:  # branches that turn back a little stay where they are
+            for k, row in enumerate(self.rises):
+                row[k:] = np.maximum.accumulate(row[k:])
+                row[k::-1] = np.maximum.accumulate(row[k::-1])
         self.rows: list[list[float]] = self.rises.tolist()
         self.edges: list[float] = operator.plane.edges.tolist()
 
@@ -116,20 +120,27 @@ class _Branches:
         return inputs
 
 
-def invert(operator: Preisach, target: ArrayLike, start: State | None = None) -> Inverse:
+def invert(
+    operator: Preisach, target: ArrayLike, start: State | None = None, *, monotone: bool = False
+) -> Inverse:
     """Return the input whose output is ``target`` (n,), exactly, from ``start``.
 
     Targets outside the reachable range are clipped to it and counted. Where cells have no weight the
     output does not answer: the input stays where it was until the target moves on, then crosses at once.
 
+    Parameters
+    ----------
+    monotone
+        Weights of either sign are allowed: the caller knows that all branches are monotone.
+
     Raises
     ------
     ArgumentError
         The target is not a finite vector, the operator uses the relay reading (its output is a
-        staircase: use ``closest_match``), or all its weights are zero.
+        staircase: use ``closest_match``), all its weights are zero, or some are negative.
     """
     wanted = finite_vector("target", target)
-    _check_invertible(operator)
+    _check_invertible(operator, monotone=monotone)
     clipped, worst, y = _into_reach(operator, wanted)
     # the memory in terms of outputs turns where the memory of inputs turns
     path = trace_after(_heights(operator, start), y, -operator.total, operator.total)
@@ -145,11 +156,16 @@ def invert(operator: Preisach, target: ArrayLike, start: State | None = None) ->
     return Inverse(u, clipped, worst, final)
 
 
-def _check_invertible(operator: Preisach) -> None:
+def _check_invertible(operator: Preisach, *, monotone: bool = False) -> None:
     if operator.reading != "continuous":
         raise ArgumentError(
             "the relay reading has no continuous inverse: its output is a staircase",
             hint="use closest_match, or read the weights as continuous",
+        )
+    if operator.signed and not monotone:
+        raise ArgumentError(
+            "an operator with weights of either sign has no inverse over its whole range",
+            hint="invert it where its branches are monotone: core.monotone",
         )
     _check_not_empty(operator)
 

@@ -174,6 +174,13 @@ def _unsettled(max_iterations: int) -> ConvergenceError:
     )
 
 
+def solve_signed(gram: FloatArray, rhs: FloatArray) -> FloatArray:
+    """Return the minimiser (q,) of x' G x / 2 - f' x, of either sign; zero where the data never were."""
+    diagonal = np.diagonal(gram)
+    scale = float(diagonal.max(initial=0.0))
+    return _solve_free(gram, rhs, diagonal > SMALLEST_DIAGONAL * scale, scale)
+
+
 def _solve_free(gram: FloatArray, rhs: FloatArray, free: NDArray[np.bool_], scale: float) -> FloatArray:
     """Unconstrained minimiser over the free variables, the others zero."""
     x = np.zeros(rhs.size)

@@ -102,13 +102,14 @@ class Preisach:
     """A Preisach operator with known weights."""
 
     plane: Plane
-    weights: FloatArray  # mu (n_q,), output unit per input unit squared, none negative
+    weights: FloatArray  # mu (n_q,), output unit per input unit squared; negative only where ``signed``
     offset: float = 0.0  # y0, output unit
     reading: Reading = "continuous"
     polarity: int = 1  # -1: the output falls when the input rises
+    signed: bool = False  # weights may be negative: the loop crosses itself, branches need not be monotone
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "weights", self.plane.check_weights(self.weights))
+        object.__setattr__(self, "weights", self.plane.check_weights(self.weights, signed=self.signed))
         if self.polarity not in (-1, 1):
             raise ArgumentError(f"polarity must be 1 or -1, got {self.polarity}", hint="1: the output rises")
         if not np.isfinite(self.offset):
@@ -136,6 +137,16 @@ class Preisach:
     def total(self) -> float:
         """Mass W of the whole plane, output unit."""
         return float(self.grid[-1, 0])
+
+    @property
+    def low(self) -> float:
+        """Lower end of the input range."""
+        return self.plane.low
+
+    @property
+    def high(self) -> float:
+        """Upper end of the input range."""
+        return self.plane.high
 
     @property
     def saturation(self) -> tuple[float, float]:

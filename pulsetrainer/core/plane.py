@@ -177,13 +177,13 @@ class Plane:
         """Middles of the bands (n_h,): where the relays of the paper's reading switch."""
         return 0.5 * (self.edges[1:] + self.edges[:-1])
 
-    def check_weights(self, weights: ArrayLike) -> FloatArray:
-        """Return ``weights`` (n_q,) when they can belong to this plane.
+    def check_weights(self, weights: ArrayLike, *, signed: bool = False) -> FloatArray:
+        """Return ``weights`` (n_q,) when they can belong to this plane; ``signed`` ones may be negative.
 
         Raises
         ------
         ArgumentError
-            The length is not n_q, or a weight is negative or not finite.
+            The length is not n_q, or a weight is not finite, or negative where it must not be.
         """
         array = float_array("weights", weights)
         if array.shape != (self.n_q,):
@@ -191,10 +191,12 @@ class Plane:
                 f"weights must have shape ({self.n_q},) for {self.n_h} levels, got {array.shape}",
                 hint="weights and edges must come from the same model",
             )
-        if not np.all(np.isfinite(array)) or np.any(array < 0):
-            k = int(np.flatnonzero(~(array >= 0) | ~np.isfinite(array))[0])
+        bad = ~np.isfinite(array) if signed else ~(array >= 0) | ~np.isfinite(array)
+        if np.any(bad):
+            k = int(np.flatnonzero(bad)[0])
+            wanted = "finite" if signed else "finite and not negative"
             raise ArgumentError(
-                f"weights must be finite and not negative, got {array[k]:g} in cell {k}",
+                f"weights must be {wanted}, got {array[k]:g} in cell {k}",
                 hint="identify the model again",
             )
         return array

@@ -174,8 +174,8 @@ def blocks(inputs: FloatArray, low: float, high: float, count: int = BLOCKS) -> 
     return np.searchsorted(cuts, np.arange(n), side="right").astype(np.int64)
 
 
-def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> Choice:
-    """Choose s by the error on held-out blocks of the records.
+def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed: bool = False) -> Choice:
+    """Choose s by the error on held-out blocks of the records, for weights >= 0 or of either sign.
 
     Each of ``FOLDS`` fits leaves out every fifth block; all are simulated from the start of their record.
     The sums of the whole minus those of the left-out blocks give the fit, the latter alone its error. The
@@ -196,13 +196,14 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading) -> Choice:
             f"got {sum(r.input.size for r in records)}",
             hint="give smoothing as a number",
         )
-    return _walk(_HeldOut(held_out))
+    return _walk(_HeldOut(held_out, signed=signed))
 
 
 class _HeldOut:
     """The error on held-out blocks as a function of s."""
 
-    def __init__(self, sums: Sequence[NodeSums]) -> None:
+    def __init__(self, sums: Sequence[NodeSums], *, signed: bool = False) -> None:
+        self.signed = signed
         self.parts = [part.dense() for part in sums]
         whole = sum(sums[1:], start=sums[0])
         self.whole = whole.dense()
@@ -221,9 +222,12 @@ class _HeldOut:
         rest = self.whole - self.parts[k]
         gram, rhs = rest.centred()
         gram += self.unit * (smoothing**8 * rest.weight_sum / self.whole.weight_sum)
-        found = nnls.solve(gram, rhs, passive=self.passive[k])
-        self.passive[k] = found.passive
-        return self.parts[k].sum_of_squares(found.x, rest.offset(found.x))
+        if self.signed:
+            masses = nnls.solve_signed(gram, rhs)
+        else:
+            found = nnls.solve(gram, rhs, passive=self.passive[k])
+            masses, self.passive[k] = found.x, found.passive
+        return self.parts[k].sum_of_squares(masses, rest.offset(masses))
 
 
 def _walk(error: _HeldOut) -> Choice:
@@ -235,6 +239,6 @@ def _walk(error: _HeldOut) -> Choice:
         k += direction
     around: Iterable[float] = (grid[k] * 2.0**-0.25, grid[k] * 2.0**0.25)
     best = min((grid[k], *around), key=error)
-    if best <= grid[0] and error(0.0) <= error(best):
+    if not error.signed and best <= grid[0] and error(0.0) <= error(best):
         best = 0.0
     return Choice(best, tuple(sorted(error.errors.items())))

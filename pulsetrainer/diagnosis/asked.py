@@ -57,6 +57,11 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
             f"{model.input_unit} and {model.output_unit}",
             hint="use a model of the same device, in the same units",
         )
+    if model.form != "direct":
+        raise DataError(
+            f"{model_name} has the form {model.form}: causes are told apart on top of direct models only",
+            hint="evaluate it on a held-out run, or diagnose a model of the direct form",
+        )
     if model.reading != "continuous":
         raise DataError(
             f"{model_name} reads its weights as relays, whose steps would be mistaken for causes",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pulsetrainer.artefacts import Model
+from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.memory import State
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
@@ -14,8 +15,8 @@ if TYPE_CHECKING:
     from pulsetrainer.diagnosis.extended import Extended
 
 
-def operator_of(model: Model) -> Preisach:
-    """Return the static Preisach operator of a model, without its extensions.
+def operator_of(model: Model) -> Preisach | Dual:
+    """Return the static operator of a model, without its extensions.
 
     Raises
     ------
@@ -29,13 +30,15 @@ def operator_of(model: Model) -> Preisach:
             f"the weights of this model are read as {model.reading!r}; known are 'continuous' and 'relay'",
             hint="identify the model again",
         )
-    return Preisach(
+    operator = Preisach(
         Plane(model.edges),
         model.weights,
         model.offset,
         "relay" if model.reading == "relay" else "continuous",
         model.polarity,
+        signed=model.form == "signed",
     )
+    return Dual(operator) if model.form == "dual" else operator
 
 
 def extended_of(model: Model) -> Extended:
@@ -51,8 +54,14 @@ def extended_of(model: Model) -> Extended:
     # scipy.signal and scipy.stats come with it: a static model need not wait for them
     from pulsetrainer.diagnosis.extended import Extended  # noqa: PLC0415
 
+    static = operator_of(model)
+    if model.form != "direct" or isinstance(static, Dual):
+        raise DataError(
+            f"this model has the form {model.form} and extensions, which only direct models have",
+            hint="identify the model again",
+        )
     named = [(one.cause, tuple(p.value for p in one.parameters)) for one in model.extensions]
-    return Extended.of(operator_of(model), named)
+    return Extended.of(static, named)
 
 
 def predict(model: Model, inputs: FloatArray, dt_s: float | None, start: State | None = None) -> FloatArray:

@@ -81,7 +81,8 @@ class RunRecorder:
         self._final = Path(path)
         self._overwrite = overwrite
         self._header = header
-        self._texts = {
+        self._texts: dict[str, Any] = {
+            "captured": True,
             "input_unit": input_unit,
             "output_unit": output_unit,
             "input_quantity": input_quantity,

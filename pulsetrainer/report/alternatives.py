@@ -27,8 +27,8 @@ def density(model: Model) -> str:
     i, j = np.tril_indices(n_h)
     covered = int(np.count_nonzero(model.covered))
     text = (
-        f"Colour map over the half-plane of switching levels, {model.input_quantity} "
-        f"{_range(model.edges, model.input_unit)}: {n_h} levels, "
+        f"Colour map over the half-plane of switching levels, {model.edges_quantity} "
+        f"{_range(model.edges, model.edges_unit)}: {n_h} levels, "
         f"{covered} of {model.weights.size} cells covered."
     )
     off_diagonal = np.where((i != j) & model.covered, model.weights, 0.0)
@@ -38,7 +38,7 @@ def density(model: Model) -> str:
         text += (
             " Off the diagonal the density is greatest, "
             f"{off_diagonal[k]:.3g} {shown(model.weights_unit)}, for relays that switch up "
-            f"at {alpha:.3g} and down at {beta:.3g} {shown(model.input_unit)}."
+            f"at {alpha:.3g} and down at {beta:.3g} {shown(model.edges_unit)}."
         )
     return text
 

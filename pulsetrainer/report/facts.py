@@ -67,15 +67,37 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
     }
 
 
+_LOOPS = {
+    "counterclockwise": "counterclockwise, the output lags",
+    "clockwise": "clockwise, the output leads",
+    "butterfly": "a butterfly, it crosses itself",
+    "none": "none, the output follows the input",
+}
+
+
+def loop_words(model: Model) -> str:
+    """Say which way the loop of a model runs: "rising, counterclockwise, the output lags"."""
+    trend = "falling" if model.polarity < 0 else "rising"
+    turns = _LOOPS.get(model.fit.loop, "") if model.fit else ""
+    if model.form == "signed":
+        return turns or "of either direction"
+    return f"{trend}, {turns}" if turns else trend
+
+
 def _model(model: Model) -> dict[str, Any]:
     fit = model.fit
     return {
+        **({"warning": fit.warning} if fit and fit.warning else {}),
         "levels": model.levels,
         "cells": model.weights.size,
         "reading": model.reading,
         "polarity": model.polarity,
-        f"input ({model.input_quantity})": _span(model.edges, model.input_unit),
-        "offset": with_unit(f"{model.offset:.4g}", model.output_unit),
+        "form": model.form,
+        "loop": fit.loop or None if fit else None,
+        f"{'output' if model.form == 'dual' else 'input'} ({model.edges_quantity})": _span(
+            model.edges, model.edges_unit
+        ),
+        "offset": with_unit(f"{model.offset:.4g}", model.offset_unit),
         "positive weights": int(np.sum(model.weights > 0)),
         "fit_rms_percent": fit.rms_percent if fit else None,
         "coverage_percent": fit.coverage_percent if fit else None,

@@ -51,6 +51,7 @@ def render_evaluation(
             readouts=[views.readout(one, identifier) for one, identifier in played],
             overview=views.overview(played, published),
             compared=any(one.name in published for one, _ in played),
+            warning=evaluation.model.fit.warning if evaluation.model and evaluation.model.fit else "",
             model=None if evaluation.model is None else views.model_section(evaluation.model),
             waveforms=[views.waveform_section(one, identifier) for one, identifier in played],
             prediction=views.prediction_section(evaluation.models) if evaluation.models else None,

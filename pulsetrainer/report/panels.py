@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import PowerNorm
+from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.patches import Polygon
 
 from pulsetrainer.artefacts.units import shown
@@ -91,12 +91,13 @@ def density(panel: FigureBase, model: Model) -> None:
     axes.set_aspect("equal")
     axes.grid(visible=False)
     top = _scale(model, rows != columns)
+    signed = model.form == "signed"
     mesh = axes.pcolormesh(
         edges,
         edges,
         np.ma.masked_invalid(field),
-        norm=PowerNorm(_DENSITY_GAMMA, vmin=0.0, vmax=top),
-        cmap=colormaps["viridis"].with_extremes(over=VERMILION),
+        norm=Normalize(-top, top) if signed else PowerNorm(_DENSITY_GAMMA, vmin=0.0, vmax=top),
+        cmap=colormaps["PuOr"] if signed else colormaps["viridis"].with_extremes(over=VERMILION),
         rasterized=True,  # as vectors a thousand seams would shine through
     )
     corner = [(edges[0], edges[0]), (edges[0], edges[-1]), (edges[-1], edges[-1])]
@@ -109,14 +110,15 @@ def density(panel: FigureBase, model: Model) -> None:
         axes.add_collection(
             PolyCollection(cells, facecolors=GRID, edgecolors=MUTED, hatch="/////", linewidths=0.0)
         )
-    axes.set_xlabel(label("β, switches down at: " + model.input_quantity, model.input_unit))
-    axes.set_ylabel(label("α, switches up at: " + model.input_quantity, model.input_unit))
-    axes.set_title("Preisach density")
+    axes.set_xlabel(label("β, switches down at: " + model.edges_quantity, model.edges_unit))
+    axes.set_ylabel(label("α, switches up at: " + model.edges_quantity, model.edges_unit))
+    axes.set_title("Preisach density" + ("" if model.form == "direct" else f", {model.form} form"))
     axes.text(0.97, 0.06, _facts(model), transform=axes.transAxes, ha="right", va="bottom", linespacing=1.5)
-    beyond = bool(np.any(model.weights[model.covered] > top))
-    bar = panel.colorbar(
-        mesh, ax=axes, label=label("μ", model.weights_unit), extend="max" if beyond else "neither", shrink=0.9
-    )
+    sizes = np.abs(model.weights[model.covered]) if signed else model.weights[model.covered]
+    ends: Literal["max", "both", "neither"] = "neither"
+    if np.any(sizes > top):
+        ends = "both" if signed else "max"
+    bar = panel.colorbar(mesh, ax=axes, label=label("μ", model.weights_unit), extend=ends, shrink=0.9)
     bar.outline.set_visible(False)
 
 
@@ -126,9 +128,9 @@ def _scale(model: Model, off_diagonal: BoolArray) -> float:
     Cells on the diagonal hold the reversible part: however large, it must not darken the rest.
     """
     for chosen in (model.covered & off_diagonal, model.covered):
-        positive = model.weights[chosen & (model.weights > 0)]
-        if positive.size:
-            return float(min(positive.max(), _DENSITY_REACH * np.quantile(positive, _DENSITY_QUANTILE)))
+        sizes = np.abs(model.weights[chosen & (model.weights != 0)])
+        if sizes.size:
+            return float(min(sizes.max(), _DENSITY_REACH * np.quantile(sizes, _DENSITY_QUANTILE)))
     return 1.0
 
 
@@ -145,7 +147,7 @@ def _facts(model: Model) -> str:
     lines = [
         f"{model.edges.size - 1} levels, {model.weights.size} cells",
         f"{covered} covered" + (", the rest hatched" if covered < model.weights.size else ""),
-        f"offset {model.offset:.4g} {shown(model.output_unit)}".rstrip().replace("-", "−"),
+        f"offset {model.offset:.4g} {shown(model.offset_unit)}".rstrip().replace("-", "−"),
     ]
     if model.polarity < 0:
         lines.append("output falls as input rises")

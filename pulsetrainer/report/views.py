@@ -212,7 +212,9 @@ def model_section(model: Model) -> Section:
     facts = [
         ("levels", _count(model.edges.size - 1, "model.levels")),
         ("cells", _count(model.weights.size, "model.cells")),
-        (label("offset", model.output_unit), number(model.offset, "model.offset", ".4g")),
+        ("form", Number(model.form)),
+        *([("loop", Number(model.fit.loop))] if model.fit and model.fit.loop else []),
+        (label("offset", model.offset_unit), number(model.offset, "model.offset", ".4g")),
     ]
     pictures = [
         _picture(

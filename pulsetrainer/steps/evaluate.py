@@ -177,10 +177,11 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
 
 def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> ModelEvaluation:
     """Return the prediction error of one model; its gain is over ``first_rms``."""
-    low, high = float(model.edges[0]), float(model.edges[-1])
+    operator = operator_of(model)
+    low, high = operator.low, operator.high
     parts = run.parts(SHORTEST_PART)
     known = [known_from(part.input, low, high) for part in parts]
-    start, state = estimated_start(operator_of(model), [(part.input, part.output) for part in parts])
+    start, state = estimated_start(operator, [(part.input, part.output) for part in parts])
     predicted = np.concatenate(
         [predict(model, part.input, run.dt_s, start)[k:] for part, k in zip(parts, known, strict=True)]
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -12,11 +13,14 @@ from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core import input_noise, metrics, uncertainty
 from pulsetrainer.core.coverage import coverage, largest_gap
 from pulsetrainer.core.fit import Fitted, fit
+from pulsetrainer.core.forms import Form
 from pulsetrainer.core.identification import Method, Smoothing
 from pulsetrainer.core.initial_state import known_from
+from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import Plane, Reading
-from pulsetrainer.diagnosis import velocity
 from pulsetrainer.errors import DataError
+from pulsetrainer.steps import fit_notes
+from pulsetrainer.steps.asked import EXCITATIONS
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -30,6 +34,7 @@ def identify(
     runs: Run | Sequence[Run],
     *,
     levels: int = 48,
+    form: Form | Literal["auto"] = "auto",
     reading: Reading = "continuous",
     method: Method = "joint",
     smoothing: Smoothing | None = None,
@@ -42,12 +47,18 @@ def identify(
 
         minimise  sum_t (y_t - y0 - sum_k mu_k A_k r_k(u_0 .. u_t))^2   over mu >= 0 and y0
 
+    That is the direct form, of an output that lags. The dual form exchanges u and y, for an output that
+    leads; the signed form allows mu of either sign, for a loop that crosses itself.
+
     Parameters
     ----------
     runs
         Measured input and output; all in the same units.
     levels
         Number of levels n_h; the model has n_h (n_h + 1) / 2 cells.
+    form
+        "direct", "dual" or "signed"; "auto": the one that predicts blocks that were not fitted, the simplest
+        where others are not much better.
     reading
         How the weights are read: "continuous", a piecewise constant density, or "relay", as in the paper.
     method
@@ -65,7 +76,8 @@ def identify(
     DataError
         The runs differ in their units, or an input does not move.
     ArgumentError
-        There are too few samples, an output does not vary, or a parameter is out of its range.
+        There are too few samples, an output does not vary, a parameter is out of its range, or relays, the
+        alternating method or a bootstrap are asked for together with another form than the direct one.
     ConvergenceError
         The fit did not settle.
 
@@ -104,23 +116,27 @@ def identify(
         reading=reading,
         method=method,
         smoothing=smoothing,
+        form=form,
     )
+    operator, plane = fitted.operator, fitted.identified.operator.plane
+    notes += fit_notes.of_form(fitted, measured[0])
     notes += _of_offsets(titles, fitted, measured)
     if not fitted.evenly_spaced:
         notes.append("the loop is steep: the levels lie closer where the output changes")
     progress(0.4 if bootstrap else 0.8)
     ensemble = None
-    if bootstrap:
+    if bootstrap and fitted.form != "direct":
+        notes.append(f"the bootstrap is of the direct form; the {fitted.form} form has no intervals")
+    elif bootstrap:
         ensemble = uncertainty.bootstrap(
             fitted.records, fitted.identified, rng=np.random.default_rng(seed), draws=bootstrap
         )
-    operator = fitted.identified.operator
     if operator.polarity < 0:
         notes.append("the output falls when the input rises: fitted as a falling loop")
-    covered = coverage(operator.plane, [part.input for part in measured])
-    notes += _of_gaps(operator.plane, covered, measured[0].input_unit)
-    warning = _warning(fitted, measured)
-    notes += [warning] if warning else []
+    dual = fitted.form == "dual"
+    covered = coverage(plane, [part.output if dual else part.input for part in measured])
+    notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
+    warning = fit_notes.warning(fitted, measured, form)
     progress(1.0)
     return _model(fitted, measured, covered, ensemble, cleaned, tuple(notes), warning)
 
@@ -191,12 +207,6 @@ def _of_gaps(plane: Plane, covered: BoolArray, unit: str) -> list[str]:
     return [] if gap is None or float(np.mean(covered)) >= WELL_COVERED else [gap.words(plane, unit)]
 
 
-def _warning(fitted: Fitted, runs: Sequence[Run]) -> str:
-    """Say where the output follows the velocity of the input, not the input; nothing elsewhere."""
-    compared = velocity.compare(fitted.records, [run.dt_s for run in runs], fitted.residuals)
-    return velocity.warning(compared, runs[0].input_quantity, runs[0].output_quantity)
-
-
 def _model(
     fitted: Fitted,
     runs: Sequence[Run],
@@ -208,32 +218,34 @@ def _model(
 ) -> Model:
     """Return the model with its fit."""
     found, first, record = fitted.identified, runs[0], fitted.records[0]
-    operator = found.operator
-    plane = operator.plane
+    inner, operator = found.operator, fitted.operator
     counted = [r.sample_weight > 0 for r in fitted.records]
     measured = np.concatenate([r.output[c] for r, c in zip(fitted.records, counted, strict=True)])
-    predicted = np.concatenate(
-        [operator(r.input, r.start)[c] for r, c in zip(fitted.records, counted, strict=True)]
-    )
+    predicted = np.concatenate([y[c] for y, c in zip(fitted.predicted, counted, strict=True)])
     errors = metrics.prediction(measured, predicted)
     thinned = slice(
-        known_from(first.input, plane.low, plane.high), None, max(1, first.input.size // TRACE_SAMPLES)
+        known_from(first.input, operator.low, operator.high), None, max(1, first.input.size // TRACE_SAMPLES)
     )
     band = None if ensemble is None else ensemble.output_band(first.input)
     weights = None if ensemble is None else ensemble.weight_interval()
     sigmas = [clean.sigma for clean in cleaned if np.isfinite(clean.sigma)]
+    units = (first.output_unit, first.input_unit)
+    above, below = units[::-1] if fitted.form == "dual" else units
     return Model(
-        edges=plane.edges,
-        weights=operator.weights,
-        offset=operator.offset,
+        edges=inner.plane.edges,
+        weights=inner.weights,
+        offset=inner.offset,
         covered=covered,
-        weights_unit=f"{first.output_unit}/({first.input_unit})^2",
+        weights_unit=f"{above}/({below})^2",
         input_unit=first.input_unit,
         output_unit=first.output_unit,
         input_quantity=first.input_quantity,
         output_quantity=first.output_quantity,
-        reading=operator.reading,
-        polarity=operator.polarity,
+        reading=inner.reading,
+        polarity=inner.polarity,
+        form=fitted.form,
+        # files of 0.1 do not say where a run is from; these names only captures had
+        captured=all(run.captured or run.signal in EXCITATIONS for run in runs),
         weights_lower=None if weights is None else weights.lower,
         weights_upper=None if weights is None else weights.upper,
         fit=Fit(
@@ -250,7 +262,7 @@ def _model(
             time_s=None if first.time_s is None else first.time_s[thinned],
             input=first.input[thinned],
             output=record.output[thinned],
-            predicted=operator(record.input, record.start)[thinned],
+            predicted=fitted.predicted[0][thinned],
             smoothing=found.smoothing,
             draws=0 if ensemble is None else len(ensemble.weights),
             predicted_lower=None if band is None else band.lower[thinned],
@@ -261,6 +273,7 @@ def _model(
             spacing="even" if fitted.evenly_spaced else "crowded",
             stiffness=found.stiffness,
             warning=warning,
+            loop=loop_of(operator, errors.rms),
             notes=notes,
         ),
     )

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from pulsetrainer.artefacts import Model, Waveform
 from pulsetrainer.artefacts.units import with_unit
-from pulsetrainer.core import excitations, inversion
+from pulsetrainer.core import inversion
 from pulsetrainer.core.beats import find_beats
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
-from pulsetrainer.diagnosis.prediction import extended_of, operator_of, predict
+from pulsetrainer.diagnosis.prediction import extended_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 from pulsetrainer.steps.asked import check_beat, check_force_range
+from pulsetrainer.steps.invertible import Invertible, invertible
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
-if TYPE_CHECKING:
-    from pulsetrainer.core.operator import Preisach
-
 Inversion = Literal["continuous", "closest-match", "extended"]
 
-CONDITIONING_TIME_S = 0.5  # for each way of the major loop that comes first
-REST_S = 0.2
+DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
+EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
 EXTENDED_BAND_HZ = 30.0  # an arterial pulse holds little above
 RAMP_S = 0.4  # from rest to the first target, and back after the last
 
@@ -40,7 +39,8 @@ def invert(
     force_max: float | None = None,
     beat: str | int | None = None,
     periods: int = 4,
-    slew_A_per_s: float = 30.0,
+    slew: float | None = None,
+    despite_warning: bool = False,
     rate_Hz: float = 1000.0,
     name: str = "the model",
     progress: Progress = silent,
@@ -64,8 +64,11 @@ def invert(
         Number of a beat from 1, or "mean"; None: the whole pulse is one period.
     periods
         Periods to play; the first one is not scored.
-    slew_A_per_s
-        Fastest the drive may move, input unit a second.
+    slew
+        Fastest the drive may move, input unit a second. None: ``DEVICE_SLEW_A_PER_S`` for a model of a run
+        that our own device recorded, no limit for any other.
+    despite_warning
+        Invert a model although its fit says that its form does not describe the record.
     name
         Name of the model, for messages.
 
@@ -74,7 +77,8 @@ def invert(
     UsageError
         The method does not suit the model, ``beat`` is none, or the force range is empty.
     DataError
-        The force range is beyond the model's reach, or the recording holds no such beat.
+        The force range is beyond the model's reach or, of a signed model, beyond the range in which it has an
+        inverse; the recording holds no such beat; or the model does not describe its own record.
 
     Source: Tan, Venkataraman, Krishnaprasad 2001 (closest match); docs/theory.md (the other inverses).
 
@@ -89,27 +93,31 @@ def invert(
     """
     notes: list[str] = []
     shape = _one_beat(pulse, beat, notes)
-    operator = operator_of(model)
+    _check_describes(model, name, despite_warning=despite_warning)
     chosen = _method(method, model, name)
-    forces = _force_range(operator, model.output_unit, force_min, force_max, name)
+    part = invertible(model, rate_Hz)
+    if model.form == "signed":
+        notes.append(part.limits(model))
+    forces = _force_range(part, model, force_min, force_max, name)
     if chosen == "extended":
-        forces = _within_beats(shape, model, forces, (force_min, force_max), rate_Hz)
+        forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz)
     progress(0.2)
-    layout = _laid_out(shape, operator, forces, periods, rate_Hz)
+    layout = _laid_out(shape, part, forces, periods, rate_Hz)
     if chosen == "extended":
         exact, clipped = _tracked(model, layout, notes)
     else:
-        exact, clipped = _compensated(operator, chosen, layout)
+        exact, clipped = _compensated(part, chosen, layout)
     if clipped:
         notes.append(f"{clipped} samples of the target were out of reach and were clipped")
-    current = inversion.slew_limited(exact, rate_Hz, slew_A_per_s)
-    compensated = np.concatenate((layout.lead, current))
+    limit = _slew(slew, model)
+    current = exact if limit is None else inversion.slew_limited(exact, rate_Hz, limit)
+    compensated = np.concatenate((part.lead, current, part.tail))
     progress(0.9)
-    return Waveform(
+    drive = Waveform(
         time_s=np.arange(compensated.size) / rate_Hz,
-        target=np.concatenate((operator(layout.lead), layout.wanted)),
+        target=_target(part, layout),
         compensated=compensated,
-        scaled=_scaled(layout, current, operator, forces),
+        scaled=_scaled(layout, current, part, forces),
         predicted=predict(model, compensated, 1.0 / rate_Hz),
         scored=layout.scored(compensated.size, shape, periods),
         name=shape.name,
@@ -122,6 +130,50 @@ def invert(
         period_s=shape.period_s,
         notes=tuple(notes),
     )
+    return replace(drive, notes=(*notes, *_expected(drive, float(np.abs(current - exact).max()), limit)))
+
+
+def _target(part: Invertible, layout: _Layout) -> FloatArray:
+    """Target (n,): what the lead and the tail give by themselves, and what is wanted between them."""
+    before = part.whole(part.lead)
+    after = np.full(part.tail.size, layout.wanted[-1])
+    return np.concatenate((before, layout.wanted, after))
+
+
+def _check_describes(model: Model, name: str, *, despite_warning: bool) -> None:
+    """Refuse a model whose fit says that its form does not describe the record."""
+    warning = model.fit.warning if model.fit else ""
+    if warning and not despite_warning:
+        raise DataError(
+            f"{name} does not describe the record it was identified on. {warning}",
+            hint="give `despite_warning` to invert it all the same",
+        )
+
+
+def _slew(asked: float | None, model: Model) -> float | None:
+    """Return the limit that was asked for, else that of our own device for its own models, else none."""
+    if asked is not None:
+        positive(slew=asked)
+        return asked
+    ours = model.input_unit == "A" and model.captured
+    return DEVICE_SLEW_A_PER_S if ours else None
+
+
+def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
+    """Warn where the model itself expects a large error of the drive, with the reason."""
+    error = drive.predicted_max_error_percent
+    if not error > EXPECTED:
+        return []
+    if limit is not None and slowed > 0:
+        unit = with_unit(f"{limit:g}", f"{drive.input_unit}/s")
+        why = f"the drive may move at most {unit}, which this pulse exceeds"
+    elif drive.clipped_samples:
+        why = "parts of the pulse are out of the model's reach"
+    elif drive.inversion == "closest-match":
+        why = "the drive takes the steps of the levels"
+    else:
+        why = "the model's output does not follow the pulse even without a limit"
+    return [f"warning: by the model itself the error will be up to {error:.1f} % of full force: {why}"]
 
 
 def shape_of(drive: Waveform) -> Shape:
@@ -185,6 +237,11 @@ def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
             f"the weights of {name} are read as relays, which have no continuous inverse",
             hint="give `method` closest-match, or identify with `reading` continuous",
         )
+    if asked == "closest-match" and model.form != "direct":
+        raise UsageError(
+            f"{name} has the form {model.form}, and closest-match is a method for direct models",
+            hint="leave `method` out",
+        )
     if asked is not None and asked not in ("continuous", "closest-match", "extended"):
         raise ArgumentError(
             f"method must be continuous, closest-match or extended, got {asked!r}", hint="leave it out"
@@ -195,17 +252,18 @@ def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
 
 
 def _force_range(
-    operator: Preisach, unit: str, force_min: float | None, force_max: float | None, name: str
+    part: Invertible, model: Model, force_min: float | None, force_max: float | None, name: str
 ) -> tuple[float, float]:
     """Return the forces that the ends of the normalised pulse stand for."""
-    reach = sorted(operator.saturation)
+    reach, unit = part.reach, model.output_unit
     low = reach[0] if force_min is None else force_min
     high = reach[1] if force_max is None else force_max
     slack = 1e-9 * (reach[1] - reach[0])
     if low < reach[0] - slack or high > reach[1] + slack:
         raise DataError(
-            f"forces from {low:g} to {with_unit(f'{high:g}', unit)} are asked for, but {name} reaches "
-            f"{reach[0]:.3f} to {with_unit(f'{reach[1]:.3f}', unit)}",
+            f"{model.output_quantity} from {low:g} to {with_unit(f'{high:g}', unit)} is asked for, but "
+            f"{name} reaches {reach[0]:.4g} to {with_unit(f'{reach[1]:.4g}', unit)}"
+            + (f": {part.limits(model)}" if model.form == "signed" else ""),
             hint=f"choose `force_min` and `force_max` inside, such as "
             f"`force_min` {np.ceil(reach[0] * 10) / 10:g} `force_max` {np.floor(reach[1] * 10) / 10:g}",
         )
@@ -213,16 +271,10 @@ def _force_range(
     return low, high
 
 
-def _major_loop(low: float, high: float, rate_Hz: float) -> FloatArray:
-    """Input (n,) that wipes out whatever came before."""
-    return excitations.conditioning(
-        low, high, speed=(high - low) / CONDITIONING_TIME_S, rate_Hz=rate_Hz, rest_s=REST_S
-    )
-
-
 def _within_beats(
     shape: Shape,
     model: Model,
+    part: Invertible,
     forces: tuple[float, float],
     asked: tuple[float | None, float | None],
     rate_Hz: float,
@@ -231,13 +283,13 @@ def _within_beats(
 
     A lag, a creep or heat keep a pulse from the ends that the hysteresis would reach in a long time.
     """
-    low, high = float(model.edges[0]), float(model.edges[-1])
-    rising = model.polarity > 0
+    low, high = part.low, part.high
+    rising = part.polarity > 0
     inputs = train(
         shape, periods=4, rate_Hz=rate_Hz, low=low if rising else high, high=high if rising else low
     )
     settle = np.full(round(rate_Hz), inputs[0])
-    lead = _major_loop(low, high, rate_Hz)
+    lead = part.lead
     made = predict(model, np.concatenate((lead, settle, inputs)), 1.0 / rate_Hz)[lead.size + settle.size :]
     period = round(shape.period_s * rate_Hz)
     beats = [made[k * period : (k + 1) * period] for k in range(1, made.size // period)]
@@ -273,35 +325,36 @@ class _Layout:
 
 
 def _laid_out(
-    shape: Shape, operator: Preisach, forces: tuple[float, float], periods: int, rate_Hz: float
+    shape: Shape, part: Invertible, forces: tuple[float, float], periods: int, rate_Hz: float
 ) -> _Layout:
     beats = train(shape, periods=periods, rate_Hz=rate_Hz, low=forces[0], high=forces[1])
-    lead = _major_loop(operator.plane.low, operator.plane.high, rate_Hz)
-    rest = float(operator(lead)[-1])
+    rest = float(part.whole(part.lead)[-1])
     ramp = np.linspace(0.0, 1.0, round(RAMP_S * rate_Hz), endpoint=False)
     wanted = np.concatenate(
         (rest + (beats[0] - rest) * ramp, beats, beats[0] + (rest - beats[0]) * ramp, [rest])
     )
-    return _Layout(lead, ramp, beats, wanted, rate_Hz)
+    return _Layout(part.lead, ramp, beats, wanted, rate_Hz)
 
 
 def _scaled(
-    layout: _Layout, current: FloatArray, operator: Preisach, forces: tuple[float, float]
+    layout: _Layout, current: FloatArray, part: Invertible, forces: tuple[float, float]
 ) -> FloatArray:
     """Drive (n,) that is the target itself, scaled to the extremes of the compensated one."""
-    body, ramp, low = layout.body, layout.ramp, operator.plane.low
-    ends = sorted((float(current[body].min()), float(current[body].max())), reverse=operator.polarity < 0)
+    body, ramp, low = layout.body, layout.ramp, part.low
+    ends = sorted((float(current[body].min()), float(current[body].max())), reverse=part.polarity < 0)
     beats = ends[0] + (ends[1] - ends[0]) * (layout.beats - forces[0]) / (forces[1] - forces[0])
     up = low + (beats[0] - low) * ramp
     down = beats[-1] + (low - beats[-1]) * ramp
-    return np.concatenate((layout.lead, up, beats, down, [low]))
+    return np.concatenate((layout.lead, up, beats, down, [low], part.tail))
 
 
-def _compensated(operator: Preisach, method: Inversion, layout: _Layout) -> tuple[FloatArray, int]:
+def _compensated(part: Invertible, method: Inversion, layout: _Layout) -> tuple[FloatArray, int]:
     """Return the input that gives what is wanted after the major loop, and what was clipped."""
     if method == "continuous":
-        exact = inversion.invert(operator, layout.wanted)
+        exact = part.inverse(layout.wanted)
         return exact.input, exact.clipped
+    operator = part.whole
+    assert isinstance(operator, Preisach)
     plane = operator.plane
     matched = inversion.closest_match(operator, layout.wanted)
     step = float(np.diff(plane.edges).mean())

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pulsetrainer.artefacts import DrivePlayback, Playback, Waveform
+from pulsetrainer.artefacts import DrivePlayback, Model, Playback, Waveform
 from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.wording import FORCE_REMEDY
+from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
@@ -107,13 +108,19 @@ def play(drive: Waveform, device: Device, *, repeats: int = 5, progress: Progres
         waveform=drive,
         compensated=_playback(kept["compensated"][:whole], drive.time_s.size),
         scaled=_playback(kept["scaled"][:whole], drive.time_s.size),
-        input_range=float(np.ptp(model.edges)) if model else float(np.ptp(drive.scaled)),
+        input_range=_input_range(model) if model else float(np.ptp(drive.scaled)),
         complete=not fault,
         dropped_samples=dropped,
         fault=fault,
     )
     raise_if_stopped(fault, remedy, "the playback", playback if whole else None)
     return playback
+
+
+def _input_range(model: Model) -> float:
+    """Range of the input over which a model was identified."""
+    operator = operator_of(model)
+    return operator.high - operator.low
 
 
 def _check(drive: Waveform, repeats: int) -> None:

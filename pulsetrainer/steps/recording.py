@@ -108,6 +108,7 @@ class Memory:
             signal=signal,
             complete=complete,
             dropped_samples=self.dropped_samples,
+            captured=True,
         )
 
 

@@ -108,6 +108,8 @@ def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None, *, full:
     for plan in plans:
         if plan.optional and not full and draw(st.booleans()):
             values[plan.name] = None
+        elif cls is kinds.Model and plan.name == "form":
+            values[plan.name] = draw(st.sampled_from(["direct", "dual", "signed"]))
         elif full and plan.role == "attribute" and plan.name.endswith("unit"):
             values[plan.name] = draw(UNITS)
         elif full and plan.role == "attribute" and plan.name.endswith("quantity"):

@@ -1,0 +1,193 @@
+"""The form of the static model: direct, dual or signed, and which of them a record asks for.
+
+- direct: y = P[u] with mu >= 0: the output lags, the loop runs counterclockwise.
+- dual: u = P[y] with mu >= 0: the output leads, the loop runs clockwise (``core.dual``).
+- signed: y = P[u] with weights of either sign: the loop may cross itself, as a butterfly does
+  (Jayawardhana, Vasquez-Beltran, van de Beek, de Jonge, Acuautla, Damerio, Peletier, Noheda, Proc. IEEE CDC
+  2018: butterfly loops are those of a Preisach operator whose density changes sign).
+
+The direct form is fitted first. Only where it leaves more than noise are the others tried, all three on a
+coarse plane and judged by blocks of the records that were not fitted. A form wins over a simpler one only
+where it leaves far less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pulsetrainer.core import nnls
+from pulsetrainer.core.dual import Dual, exchanged
+from pulsetrainer.core.edges import plane_for, thinned
+from pulsetrainer.core.equations import NormalEquations, parted_sums
+from pulsetrainer.core.identification import polarity_of
+from pulsetrainer.core.initial_state import record_of
+from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import FloatArray, IntArray, Plane
+from pulsetrainer.core.record import Record, levelled
+from pulsetrainer.core.smoothing import FOLDS, blocks, smoothed
+from pulsetrainer.errors import ArgumentError
+
+Form = Literal["direct", "dual", "signed"]
+FORMS: tuple[Form, ...] = ("direct", "dual", "signed")
+Signals = Sequence[tuple[FloatArray, FloatArray]]
+Static = Preisach | Dual
+
+# Above this multiple of what looks like white noise in its residual, a fit leaves more than noise.
+STRUCTURED = 1.3
+SMALLEST = 0.001  # of the span, rms: nobody needs another form for less
+# A less simple form must leave less than this share of what the simpler one leaves on held-out blocks.
+BETTER = 0.8
+# A form other than the direct one must describe the record: of the span, rms on held-out blocks.
+DESCRIBES = 0.05
+# Where weights of either sign leave more than this share of what the direct form leaves, no more is tried.
+LOOK = 0.85
+_LEVELS = 16
+_FIRST = 0.05
+_SMOOTHINGS = (0.025, _FIRST, 0.1)
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """What each form left on held-out blocks, rms, output unit; and the form that is asked for."""
+
+    left: dict[Form, float]
+    form: Form
+
+
+def asked_form(
+    form: Form | Literal["auto"], signals: Signals, low: float, high: float, *, plain: bool
+) -> Form:
+    """Return the form to fit: the one asked for, or with "auto" the one that the records ask for.
+
+    Parameters
+    ----------
+    plain
+        Weights are fitted jointly in the continuous reading; else there is only the direct form.
+
+    Raises
+    ------
+    ArgumentError
+        An unknown form, or dual or signed where only the direct one exists.
+    """
+    if form not in ("auto", *FORMS):
+        raise ArgumentError(f"form must be auto, {', '.join(FORMS)}, got {form!r}", hint="use auto")
+    if form == "auto":
+        return try_all(signals, low, high).form if plain else "direct"
+    if form != "direct" and not plain:
+        raise ArgumentError(
+            f"the {form} form is fitted jointly, in the continuous reading",
+            hint="leave method and reading out, or ask for the direct form",
+        )
+    return form
+
+
+def white(residual: FloatArray) -> float:
+    """Standard deviation of the white part of a residual (n,), by its fourth differences."""
+    if residual.size < 5:
+        return 0.0
+    fourth = np.convolve(residual, [1.0, -4.0, 6.0, -4.0, 1.0], mode="valid")
+    return 1.4826 * float(np.median(np.abs(fourth))) / np.sqrt(70.0)
+
+
+def leaves_more_than_noise(residuals: Sequence[FloatArray], span: float) -> bool:
+    """Tell whether residuals are larger than their own white noise, and large enough to matter."""
+    left = root_mean_square(np.concatenate(list(residuals)))
+    return left > max(SMALLEST * span, STRUCTURED * max(white(r) for r in residuals))
+
+
+def try_all(signals: Signals, low: float, high: float) -> Tried:
+    """Fit every form to blocks of the records, pairs of input and output (n,), and judge it by the others.
+
+    Raises
+    ------
+    ConvergenceError
+        A fit did not settle.
+    """
+    records = [record_of(u, y, low, high) for u, y in signals]
+    folds = [np.where(r.sample_weight > 0, blocks(r.input, low, high) % FOLDS, -1) for r in records]
+    plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
+    direct, signed = (_HeldOut.of(records, folds, plane, signed=either) for either in (False, True))
+    span = float(np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in records])))
+    left: dict[Form, float] = {"direct": direct(_FIRST), "signed": signed(_FIRST)}
+    # the dual form too is rarely much worse as a signed one than by itself
+    if left["direct"] < SMALLEST * span or left["signed"] > LOOK * left["direct"]:
+        return Tried(left, "direct")
+    left = {"direct": direct.best(), "signed": signed.best(), "dual": _held_out_dual(signals, folds)}
+    form: Form = "direct"
+    for other in ("dual", "signed"):
+        if left[other] < min(BETTER * left[form], DESCRIBES * span):
+            form = other
+    return Tried(left, form)
+
+
+class _HeldOut:
+    """The rms error on held-out blocks as a function of the smoothing, for weights of one sign or either."""
+
+    def __init__(self, parts: list[NormalEquations], *, signed: bool) -> None:
+        self.signed, self.outs = signed, _each_out(parts)
+        self.errors: dict[float, float] = {}
+
+    @classmethod
+    def of(
+        cls, records: Sequence[Record], folds: Sequence[IntArray], plane: Plane, *, signed: bool
+    ) -> _HeldOut:
+        turned, _ = levelled(records, 1 if signed else polarity_of(records, plane))
+        parts = [part.dense() for part in parted_sums(plane, turned, "continuous", folds, FOLDS)]
+        return cls([part for part in parts if part.weight_sum > 0], signed=signed)
+
+    def __call__(self, smoothing: float) -> float:
+        if smoothing not in self.errors:
+            squares = 0.0
+            for part, rest in self.outs:
+                gram, rhs = smoothed(rest, smoothing)
+                masses = nnls.solve_signed(gram, rhs) if self.signed else nnls.solve(gram, rhs).x
+                squares += part.sum_of_squares(masses, rest.offset(masses))
+            weight = sum(part.weight_sum for part, _ in self.outs)
+            self.errors[smoothing] = float(np.sqrt(max(squares, 0.0) / weight))
+        return self.errors[smoothing]
+
+    def best(self) -> float:
+        """Least error of all smoothings."""
+        return min(self(s) for s in _SMOOTHINGS)
+
+
+def _each_out(parts: Sequence[NormalEquations]) -> list[tuple[NormalEquations, NormalEquations]]:
+    """Each part, and the sums over all the others."""
+    whole = parts[0]
+    for part in parts[1:]:
+        whole = whole + part
+    return [(part, whole - part) for part in parts]
+
+
+def _held_out_dual(signals: Signals, folds: Sequence[IntArray]) -> float:
+    """Rms error on held-out blocks of the form with the roles exchanged, in the output's unit."""
+    swapped = exchanged(signals)
+    low, high = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
+    records = [record_of(y, u, low, high) for y, u in swapped]
+    plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
+    sign = polarity_of(records, plane)
+    turned, zero = levelled(records, sign)
+    parts = [part.dense() for part in parted_sums(plane, turned, "continuous", folds, FOLDS)]
+    used = [k for k, part in enumerate(parts) if part.weight_sum > 0]
+
+    def left(smoothing: float) -> float:
+        squares, count = 0.0, 0
+        for k, (_, rest) in zip(used, _each_out([parts[k] for k in used]), strict=True):
+            gram, rhs = smoothed(rest, smoothing)
+            masses = nnls.solve(gram, rhs).x
+            if not masses.sum() > 0:
+                return float("inf")
+            offset = sign * (rest.offset(masses) + zero)
+            operator = Dual(Preisach(plane, masses / plane.areas, offset, polarity=sign))
+            for (u, y), fold in zip(signals, folds, strict=True):
+                chosen = fold == k
+                squares += float(np.sum((operator(u) - y)[chosen] ** 2))
+                count += int(chosen.sum())
+        return float(np.sqrt(squares / count))
+
+    return min(left(s) for s in _SMOOTHINGS)

@@ -1,0 +1,51 @@
+"""What a fit says of itself in words: its form, and whether it describes the record at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pulsetrainer.artefacts import Run
+from pulsetrainer.core.fit import Fitted
+from pulsetrainer.core.forms import leaves_more_than_noise
+from pulsetrainer.diagnosis import velocity
+
+POOR = 0.05  # of the output's span, rms: a model that leaves more of what is not noise describes nothing
+UNEXPLAINED = 0.5  # of the output's standard deviation: what leaves more explains next to nothing
+
+
+def of_form(fitted: Fitted, run: Run) -> list[str]:
+    """Say what was done where the form is not the direct one."""
+    output, given = run.output_quantity, run.input_quantity
+    if fitted.form == "dual":
+        how = f"fitted with the roles exchanged, {given} over {output} (dual form)"
+        return [f"the {output} leads the {given}, its loop runs clockwise: {how}"]
+    if fitted.form == "signed":
+        return [
+            "no loop that runs one way fits this record: fitted with weights of either sign (signed form)"
+        ]
+    return []
+
+
+def warning(fitted: Fitted, runs: Sequence[Run], asked: str) -> str:
+    """Say that no form describes the record, and why where that is plain; nothing where one does."""
+    residuals = [e[r.sample_weight > 0] for e, r in zip(fitted.residuals, fitted.records, strict=True)]
+    output = np.concatenate([r.output[r.sample_weight > 0] for r in fitted.records])
+    left = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+    span = float(np.ptp(output))
+    if left <= POOR * span:
+        return ""
+    first = runs[0]
+    compared = velocity.compare(fitted.records, [run.dt_s for run in runs], fitted.residuals)
+    if compared.wrong:
+        return velocity.warning(compared, first.input_quantity, first.output_quantity)
+    if not leaves_more_than_noise(residuals, span) and left <= UNEXPLAINED * float(np.std(output)):
+        return ""
+    what = "No static form (direct, dual, signed)" if asked == "auto" else f"The {asked} form does not"
+    verb = " describes this record" if asked == "auto" else " describe this record"
+    return (
+        f"{what}{verb}: the best fit leaves {100 * left / span:.1f} % of the span. The "
+        f"{first.output_quantity} may depend on the speed, on a second input, or hardly on the "
+        f"{first.input_quantity}"
+    )

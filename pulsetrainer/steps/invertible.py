@@ -1,0 +1,96 @@
+"""The part of a model that has an inverse: all of a direct or dual model, a range of a signed one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pulsetrainer.artefacts import Model
+from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.core import excitations, inversion
+from pulsetrainer.core.dual import Dual
+from pulsetrainer.core.monotone import invertible_range
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.prediction import operator_of
+from pulsetrainer.errors import ArgumentError, DataError
+
+CONDITIONING_TIME_S = 0.5  # for each way of the major loop that comes first
+REST_S = 0.2
+_TURNS_BACK = (
+    2.0  # times the rms error of the fit: a branch of a signed model that turns back less is monotone
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Invertible:
+    """Where a model is inverted, and how."""
+
+    whole: Preisach | Dual
+    low: float  # ends of the input
+    high: float
+    reach: tuple[float, float]  # outputs, rising
+    polarity: int
+    lead: FloatArray  # (n,) input that wipes out whatever came before and ends at ``low``
+    tail: FloatArray  # (m,) input back to the rest of the whole model
+    inverse: Callable[[FloatArray], inversion.Inverse]  # after the lead
+
+    def limits(self, model: Model) -> str:
+        """Say in words where the inverse exists."""
+        u, y = (f"{a:.4g} .. {b:.4g}" for a, b in ((self.low, self.high), self.reach))
+        return (
+            f"the inverse exists for the {model.output_quantity} in {with_unit(y, model.output_unit)}, "
+            f"with the {model.input_quantity} in {with_unit(u, model.input_unit)}"
+        )
+
+
+def invertible(model: Model, rate_Hz: float) -> Invertible:
+    """Return the part of a model that can be inverted.
+
+    Raises
+    ------
+    DataError
+        A signed model has no range with monotone branches.
+    """
+    whole = operator_of(model)
+    loop = excitations.conditioning(
+        whole.low,
+        whole.high,
+        speed=(whole.high - whole.low) / CONDITIONING_TIME_S,
+        rate_Hz=rate_Hz,
+        rest_s=REST_S,
+    )
+    low, high = sorted(whole.saturation)
+    if isinstance(whole, Dual):
+        return Invertible(
+            whole, whole.low, whole.high, (low, high), whole.polarity, loop, np.zeros(0),
+            lambda wanted: whole.inverse(wanted, loop),
+        )  # fmt: skip
+    if not whole.signed:
+        return Invertible(
+            whole, whole.low, whole.high, (low, high), whole.polarity, loop, np.zeros(0),
+            lambda wanted: inversion.invert(whole, wanted),
+        )  # fmt: skip
+    return _within(whole, model, loop, rate_Hz)
+
+
+def _within(whole: Preisach, model: Model, loop: FloatArray, rate_Hz: float) -> Invertible:
+    """Return the range of a signed model in which the output moves most and all branches are monotone."""
+    error = model.fit.rms if model.fit else 0.0
+    try:
+        found = invertible_range(whole, _TURNS_BACK * error)
+    except ArgumentError as none:
+        raise DataError(none.message, hint=none.hint) from none
+    held = found.operator
+    speed = (whole.high - whole.low) / CONDITIONING_TIME_S
+    way = excitations.through(found.lead, speed, rate_Hz)
+    back = (
+        excitations.through((found.low, whole.low), speed, rate_Hz) if found.low > whole.low else np.zeros(0)
+    )
+    low, high = sorted(held.saturation)
+    return Invertible(
+        whole, found.low, found.high, (low, high), held.polarity, np.concatenate((loop, way)), back,
+        lambda wanted: inversion.invert(held, wanted, monotone=True),
+    )  # fmt: skip

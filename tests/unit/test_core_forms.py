@@ -1,0 +1,232 @@
+"""Which form a record asks for, on devices that nothing was tuned to: thresholds were set on other seeds."""
+
+from __future__ import annotations
+
+import form_devices as devices
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from pulsetrainer.core.forms import try_all
+from pulsetrainer.core.loop import loop_of
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.errors import ArgumentError, DataError
+
+NOISE = 0.003  # of the span
+SAMPLES = 3000
+
+
+def measured(draw, seed, n=SAMPLES):
+    """A device, an input, its clean output and the size of the noise."""
+    rng = np.random.default_rng(seed)
+    device = draw(rng)
+    u = devices.record(rng, n)
+    clean = device(u)
+    noise = NOISE * np.ptp(clean)
+    return device, u, clean + rng.normal(0.0, noise, n), noise, rng
+
+
+def run_of(u, y):
+    """A run in units of somebody else's bench."""
+    return pt.Run(
+        time_s=np.arange(u.size) / 100.0, input=u, output=y, input_unit="V", output_unit="mm",
+        input_quantity="voltage", output_quantity="stroke",
+    )  # fmt: skip
+
+
+def named(draws, seeds):
+    """Forms that the records of these devices ask for."""
+    found = []
+    for k, seed in enumerate(seeds):
+        _, u, y, _, _ = measured(draws[k % len(draws)], seed)
+        found.append(try_all([(u, y)], u.min(), u.max()).form)
+    return found
+
+
+def test_a_direct_device_is_called_direct():
+    """Planes, sums of plays and falling loops."""
+    assert named(devices.DIRECT, range(1000, 1009)) == ["direct"] * 9
+
+
+@pytest.mark.slow
+def test_none_of_200_direct_devices_is_called_anything_else():
+    """The same, 200 of them."""
+    assert named(devices.DIRECT, range(2000, 2200)) == ["direct"] * 200
+
+
+@pytest.mark.parametrize(
+    ("draws", "form"),
+    [(devices.CLOCKWISE, "dual"), (devices.BUTTERFLY, "signed"), (devices.MIXED, "signed")],
+    ids=["clockwise", "butterfly", "mixed"],
+)
+def test_the_form_is_named_right(draws, form):
+    """Twelve devices of each kind: at most one of twenty may be named wrongly."""
+    found = named(draws, range(5000, 5012))
+    assert found.count(form) / len(found) >= 0.95
+
+
+def held_out(draw, seed):
+    """Error on a held-out signal with noise, in units of the noise."""
+    device, u, y, noise, rng = measured(draw, seed, 4000)
+    model = pt.identify(run_of(u, y))
+    turns = rng.uniform(0.0, 1.0, 60)
+    unseen = np.interp(np.linspace(0, 62, 3000), np.arange(63), np.concatenate(([0.0, 1.0, 0.0], turns)))
+    wanted = device(unseen) + rng.normal(0.0, noise, unseen.size)
+    return model, float(np.sqrt(np.mean((model.predict(unseen) - wanted) ** 2)) / noise)
+
+
+@pytest.mark.parametrize("draw", [devices.exchanged_plane, devices.stop_sum])
+@pytest.mark.parametrize("seed", [4000, 4001])
+def test_a_dual_model_predicts_within_the_noise(draw, seed):
+    """Held-out error at most 1.3 times the noise."""
+    model, error = held_out(draw, seed)
+    assert (model.form, model.fit.loop) == ("dual", "clockwise")
+    assert error <= 1.3
+
+
+@pytest.mark.parametrize("draw", [devices.butterfly_density, devices.mixed_plays, devices.mixed_planes])
+def test_a_signed_model_predicts_within_twice_the_noise(draw):
+    """Held-out error at most 2 times the noise."""
+    model, error = held_out(draw, 4002)
+    assert model.form == "signed"
+    assert error <= 2.0
+
+
+@pytest.fixture(scope="module")
+def butterfly():
+    """A signed model of a butterfly."""
+    _, u, y, _, _ = measured(devices.butterfly_density, 4003)
+    return pt.identify(run_of(u, y))
+
+
+@pytest.fixture(scope="module")
+def clockwise():
+    """A dual model."""
+    _, u, y, _, _ = measured(devices.stop_sum, 4004)
+    return pt.identify(run_of(u, y))
+
+
+def test_units_of_a_dual_model_are_exchanged(clockwise):
+    """Edges are of the output, the offset of the input."""
+    assert (clockwise.edges_unit, clockwise.offset_unit) == ("mm", "V")
+    assert clockwise.weights_unit == "V/(mm)^2"
+
+
+def test_forms_are_kept_in_files(tmp_path, butterfly, clockwise):
+    """What is loaded predicts the same."""
+    u = np.concatenate((np.linspace(0, 1, 50), np.linspace(1, 0.2, 50)))
+    for model in (butterfly, clockwise):
+        pt.save(model, tmp_path / f"{model.form}.h5")
+        again = pt.load(tmp_path / f"{model.form}.h5")
+        assert (again.form, again.fit.loop, again.captured) == (model.form, model.fit.loop, False)
+        np.testing.assert_array_equal(again.predict(u), model.predict(u))
+
+
+def test_both_forms_are_drawn_and_printed(butterfly, clockwise):
+    """A figure, and the form among the facts."""
+    for model in (butterfly, clockwise):
+        assert model.form in str(model)
+        assert model.plot() is not None
+
+
+def test_a_dual_model_is_inverted_exactly(clockwise):
+    """What the drive is expected to give is the target."""
+    drive = pt.invert("normal", clockwise)
+    assert drive.predicted_max_error_percent < 1e-6
+    assert drive.clipped_samples == 0
+
+
+def test_a_signed_model_is_inverted_within_its_range(butterfly):
+    """The range is named, kept, and nothing beyond it is promised."""
+    drive = pt.invert("normal", butterfly)
+    assert any("inverse exists" in note for note in drive.notes)
+    assert drive.predicted_max_error_percent < 5.0
+    assert drive.clipped_samples == 0
+    with pytest.raises(DataError):
+        pt.invert("normal", butterfly, force_max=float(drive.target[drive.scored].max()) + 10.0)
+
+
+def test_closest_match_is_for_direct_models(clockwise):
+    """The relays of the paper know one form."""
+    with pytest.raises(pt.errors.UsageError):
+        pt.invert("normal", clockwise, method="closest-match")
+
+
+def test_a_diagnosis_is_of_direct_models(clockwise):
+    """It says so instead of naming causes of another form's residual."""
+    _, u, y, _, _ = measured(devices.stop_sum, 4004)
+    with pytest.raises(DataError):
+        pt.diagnose(run_of(u, y), clockwise, quick=True)
+
+
+def test_evaluate_knows_every_form(clockwise, butterfly):
+    """The error on the record itself is that of the fit."""
+    for draw, seed, model in (
+        (devices.stop_sum, 4004, clockwise),
+        (devices.butterfly_density, 4003, butterfly),
+    ):
+        _, u, y, _, _ = measured(draw, seed)
+        found = pt.evaluate(run_of(u, y), model).models[0]
+        assert found.rms_percent == pytest.approx(model.fit.rms_percent, rel=0.05)
+
+
+@pytest.mark.parametrize("other", ["dual", "signed"])
+@pytest.mark.parametrize("option", [{"reading": "relay"}, {"method": "alternating"}])
+def test_other_forms_are_fitted_jointly_and_continuously(other, option):
+    """Relays and the paper's alternation know the direct form only."""
+    _, u, y, _, _ = measured(devices.play_sum, 1, 500)
+    with pytest.raises(ArgumentError):
+        pt.identify(run_of(u, y), levels=8, form=other, **option)
+    assert pt.identify(run_of(u, y), levels=8, **option).form == "direct"
+
+
+def test_an_unknown_form_is_refused():
+    """By its name."""
+    _, u, y, _, _ = measured(devices.play_sum, 1, 500)
+    with pytest.raises(ArgumentError, match="sideways"):
+        pt.identify(run_of(u, y), form="sideways")
+
+
+def velocity(u, rng):
+    """A damper: the output follows the speed."""
+    return np.tanh(80.0 * np.gradient(u)) + 0.02 * rng.normal(size=u.size)
+
+
+def second_input(u, rng):
+    """Half of the output comes from elsewhere."""
+    return u + np.sin(np.linspace(0.0, 57.0, u.size) ** 1.1) + 0.0 * rng.normal(size=u.size)
+
+
+def nothing(u, rng):
+    """Noise alone."""
+    return rng.normal(size=u.size) + 0.0 * u
+
+
+@pytest.mark.parametrize("output", [velocity, second_input, nothing])
+def test_a_record_that_no_form_describes_is_said_to_be_one(output):
+    """The plain sentence; and no inverse, unless it is asked for."""
+    rng = np.random.default_rng(5)
+    u = 0.5 - 0.5 * np.cos(np.linspace(0.0, 60.0, 2000)) * np.linspace(1.0, 0.4, 2000)
+    model = pt.identify(run_of(u, output(u, rng)), levels=16)
+    assert model.fit.warning
+    assert model.fit.warning in str(model)
+    with pytest.raises(DataError):
+        pt.invert("normal", model)
+    assert pt.invert("normal", model, despite_warning=True).compensated.size
+
+
+@pytest.mark.parametrize("draws", [devices.DIRECT, devices.CLOCKWISE, devices.BUTTERFLY, devices.MIXED])
+def test_a_record_that_a_form_describes_has_no_warning(draws):
+    """The sentence is for others."""
+    _, u, y, _, _ = measured(draws[0], 7)
+    assert pt.identify(run_of(u, y), levels=24).fit.warning == ""
+
+
+def test_a_single_valued_curve_has_no_loop():
+    """A reversible operator lags nowhere."""
+    plane = Plane.uniform(0.0, 1.0, 8)
+    i, j = plane.cell_indices
+    assert loop_of(Preisach(plane, np.where(i == j, 1.0, 0.0))) == "none"
+    assert loop_of(Preisach(plane, np.where(i == j, 1.0, 0.3))) == "counterclockwise"
+    assert loop_of(Preisach(plane, np.where(i == j, 1.0, 0.3)), doubt=1.0) == "none"
