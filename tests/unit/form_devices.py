@@ -21,7 +21,7 @@ Generator = np.random.Generator
 
 
 def play(u: FloatArray, radius: FloatArray) -> FloatArray:
-    """Play operators (n, k) of radii (k,), that follow with a slack of their radius, after a falling input."""
+    """Play operators (n, k) that follow with a slack of their radius (k,), after a falling input."""
     state, out = u[0] + radius, np.empty((u.size, radius.size))
     for n, value in enumerate(u):
         state = np.clip(state, value - radius, value + radius)
@@ -98,7 +98,7 @@ def stop_sum(rng: Generator) -> Device:
 
 
 def bouc_wen(rng: Generator) -> Device:
-    """Return a rate-independent Bouc-Wen element, dz = (1 - |z|/Z (b sign(z du) + 1 - b)) du, beside a spring."""
+    """Return a spring beside a Bouc-Wen element, dz = (1 - |z|/Z (b sign(z du) + 1 - b)) du."""
     limit, share = rng.uniform(0.05, 0.2), rng.uniform(0.3, 0.8)
     b = rng.uniform(0.5, 0.9)
 
@@ -129,7 +129,7 @@ def butterfly_density(rng: Generator) -> Device:
 
 
 def rectified(rng: Generator) -> Device:
-    """Return the size of a polarisation that lags and saturates: a piezo's strain beyond the coercive field."""
+    """Return the size of a polarisation that lags: the strain of a piezo beyond its coercive field."""
     radius = rng.uniform(0.05, 0.25) + 0.08 * np.linspace(-0.5, 0.5, 15)
     sharp, flat = rng.uniform(4.0, 8.0), rng.uniform(0.0, 0.3)
 
@@ -160,9 +160,8 @@ def mixed_planes(rng: Generator) -> Device:
     x = one.plane.thresholds
     upper = 1.0 / (1.0 + np.exp(-(0.5 * (x[i] + x[j]) - 0.5) / 0.05))
     off = i != j
-    weights = np.where(
-        off, upper * one.weights - rng.uniform(0.3, 0.6) * (1 - upper) * other.weights, one.weights
-    )
+    lower = rng.uniform(0.3, 0.6) * (1.0 - upper)
+    weights = np.where(off, upper * one.weights - lower * other.weights, one.weights)
     return Preisach(one.plane, weights, 0.0, signed=True)
 
 
