@@ -122,6 +122,8 @@ class Model(Shown):
     extensions: tuple[Extension, ...] = ()
     form: str = "direct"  # "direct" | "dual" | "signed"
     captured: bool = True  # on our own device; files of 0.1 do not say, and were
+    edges_unit: str = ""  # of the input, of a dual model of the output: follows from the form
+    offset_unit: str = ""  # of the output, of a dual model of the input: follows from the form
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:
@@ -129,6 +131,10 @@ class Model(Shown):
                 f"the form of a model is one of {', '.join(FORMS)}, this one has {self.form!r}",
                 hint="identify the model again: pulsetrainer identify RUN.h5 -o model.h5",
             )
+        units = (self.input_unit, self.output_unit)
+        edges, offset = units[::-1] if self.form == "dual" else units
+        object.__setattr__(self, "edges_unit", edges)
+        object.__setattr__(self, "offset_unit", offset)
         n_h = np.size(self.edges) - 1
         if np.size(self.weights) != n_h * (n_h + 1) // 2:
             raise DataError(
@@ -138,19 +144,9 @@ class Model(Shown):
             )
 
     @property
-    def edges_unit(self) -> str:
-        """Unit of the edges: that of the input, of a dual model that of the output."""
-        return self.output_unit if self.form == "dual" else self.input_unit
-
-    @property
     def edges_quantity(self) -> str:
         """Quantity of the edges: the input's, of a dual model the output's."""
         return self.output_quantity if self.form == "dual" else self.input_quantity
-
-    @property
-    def offset_unit(self) -> str:
-        """Unit of the offset: that of the output, of a dual model that of the input."""
-        return self.input_unit if self.form == "dual" else self.output_unit
 
     @property
     def levels(self) -> int:

@@ -38,9 +38,7 @@ class Later:
 def values_of(artefact: Any) -> dict[str, Any]:
     """Return the fields of an artefact by name."""
     cls: type = type(artefact)
-    plans = plan_of(cls)
-    named = {plan.data.units[1:] for plan in plans if plan.data is not None and plan.data.units[0] == "@"}
-    return {name: getattr(artefact, name) for name in (*(plan.name for plan in plans), *named)}
+    return {plan.name: getattr(artefact, plan.name) for plan in plan_of(cls)}
 
 
 def encode(
