@@ -22,7 +22,15 @@ PAIRS = (("min", "max"), ("minimum", "maximum"), ("argmin", "argmax"), ("any", "
 TWINS = {a: b for pair in (*PAIRS, ("left", "right")) for a, b in (pair, pair[::-1])}
 UNSEEN = {"annotation", "returns", "decorator_list", "format_spec"}  # parts of a node
 HOW = {"strict", "check_finite", "copy", "repr", "init", "hint", "help", "exist_ok", "parents"}  # arguments
-SPEAKING = {"note", "debug", "info", "warn", "fault", "BadParameter"}  # calls that only say something
+SPEAKING = {
+    "note",
+    "progress",
+    "debug",
+    "info",
+    "warn",
+    "fault",
+    "BadParameter",
+}  # calls that only say something
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ PACKAGES = {  # the tests that answer for a package
         *(f"{UNIT}{one}*.py" for one in ("artefacts", "store", "units", "figures", "table")),
         "tests/api",
     ),
-    "steps": ("tests/api", "tests/cli"),
+    "steps": (f"{UNIT}steps*.py", "tests/api", "tests/cli"),
     "cli": ("tests/cli",),
 }
 MEMORY = 6_000_000_000  # a fault must not take the machine with it

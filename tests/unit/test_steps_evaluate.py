@@ -1,0 +1,102 @@
+"""Evaluate and compare: each figure against its definition, on a run whose errors are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import report_examples
+import store_examples as examples
+from core_jobs import curves
+
+from pulsetrainer.artefacts import Evaluation, Run
+from pulsetrainer.errors import DataError, QualityError
+from pulsetrainer.steps.compare import compare
+from pulsetrainer.steps.evaluate import breaches, evaluate
+
+MODEL = examples.model(6)
+U = 0.5 + 0.5 * curves(1000, 6, 4)
+WAVE = 0.2 * np.sin(np.arange(1000) / 7.0) + 0.3 * (np.arange(1000) >= 500)
+
+
+def _run(error=WAVE, u=U) -> Run:
+    clean = MODEL.predict(u, dt_s=1e-3)
+    return Run(np.arange(u.size) / 1000.0, u, clean + error)
+
+
+def test_prediction_errors_are_what_they_are_called():
+    """Rms, largest, offset, shape, and the second half with the zero of the first; in percent of the span."""
+    run = _run()
+    found = evaluate(run, MODEL).models[0]
+    span = np.ptp(run.output)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(WAVE**2)))
+    assert found.rms_percent == pytest.approx(100.0 * found.rms / span)
+    assert found.max_percent == pytest.approx(100.0 * np.abs(WAVE).max() / span)
+    assert found.offset == pytest.approx(WAVE.mean())
+    assert found.shape_rms_percent == pytest.approx(100.0 * np.std(WAVE) / span)
+    second = WAVE[500:] - WAVE[:500].mean()
+    assert found.second_half_percent == pytest.approx(100.0 * np.sqrt(np.mean(second**2)) / span)
+    assert (found.outside_percent, found.gain_percent, found.start) == (0.0, 0.0, "known")
+    np.testing.assert_array_equal(found.output, run.output)
+    np.testing.assert_allclose(found.predicted, run.output - WAVE)
+    np.testing.assert_array_equal(found.time_s, run.time_s)
+
+
+def test_a_second_model_gains_on_the_first():
+    """Its rms against that of the first, in percent."""
+    worse = replace(MODEL, offset=MODEL.offset + 1.0)
+    first, second = evaluate(_run(), [worse, MODEL]).models
+    assert second.gain_percent == pytest.approx(100.0 * (1.0 - second.rms / first.rms))
+    assert second.gain_percent > 0
+
+
+def test_samples_outside_the_model_are_counted():
+    """A little noise beyond the range is none; at both ends."""
+    u = U.copy()
+    u[200:210], u[300:320], u[400] = 1.02, -0.02, 1.004
+    assert evaluate(_run(0.0 * WAVE, u), MODEL).models[0].outside_percent == pytest.approx(3.0)
+
+
+def test_a_long_prediction_is_thinned_for_the_figures():
+    """Every other sample of twice as many as are kept; the figures are those of all."""
+    u = np.tile(U, 12)
+    run = _run(np.tile(WAVE, 12), u)
+    found = evaluate(run, MODEL).models[0]
+    np.testing.assert_array_equal(found.output, run.output[::2])
+    np.testing.assert_array_equal(found.time_s, run.time_s[::2])
+    assert found.rms == pytest.approx(np.sqrt(np.mean(WAVE**2)))
+
+
+def test_a_bound_holds_on_both_sides():
+    """Its ends included; one of a figure that is not there is no bound."""
+    evaluation = report_examples.evaluation()
+    name, value = next(iter(evaluation.figures().items()))
+    assert breaches(evaluation, {name: (value, value)}) == ()
+    for low, high in ((value + 1e-9, value + 1.0), (value - 1.0, value - 1e-9)):
+        (broken,) = breaches(evaluation, {name: (low, high)})
+        assert (broken.metric, broken.value, broken.low, broken.high) == (name, value, low, high)
+    with pytest.raises(QualityError) as caught:
+        breaches(evaluation, {"none.such": (0.0, 1.0)})
+    assert "none.such" in caught.value.message
+
+
+def test_models_are_compared_by_their_place():
+    """One model an evaluation is called model, whatever its file; several keep their names."""
+    one, other = (evaluate(_run(), MODEL, model_names=[f"{name}.h5"]) for name in ("old", "new"))
+    both = evaluate(_run(), [MODEL, MODEL], model_names=["old.h5", "new.h5"])
+    assert {m.name.split(".")[0] for m in compare([one, other], everything=True)} == {"model"}
+    assert {m.name.split(".")[0] for m in compare([both, both], everything=True)} == {"old", "new"}
+    with pytest.raises(DataError):
+        compare([one, Evaluation()])
+
+
+def test_a_change_is_better_or_worse_or_none():
+    """Errors shall fall and reductions rise; what stays the same is neither."""
+    worse = replace(MODEL, offset=MODEL.offset + 1.0)
+    before, after = evaluate(_run(), worse), evaluate(_run(), MODEL)
+    change = {m.name: m for m in compare([before, after])}
+    rms = change["model.rms_percent"]
+    assert (rms.better, rms.values[1] - rms.values[0]) == (True, pytest.approx(rms.change))
+    assert {m.better for m in compare([after, after])} == {None}
+    assert {m.name: m.better for m in compare([after, before])}["model.rms_percent"] is False
