@@ -87,6 +87,7 @@ class Thresholds:
     most_causes: int = 5  # at once: more has never been right
     tried: int = 3  # candidates refitted in each round
     linearised: float = 0.5  # of what a refit gains: a linearised score shows at least so much (decision 044)
+    nearly: float = 0.75  # of the relevant fall: a candidate that gains so much is refitted to its end first
     held_out_least: float = 0.05  # of the reducible part: a smaller fall of the held-out error is no gain
     blocks: int = 20  # of a record, cut where its memory is wiped out
     jackknife: int = 10  # parts left out in turn for the intervals

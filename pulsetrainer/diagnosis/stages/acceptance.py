@@ -2,7 +2,8 @@
 
 That a candidate is significant at all was asked before it was refitted (``joint_fit``). Of the candidates,
 best fit first, the first one is taken whose refit lowers the squares by a relevant amount and the error on
-blocks that were left out by at least a twentieth of what can be lowered. Where too few blocks are left to
+blocks that were left out by at least a twentieth of what can be lowered. One that falls just short is refitted
+to its end before it is refused. Where too few blocks are left to
 ask, the fit alone decides. With a new cause in the model the error of the levels is estimated again: a
 missing cause makes that estimate too large, never too small.
 """
@@ -21,8 +22,11 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 def stage(state: State) -> State:
     """Return the state with the accepted cause in the model; the same model where none is."""
-    for trial, score in state.trials:
-        if state.current.squares - trial.squares < state.floor.relevant:
+    for begun, score in state.trials:
+        trial = begun
+        if LIMITS.nearly < _fall(state, begun) < 1.0:  # a refit that has not ended refuses nothing
+            trial = settled(state.problem, begun)
+        if _fall(state, trial) < 1.0:
             continue
         gain = state.held_out.gain(state.current, trial, state.floor)
         if np.isfinite(gain) and gain < LIMITS.held_out_least:
@@ -36,6 +40,11 @@ def stage(state: State) -> State:
             trials=(),
         )
     return replace(state, trials=())
+
+
+def _fall(state: State, trial: Fitted) -> float:
+    """Fall of the sum of squares by a trial, of the relevant one."""
+    return (state.current.squares - trial.squares) / state.floor.relevant
 
 
 def settled(problem: Problem, trial: Fitted) -> Fitted:
