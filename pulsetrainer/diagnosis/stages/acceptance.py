@@ -2,10 +2,10 @@
 
 That a candidate is significant at all was asked before it was refitted (``joint_fit``). Of the candidates,
 best fit first, the first one is taken whose refit lowers the squares by a relevant amount and the error on
-blocks that were left out by at least a twentieth of what can be lowered. One that falls just short is refitted
-to its end before it is refused. Where too few blocks are left to
-ask, the fit alone decides. With a new cause in the model the error of the levels is estimated again: a
-missing cause makes that estimate too large, never too small.
+blocks that were left out by at least a twentieth of what can be lowered. One that falls just short is
+refitted to its end before it is refused. Where too few blocks are left to ask, the fit alone decides. With
+a new cause in the model the error of the levels is estimated again: a missing cause makes that estimate too
+large, never too small.
 """
 
 from __future__ import annotations
