@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from core_jobs import curves, job, plant
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pulsetrainer.core import smoothing
 from pulsetrainer.core.identification import identify
@@ -138,3 +140,19 @@ def test_blocks_are_cut_where_the_memory_is_wiped_out():
     inner = smoothing.blocks(0.2 + 0.5 * u, 0.0, 1.0, 7)
     assert np.ptp(np.bincount(inner)) <= 1
     assert np.array_equal(smoothing.blocks(u[:3], 0.0, 1.0, 7), [0, 0, 0])
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(12, 200), st.integers(2, 8))
+def test_cuts_are_the_nearest_ends_one_by_one(seed, n, count):
+    """As a person would place them: cut by cut, looking at every sample that is at an end."""
+    rng = np.random.default_rng(seed)
+    u = np.where(rng.random(n) < 0.1, rng.choice([0.0, 0.005, 0.995, 1.0], n), rng.uniform(0.1, 0.9, n))
+    ends = [k for k in range(n) if u[k] <= 0.01 or u[k] >= 0.99]
+    kept = max(1, min(count, n // 2))
+    cuts = []
+    for number in range(1, kept):
+        even = number * n // kept
+        nearest = min(ends, key=lambda k: (abs(k - even), -k), default=even)
+        cuts.append(nearest if abs(nearest - even) <= n / (2 * kept) else even)
+    expected = [sum(k >= cut for cut in cuts) for k in range(n)]
+    assert smoothing.blocks(u, 0.0, 1.0, count).tolist() == expected
