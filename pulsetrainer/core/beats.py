@@ -81,7 +81,13 @@ class Beats:
 
 
 def find_beats(record: Shape) -> Beats:
-    """Find the whole beats of a record of several.
+    """Find the whole beats of a record (n,) of several, in any unit: k beats have k + 1 feet.
+
+    A foot is the lowest sample, of two that are equal the later, between two systolic peaks of the record
+    smoothed by local parabolas over 20 ms; a peak stands out by half of the height between the 5th and the
+    95th percentile, and is no nearer than 0.25 s to the next.
+
+    Source: Savitzky and Golay, Analytical Chemistry 36 (1964), 1627, for the parabolas.
 
     Raises
     ------

@@ -50,7 +50,11 @@ def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:
     """Tell for every cell (n_q,) whether some input switched it on and, later, off.
 
     Cell (i, j) is switched on at the first input >= the middle of band i, and off when the input
-    then falls below the middle of band j.
+    then falls below the middle of band j: a_i = (e_i + e_(i+1)) / 2 <= u_s and u_t < a_j for some s < t.
+    Inputs (n,) and edges e share a unit.
+
+    Source: Mayergoyz, Mathematical Models of Hysteresis and Their Applications, 2003, section 1.3: what is
+    never switched cannot be identified.
 
     Raises
     ------
@@ -118,7 +122,7 @@ def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:
     """Return the largest rectangle, cut by the diagonal, of cells that are not ``covered`` (n_q,).
 
     Every rectangle of bands is tried whose cells below the diagonal are all uncovered; the one of the
-    largest area is named. None when all cells are covered.
+    largest area, input unit squared, is named, and of equal ones the first. None when all cells are covered.
 
     Raises
     ------

@@ -56,7 +56,11 @@ def check_size(times: int, samples: float, most: int = MOST_SAMPLES) -> None:
 
 
 def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
-    """Samples of a path that visits ``points`` (k,) in turn at constant ``speed``, input units per second.
+    """Samples (n,) of a path that visits ``points`` (k,) in turn at constant ``speed``, input units a second.
+
+        n = ceil(sum |p_(i+1) - p_i| / speed * rate) + 1, more where turns are less than a sample apart
+
+    Each point lies on the nearest sample, each turn on one of its own, so that none is cut short.
 
     Raises
     ------
@@ -129,7 +133,10 @@ def _check_step(step: float, reach: float) -> None:
 
 
 def conditioning(low: float, high: float, *, speed: float, rate_Hz: float, rest_s: float) -> FloatArray:
-    """Samples of one major loop low -> high -> low and a rest: it leaves a known memory behind.
+    """Samples (n,) of one major loop low -> high -> low and a rest: it leaves a known memory behind.
+
+    At ``high`` every relay is up, back at ``low`` every relay is down, whatever came before (wiping out,
+    Mayergoyz 2003, section 1.2). ``low``, ``high`` and the samples share a unit, ``speed`` is that a second.
 
     Raises
     ------

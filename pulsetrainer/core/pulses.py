@@ -62,9 +62,14 @@ class Shape:
 
 
 def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float) -> FloatArray:
-    """Samples of ``periods`` periods of a shape, shifted and scaled to [low, high].
+    """Samples (n,) of ``periods`` periods of a shape, shifted and scaled to [low, high].
 
-    Interpolated without overshoot (monotone cubic), so the extremes stay those of the shape.
+        y_k = low + (high - low) P(k / rate mod T),   k = 0 .. n - 1,   n = round(periods T rate)
+
+    P is the shape normalised to 0..1, T its period, s; ``low``, ``high`` and y share a unit. P is
+    interpolated without overshoot (monotone cubic), so the extremes stay those of the shape.
+
+    Source: Fritsch and Carlson, SIAM Journal on Numerical Analysis 17 (1980), 238.
 
     Raises
     ------
