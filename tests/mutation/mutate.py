@@ -225,6 +225,8 @@ def _order(fault: Fault, lines: dict[str, list[str]], times: Times, budget_s: fl
     wanted = lines if fault.at_import else {str(k) for k in fault.lines}
     contexts = {one for line in wanted for one in lines.get(line, [])}
     direct = {one.rsplit(" (", 1)[0] for one in contexts} & times.keys()
+    if fault.at_import and not direct:  # a file of constants
+        direct = set(times)
     shared = {one.split("::")[0] for one in contexts if one.endswith("(setup)")}
     besides = [name for name in times if name.split("::")[0] in shared and name not in direct]
     order = [one for group in (direct, besides) for one in sorted(group, key=times.__getitem__)]
