@@ -51,6 +51,7 @@ PACKAGES = {  # the tests that answer for a package
         f"{UNIT}congruency.py",
         f"{UNIT}sticking.py",
         "tests/blind/test_p*.py",
+        "tests/api",
     ),
     "files": tuple(
         f"{UNIT}{one}*.py" for one in ("store", "table", "recorder", "provenance", "units", "file", "signal")
@@ -219,7 +220,7 @@ def _record(tree: Path, folder: Path, test: str) -> dict[str, Any]:
 def _order(fault: Fault, lines: dict[str, list[str]], times: Times, budget_s: float) -> list[str]:
     """The tests that may notice a fault: those that run its statement, the quickest first.
 
-    What no single test runs (a constant) concerns all tests that run anything in the file. What is run while
+    What no single test runs (a constant) concerns all tests that run anything in the file, or all. What is run while
     a test is set up may serve the others of its file. What would take longer than the budget is left out.
     """
     wanted = lines if fault.at_import else {str(k) for k in fault.lines}
