@@ -220,8 +220,9 @@ def _record(tree: Path, folder: Path, test: str) -> dict[str, Any]:
 def _order(fault: Fault, lines: dict[str, list[str]], times: Times, budget_s: float) -> list[str]:
     """The tests that may notice a fault: those that run its statement, the quickest first.
 
-    What no single test runs (a constant) concerns all tests that run anything in the file, or all. What is run while
-    a test is set up may serve the others of its file. What would take longer than the budget is left out.
+    What no single test runs (a constant) concerns all tests that run anything in the file, or all there are.
+    What is run while a test is set up may serve the others of its file. What would take longer than the
+    budget is left out.
     """
     wanted = lines if fault.at_import else {str(k) for k in fault.lines}
     contexts = {one for line in wanted for one in lines.get(line, [])}
