@@ -158,7 +158,7 @@ Every artefact is one HDF5 file. Any HDF5 reader opens it; axes are dimension sc
   is made of holds neither NaN nor infinity.
 - **Units** come with the data: where the table says `input_unit`, the attribute of that name in the same group says which.
 - **Groups** hold parts, groups named `0000`, `0001`, ... hold a list. What is marked *optional* may be missing.
-- An axis is the dataset of its name: `time` in seconds, or an index (`level`, `cell`, `repeat`, `group`). Time may be
+- An axis is the dataset of its name: `time` in seconds, or an index (`level`, `cell`, `repeat`, `group`, `beat`, `question`). Time may be
   missing in a run that was imported without one.
 - Files are written under another name and renamed when they are complete: a killed command leaves the old file or none. A
   capture keeps its samples in `NAME.partial` until it ends; stopped by a fault or Ctrl-C, it has `complete` = 0. After a kill

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 from pulsetrainer.version import __version__
 
 if TYPE_CHECKING:
-    from pulsetrainer.api import invert, load, open_device, read_table, save
-    from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Waveform
+    from pulsetrainer.api import invert, load, open_device, read_table, save, session
+    from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
     from pulsetrainer.steps.capture import capture
     from pulsetrainer.steps.compare import compare
     from pulsetrainer.steps.diagnose import diagnose
@@ -33,6 +33,7 @@ __all__ = [
     "Model",
     "Playback",
     "Run",
+    "Session",
     "Waveform",
     "__version__",
     "capture",
@@ -47,12 +48,13 @@ __all__ = [
     "play",
     "read_table",
     "save",
+    "session",
 ]
 
-_NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Waveform")
+_NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Session", "Waveform")
 _HOME = {
     **dict.fromkeys(_NOUNS, "artefacts"),
-    **dict.fromkeys(("invert", "load", "open_device", "read_table", "save"), "api"),
+    **dict.fromkeys(("invert", "load", "open_device", "read_table", "save", "session"), "api"),
     **{
         verb: f"steps.{verb}"
         for verb in ("capture", "compare", "diagnose", "evaluate", "extend", "identify", "play")

@@ -20,9 +20,10 @@ from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.steps.import_ import import_parts
 from pulsetrainer.steps.invert import invert as _invert
 from pulsetrainer.steps.invert import shape_of
+from pulsetrainer.steps.session import session as _session
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Model, Run
+    from pulsetrainer.artefacts import Model, Run, Session
 
 
 def load(path: Path | str) -> Any:
@@ -114,6 +115,40 @@ def invert(
     ('bifid', 'continuous')
     """
     return _invert(_shape(pulse), model, **options)
+
+
+def session(
+    model: Model,
+    device: Device,
+    *,
+    pulses: str | Shape | Sequence[str | Waveform | Shape | tuple[ArrayLike, ArrayLike]] = "normal",
+    **options: Any,
+) -> Session:
+    """Press pulses for minutes, beat by beat: names in the library, tables, drives, or times and values.
+
+    Everything else is as in ``steps.session.session``, which this calls: ``minutes`` or ``beats``, ``rate``,
+    ``amplitude``, ``variability``, ``quiz``; or ``decide``, which is asked for every beat.
+
+    Raises
+    ------
+    UsageError
+        There is no pulse of that name, or a rate or an amplitude cannot be played.
+    DataError
+        The model is of another device, or an answer names what is not asked.
+    DeviceError, Interrupted
+        The device or the user stopped it; what was recorded is in the error's ``kept``.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> with pt.open_device("bench:") as device:
+    ...     run = pt.capture("identification", device, levels=16)
+    ...     pressed = pt.session(pt.identify(run, levels=16), device, pulses=["normal", "bifid"], beats=4)
+    >>> pressed.beats.start_s.size, pressed.underruns
+    (4, 0)
+    """
+    several = [pulses] if isinstance(pulses, str | Shape) else pulses
+    return _session(model, device, pulses=[_shape(one) for one in several], **options)
 
 
 def read_table(

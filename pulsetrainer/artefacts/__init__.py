@@ -8,12 +8,14 @@ from pulsetrainer.artefacts.evaluation import DriveError, Evaluation, ModelEvalu
 from pulsetrainer.artefacts.model import Extension, Fit, Model, Parameter
 from pulsetrainer.artefacts.playback import DrivePlayback, Playback
 from pulsetrainer.artefacts.run import Run
+from pulsetrainer.artefacts.session import Beats, Quiz, Score, Session
 from pulsetrainer.artefacts.waveform import Waveform
 
 __all__ = [
     "KINDS",
     "LARGEST",
     "Attribute",
+    "Beats",
     "BoolArray",
     "Cause",
     "Data",
@@ -29,10 +31,13 @@ __all__ = [
     "Parameter",
     "Playback",
     "Profile",
+    "Quiz",
     "Run",
+    "Score",
+    "Session",
     "Waveform",
     "WaveformEvaluation",
     "beyond_all_quantities",
 ]
 
-KINDS: dict[str, type] = {k.kind: k for k in (Run, Model, Waveform, Playback, Evaluation, Diagnosis)}
+KINDS: dict[str, type] = {k.kind: k for k in (Run, Model, Waveform, Playback, Evaluation, Diagnosis, Session)}

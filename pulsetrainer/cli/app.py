@@ -23,6 +23,7 @@ from pulsetrainer.cli import (
     play,
     plot,
     ports,
+    session,
     settings,
     show,
 )
@@ -47,6 +48,7 @@ app.command("compare")(compare.compare)
 app.command("diagnose")(diagnose.diagnose)
 app.command("extend")(extend.extend)
 app.command("export")(export.export)
+app.command("session")(session.session)
 app.command("show")(show.show)
 app.command("plot")(plot.plot)
 app.command("ports")(ports.ports)

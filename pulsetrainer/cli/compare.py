@@ -1,4 +1,4 @@
-"""``pulsetrainer compare``: several evaluations side by side."""
+"""``pulsetrainer compare``: evaluations, or sessions of learners, side by side."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 def compare(
     context: typer.Context,
     files: Annotated[
-        list[Path], typer.Argument(help="Evaluations, the oldest first.", metavar="EVALUATION.h5...")
+        list[Path],
+        typer.Argument(help="Evaluations or sessions, the oldest first.", metavar="EVALUATION.h5..."),
     ],
     out: Annotated[
         Path | None,
@@ -33,22 +34,22 @@ def compare(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Compare several evaluations side by side.
+    """Compare evaluations or sessions side by side.
 
-    Before and after, device against device, week against week.
+    Before and after, device against device, week against week, learner against learner.
 
     Example: pulsetrainer compare before.h5 after.h5 -o change.png
     """
     check_several(files)
     form = figure_form(out, "a comparison", "csv") if out is not None else ""
     job = Job(context, inputs=files, outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Evaluation
+    from pulsetrainer.artefacts import Evaluation, Session
     from pulsetrainer.files import store
     from pulsetrainer.steps.compare import compare as side_by_side
 
     labels = labels_of(files)
     with job.working("comparing"):
-        evaluations = [job.load(path, Evaluation) for path in files]
+        evaluations = [job.load_any(path, Evaluation, Session) for path in files]
         headers = [store.read_header(path) for path in files]
         metrics = side_by_side(evaluations, names=list(map(str, files)), everything=everything)
         if out is not None and form == "csv":
@@ -100,6 +101,11 @@ _SHORT = {
     "compensated.max_abs_error_percent": "max error",
     "rms_percent": "rms error",
     "max_percent": "max error",
+    "right_percent": "right",
+    "right_from_percent": "right, 95 % from",
+    "right_to_percent": "right, 95 % to",
+    "response_s": "time to the answer, s",
+    "mean_abs_error_percent": "mean error",
 }
 
 

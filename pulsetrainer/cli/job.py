@@ -100,6 +100,10 @@ class Job:
         """Name a file that is no artefact, but that the result is made from."""
         self._tables.append(path)
 
+    def know(self, name: str, value: Any) -> None:
+        """Name a parameter of the work that the command line left open."""
+        self._parameters = {**self._parameters, name: value}
+
     def header(self, title: str, *, device: Device | None = None, ancestors: Sequence[Header] = ()) -> Header:
         """Return what the result says about itself: command, parameters, inputs and their history."""
         from pulsetrainer.files import provenance, store

@@ -26,6 +26,7 @@ _MAKES = {
     "playback": "pulsetrainer play drive.h5 -o played.h5",
     "evaluation": "pulsetrainer evaluate played.h5 -o evaluation.h5",
     "diagnosis": "pulsetrainer diagnose RUN.h5 --model model.h5 -o diagnosis.h5",
+    "session": "pulsetrainer session --model model.h5 -o session.h5",
 }
 
 # (expected, got): what to do; {file} is the file that was given

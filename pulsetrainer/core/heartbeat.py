@@ -19,10 +19,9 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.pulses import Shape
-from pulsetrainer.errors import ArgumentError
 
 SLOWEST_BPM, FASTEST_BPM = 20.0, 240.0
-_LONGEST = 3.99  # of its own interval: beyond 4 the time of a beat would run backwards
+_STEEPEST = 1.9  # at 2 the time of a beat would stand still at its end
 
 
 @dataclass(frozen=True)
@@ -61,21 +60,19 @@ class Pulse:
         at = number % self.beats
         return feet[at + 1] - feet[at]
 
-    def level(self, number: int, interval_s: float, time_s: FloatArray) -> FloatArray:
-        """Level 0..1 (n,) of a beat stretched to ``interval_s``, at ``time_s`` (n,) from its foot.
+    def record(self, stretch: float, rate_Hz: float) -> FloatArray:
+        """Level 0..1 (n,) of the whole record, each beat ``stretch`` times as long as its own interval."""
+        beats = []
+        for number in range(self.beats):
+            interval_s = self.own_interval_s(number) * stretch
+            count = max(round(interval_s * rate_Hz), 2)
+            beats.append(self.level(number, interval_s, np.arange(count) * interval_s / count))
+        return np.concatenate(beats)
 
-        Raises
-        ------
-        ArgumentError
-            The interval is not positive, or four times the beat's own.
-        """
+    def level(self, number: int, interval_s: float, time_s: FloatArray) -> FloatArray:
+        """Level 0..1 (n,) of a beat stretched to ``interval_s``, at ``time_s`` (n,) from its foot."""
         own = self.own_interval_s(number)
-        if not 0.0 < interval_s <= _LONGEST * own:
-            raise ArgumentError(
-                f"a beat of {self.name} lasts {own:g} s and cannot be stretched to {interval_s:g} s",
-                hint=f"ask for more than {60.0 / (_LONGEST * own):.0f} beats a minute",
-            )
         share = time_s / interval_s
-        steep = np.sqrt(interval_s / own)
+        steep = min(np.sqrt(interval_s / own), _STEEPEST)
         place = self.shape.feet_s[number % self.beats] + own * share * (steep + (1.0 - steep) * share)
         return np.clip(self._curve(place % self.shape.period_s), 0.0, 1.0)

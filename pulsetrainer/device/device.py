@@ -318,15 +318,18 @@ class Device:
         feed, lead = Feed(), round(lead_s * rate_Hz)
         player = self._player_of(feed, step, decimation)
 
-        def top_up() -> None:
-            while not feed.ended and feed.size - player.played < lead:
-                samples = more()
-                if samples is None:
-                    feed.end()
-                else:
-                    feed.append(to_wire(samples, limit_A=self.info.current_limit_A))
+        def top_up() -> bool:
+            if feed.ended or feed.size - player.played >= lead:
+                return False
+            samples = more()
+            if samples is None:
+                feed.end()
+            else:
+                feed.append(to_wire(samples, limit_A=self.info.current_limit_A))
+            return True
 
-        top_up()
+        while top_up():  # nothing is played yet
+            pass
         if feed.size == 0:
             raise ArgumentError("there is nothing to play", hint="give at least one sample")
         self._remember_heat(1.0)  # at most: should nobody be left to ask afterwards
@@ -351,7 +354,7 @@ class Device:
         should_stop: Callable[[], bool] | None,
         *,
         keep: bool,
-        top_up: Callable[[], None] | None = None,
+        top_up: Callable[[], bool] | None = None,
     ) -> Trace:
         """Let a player play in a thread of its own, and follow what it brings back."""
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
@@ -389,7 +392,7 @@ class Device:
         should_stop: Callable[[], bool] | None,
         *,
         keep: bool,
-        top_up: Callable[[], None] | None,
+        top_up: Callable[[], bool] | None,
     ) -> bool:
         """Hand over the telemetry as it comes until the play has ended; True if Ctrl-C hastened the end."""
         passed = forgotten = 0
@@ -410,11 +413,10 @@ class Device:
                 if not keep:
                     player.forget(forgotten, passed)
                     forgotten = passed
-                if top_up is not None and not ended:
-                    top_up()
+                hungry = top_up is not None and not ended and top_up()
                 if should_stop is not None and should_stop():
                     player.stop(_STOPPED)
-                if not ended:
+                if not ended and not hungry:
                     self._sleep(_TAKE_EVERY_S)
             except KeyboardInterrupt:
                 interrupted = True

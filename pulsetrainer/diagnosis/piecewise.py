@@ -25,6 +25,7 @@ from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 _CARRIED = 4.0  # of the filter's pad: errors of the piece before that the filter sees
+_ENOUGH = 2e-4  # of the output's span: a tenth of what the best sensors resolve
 _GAIN = 0.98  # of the error: a step that leaves more ends the iteration, the next beat is due soon
 
 
@@ -99,6 +100,8 @@ class Piecewise:
             if best is not None and rms > _GAIN * best[0]:
                 break
             best = rms, lift, inputs, exact.input, error
+            if rms < _ENOUGH * 2.0 * self._upright.static.total:
+                break
             lift = lift + LIMITS.inverse_step * self._correction(error)
         assert best is not None
         _, lift, inputs, wished, error = best

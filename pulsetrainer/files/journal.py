@@ -8,7 +8,8 @@ What ``append`` has returned from survives the death of the program. The file is
 
 A ``HEAD`` is JSON: the header of the artefact and the run's texts. Whoever goes on with a recording adds
 another, and the last one counts. ``DATA`` is little-endian float64 (4, n): time, reference, input, output.
-``PART`` is the same, and its first sample comes after a pause. The last block may be incomplete, where the
+``PART`` is the same, and its first sample comes after a pause. A ``GOAL`` after one of them has the
+targets (n,) of its samples, where it is the record of a session. The last block may be incomplete, where the
 writer was killed or is writing: it is ignored. Anything else that does not fit is damage.
 """
 
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 COLUMNS = ("time_s", "reference", "input", "output")
+GOAL = b"GOAL"
 _HEAD = struct.Struct("<4sQQII")
 _LARGEST = 1 << 32  # bytes of a block; a batch of samples has some thousands
 
@@ -48,8 +50,8 @@ class Block:
 
     @property
     def samples(self) -> FloatArray:
-        """Time, reference, input and output, (4, n); none in a HEAD."""
-        if self.tag == b"HEAD":
+        """Time, reference, input and output, (4, n); none in a HEAD or a GOAL."""
+        if self.tag in (b"HEAD", GOAL):
             return np.zeros((len(COLUMNS), 0))
         return np.frombuffer(self.content, dtype="<f8").reshape(len(COLUMNS), -1)
 

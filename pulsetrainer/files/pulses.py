@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,9 +32,11 @@ def pulse_file(name: str) -> Path:
     known = library()
     path = known.get(name, Path(name))
     if name not in known and path.suffix.lower() != ".csv" and not path.exists():
+        near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
         raise UsageError(
             f"there is no pulse {name!r}; the library has {', '.join(known)}",
-            hint="name one of them, or a CSV file with the columns t_s and p",
+            hint=(f"did you mean {' or '.join(near)}? Or " if near else "name one of them, or ")
+            + "give a CSV file with the columns t_s and p",
         )
     check_file(path)
     return path

@@ -18,6 +18,8 @@ _NAMES = {
     "compensated.max_abs_error_percent": "max error, % of full force",
     "rms_percent": "rms error, % of the span",
     "max_percent": "max error, % of the span",
+    "right_percent": "right answers, %",
+    "response_s": "time to the answer, s",
 }
 _LINES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
 

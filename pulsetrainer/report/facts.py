@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Parameter, Playback, Run, Waveform
+from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Parameter, Playback, Run, Session, Waveform
 from pulsetrainer.artefacts.time_steps import gaps_of, steps_of
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core.memory import turning_points
@@ -23,6 +23,7 @@ def facts(artefact: Any) -> dict[str, Any]:
         Playback: _playback,
         Evaluation: Evaluation.figures,
         Diagnosis: _diagnosis,
+        Session: _session,
     }
     return dict(summaries[type(artefact)](artefact))
 
@@ -135,4 +136,19 @@ def _diagnosis(found: Diagnosis) -> dict[str, Any]:
         "extended_percent": found.extended_percent,
         "floor_percent": found.floor_percent,
         "next": found.next_experiment,
+    }
+
+
+def _session(session: Session) -> dict[str, Any]:
+    quiz = session.quiz
+    return {
+        "pulses": list(session.pulses),
+        "beats": session.beats.start_s.size,
+        "seconds": float(session.time_s[-1] - session.time_s[0]),
+        **session.figures(),
+        "error in just noticeable differences": session.error_jnd,
+        "underruns": session.underruns,
+        "complete": session.complete,
+        "dropped_samples": session.dropped_samples,
+        "right": None if quiz is None else f"{quiz.right} of {len(quiz.asked)}",
     }

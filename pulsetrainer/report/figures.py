@@ -7,13 +7,13 @@ Figure numbers are those of Carneiro, Abreu and Restivo, Sensors 2018, 18(5), 16
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Waveform
+from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import diagnosis_figures, panels
+from pulsetrainer.report import diagnosis_figures, panels, session_figures
 from pulsetrainer.report.style import (
     COLUMN_IN,
     COMPENSATED,
@@ -27,6 +27,8 @@ from pulsetrainer.report.style import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from pulsetrainer.artefacts import Fit, ModelEvaluation, WaveformEvaluation
 
 _ROW_IN = 4.4  # height of a figure of one column
@@ -176,7 +178,7 @@ def evaluation(errors: Evaluation) -> Figure:
     return figure
 
 
-def draw(artefact: Run | Model | Waveform | Playback | Evaluation | Diagnosis) -> Figure:
+def draw(artefact: Run | Model | Waveform | Playback | Evaluation | Diagnosis | Session) -> Figure:
     """Return the figure of an artefact, chosen by its kind.
 
     Raises
@@ -184,21 +186,19 @@ def draw(artefact: Run | Model | Waveform | Playback | Evaluation | Diagnosis) -
     DataError
         There is no figure for this kind of artefact.
     """
-    match artefact:
-        case Run():
-            return run(artefact)
-        case Model():
-            return model(artefact)
-        case Waveform():
-            return waveform(artefact)
-        case Playback():
-            return playback(artefact)
-        case Evaluation():
-            return evaluation(artefact)
-        case Diagnosis():
-            return diagnosis_figures.course(artefact)
+    drawing: dict[type, Callable[[Any], Figure]] = {
+        Run: run,
+        Model: model,
+        Waveform: waveform,
+        Playback: playback,
+        Evaluation: evaluation,
+        Diagnosis: diagnosis_figures.course,
+        Session: session_figures.course,
+    }
+    if type(artefact) in drawing:
+        return drawing[type(artefact)](artefact)
     raise DataError(
         f"there is no figure for a {getattr(artefact, 'kind', type(artefact).__name__)}: "
-        "expected a run, model, waveform, playback, evaluation or diagnosis",
+        "expected a run, model, waveform, playback, evaluation, diagnosis or session",
         hint="pulsetrainer show FILE.h5 tells what a file holds",
     )

@@ -14,6 +14,7 @@ from pulsetrainer.report.facts import facts
 
 _TITLED = {
     "run": "signal", "model": "cells", "waveform": "waveform", "playback": "waveform", "diagnosis": "verdict",
+    "session": "pulses",
 }  # fmt: skip
 _WIDTH = 110  # of a table, unless a screen says otherwise
 _LABEL_WIDTH, _COLUMN_WIDTH = 32, 13

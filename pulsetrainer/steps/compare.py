@@ -1,13 +1,16 @@
-"""Compare: several evaluations side by side, before and after, device against device, week against week."""
+"""Compare: evaluations or sessions side by side: before and after, device by device, learner by learner."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pulsetrainer.artefacts import Evaluation
+import numpy as np
+
+from pulsetrainer.artefacts import Evaluation, Session
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.asked import check_several
+from pulsetrainer.steps.quiz import score
 
 # What a person wants to see first; the others on request.
 HEADLINES = (
@@ -16,8 +19,19 @@ HEADLINES = (
     "compensated.max_abs_error_percent",
     "rms_percent",
     "max_percent",
+    "right_percent",
+    "right_from_percent",
+    "right_to_percent",
+    "response_s",
+    "mean_abs_error_percent",
 )
-_RISING = ("mean_error_reduction_percent", "gain_percent")  # more is better
+_RISING = (
+    "mean_error_reduction_percent",
+    "gain_percent",
+    "right_percent",
+    "right_from_percent",
+    "right_to_percent",
+)  # more is better
 _SAME = 0.005  # smaller changes are no change: a figure is shown with two digits
 
 
@@ -32,14 +46,20 @@ class Metric:
 
 
 def compare(
-    evaluations: Sequence[Evaluation], *, names: Sequence[str] = (), everything: bool = False
+    evaluations: Sequence[Evaluation] | Sequence[Session],
+    *,
+    names: Sequence[str] = (),
+    everything: bool = False,
 ) -> tuple[Metric, ...]:
-    """Return the figures of several evaluations side by side, the oldest first, and how each changed.
+    """Return the figures of several evaluations or sessions side by side, and how each changed.
 
     Parameters
     ----------
+    evaluations
+        The oldest first. Of sessions: the share right with its 95 % interval, the time to the answer, and how
+        true the pulses were.
     names
-        Names of the evaluations, for messages.
+        Their names, for messages.
     everything
         All figures instead of the headlines.
 
@@ -58,7 +78,14 @@ def compare(
     [None, None, None]
     """
     check_several(evaluations)
-    every = _figures(evaluations)
+    sessions = [one for one in evaluations if isinstance(one, Session)]
+    if sessions and len(sessions) < len(evaluations):
+        raise DataError(
+            "evaluations and sessions cannot be compared with each other", hint="give one kind or the other"
+        )
+    every = [_of_session(one) for one in sessions] or _figures(
+        [one for one in evaluations if isinstance(one, Evaluation)]
+    )
     wanted = [n for n in dict.fromkeys(n for one in every for n in one) if everything or _headline(n)]
     metrics = tuple(_metric(name, tuple(one.get(name) for one in every)) for name in wanted)
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
@@ -90,6 +117,20 @@ def _figures(evaluations: Sequence[Evaluation]) -> list[dict[str, float]]:
                 for name, value in figures.items()
             }
         found.append(figures)
+    return found
+
+
+def _of_session(one: Session) -> dict[str, float]:
+    found = {f"session.{name}": value for name, value in one.figures().items() if np.isfinite(value)}
+    if one.quiz is not None:
+        result = score(one.quiz)
+        found |= {
+            "quiz.right_percent": 100.0 * result.share,
+            "quiz.right_from_percent": 100.0 * result.interval[0],
+            "quiz.right_to_percent": 100.0 * result.interval[1],
+        }
+        if np.isfinite(result.response_s):
+            found["quiz.response_s"] = result.response_s
     return found
 
 

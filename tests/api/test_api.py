@@ -15,10 +15,10 @@ import pulsetrainer as pt
 from pulsetrainer.errors import DataError, NotAnArtefactError, UsageError
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
-NOUNS = {"Run", "Model", "Waveform", "Playback", "Evaluation", "Diagnosis"}
+NOUNS = {"Run", "Model", "Waveform", "Playback", "Evaluation", "Diagnosis", "Session"}
 VERBS = {
     "load", "save", "read_table", "open_device", "capture", "identify", "invert", "play", "evaluate",
-    "compare", "diagnose", "extend",
+    "compare", "diagnose", "extend", "session",
 }  # fmt: skip
 
 

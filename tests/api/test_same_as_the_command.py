@@ -120,3 +120,17 @@ def test_compare(tmp_path):
     done = pulsetrainer(tmp_path, "compare", KEPT / "evaluation.h5", KEPT / "evaluation.h5", "--json")
     assert [m["name"] for m in done.json["metrics"]] == [m.name for m in metrics]
     assert [m["values"] for m in done.json["metrics"]] == [list(m.values) for m in metrics]
+
+
+def test_session(tmp_path):
+    """Pulses with a rhythm, on two benches that are alike in every bit; the learner has the file's name."""
+    model = KEPT / "model-extended.h5"
+    with pt.open_device("bench:?seed=5") as device:
+        pressed = pt.session(
+            pt.load(model), device, pulses=["normal", "bifid"], beats=4, variability=5, ectopic=20, seed=2
+        )
+    words = ("--pulses", "normal,bifid", "--beats", 4, "--variability", 5, "--ectopic", 20, "--seed", 2)
+    same(
+        by_command(tmp_path, "session", "--model", model, *words, "--port", "bench:?seed=5"),
+        stored(pressed, tmp_path),
+    )

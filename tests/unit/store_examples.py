@@ -71,7 +71,18 @@ def diagnosis(m: int = 12) -> kinds.Diagnosis:
     )
 
 
+def session(n: int = 40) -> kinds.Session:
+    """Return a session of two beats with a quiz of two questions."""
+    time, ones, two = np.arange(n) / 1000, np.ones(n), np.ones(2)
+    beats = kinds.Beats(np.array([0.0, 0.02]), 0.02 * two, np.array([0, 1]), *(two,) * 5)
+    quiz = kinds.Quiz(("normal", "bifid"), ("normal", "bifid"), ("bifid", "bifid"), two)
+    return kinds.Session(
+        time, ones, ones, ones, ones, beats, ("normal", "bifid"), *(1.0,) * 8, mean_force=1.0, quiz=quiz
+    )
+
+
 EXAMPLES = {
+    "session": session,
     "diagnosis": diagnosis,
     "run": run,
     "model": model,
@@ -103,6 +114,8 @@ def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None, *, full:
         "cell": level * (level - 1) // 2,
         "repeat": draw(st.integers(0, 3)),
         "group": draw(st.integers(0, 6)),
+        "beat": draw(st.integers(0, 6)),
+        "question": draw(st.integers(0, 4)),
     }
     values = {}
     for plan in plans:
@@ -130,7 +143,7 @@ def _values(plan: FieldPlan, lengths: dict[str, int], *, full: bool) -> st.Searc
             lambda seed: np.cumsum(np.random.default_rng(seed).uniform(1e-4, 1, lengths[TIME]))
         )
     if plan.role == "array":
-        elements = st.booleans() if plan.type is np.bool_ else quantities
+        elements = {np.bool_: st.booleans(), np.int64: st.integers(0, 99)}.get(plan.type, quantities)
         return hnp.arrays(plan.type, tuple(lengths[axis] for axis in plan.dims), elements=elements)
     if plan.role == "number":
         return {float: floats, int: ATTRIBUTES[int], bool: st.booleans()}[plan.type]

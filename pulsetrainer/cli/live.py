@@ -1,0 +1,133 @@
+"""The screen and the keys of a session on a terminal; in a pipe there are neither."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import sys
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.steps.steering import KEYS
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from pulsetrainer.steps.session import Now
+
+SMALLEST = (50, 10)  # columns and lines
+_BARS = " ▁▂▃▄▅▆▇█"
+_ROWS = 5  # of the trace
+_SHOWN_S = 3.0
+_DRAWN_EACH_S = 0.08
+
+
+class Live:
+    """Shows a session and takes keys, called with each piece of telemetry.
+
+    Parameters
+    ----------
+    press
+        Gets every key, with the time of the session in s.
+    names
+        Of the pulses.
+    blind
+        In a quiz: the choices are shown, and nothing of the pulse.
+    """
+
+    def __init__(self, press: Callable[[str, float], None], names: Sequence[str], *, blind: bool) -> None:
+        self._press, self._names, self._blind = press, tuple(names), blind
+        self._traces: deque[tuple[np.ndarray, np.ndarray]] = deque()
+        self._show: Callable[[RenderableType], None] = lambda _text: None
+        self._drawn_s = -1.0
+        self.status: Callable[[], str] = lambda: ""
+
+    def __call__(self, now: Now) -> None:
+        """Take the keys that were pressed, and draw."""
+        while select.select([sys.stdin], [], [], 0.0)[0]:
+            key = os.read(sys.stdin.fileno(), 1).decode("ascii", "replace")
+            if not key:
+                break
+            self._press(key, now.time_s)
+        self._traces.append((now.target, now.force))
+        while sum(target.size for target, _ in self._traces) > _SHOWN_S * 1000:
+            self._traces.popleft()
+        if now.time_s - self._drawn_s >= _DRAWN_EACH_S:
+            self._drawn_s = now.time_s
+            self._show(self._text(now))
+
+    def _text(self, now: Now) -> RenderableType:
+        from rich.text import Text
+
+        if self._blind:
+            choices = "  ".join(f"{letter} {name}" for letter, name in zip(letters(), self._names))  # noqa: B905
+            return Text(f"{self.status()}\n{choices}")
+        width = max(os.get_terminal_size(sys.stderr.fileno()).columns - 2, 20)
+        force = np.concatenate([force for _, force in self._traces])
+        lines = plotted(force, width, _ROWS)
+        beat = now.beat
+        said = f"{now.time_s:7.1f} s  {force[-1]:5.2f} N  {now.current[-1]:5.3f} A"
+        if now.resting:
+            said += "  at rest"
+        elif beat is not None:
+            rate = 60.0 / now.interval_s
+            said += f"  {self._names[beat.pulse]}  {rate:.0f}/min  {100 * beat.amplitude:.0f} %"
+        keys = "  ".join(f"{'space' if key == ' ' else key} {what}" for key, what in KEYS.items())
+        return Text("\n".join([*lines, said, self.status(), keys]), no_wrap=True, overflow="crop")
+
+    @contextlib.contextmanager
+    def on_screen(self) -> Iterator[None]:
+        """Take the terminal: keys come at once and unseen, and are given back in the end."""
+        import termios
+        import tty
+
+        from rich.console import Console
+        from rich.live import Live as Screen
+
+        before = termios.tcgetattr(sys.stdin)
+        try:
+            tty.setcbreak(sys.stdin)
+            with Screen(console=Console(stderr=True), transient=True, auto_refresh=False) as screen:
+                self._show = lambda text: screen.update(text, refresh=True)
+                yield
+        finally:
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def letters() -> str:
+    """Return the keys that answer, in the order of the choices."""
+    return "abcdefghijklmnopqrstuvwxyz"
+
+
+def why_not() -> str:
+    """Return why there is no screen; empty if there can be one."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return "no terminal"
+    try:
+        import termios  # noqa: F401
+    except ImportError:
+        return "this system has no terminal of the kind that is needed"
+    columns, rows = os.get_terminal_size(sys.stderr.fileno())
+    if columns < SMALLEST[0] or rows < SMALLEST[1]:
+        return (
+            f"the terminal of {columns} x {rows} is too small for the live view: it needs "
+            f"{SMALLEST[0]} x {SMALLEST[1]}"
+        )
+    return ""
+
+
+def plotted(values: np.ndarray, width: int, rows: int) -> list[str]:
+    """Return a curve as ``rows`` lines of ``width`` block characters, lowest to highest value."""
+    known = np.nan_to_num(values, nan=float(np.nanmin(values)) if np.isfinite(values).any() else 0.0)
+    means = np.asarray([part.mean() if part.size else known[-1] for part in np.array_split(known, width)])
+    span = float(np.ptp(means)) or 1.0
+    height = (means - means.min()) / span * rows * (len(_BARS) - 1)
+    lines = []
+    for row in range(rows - 1, -1, -1):
+        filled = np.clip(height - row * (len(_BARS) - 1), 0, len(_BARS) - 1).round().astype(int)
+        lines.append("".join(_BARS[k] for k in filled))
+    return lines

@@ -1,0 +1,67 @@
+"""The figures of a session: what was pressed, how true each beat was, and what was answered."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from pulsetrainer.report import panels
+from pulsetrainer.report.style import BLUE, COLUMN_IN, INK, MEASURED, TARGET, VERMILION, label, styled
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts import Quiz, Session
+
+_SHOWN_S = 6.0
+
+
+@styled
+def course(session: Session) -> Figure:
+    """Return the middle of a session, target and force, and the errors of all its beats."""
+    figure = Figure(figsize=(1.5 * COLUMN_IN, 5.6), layout="constrained")
+    above, below = figure.subplots(2, 1, height_ratios=(1.5, 1.0))
+    middle = session.time_s[session.time_s.size // 2]
+    near = np.abs(session.time_s - middle) <= 0.5 * _SHOWN_S
+    panels.trace(above, session.time_s[near], session.target[near], **TARGET, label="target")
+    panels.trace(above, session.time_s[near], session.output[near], **MEASURED, label="measured")
+    above.set_ylabel(label("force", session.output_unit))
+    above.set_xlabel(label("time", "s"))
+    above.set_title("some seconds" + ("" if session.complete else ", stopped early"))
+    panels.headroom(above)
+    beats = session.beats
+    percent = 100.0 / session.full_force
+    below.plot(beats.start_s, percent * beats.max_error, ".", markersize=3, color=INK, label="largest")
+    below.plot(beats.start_s, percent * beats.mean_error, ".", markersize=3, color=VERMILION, label="mean")
+    below.set_ylabel("error [% of full force]")
+    below.set_xlabel(label("start of the beat", "s"))
+    below.set_ylim(bottom=0.0)
+    panels.headroom(below)
+    return figure
+
+
+@styled
+def confusion(quiz: Quiz) -> Figure:
+    """Return the confusion matrix: what was asked downwards, what was answered across."""
+    size = len(quiz.choices)
+    side = min(2.2 + 0.55 * size, 1.5 * COLUMN_IN)
+    figure = Figure(figsize=(side, side), layout="constrained")
+    axes = figure.subplots()
+    count = np.asarray([list(row.values()) for row in quiz.confusion.values()])
+    share = count / np.maximum(count.sum(axis=1, keepdims=True), 1)
+    for (row, column), value in np.ndenumerate(count):
+        if value:
+            colour, strength = BLUE if row == column else VERMILION, 0.15 + 0.45 * share[row, column]
+            corner = column - 0.5, row - 0.5
+            axes.add_patch(Rectangle(corner, 1.0, 1.0, facecolor=colour, alpha=strength, linewidth=0))
+            axes.text(column, row, str(value), ha="center", va="center")
+    axes.set_xticks(range(size), quiz.choices, rotation=40, ha="right")
+    axes.set_yticks(range(size), quiz.choices)
+    axes.set_xlim(-0.5, size - 0.5)
+    axes.set_ylim(size - 0.5, -0.5)
+    axes.set_aspect("equal")
+    axes.set_xlabel("answered")
+    axes.set_ylabel("asked")
+    axes.grid(visible=False)
+    return figure

@@ -1,0 +1,276 @@
+"""The conductor: turns decisions, a beat at a time, into the current of a session.
+
+A part of a session is what the device plays in one go: once around the major loop, up to the foot of the
+first beat, beats, down again. A change of anything takes effect at the next beat; where the feet of
+two beats differ, the second begins at the level of the first and finds its own within ``BLEND_S``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.core import excitations
+from pulsetrainer.core.heartbeat import Pulse
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.steps.invert import EXTENDED_BAND_HZ, RAMP_S
+from pulsetrainer.steps.invertible import CONDITIONING_TIME_S
+from pulsetrainer.steps.invertible import REST_S as LEAD_REST_S
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.extended import Extended
+
+RATE_HZ = 1000.0
+SLEW_A_PER_S = 30.0
+BLEND_S = 0.15
+HOT, COOL = 0.95, 0.75  # of the heat at which the device stops: where a session pauses, and goes on
+REST_S = 0.25  # of a pause, between two looks whether it is over
+MARGIN_S = 1.0  # before the device's on-time ends
+
+
+@dataclass(frozen=True, slots=True)
+class Play:
+    """The decision to play a beat."""
+
+    pulse: int  # number of the pulse
+    amplitude: float = 1.0  # of the reach
+    bpm: float | None = None  # None: the pulse's own rate
+    cut_s: float = np.inf  # time after which even a beat under way ends: a question ends on time
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """The decision to let the finger rest."""
+
+    seconds: float = REST_S
+
+
+Decision = Play | Rest | None  # None: the end
+Decide = Callable[[int, float], Decision]
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """The forces between which a pulse of full amplitude moves."""
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Beat:
+    """A beat that was given out: where it is, and what was asked."""
+
+    start_s: float
+    interval_s: float
+    first: int  # number of its first sample
+    count: int
+    play: Play
+    in_record: int
+    strength: float
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A piece of current with the force it is for; without a beat it is on the way, or rest."""
+
+    first: int
+    input: FloatArray
+    target: FloatArray
+    predicted: FloatArray
+    beat: Beat | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where the next beat begins."""
+
+    number: int
+    start_s: float
+    force: float  # at the end of the beat before
+    pulse: int = -1
+    in_record: int = -1
+
+
+class Conductor:
+    """Makes the current of a session; ``give`` gets every piece of it before it is played.
+
+    Parameters
+    ----------
+    decide
+        Asked for the beat with a number that begins at a time, s. The same beat is asked for twice: to
+        know what comes ahead, and when it is its turn. The second answer counts.
+    heat
+        Of the coil at the start, of the limit.
+    heated
+        Heat (n,) that a current (n,) at a rate gives a cold coil, and the time constant of its cooling, s.
+    """
+
+    def __init__(
+        self,
+        extended: Extended,
+        pulses: Sequence[Pulse],
+        reach: Reach,
+        rhythm: Rhythm,
+        decide: Decide,
+        give: Callable[[Given], None],
+        *,
+        heat: float,
+        heated: Callable[[FloatArray, float], FloatArray],
+        cooling_s: float,
+    ) -> None:
+        from pulsetrainer.diagnosis.piecewise import Piecewise
+
+        self._pulses, self._reach, self._rhythm = tuple(pulses), reach, rhythm
+        self._decide, self._give = decide, give
+        self._inverse = Piecewise(extended, 1.0 / RATE_HZ, slew_per_s=SLEW_A_PER_S, band_Hz=EXTENDED_BAND_HZ)
+        self._plane = extended.static.plane
+        self._rest_force = extended.polarity * (extended.static.offset - extended.static.total)
+        self._heat, self._heated, self._cooling_s = heat, heated, cooling_s
+        self._samples = 0
+        self._number = 0
+        self.clipped = 0
+        self.ended = False
+        self.notes: list[str] = []
+
+    @property
+    def time_s(self) -> float:
+        """Time of the next sample since the session began, without the gaps between parts."""
+        return self._samples / RATE_HZ
+
+    def part(self, longest_s: float) -> Iterator[FloatArray]:
+        """Yield the currents (n,) in A of a part of at most ``longest_s``; it ends at rest."""
+        until = self._samples + round((longest_s - MARGIN_S) * RATE_HZ)
+        yield self._played(major_loop(self._plane.low, self._plane.high))
+        place: _Place | None = None  # None: at rest
+        while True:
+            decision = self._decide(self._number, place.start_s if place else self.time_s + RAMP_S)
+            self.ended = decision is None
+            over = self._is_over(decision, place, until)
+            if not isinstance(decision, Play) or over or self._heat > HOT:
+                if place is not None:
+                    yield self._down(place)
+                    place = None
+                if decision is None or over:
+                    return
+                yield self._rest(decision.seconds if isinstance(decision, Rest) else self._cooling())
+                continue
+            if place is None:
+                current, place = self._up(decision)
+                yield current
+            current, place = self._beat(decision, place)
+            yield current
+
+    def _is_over(self, decision: Decision, place: _Place | None, until: int) -> bool:
+        """Whether there is no time left in this part for what was decided, and for the way down."""
+        seconds = RAMP_S + REST_S
+        if isinstance(decision, Play):
+            way = place or _Place(self._number, self.time_s, 0.0)
+            seconds += self._interval(decision, way)[1] + (0.0 if place else RAMP_S)
+        return self._samples + seconds * RATE_HZ > until
+
+    def _cooling(self) -> float:
+        seconds = self._cooling_s * float(np.log(self._heat / COOL))
+        self.notes.append(f"a pause of {seconds:.0f} s after {self.time_s:.0f} s, to let the coil cool")
+        return seconds
+
+    # --- pieces ------------------------------------------------------------------------------------
+
+    def _played(self, current: FloatArray) -> FloatArray:
+        predicted = self._inverse.play(current)
+        return self._given(current, predicted, predicted)
+
+    def _given(
+        self, current: FloatArray, target: FloatArray, predicted: FloatArray, beat: Beat | None = None
+    ) -> FloatArray:
+        self._give(Given(self._samples, current, target, predicted, beat))
+        self._samples += current.size
+        left = float(np.exp(-current.size / (RATE_HZ * self._cooling_s)))
+        self._heat = self._heat * left + float(self._heated(current, RATE_HZ)[-1])
+        return current
+
+    def _rest(self, seconds: float) -> FloatArray:
+        return self._played(np.full(max(round(seconds * RATE_HZ), 1), self._plane.low))
+
+    def _up(self, play: Play) -> tuple[FloatArray, _Place]:
+        count = round(RAMP_S * RATE_HZ)
+        place = _Place(self._number, (self._samples + count) / RATE_HZ, 0.0)
+        foot = float(self._force(play, place, np.zeros(1))[0])
+        place = replace(place, force=foot)
+        rise = self._rest_force + (foot - self._rest_force) * _smooth(np.arange(count) / count)
+        return self._inverted(rise, self._target(play, place, self._samples + count)[0]), place
+
+    def _down(self, place: _Place) -> FloatArray:
+        current = self._inverted(self._fall(place.force), np.full(self._inverse.reach, self._rest_force))
+        return np.append(current, self._played(np.asarray([self._plane.low])))
+
+    def _fall(self, force: float) -> FloatArray:
+        count = round(RAMP_S * RATE_HZ)
+        return force + (self._rest_force - force) * _smooth(np.arange(count) / count)
+
+    def _inverted(self, target: FloatArray, ahead: FloatArray, beat: Beat | None = None) -> FloatArray:
+        piece = self._inverse.next(target, ahead)
+        if beat is not None:
+            self.clipped += piece.clipped
+        return self._given(piece.input, target, piece.predicted, beat)
+
+    def _beat(self, play: Play, place: _Place) -> tuple[FloatArray, _Place]:
+        target, beat, then = self._target(play, place, self._samples)
+        self._number += 1
+        coming = self._decide(self._number, then.start_s)
+        if isinstance(coming, Play):
+            ahead = self._target(coming, then, self._samples + target.size)[0]
+        else:
+            ahead = self._fall(then.force)
+        if ahead.size < self._inverse.reach:
+            ahead = np.append(ahead, np.full(self._inverse.reach - ahead.size, ahead[-1]))
+        return self._inverted(target, ahead, beat), then
+
+    # --- a beat ------------------------------------------------------------------------------------
+
+    def _in_record(self, play: Play, place: _Place) -> int:
+        return (place.in_record + 1) % self._pulses[play.pulse].beats if play.pulse == place.pulse else 0
+
+    def _interval(self, play: Play, place: _Place) -> tuple[int, float, float]:
+        """Which beat of the record it is, how long it lasts in s, and how strong it is."""
+        pulse, at = self._pulses[play.pulse], self._in_record(play, place)
+        timing = self._rhythm.timing(place.number, place.start_s)
+        own = pulse.own_interval_s(at) * (pulse.own_bpm / play.bpm if play.bpm else 1.0)
+        return at, own * timing.interval, timing.strength
+
+    def _force(self, play: Play, place: _Place, level_at: FloatArray) -> FloatArray:
+        at, interval_s, strength = self._interval(play, place)
+        level = self._pulses[play.pulse].level(at, interval_s, level_at)
+        return self._reach.low + (self._reach.high - self._reach.low) * play.amplitude * strength * level
+
+    def _target(self, play: Play, place: _Place, first: int) -> tuple[FloatArray, Beat, _Place]:
+        """Return the force (n,) of a beat from sample ``first`` on, and where the next one begins."""
+        at, interval_s, strength = self._interval(play, place)
+        end_s = min(place.start_s + interval_s, max(play.cut_s, place.start_s + 2.0 / RATE_HZ))
+        last = int(np.ceil(end_s * RATE_HZ - 1e-6))
+        since = np.arange(first, last) / RATE_HZ - place.start_s
+        step = place.force - float(self._force(play, place, np.zeros(1))[0])
+
+        def force(since_s: FloatArray) -> FloatArray:
+            blend = 1.0 - _smooth(np.clip(since_s / min(BLEND_S, interval_s), 0.0, 1.0))
+            return self._force(play, place, since_s) + step * blend
+
+        end = float(force(np.asarray([end_s - place.start_s]))[0])
+        then = _Place(place.number + 1, end_s, end, play.pulse, at)
+        beat = Beat(place.start_s, end_s - place.start_s, first, since.size, play, at, strength)
+        return force(since), beat, then
+
+
+def major_loop(low: float, high: float) -> FloatArray:
+    """Input (n,) that wipes out whatever came before and ends at its low end."""
+    speed = (high - low) / CONDITIONING_TIME_S
+    return excitations.conditioning(low, high, speed=speed, rate_Hz=RATE_HZ, rest_s=LEAD_REST_S)
+
+
+def _smooth(share: FloatArray) -> FloatArray:
+    """From 0 to 1 without a jump of the slope."""
+    return np.asarray(share**2 * (3.0 - 2.0 * share))

@@ -1,0 +1,140 @@
+"""The programme of a session without a quiz: which pulse, rate and amplitude at which time, and the end."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
+from pulsetrainer.errors import UsageError
+from pulsetrainer.steps.conductor import Decision, Play
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What is different from a time on; None: as before."""
+
+    time_s: float
+    rate: float | None = None  # beats a minute
+    amplitude: float | None = None  # % of the reach
+    pulse: str | None = None
+
+
+def check_rate(rate: float | None) -> None:
+    """Refuse a rate that no heart has.
+
+    Raises
+    ------
+    UsageError
+        It is outside 20 to 240 beats a minute.
+    """
+    if rate is not None and not SLOWEST_BPM <= rate <= FASTEST_BPM:
+        raise UsageError(
+            f"a rate of {rate:g} beats a minute is outside {SLOWEST_BPM:g} to {FASTEST_BPM:g}",
+            hint="75 is usual",
+        )
+
+
+def check_amplitude(amplitude: float | None) -> None:
+    """Refuse an amplitude that cannot be pressed.
+
+    Raises
+    ------
+    UsageError
+        It is not above 0, or more than the reach.
+    """
+    if amplitude is not None and not 0.0 < amplitude <= 100.0:
+        raise UsageError(
+            f"an amplitude of {amplitude:g} % cannot be pressed: 100 % is all that the model reaches",
+            hint="ask for more than 0 and at most 100 %",
+        )
+
+
+def number_of(name: str, pulses: Sequence[str]) -> int:
+    """Return the place of a pulse in the session's list.
+
+    Raises
+    ------
+    UsageError
+        It is not there.
+    """
+    if name in pulses:
+        return list(pulses).index(name)
+    near = difflib.get_close_matches(name, pulses, n=3, cutoff=0.4) or list(pulses)
+    raise UsageError(
+        f"the session has no pulse {name!r}", hint=f"did you mean {' or '.join(near)}? add it to `pulses`"
+    )
+
+
+class Programme:
+    """Plays the pulses one after the other, each for an equal share of the time, until something changes.
+
+    Parameters
+    ----------
+    pulses
+        Their names.
+    beats, seconds
+        The end: after so many beats, or after so long; None: the other one.
+    changes
+        From the earliest on; a change of the pulse ends the taking of turns.
+
+    Raises
+    ------
+    UsageError
+        A rate, an amplitude or a pulse cannot be played, or there is no end.
+    """
+
+    def __init__(
+        self,
+        pulses: Sequence[str],
+        *,
+        rate: float | None = None,
+        amplitude: float = 100.0,
+        beats: int | None = None,
+        seconds: float | None = None,
+        changes: Sequence[Change] = (),
+    ) -> None:
+        check_rate(rate)
+        check_amplitude(amplitude)
+        if (beats is None) == (seconds is None):
+            raise UsageError("a session ends after minutes or after beats", hint="give one of the two")
+        if (beats is not None and beats < 1) or (seconds is not None and not 0 < seconds < np.inf):
+            raise UsageError("a session needs at least one beat", hint="give more `beats` or `minutes`")
+        for change in changes:
+            check_rate(change.rate)
+            check_amplitude(change.amplitude)
+        self._names = tuple(pulses)
+        self._beats, self._seconds = beats, seconds
+        self._start = Play(0, amplitude / 100.0, rate)
+        self._changes = [
+            (change, None if change.pulse is None else number_of(change.pulse, pulses))
+            for change in sorted(changes, key=lambda one: one.time_s)
+        ]
+
+    @property
+    def rates(self) -> tuple[float | None, ...]:
+        """Every rate that is asked for."""
+        return (self._start.bpm, *(change.rate for change, _ in self._changes if change.rate is not None))
+
+    def share(self, number: int, time_s: float) -> float:
+        """How much of it is over."""
+        return number / self._beats if self._beats else time_s / (self._seconds or np.inf)
+
+    def __call__(self, number: int, time_s: float) -> Decision:
+        """Return what is played next."""
+        share = self.share(number, time_s)
+        if share >= 1.0:
+            return None
+        play = replace(self._start, pulse=int(share * len(self._names)))
+        for change, pulse in self._changes:
+            if change.time_s > time_s:
+                break
+            play = Play(
+                play.pulse if pulse is None else pulse,
+                play.amplitude if change.amplitude is None else change.amplitude / 100.0,
+                play.bpm if change.rate is None else change.rate,
+            )
+        return play

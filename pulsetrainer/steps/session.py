@@ -1,0 +1,427 @@
+"""Session: pulses for as long as wanted, beat by beat, recorded and judged while they are pressed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from pulsetrainer.artefacts import Model
+from pulsetrainer.artefacts.session import Beats, Quiz, Session
+from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM, Pulse
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.pulses import Shape
+from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.device.codes import HEAT_TAU_S
+from pulsetrainer.device.heat import added
+from pulsetrainer.device.plausibility import judge_against
+from pulsetrainer.device.wording import FORCE_REMEDY
+from pulsetrainer.diagnosis.prediction import extended_of
+from pulsetrainer.errors import DataError, DeviceError, UsageError
+from pulsetrainer.steps.beat_errors import Ledger
+from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach, major_loop
+from pulsetrainer.steps.one_thread import one_thread
+from pulsetrainer.steps.programme import Change, Programme
+from pulsetrainer.steps.progress import Progress, silent
+from pulsetrainer.steps.quiz import Answer, Blind, from_list, order
+from pulsetrainer.steps.recording import PAUSE_S
+from pulsetrainer.steps.stopped import raise_if_stopped
+
+if TYPE_CHECKING:
+    from pulsetrainer.device.device import Device
+    from pulsetrainer.device.trace import Block
+
+LEAD_S = 3.0  # of current that is ready before its time: how long this computer may be busy with other things
+LIVE_LEAD_S = 0.5  # the same where a person changes what comes next
+_SETTLED = 4.0  # of the slowest time constant of a model
+_LONGEST_SETTLING_S = 300.0
+
+
+class Sink(Protocol):
+    """Where a session goes while it is pressed."""
+
+    def append(
+        self,
+        time_s: FloatArray,
+        target: FloatArray,
+        reference: FloatArray,
+        current: FloatArray,
+        force: FloatArray,
+        /,
+    ) -> None:
+        """Take samples in, arrays (n,) in s, N, A, A and N."""
+        ...
+
+
+class Memory:
+    """A sink that keeps everything."""
+
+    def __init__(self) -> None:
+        self.blocks: list[FloatArray] = []
+
+    def append(self, *columns: FloatArray) -> None:
+        """Take samples in."""
+        self.blocks.append(np.stack(columns))
+
+
+@dataclass(frozen=True, slots=True)
+class Now:
+    """What a screen may show while a session goes on."""
+
+    time_s: float
+    target: FloatArray  # (n,) N, the samples that came last
+    current: FloatArray  # (n,) A
+    force: FloatArray  # (n,) N
+    beat: Play | None  # the one that was pressed last
+    interval_s: float
+    resting: bool  # no beat is under way
+
+
+@dataclass(frozen=True, slots=True)
+class Performed:
+    """How a session went, without its samples."""
+
+    figures: dict[str, float]
+    beats: Beats
+    full_force: float
+    mean_force: float
+    reach: Reach
+    clipped: int
+    dropped: int
+    parts: int
+    underruns: int
+    fault: str
+    remedy: str
+    notes: tuple[str, ...]
+
+    @property
+    def fields(self) -> dict[str, object]:
+        """Fields of the artefact that are no samples."""
+        return self.figures | {
+            "beats": self.beats,
+            "full_force": self.full_force,
+            "mean_force": self.mean_force,
+            "complete": not self.fault,
+            "dropped_samples": self.dropped,
+            "underruns": self.underruns,
+            "clipped_samples": self.clipped,
+            "fault": self.fault,
+            "notes": self.notes,
+        }
+
+
+def check_model(model: Model) -> None:
+    """Refuse a model that no session can be played with.
+
+    Raises
+    ------
+    DataError
+        It is of another device, of another form, or its weights are read as relays.
+    """
+    if (model.input_unit, model.output_unit) != ("A", "N"):
+        raise DataError(
+            f"the model is of a device from {model.input_unit} to {model.output_unit}; a session drives a "
+            "current in A and presses a force in N",
+            hint="identify a run that was captured on the device",
+        )
+    if model.form != "direct":
+        raise DataError(
+            f"the model has the form {model.form}; a session carries the memory of direct models only",
+            hint="identify with `form` direct",
+        )
+    if model.reading != "continuous":
+        raise DataError(
+            f"the weights of the model are read as {model.reading}, which has no continuous inverse",
+            hint="identify with `reading` continuous",
+        )
+
+
+def reach_of(model: Model, pulses: Sequence[Pulse], rates: Sequence[float | None]) -> Reach:
+    """Return the forces that every beat reaches with the range of the input, in the long run.
+
+    The model is given each pulse as its input, over the whole range and at the slowest and the fastest rate,
+    until its slowest cause has settled: heat, lag and creep keep a pulse from the ends of the static loop.
+    """
+    extended = extended_of(model)
+    low, high = float(model.edges[0]), float(model.edges[-1])
+    slow = [p.value for e in model.extensions for p in e.parameters if p.unit == "s"]
+    seconds = min(_SETTLED * max(slow, default=0.0) + 4.0, _LONGEST_SETTLING_S)
+    lead = major_loop(low, high)
+    lows, highs = [], []
+    for pulse in pulses:
+        asked = {rate or pulse.own_bpm for rate in rates}
+        for bpm in {max(min(asked), SLOWEST_BPM), min(max(asked), FASTEST_BPM)}:
+            record = pulse.record(pulse.own_bpm / bpm, RATE_HZ)
+            turns = max(2, int(np.ceil(seconds * RATE_HZ / record.size)))
+            level = np.tile(record, turns)
+            if model.polarity < 0:
+                level = 1.0 - level
+            made = extended(np.concatenate((lead, low + (high - low) * level)), 1.0 / RATE_HZ)
+            last = made[-record.size :]
+            cold = made[lead.size + record.size : lead.size + 2 * record.size]
+            lows.append(max(float(last.min()), float(cold.min())))
+            highs.append(min(float(last.max()), float(cold.max())))
+    return Reach(max(lows), min(highs))
+
+
+class _Performance:
+    """A session under way: what is given out, what comes back."""
+
+    def __init__(
+        self,
+        model: Model,
+        device: Device,
+        pulses: Sequence[Pulse],
+        rhythm: Rhythm,
+        decide: Decide,
+        sink: Sink,
+        reach: Reach,
+        watch: Callable[[Now], None],
+    ) -> None:
+        self._device, self._sink, self._watch = device, sink, watch
+        self._ledger = Ledger(tuple(pulse.name for pulse in pulses))
+        self._reach = reach
+        self._conductor = Conductor(
+            extended_of(model),
+            pulses,
+            reach,
+            rhythm,
+            decide,
+            self._ledger.give,
+            heat=device.heat,
+            heated=added,
+            cooling_s=HEAT_TAU_S,
+        )
+        self._begun = 0  # sample at which the part began
+        self._gap_s = 0.0
+        self._implausible = ""
+        self._last: Given | None = None
+        self.measured_s = 0.0
+
+    def run(self, lead_s: float) -> Performed:
+        """Press part after part until the end is decided, or the device or the user stops it."""
+        conductor, device = self._conductor, self._device
+        decimation = round(device.info.tick_rate_Hz / RATE_HZ)
+        parts = dropped = 0
+        fault = remedy = ""
+        underrun = False
+        while not conductor.ended and not fault:
+            before = self._ledger.count
+            self._begun = round(conductor.time_s * RATE_HZ)
+            trace = device.stream(
+                partial(next, conductor.part(device.longest_play_s), None),
+                RATE_HZ,
+                lead_s=lead_s,
+                decimation=decimation,
+                on_block=lambda block: self._take(block, decimation),
+                should_stop=lambda: bool(self._implausible),
+            )
+            parts += 1
+            dropped += trace.dropped_samples
+            fault, remedy, underrun = trace.fault, trace.remedy, trace.underrun
+            if self._implausible:
+                fault, remedy = self._implausible, FORCE_REMEDY
+            self._gap_s += PAUSE_S
+            if not fault and not conductor.ended and self._ledger.count == before:
+                fault, remedy = "the device stays on too short for one beat", "raise its on-time limit"
+        ledger = self._ledger
+        return Performed(
+            figures=ledger.figures(),
+            beats=ledger.beats("N"),
+            full_force=ledger.high if ledger.count else float("nan"),
+            mean_force=ledger.mean_force,
+            reach=self._reach,
+            clipped=conductor.clipped,
+            dropped=dropped,
+            parts=parts,
+            underruns=int(underrun),
+            fault=fault,
+            remedy=remedy,
+            notes=tuple(conductor.notes),
+        )
+
+    def _take(self, block: Block, decimation: int) -> None:
+        sample = self._begun + block.tick // decimation
+        target, done, measured = self._ledger.measure(sample, block.force_N)
+        self.measured_s = float(sample[-1]) / RATE_HZ
+        self._sink.append(
+            sample / RATE_HZ + self._gap_s, target, block.reference_A, block.current_A, block.force_N
+        )
+        for piece, force in zip(done, measured, strict=True):
+            if piece.beat is not None:
+                self._last = piece
+                time_s = (piece.first + np.arange(force.size)) / RATE_HZ
+                self._implausible = self._implausible or judge_against(time_s, piece.predicted, force)
+        last = self._last.beat if self._last else None
+        self._watch(
+            Now(
+                self.measured_s,
+                target,
+                block.current_A,
+                block.force_N,
+                last.play if last else None,
+                last.interval_s if last else float("nan"),
+                resting=not self._ledger.is_beating,
+            )
+        )
+
+
+@one_thread
+def perform(
+    model: Model,
+    device: Device,
+    pulses: Sequence[Shape],
+    decide: Decide,
+    sink: Sink,
+    *,
+    rhythm: Rhythm,
+    rates: Sequence[float | None] = (None,),
+    lead_s: float = LEAD_S,
+    watch: Callable[[Now], None] = lambda _now: None,
+) -> Performed:
+    """Press what ``decide`` decides until it decides the end, and judge every beat.
+
+    Parameters
+    ----------
+    rates
+        Between the slowest and the fastest of these every pulse reaches its full amplitude, beats a minute;
+        None: its own.
+    lead_s
+        How long before its time a beat is decided and made.
+    watch
+        Called with each piece of telemetry.
+
+    Raises
+    ------
+    DataError
+        The model cannot be used.
+    DeviceError
+        The device cannot be talked to, or its firmware knows no open-ended waves.
+    """
+    check_model(model)
+    beating = [Pulse(shape) for shape in pulses]
+    reach = reach_of(model, beating, rates)
+    return _Performance(model, device, beating, rhythm, decide, sink, reach, watch).run(lead_s)
+
+
+def session(
+    model: Model,
+    device: Device,
+    *,
+    pulses: Sequence[Shape],
+    rate: float | None = None,
+    amplitude: float = 100.0,
+    minutes: float | None = None,
+    beats: int | None = None,
+    variability: float = 0.0,
+    respiration: float = 0.0,
+    ectopic: float = 0.0,
+    seed: int = 0,
+    changes: Sequence[Change] = (),
+    quiz: int = 0,
+    answers: Sequence[str] | Answer = (),
+    decide: Decide | None = None,
+    progress: Progress = silent,
+) -> Session:
+    """Press pulses for as long as wanted and return everything, every beat judged.
+
+    Parameters
+    ----------
+    pulses
+        Each is pressed for an equal share of the time.
+    rate
+        Beats a minute, 20 to 240; None: each pulse's own.
+    amplitude
+        Height of the pulses, % of what every beat reaches.
+    minutes, beats
+        The end; neither: after five minutes, or of the quiz.
+    variability, respiration, ectopic
+        Irregularity of the rhythm, %, from ``seed``: see ``core.rhythm.Rhythm``.
+    changes
+        What changes when.
+    quiz, answers
+        Number of questions, and the answers to them: a list, or a callable that is asked for each.
+    decide
+        In the place of all that: asked for each beat what is played; see ``steps.conductor``.
+
+    Raises
+    ------
+    UsageError
+        A rate, an amplitude or a pulse cannot be played.
+    DataError
+        The model is of another device, or an answer names what is not asked.
+    DeviceError, Interrupted
+        The device or the user stopped it; what was recorded is in the error's ``kept``.
+    """
+    chosen, rates = programme(
+        [shape.name for shape in pulses],
+        rate=rate,
+        amplitude=amplitude,
+        minutes=minutes,
+        beats=beats,
+        changes=changes,
+        quiz=quiz,
+        answers=answers,
+        seed=seed,
+    )
+    sink, rhythm = Memory(), Rhythm(variability / 100.0, respiration / 100.0, ectopic / 100.0, seed)
+
+    def watch(now: Now) -> None:
+        if isinstance(chosen, Programme):
+            progress(chosen.share(0, now.time_s))
+
+    done = perform(model, device, pulses, decide or chosen, sink, rhythm=rhythm, rates=rates, watch=watch)
+    asked = chosen.quiz() if isinstance(chosen, Blind) else None
+    kept = _session(sink, done, tuple(shape.name for shape in pulses), asked)
+    raise_if_stopped(done.fault, done.remedy, "the session", kept)
+    if kept is None:
+        raise DeviceError("the session brought back no sample", hint="check the line to the device")
+    return kept
+
+
+def programme(
+    names: Sequence[str],
+    *,
+    rate: float | None,
+    amplitude: float,
+    minutes: float | None,
+    beats: int | None,
+    changes: Sequence[Change],
+    quiz: int,
+    answers: Sequence[str] | Answer,
+    seed: int,
+) -> tuple[Programme | Blind, tuple[float | None, ...]]:
+    """Return who decides, and between which rates every pulse shall reach its full amplitude.
+
+    Raises
+    ------
+    UsageError, DataError
+        As ``session``.
+    """
+    if not names or len(set(names)) < len(names):
+        raise UsageError(
+            "a session needs pulses, each named once, got " + (", ".join(names) or "none"),
+            hint="name some of the library: normal,bifid",
+        )
+    if minutes is None and beats is None:
+        minutes = 5.0
+    seconds = None if minutes is None else 60.0 * minutes
+    programme = Programme(
+        names, rate=rate, amplitude=amplitude, beats=beats, seconds=seconds, changes=changes
+    )
+    if not quiz:
+        return programme, programme.rates
+    asked = order(len(names), quiz, seed)
+    answer = answers if callable(answers) else from_list(answers, names, quiz)
+    return Blind(names, asked, answer, Play(0, amplitude / 100.0, rate)), (rate,)
+
+
+def _session(sink: Memory, done: Performed, names: tuple[str, ...], asked: Quiz | None) -> Session | None:
+    if not sink.blocks or not done.beats.start_s.size:
+        return None
+    time_s, target, reference, current, force = np.concatenate(sink.blocks, axis=1)
+    fields = done.fields | {"pulses": names, "quiz": asked}
+    return Session(time_s=time_s, target=target, reference=reference, input=current, output=force, **fields)  # type: ignore[arg-type]

@@ -1,0 +1,308 @@
+"""``session`` from the command line: its figures, its keys, its quiz, and what happens when it is cut off."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import pty
+import re
+import signal
+import struct
+import subprocess
+import termios
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from program import PROGRAM, pulsetrainer
+from pulsetrainer.artefacts import Run, Session
+from pulsetrainer.files.store import read, read_any
+from pulsetrainer.steps.conductor import SLEW_A_PER_S
+
+KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
+MODEL = str(KEPT / "model-extended.h5")
+SHORT = ("session", "--model", MODEL, "-o", "s.h5")
+KEYS = {
+    "beats", "rate_cv_percent", "amplitude_cv_percent", "beat_timing_max_ms", "mean_abs_error_percent",
+    "max_abs_error_percent", "nrmse", "augmentation_index_error_percent", "underruns",
+}  # fmt: skip
+
+
+def test_the_contract(run, tmp_path):
+    """Every key of the contract; the file says the same; asked and pressed are in it sample by sample."""
+    done = run(*SHORT, "--beats", 6, "--pulses", "normal,bifid", "--json", "--html", "s.html")
+    assert done.code == 0, done.err
+    assert set(done.json) >= KEYS
+    assert "quiz" not in done.json
+    kept = read(tmp_path / "s.h5", Session)
+    assert kept.figures() == {name: pytest.approx(done.json[name]) for name in kept.figures()}
+    assert (kept.complete, kept.underruns, kept.pulses) == (True, 0, ("normal", "bifid"))
+    assert kept.beats.pulse.tolist() == [0, 0, 0, 1, 1, 1]
+    np.testing.assert_allclose(np.diff(kept.time_s), 1e-3, atol=1e-9)
+    assert np.isfinite(kept.target).all()
+    page = (tmp_path / "s.html").read_text()
+    for name in ("mean_abs_error_percent", "error_jnd"):
+        assert float(re.search(rf'data-metric="{name}" data-value="([^"]+)"', page)[1]) == getattr(kept, name)
+    assert run("show", "s.h5").code == 0
+    assert run("plot", "s.h5", "-o", "s.png").code == 0
+    assert "<svg" in page
+
+
+def test_changes_of_a_script_come_at_the_next_beat(run, tmp_path):
+    """Rate, amplitude and pulse; the current moves no faster than the slew limit, and the force follows."""
+    (tmp_path / "changes.csv").write_text("t_s,rate,amplitude,pulse\n3,100,,\n5,,50,bifid\n")
+    done = run(*SHORT, "--pulses", "normal,bifid", "--rate", 60, "--beats", 9, "--changes", "changes.csv")
+    assert done.code == 0, done.err
+    kept = read(tmp_path / "s.h5", Session)
+    beats = kept.beats
+    later = beats.start_s >= 5
+    np.testing.assert_allclose(beats.interval_s[beats.start_s < 3], 1.0)
+    np.testing.assert_allclose(beats.interval_s[beats.start_s >= 3], 0.6)
+    np.testing.assert_allclose(beats.amplitude, np.where(later, 50, 100))
+    assert (beats.pulse[later] == 1).all()
+    assert np.abs(np.diff(kept.reference)).max() <= SLEW_A_PER_S / 1000 + 2e-4
+
+
+def test_the_rhythm_comes_from_the_seed(run, tmp_path):
+    """Twice the same, and another one."""
+    intervals = []
+    for seed in (1, 1, 2):
+        words = ("--variability", 8, "--ectopic", 20, "--respiration", 5, "--beats", 5, "--seed", seed)
+        assert run(*SHORT, *words, "--overwrite").code == 0
+        intervals.append(read(tmp_path / "s.h5", Session).beats.interval_s)
+    np.testing.assert_array_equal(intervals[0], intervals[1])
+    assert np.abs(intervals[0] - intervals[2]).max() > 0.01
+
+
+def test_a_quiz_by_file(run, tmp_path):
+    """Score and confusion fit what the file holds; right are those that are right."""
+    (tmp_path / "a.txt").write_text("normal\nbifid\nnormal\nbifid\n")
+    words = ("--pulses", "normal,bifid", "--quiz", 4, "--answers", "a.txt", "--seed", 3, "--html", "q.html")
+    done = run(*SHORT, *words, "--json")
+    assert done.code == 0, done.err
+    quiz = done.json["quiz"]
+    kept = read(tmp_path / "s.h5", Session).quiz
+    assert kept.answered == ("normal", "bifid", "normal", "bifid")
+    assert sorted(kept.asked) == ["bifid", "bifid", "normal", "normal"]
+    assert (quiz["asked"], quiz["right"], quiz["confusion"]) == (4, kept.right, kept.confusion)
+    assert 0 <= quiz["interval"][0] <= kept.right / 4 <= quiz["interval"][1] <= 1
+    assert kept.learner == "s"
+    assert "Confusion matrix" in (tmp_path / "q.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("--pulses", "normla"), 2, "normal"),
+        (("--pulses", "normal,normal"), 2, "once"),
+        (("--rate", "10"), 2, "20 to 240"),
+        (("--rate", "241"), 2, "20 to 240"),
+        (("--amplitude", "120"), 2, "100 %"),
+        (("--beats", "0"), 2, "beat"),
+        (("--beats", "5", "--minutes", "1"), 2, "one of the two"),
+        (("--variability", "60"), 3, "25 %"),
+        (("--quiz", "4"), 2, "two pulses"),
+        (("--quiz", "4", "--pulses", "normal,bifid"), 2, "terminal"),
+        (("--quiz", "4", "--pulses", "normal,bifid", "--answers", "short.txt"), 3, "4 questions"),
+        (("--quiz", "2", "--pulses", "normal,bifid", "--answers", "wrong.txt"), 3, "stiff"),
+        (("--changes", "bad.csv"), 3, "line 2"),
+        (("--changes", "other.csv"), 3, "columns"),
+        (("--changes", "unknown.csv"), 2, "bifd"),
+        (("--changes", "absent.csv"), 3, "absent.csv"),
+    ],
+)
+def test_what_makes_no_sense_is_told_before_anything_moves(run, tmp_path, words, code, said):
+    """Exit code, what is wrong, and nothing written."""
+    (tmp_path / "short.txt").write_text("normal\n")
+    (tmp_path / "wrong.txt").write_text("normal\nstiff\n")
+    (tmp_path / "bad.csv").write_text("t_s,rate\nsoon,80\n")
+    (tmp_path / "other.csv").write_text("time,bpm\n1,80\n")
+    (tmp_path / "unknown.csv").write_text("t_s,pulse\n1,bifd\n")
+    done = run(*SHORT, *words, env={"PULSETRAINER_PORT": "/dev/no-such-port"})
+    assert (done.code, said in done.err) == (code, True), done.err
+    assert not list(tmp_path.glob("s.h5*"))
+
+
+def test_a_model_of_another_device_is_refused(run, tmp_path):
+    """Before the device is touched."""
+    rows = "\n".join(f"{k / 100},{np.sin(k / 30)},{2 * np.sin(k / 30)}" for k in range(600))
+    (tmp_path / "t.csv").write_text(f"t_s,u,y\n{rows}\n")
+    words = ("--input", "u", "--output", "y", "--input-unit", "V", "--output-unit", "T", "-o", "t.h5")
+    assert run("import", "t.csv", *words).code == 0
+    assert run("identify", "t.h5", "--levels", 6, "-o", "m.h5").code == 0
+    done = run("session", "--model", "m.h5", "-o", "s.h5", "--port", "/dev/no-such-port")
+    assert done.code == 3
+    assert "V" in done.err
+
+
+def _started(folder: Path, *words: object, port: str = "bench:?speed=real") -> subprocess.Popen[bytes]:
+    env = {**os.environ, "PULSETRAINER_PORT": port}
+    return subprocess.Popen(
+        [*PROGRAM, *map(str, words)], cwd=folder, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def _until(there, seconds: float = 40.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not there():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def _recorded(folder: Path) -> int:
+    with contextlib.suppress(Exception):
+        return read_any(folder / "s.h5.partial").input.size
+    return 0
+
+
+@pytest.mark.parametrize("after", [200, 2500])
+def test_killed_at_any_moment_the_file_is_readable(tmp_path, after):
+    """What was pressed until then is a run: time, reference, current and force."""
+    process = _started(tmp_path, *SHORT, "--minutes", 5)
+    try:
+        _until(lambda: _recorded(tmp_path) >= after)
+    finally:
+        process.kill()
+        process.communicate()
+    kept = read_any(tmp_path / "s.h5.partial")
+    assert isinstance(kept, Run)
+    assert kept.input.size >= after
+    assert not kept.complete
+    assert pulsetrainer(tmp_path, "show", "s.h5.partial").code == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_stopped_by_a_signal_nothing_is_lost(tmp_path, number):
+    """The file is whole, holds the beats so far, and the exit code says who stopped it."""
+    process = _started(tmp_path, *SHORT, "--minutes", 5)
+    try:
+        _until(lambda: _recorded(tmp_path) >= 4000)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 130, err
+    kept = read(tmp_path / "s.h5", Session)
+    assert not kept.complete
+    assert kept.beats.start_s.size >= 2
+    assert not list(tmp_path.glob("*.partial"))
+
+
+def test_a_lost_port_keeps_what_was_pressed(tmp_path):
+    """The device goes away in the middle: exit 4, the beats so far are there."""
+    done = pulsetrainer(tmp_path, *SHORT, "--minutes", 1, "--port", "bench:?break=reset@6")
+    assert done.code == 4
+    kept = read(tmp_path / "s.h5", Session)
+    assert kept.fault
+    assert not kept.complete
+    assert kept.beats.start_s.size >= 3
+
+
+class Terminal:
+    """The program on a terminal of its own."""
+
+    def __init__(self, folder: Path, *words: object, port: str = "bench:?speed=real", size=(24, 80)) -> None:
+        self.seen = b""
+        self.pid, self.handle = pty.fork()
+        if self.pid == 0:
+            os.chdir(folder)
+            os.environ["PULSETRAINER_PORT"] = port
+            os.environ["TERM"] = "xterm"
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", *size, 0, 0))
+            os.execv(PROGRAM[0], [*PROGRAM, *map(str, words)])
+
+    def read(self) -> bool:
+        """Take in what is on the screen; False at the end."""
+        try:
+            piece = os.read(self.handle, 65536)
+        except OSError:
+            return False
+        self.seen += piece
+        return bool(piece)
+
+    def until(self, there, seconds: float = 60.0) -> None:
+        """Read until something is true."""
+        deadline = time.monotonic() + seconds
+        while not there():
+            assert time.monotonic() < deadline, self.seen[-2000:]
+            assert self.read(), self.seen[-2000:]
+
+    def press(self, key: str) -> None:
+        """Press a key."""
+        os.write(self.handle, key.encode())
+
+    def end(self) -> int:
+        """Read to the end and return the exit code."""
+        while self.read():
+            pass
+        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+
+
+def test_keys_change_the_beats_and_stop(tmp_path):
+    """Faster, weaker, another pulse, a pause, on, stop: each is in the beats that follow."""
+    terminal = Terminal(tmp_path, *SHORT, "--pulses", "normal,bifid", "--rate", 100, "--minutes", 5)
+    terminal.until(lambda: b"normal  100/min" in terminal.seen)
+    assert b"pause, go on" in terminal.seen
+    terminal.press("+")
+    terminal.until(lambda: b"105/min" in terminal.seen)
+    terminal.press("<")
+    terminal.until(lambda: b"90 %" in terminal.seen)
+    terminal.press("p")
+    terminal.until(lambda: b"bifid" in terminal.seen)
+    mark = len(terminal.seen)
+    terminal.press(" ")
+    terminal.until(lambda: b"at rest" in terminal.seen[mark:])
+    terminal.press(" ")
+    mark = len(terminal.seen)
+    terminal.until(lambda: b"bifid" in terminal.seen[mark:] and b"at rest" not in terminal.seen[-2000:])
+    terminal.press("q")
+    assert terminal.end() == 0
+    beats = read(tmp_path / "s.h5", Session).beats
+    assert 60 / beats.interval_s[0] == pytest.approx(100)
+    assert 60 / beats.interval_s[-1] == pytest.approx(105)
+    assert beats.amplitude[-1] == pytest.approx(90)
+    assert (beats.pulse[0], beats.pulse[-1]) == (0, 1)
+    assert np.diff(beats.start_s).max() > 1.2  # the pause
+
+
+def test_nothing_gives_a_question_away(tmp_path):
+    """Blind: neither screen, nor file names, nor the files, nor the time tell what is asked."""
+    words = ("--pulses", "bifid,parvus-et-tardus", "--quiz", 2, "--seed", 7)
+    terminal = Terminal(tmp_path, *SHORT, *words, port="bench:")
+    terminal.until(lambda: b"question 1 of 2" in terminal.seen)
+    shown = [terminal.seen.count(name) for name in (b"bifid", b"parvus-et-tardus")]
+    terminal.until(lambda: terminal.seen.count(b"bifid") > shown[0] + 5)
+    # both names stand in the list of choices and nowhere else: as often
+    assert abs(terminal.seen.count(b"bifid") - terminal.seen.count(b"parvus-et-tardus")) <= 1
+    assert not re.search(rb"/min| N  | A  ", terminal.seen)
+    files = {path.name for path in tmp_path.iterdir()}
+    assert not any("bifid" in name or "parvus" in name for name in files)
+    journal = (tmp_path / "s.h5.partial").read_bytes()
+    assert journal.count(b'"asked"') == journal.count(b'"pulse"') == 0
+    # an answer for each question, whenever it is its turn
+    terminal.press("a")
+    terminal.until(lambda: b"question 2 of 2" in terminal.seen)
+    terminal.press("b")
+    assert terminal.end() == 0
+    kept = read(tmp_path / "s.h5", Session)
+    assert kept.quiz.answered == ("bifid", "parvus-et-tardus")
+    assert np.isfinite(kept.quiz.response_s).all()
+
+
+def test_a_terminal_that_is_too_small_has_no_view(tmp_path):
+    """It is said, and the session goes on without."""
+    terminal = Terminal(tmp_path, *SHORT, "--beats", 3, port="bench:", size=(5, 30))
+    assert terminal.end() == 0
+    assert b"too small" in terminal.seen.replace(b"\r\n", b" ")
+    assert b"pause, go on" not in terminal.seen
+
+
+def test_a_pipe_is_quiet(run):
+    """No view, no key, no bar; the figures on stdout."""
+    done = run(*SHORT, "--beats", 3)
+    assert done.code == 0
+    assert "\x1b" not in done.out + done.err
+    assert "beats" in done.out

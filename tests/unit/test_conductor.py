@@ -1,0 +1,239 @@
+"""The conductor without a device: changes at the next beat, no step beyond the slew limit, rests, pauses."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from pulsetrainer.core.heartbeat import Pulse
+from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.diagnosis.prediction import extended_of
+from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.pulses import read_pulse
+from pulsetrainer.steps.beat_errors import Ledger
+from pulsetrainer.steps.conductor import COOL, HOT, RATE_HZ, SLEW_A_PER_S, Conductor, Play, Rest
+from pulsetrainer.steps.programme import Change, Programme
+from pulsetrainer.steps.session import check_model, reach_of
+from pulsetrainer.steps.steering import Steering
+
+KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
+NAMES = ("normal", "bifid", "parvus-et-tardus")
+PULSES = [Pulse(read_pulse(name)) for name in NAMES]
+TAU_S = 100.0
+
+
+@pytest.fixture(scope="module", params=["model.h5", "model-extended.h5"])
+def model(request):
+    """A static model and an extended one."""
+    return pt.load(KEPT / request.param)
+
+
+def _conducted(model, decide, *, rhythm=None, longest_s=900.0, heat=0.0, warms=0.0):
+    """Play everything; return the conductor, the pieces and the parts' currents."""
+    given, parts = [], []
+    conductor = Conductor(
+        extended_of(model),
+        PULSES,
+        reach_of(model, PULSES, (75.0,)),
+        rhythm or Rhythm(),
+        decide,
+        given.append,
+        heat=heat,
+        heated=lambda current, rate: warms * np.cumsum(current**2) / rate,
+        cooling_s=TAU_S,
+    )
+    while not conductor.ended:
+        parts.append(np.concatenate(list(conductor.part(longest_s))))
+        assert len(parts) < 100
+    return conductor, given, parts
+
+
+def _random(seed, minutes=0.5):
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.3, 2.0, 40))
+    return Programme(
+        NAMES,
+        seconds=60 * minutes,
+        changes=[
+            Change(float(t), float(rng.uniform(20, 240)), float(rng.uniform(1, 100)), NAMES[rng.integers(3)])
+            for t in times
+        ],
+    )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_change_is_a_step(model, seed):
+    """Changes of rate, amplitude and pulse, at any time, move the current no faster than the slew limit."""
+    rhythm = Rhythm(0.1, 0.1, 0.2, seed)
+    _, given, parts = _conducted(model, _random(seed), rhythm=rhythm)
+    (current,) = parts
+    assert np.abs(np.diff(current)).max() <= SLEW_A_PER_S / RATE_HZ * (1 + 1e-9)
+    assert current[0] == current[-1] == model.edges[0]
+    assert current.min() >= model.edges[0]
+    assert current.max() <= model.edges[-1]
+    target = np.concatenate([g.target for g in given if g.beat])
+    low, high = reach_of(model, PULSES, (75.0,)).low, reach_of(model, PULSES, (75.0,)).high
+    assert low - 1e-9 <= target.min() <= target.max() <= high + 1e-9
+
+
+def test_beats_follow_each_other_without_a_gap(model):
+    """Sample by sample, and to the rounding of the clock; every interval is the one asked for."""
+    _, given, _ = _conducted(model, Programme(NAMES[:1], rate=83.0, beats=40))
+    beats = [g.beat for g in given if g.beat]
+    assert len(beats) == 40
+    for before, after in itertools.pairwise(beats):
+        assert before.first + before.count == after.first
+        assert after.start_s - before.start_s == pytest.approx(60.0 / 83.0, abs=1e-9)
+        assert 0 <= after.first / RATE_HZ - after.start_s < 1 / RATE_HZ + 1e-9
+
+
+def test_a_key_is_in_the_force_of_the_next_beat(model):
+    """Whatever is pressed while a beat is given out: the beat after it has it."""
+    steering = Steering(Programme(NAMES, rate=75.0, beats=12), [p.own_bpm for p in PULSES])
+    pressed = {3: "+", 5: "<", 7: "p"}
+    seen = []
+
+    def decide(number, time_s):
+        if number in pressed and number not in seen and len(seen_numbers) >= number:
+            seen.append(number)
+            steering.press(pressed[number])
+        return steering(number, time_s)
+
+    seen_numbers: list[int] = []
+    given = []
+
+    def give(piece):
+        given.append(piece)
+        if piece.beat:
+            seen_numbers.append(len(seen_numbers))
+
+    conductor = Conductor(
+        extended_of(model), PULSES, reach_of(model, PULSES, (75.0,)), Rhythm(), decide, give,
+        heat=0.0, heated=lambda current, _rate: np.zeros(current.size), cooling_s=TAU_S,
+    )  # fmt: skip
+    for _ in conductor.part(900.0):
+        pass
+    beats = [g.beat for g in given if g.beat]
+    assert beats[2].interval_s == pytest.approx(0.8)
+    assert beats[3].interval_s == pytest.approx(60 / 80)
+    assert (beats[4].play.amplitude, beats[5].play.amplitude) == (1.0, pytest.approx(0.9))
+    assert beats[7].play.pulse == (beats[6].play.pulse + 1) % 3
+
+
+def test_a_pause_lets_the_force_go_and_comes_back(model):
+    """The current is at its low end, and stays; afterwards the beats go on."""
+
+    def decide(number, time_s):
+        if number < 3 or time_s > 6.0:
+            return Play(0) if time_s < 9.0 else None
+        return Rest()
+
+    _, given, parts = _conducted(model, decide)
+    times = np.arange(parts[0].size) / RATE_HZ
+    quiet = (times > 4.8) & (times < 5.6)
+    assert np.all(parts[0][quiet] == model.edges[0])
+    assert sum(g.beat is not None for g in given) >= 5
+
+
+def test_a_long_session_comes_in_parts_that_end_at_rest(model):
+    """No part is longer than the device stays on, and no beat is lost between two."""
+    _, given, parts = _conducted(model, Programme(NAMES[:1], beats=30), longest_s=12.0)
+    assert len(parts) > 2
+    assert all(part.size <= 12.0 * RATE_HZ and part[-1] == model.edges[0] for part in parts)
+    assert sum(g.beat is not None for g in given) == 30
+
+
+def test_a_hot_coil_gets_a_pause_and_it_is_said(model):
+    """Long enough to cool, before the device would stop by itself."""
+    conductor, given, _ = _conducted(model, Programme(NAMES[:1], beats=30), heat=0.8, warms=0.1)
+    assert conductor.notes
+    rests = [g for g in given if g.beat is None and np.all(g.input == model.edges[0]) and g.input.size > 2000]
+    assert rests
+    assert rests[0].input.size / RATE_HZ == pytest.approx(TAU_S * np.log(HOT / COOL), rel=0.2)
+
+
+def test_the_ledger_finds_what_was_done_to_a_force():
+    """A force that is late, weak and noisy by known amounts is told so, sample by sample counted."""
+    static = pt.load(KEPT / "model.h5")
+    _, given, _ = _conducted(static, Programme(NAMES, rate=75.0, beats=60))
+    ledger = Ledger(NAMES)
+    rng = np.random.default_rng(4)
+    target = np.concatenate([g.target for g in given])
+    time = np.arange(target.size)
+    force = 0.98 * np.interp(time - 0.7, time, target) + 0.02 * rng.normal(size=target.size)
+    begun = 0
+    for piece in given:
+        ledger.give(piece)
+    while begun < time.size:
+        step = int(rng.integers(1, 90))
+        block = slice(begun, begun + step)
+        shown, _, _ = ledger.measure(time[block], force[block])
+        np.testing.assert_array_equal(shown, target[block])
+        begun += step
+    figures, beats = ledger.figures(), ledger.beats("N")
+    assert ledger.count == 60
+    assert figures["beat_timing_max_ms"] == pytest.approx(0.7, abs=0.15)
+    assert np.median(beats.late) == pytest.approx(0.7e-3, abs=2e-5)
+    assert np.median(beats.gain) == pytest.approx(0.98, abs=1e-3)
+    error = np.concatenate([abs(force - target)[g.first : g.first + g.input.size] for g in given if g.beat])
+    full = max(g.target.max() for g in given if g.beat)
+    assert figures["mean_abs_error_percent"] == pytest.approx(100 * error.mean() / full, rel=1e-9)
+    assert figures["max_abs_error_percent"] == pytest.approx(100 * error.max() / full, rel=1e-9)
+    assert figures["augmentation_index_error_percent"] < 3.0
+
+
+def test_lost_samples_are_left_out():
+    """A beat with a gap is judged on what came; one with little left is not judged."""
+    static = pt.load(KEPT / "model.h5")
+    _, given, _ = _conducted(static, Programme(NAMES[:1], beats=6))
+    ledger = Ledger(NAMES[:1])
+    for piece in given:
+        ledger.give(piece)
+    target = np.concatenate([g.target for g in given])
+    sample = np.arange(target.size)
+    beats = [g.beat for g in given if g.beat]
+    lost = (sample >= beats[2].first) & (sample < beats[2].first + 400)
+    lost |= (sample >= beats[4].first + 10) & (sample < beats[4].first + 20)
+    ledger.measure(sample[~lost], target[~lost])
+    found = ledger.beats("N")
+    assert np.isnan(found.gain[2])
+    np.testing.assert_allclose(np.delete(found.gain, 2), 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"rate": 19.0},
+        {"rate": 241.0},
+        {"rate": float("nan")},
+        {"amplitude": 0.0},
+        {"amplitude": 101.0},
+        {"beats": 0},
+        {"seconds": -1.0},
+        {"beats": 5, "seconds": 5.0},
+        {"changes": [Change(1.0, rate=300.0)]},
+        {"changes": [Change(1.0, pulse="normla")]},
+    ],
+)
+def test_what_cannot_be_played_is_refused(options):
+    """Rates outside 20 to 240, more than the reach, no end or two, a pulse that is not there."""
+    with pytest.raises(UsageError):
+        Programme(NAMES, **({"seconds": 60.0} if not {"beats", "seconds"} & set(options) else {}) | options)
+
+
+def test_a_model_of_another_device_is_refused():
+    """Units are looked at, and the reading."""
+    good = pt.load(KEPT / "model.h5")
+    check_model(good)
+    for bad in (
+        replace(good, input_unit="V"),
+        replace(good, output_unit="T"),
+        replace(good, reading="relay"),
+    ):
+        with pytest.raises(DataError):
+            check_model(bad)
