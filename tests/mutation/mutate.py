@@ -220,17 +220,17 @@ def _record(tree: Path, folder: Path, test: str) -> dict[str, Any]:
 def _order(fault: Fault, lines: dict[str, list[str]], times: Times, budget_s: float) -> list[str]:
     """The tests that may notice a fault: those that run its statement, the quickest first.
 
-    What no single test runs (a constant) concerns all tests that run anything in the file, or all there are.
+    What no single test runs (a constant) concerns all tests, first those that run anything in the file.
     What is run while a test is set up may serve the others of its file. What would take longer than the
     budget is left out.
     """
     wanted = lines if fault.at_import else {str(k) for k in fault.lines}
     contexts = {one for line in wanted for one in lines.get(line, [])}
     direct = {one.rsplit(" (", 1)[0] for one in contexts} & times.keys()
-    if fault.at_import and not direct:  # a file of constants
-        direct = set(times)
     shared = {one.split("::")[0] for one in contexts if one.endswith("(setup)")}
-    besides = [name for name in times if name.split("::")[0] in shared and name not in direct]
+    besides = [
+        name for name in times if name not in direct and (fault.at_import or name.split("::")[0] in shared)
+    ]
     order = [one for group in (direct, besides) for one in sorted(group, key=times.__getitem__)]
     return [
         one for one, until in zip(order, accumulate(map(times.get, order)), strict=True) if until < budget_s
