@@ -188,12 +188,19 @@ def _press(
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.errors import UsageError
     from pulsetrainer.files.pulses import read_pulse
+    from pulsetrainer.files.recorder import interrupted
     from pulsetrainer.files.session_recorder import SessionRecorder
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, perform
 
     chosen, rates = asked.decider()
     assert asked.seed is not None
+    job.notes(
+        [
+            f"{left} holds {samples} samples of an interrupted session: it can be read as a run; delete it"
+            for left, samples in interrupted(out)
+        ]
+    )
     rhythm = Rhythm(asked.variability / 100, asked.respiration / 100, asked.ectopic / 100, asked.seed)
     shapes = [read_pulse(name) for name in asked.names]
     dark = "a result in JSON has no live view" if job.screen.as_json else live.why_not()
