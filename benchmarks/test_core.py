@@ -8,12 +8,14 @@ import pytest
 from measuring import in_own_process, seconds, taking_turns
 
 import oracle
+from pulsetrainer.artefacts import Run
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.identification import identify
 from pulsetrainer.core.inversion import invert
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
+from pulsetrainer.steps.identify import identify as identify_run
 
 N, LEVELS = 20_000, 48
 SEEDS = (1, 2, 3, 4, 5)
@@ -92,6 +94,20 @@ def test_forward_is_linear(table, fitted):
         bar="linear: 75",
     )
     assert ratio < 75
+
+
+def test_form_is_chosen_in_no_time(table, job):
+    """Choosing among the forms of the model beside fitting the direct one: less than half of a fit more."""
+    run = Run(time_s=np.arange(N) / 1000.0, input=job.input, output=job.output)
+    took = taking_turns(lambda: identify_run(run, form="auto"), lambda: identify_run(run, form="direct"), 3)
+    table.add(
+        f"identify --form auto, {N} samples",
+        ours=f"{took.ours:.2f} s",
+        baseline=f"{took.baseline:.2f} s, --form direct",
+        figure=f"{1.0 / took.ratio:.2f} of the time",
+        bar="1.6 times",
+    )
+    assert took.ratio >= 1.0 / 1.6
 
 
 def test_identify(table):

@@ -55,6 +55,10 @@ class Fit:
     spacing: str = "even"  # of the levels: "even", or "crowded" where the loop is steep
     stiffness: float = 0.0  # t, how alike the loops are along the diagonal; 0: the density is free
     warning: str = ""  # that this kind of model is the wrong one, in words; empty where it is not
+    masked_samples: int = 0  # wild ones, left out of the fit
+    # of the identification record: what was measured there
+    wild_input: Annotated[FloatArray | None, Data("@input_unit", "input of wild samples", "wild")] = None
+    wild_output: Annotated[FloatArray | None, Data("@output_unit", "output of wild samples", "wild")] = None
     loop: str = ""  # "counterclockwise" | "clockwise" | "butterfly" | "none"; empty in files of 0.1
     notes: tuple[str, ...] = ()  # what a person should know about the fit
 

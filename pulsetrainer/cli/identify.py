@@ -47,11 +47,15 @@ def identify(
     runs: Annotated[list[Path], typer.Argument(help="Runs to fit together.", metavar="RUN.h5...")],
     out: Out,
     levels: Annotated[
-        int,
+        int | None,
         typer.Option(
-            min=2, max=_MOST_LEVELS, help="Levels of the Preisach plane.", envvar=variable("levels")
+            min=2,
+            max=_MOST_LEVELS,
+            help="Levels of the Preisach plane; default: 48, fewer for a short record.",
+            envvar=variable("levels"),
+            show_default=False,
         ),
-    ] = 48,
+    ] = None,
     form: Annotated[
         FormChoice,
         typer.Option(
@@ -141,7 +145,7 @@ def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
     assert fit is not None
     same = (
         "coverage_percent", "smoothing", "input_noise", "false_reversals", "output_uncertainty", "offsets",
-        "spacing", "stiffness", "loop", "warning", "iterations",
+        "spacing", "stiffness", "loop", "masked_samples", "warning", "iterations",
     )  # fmt: skip
     return {
         "output": out,

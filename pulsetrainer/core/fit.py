@@ -7,7 +7,8 @@ whose outputs are shifted against each other get an offset each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -19,7 +20,7 @@ from pulsetrainer.core.forms import Form, Signals, Static, asked_form
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify, offsets_between
 from pulsetrainer.core.initial_state import record_of
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray, Plane, Reading
+from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, Reading
 from pulsetrainer.core.record import Record
 
 CROWDED_MISFIT = 0.02  # of the span, rms: above it, what looks steep is nothing that the operator can follow
@@ -75,10 +76,16 @@ def fit(
     method: Method = "joint",
     smoothing: Smoothing = "auto",
     form: Form | Literal["auto"] = "direct",
+    kept: Sequence[BoolArray] | None = None,
 ) -> Fitted:
     """Fit one operator with ``n_h`` levels on [low, high] to measured inputs and outputs, pairs of (n,).
 
     For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output.
+
+    Parameters
+    ----------
+    kept
+        For each record which samples (n,) count; the others are left out of the fit. None: all.
 
     Raises
     ------
@@ -87,17 +94,17 @@ def fit(
     """
     chosen = asked_form(form, signals, low, high, plain=reading == "continuous" and method == "joint")
     if chosen == "dual":
-        return _dual(signals, low, high, n_h, smoothing)
+        return _dual(signals, low, high, n_h, smoothing, kept)
+    records = _records(signals, low, high, kept)
     if chosen == "signed":
-        records = [record_of(u, y, low, high) for u, y in signals]
         found = identify(records, plane_for(records, low, high, n_h), smoothing=smoothing, signed=True)
         return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
-    records = [record_of(u, y, low, high) for u, y in signals]
     even = Plane.uniform(low, high, n_h)
     plane = even if reading == "relay" else plane_for(records, low, high, n_h)
     offsets = offsets_between(records, plane, reading)
     if np.any(offsets):
-        records = [record_of(u, y - shift, low, high) for (u, y), shift in zip(signals, offsets, strict=True)]
+        moved = [(u, y - shift) for (u, y), shift in zip(signals, offsets, strict=True)]
+        records = _records(moved, low, high, kept)
 
     def on(levels: Plane) -> Fitted:
         found = identify(records, levels, reading=reading, method=method, smoothing=smoothing)
@@ -109,10 +116,25 @@ def fit(
     return fitted
 
 
-def _dual(signals: Signals, low: float, high: float, n_h: int, smoothing: Smoothing) -> Fitted:
+def _records(signals: Signals, low: float, high: float, kept: Sequence[BoolArray] | None) -> list[Record]:
+    """Records of the signals, of which only the samples that are kept count."""
+    records = [record_of(u, y, low, high) for u, y in signals]
+    if kept is None:
+        return records
+    return [replace(r, sample_weight=r.sample_weight * k) for r, k in zip(records, kept, strict=True)]
+
+
+def _dual(
+    signals: Signals,
+    low: float,
+    high: float,
+    n_h: int,
+    smoothing: Smoothing,
+    kept: Sequence[BoolArray] | None,
+) -> Fitted:
     """Fit the operator from output to input."""
     swapped = exchanged(signals)
     bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
-    within = fit(swapped, bottom, top, n_h, smoothing=smoothing)
-    records = tuple(record_of(u, y, low, high) for u, y in signals)
+    within = fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept)
+    records = tuple(_records(signals, low, high, kept))
     return Fitted(within.identified, records, np.zeros(len(records)), "dual")

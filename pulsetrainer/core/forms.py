@@ -46,6 +46,7 @@ BETTER = 0.8
 DESCRIBES = 0.05
 # Where weights of either sign leave more than this share of what the direct form leaves, no more is tried.
 LOOK = 0.85
+_FEWEST = 4 * FOLDS  # samples: below, there are no blocks to hold out
 _LEVELS = 16
 _FIRST = 0.05
 _SMOOTHINGS = (0.025, _FIRST, 0.1)
@@ -77,7 +78,8 @@ def asked_form(
     if form not in ("auto", *FORMS):
         raise ArgumentError(f"form must be auto, {', '.join(FORMS)}, got {form!r}", hint="use auto")
     if form == "auto":
-        return try_all(signals, low, high).form if plain else "direct"
+        enough = sum(u.size for u, _ in signals) >= _FEWEST and any(np.ptp(y) > 0 for _, y in signals)
+        return try_all(signals, low, high).form if plain and enough else "direct"
     if form != "direct" and not plain:
         raise ArgumentError(
             f"the {form} form is fitted jointly, in the continuous reading",

@@ -27,6 +27,9 @@ _ROUNDING = 1e-14
 # Added to the diagonal where the data leave so much open that no end was found: the solution then violates
 # the optimality conditions by about a hundredth of this.
 _LAST_RIDGE = 1e-10
+_ACTIVE_SETS = 30  # times the number of variables
+# Systems after which the exchanges leave the rest to the active set of scipy.
+_SYSTEMS = 200
 # Full exchanges that may fail to reduce the infeasibilities before descent takes over.
 _PATIENCE = 3
 
@@ -44,14 +47,17 @@ def solve(
     rhs: FloatArray,
     *,
     passive: NDArray[np.bool_] | None = None,
-    max_iterations: int = 500,
+    max_iterations: int = _SYSTEMS,
 ) -> NonNegative:
     """Return the non-negative minimiser of x' G x / 2 - f' x for G = ``gram`` (q, q) and f = ``rhs`` (q,).
 
     All variables on the wrong side are exchanged at once, which usually ends within ten systems. Where
     the exchanges stop making progress, Newton steps that never climb go on from there, so they cannot cycle:
     as in Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23, but freeing all variables
-    that descend at once, and putting all to zero at once where that is lower.
+    that descend at once, and putting all to zero at once where that is lower. With fewer samples than
+    variables those steps may be short: each ends where one of hundreds of variables that the data cannot tell
+    apart reaches zero. After ``max_iterations`` systems the active set of ``scipy.optimize.nnls`` ends it,
+    on a root of G: it frees one variable at a time and never returns to a set that it left.
 
     Variables whose diagonal entry is zero never appear in the data and stay at zero. ``passive``
     is a first guess of the positive variables, from a neighbouring problem.
@@ -61,7 +67,7 @@ def solve(
     ArgumentError
         Shapes that do not fit, or numbers that are not finite.
     ConvergenceError
-        More than ``max_iterations`` systems: the matrix is too far from positive definite.
+        No method settled: the matrix is not positive semidefinite.
     """
     rhs = finite_vector("rhs", rhs)
     if gram.shape != (rhs.size, rhs.size) or not np.all(np.isfinite(gram)):
@@ -76,6 +82,10 @@ def solve(
     try:
         return _exchange(_Problem(gram, rhs), rhs, passive, max_iterations)
     except ConvergenceError:
+        pass
+    try:
+        return _active_set(gram, rhs, max_iterations)
+    except RuntimeError:
         # a record of one branch only: no cell is better than its neighbours
         ridge = _LAST_RIDGE * float(np.diagonal(gram).max(initial=0.0))
         return _exchange(
@@ -103,6 +113,16 @@ def _exchange(
             return _descend(problem, np.maximum(x, 0.0), iteration, max_iterations)
         free = free ^ wrong
     raise _unsettled(max_iterations)
+
+
+def _active_set(gram: FloatArray, rhs: FloatArray, used: int) -> NonNegative:
+    """Minimise |A x - b|^2 / 2 with A'A = G and A'b = f, A from the eigenvectors of G (rank, q)."""
+    value, vector = scipy.linalg.eigh(gram)
+    kept = value > _RELATIVE_RIDGE * value[-1]
+    root = np.sqrt(value[kept])
+    a = root[:, None] * vector[:, kept].T
+    x, _ = scipy.optimize.nnls(a, (vector[:, kept].T @ rhs) / root, maxiter=_ACTIVE_SETS * rhs.size)
+    return NonNegative(x, x > 0, used)
 
 
 class _Problem:

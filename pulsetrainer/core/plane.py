@@ -23,6 +23,7 @@ from pulsetrainer.errors import ArgumentError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 Reading = Literal["continuous", "relay"]
 

@@ -102,6 +102,7 @@ def _model(model: Model) -> dict[str, Any]:
         "positive weights": int(np.sum(model.weights > 0)),
         "fit_rms_percent": fit.rms_percent if fit else None,
         "coverage_percent": fit.coverage_percent if fit else None,
+        **({"masked_samples": fit.masked_samples} if fit and fit.masked_samples else {}),
         "extensions": [extension.cause for extension in model.extensions],
     }
 

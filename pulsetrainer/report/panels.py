@@ -160,6 +160,9 @@ def fit(panel: FigureBase, record: Fit, input_quantity: str, output_quantity: st
     loop, below = panel.subplots(2, 1, height_ratios=(2.4, 1.0))
     orbit(loop, record.input, record.output, **GROUND, label="measured")
     orbit(loop, record.input, record.predicted, **MODEL, label="model")
+    if record.wild_input is not None and record.wild_output is not None:
+        wild = {"linestyle": "none", "marker": "x", "markersize": 4.0, "color": VERMILION}
+        loop.plot(record.wild_input, record.wild_output, **wild, label="left out")
     loop.set_xlabel(label(input_quantity, record.input_unit))
     loop.set_ylabel(label(output_quantity, record.output_unit))
     loop.set_title("Identification signal")

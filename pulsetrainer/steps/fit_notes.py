@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pulsetrainer.artefacts import Run
+from pulsetrainer.artefacts import BoolArray, Run
 from pulsetrainer.core.fit import Fitted
 from pulsetrainer.core.forms import leaves_more_than_noise
 from pulsetrainer.diagnosis import velocity
@@ -26,6 +26,15 @@ def of_form(fitted: Fitted, run: Run) -> list[str]:
             "no loop that runs one way fits this record: fitted with weights of either sign (signed form)"
         ]
     return []
+
+
+def of_wild(masks: Sequence[BoolArray]) -> list[str]:
+    """Say how many samples were left out because they are wild."""
+    count, size = sum(int(mask.sum()) for mask in masks), sum(mask.size for mask in masks)
+    if not count:
+        return []
+    are = "sample is" if count == 1 else "samples are"
+    return [f"{count} wild {are} left out of the fit ({100 * count / size:.2g} % of the record)"]
 
 
 def warning(fitted: Fitted, runs: Sequence[Run], asked: str) -> str:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Fit, Model, Run
 from pulsetrainer.artefacts.units import with_unit
-from pulsetrainer.core import input_noise, metrics, uncertainty
+from pulsetrainer.core import input_noise, metrics, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap
 from pulsetrainer.core.fit import Fitted, fit
 from pulsetrainer.core.forms import Form
 from pulsetrainer.core.identification import Method, Smoothing
 from pulsetrainer.core.initial_state import known_from
 from pulsetrainer.core.loop import loop_of
-from pulsetrainer.core.plane import Plane, Reading
+from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps import fit_notes
 from pulsetrainer.steps.asked import EXCITATIONS
@@ -26,6 +27,9 @@ from pulsetrainer.steps.progress import Progress, silent
 
 TRACE_SAMPLES = 6000  # of the record and the fit, kept for the figures
 SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
+_ROUNDS = 3  # of fits, each without the wild samples of the one before
+LEVELS = 48  # where nothing else is asked for
+FEWEST_LEVELS = 4
 WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
 
@@ -33,7 +37,7 @@ WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 def identify(
     runs: Run | Sequence[Run],
     *,
-    levels: int = 48,
+    levels: int | None = None,
     form: Form | Literal["auto"] = "auto",
     reading: Reading = "continuous",
     method: Method = "joint",
@@ -55,7 +59,8 @@ def identify(
     runs
         Measured input and output; all in the same units.
     levels
-        Number of levels n_h; the model has n_h (n_h + 1) / 2 cells.
+        Number of levels n_h; the model has n_h (n_h + 1) / 2 cells. None: 48, or one for every two samples of
+        a record that is shorter.
     form
         "direct", "dual" or "signed"; "auto": the one that predicts blocks that were not fitted, the simplest
         where others are not much better.
@@ -101,6 +106,11 @@ def identify(
     cut = [run.parts(SHORTEST_PART) for run in whole]
     titles = [title for title, parts in zip(titles, cut, strict=True) for _ in parts]
     measured = [part for parts in cut for part in parts]
+    raw = measured
+    tamed = wild.tame([(part.input, part.output) for part in measured])
+    measured = [
+        replace(part, input=t.input, output=t.output) for part, t in zip(measured, tamed, strict=True)
+    ]
     low, high = _reach(titles, measured)
     cleaned = [input_noise.clean(part.input) for part in measured]
     notes += _of_noise(cleaned, measured[0].input_unit)
@@ -108,16 +118,11 @@ def identify(
     progress(0.1)
     if smoothing is None:
         smoothing = 0.0 if reading == "relay" else "auto"
-    fitted = fit(
-        [(part.input, part.output) for part in measured],
-        low,
-        high,
-        levels,
-        reading=reading,
-        method=method,
-        smoothing=smoothing,
-        form=form,
-    )
+    n_h = _levels(measured, notes) if levels is None else levels
+    on = partial(fit, low=low, high=high, n_h=n_h, reading=reading, method=method, smoothing=smoothing)
+    signals = [(part.input, part.output) for part in measured]
+    fitted, masks = _without_wild(on, signals, form, [t.wild for t in tamed])
+    notes += fit_notes.of_wild(masks)
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += fit_notes.of_form(fitted, measured[0])
     notes += _of_offsets(titles, fitted, measured)
@@ -138,7 +143,55 @@ def identify(
     notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
     warning = fit_notes.warning(fitted, measured, form)
     progress(1.0)
-    return _model(fitted, measured, covered, ensemble, cleaned, tuple(notes), warning)
+    model = _model(fitted, measured, covered, ensemble, cleaned, tuple(notes), warning)
+    return _with_wild(model, raw[0], masks)
+
+
+def _without_wild(
+    on: Callable[..., Fitted],
+    signals: list[tuple[FloatArray, FloatArray]],
+    form: Form | Literal["auto"],
+    masks: list[BoolArray],
+) -> tuple[Fitted, list[BoolArray]]:
+    """Fit without the samples that are known to be wild, then without those that its residual shows.
+
+    Whether input or output is wild there a residual does not tell: both are taken between their neighbours.
+    """
+    fitted = on(signals, form=form, kept=[~mask for mask in masks] if any(map(np.any, masks)) else None)
+    span = float(np.ptp(np.concatenate([y for _, y in signals])))
+    for _ in range(_ROUNDS):
+        more = wild.off(fitted.residuals, span)
+        if not any(np.any(new & ~mask) for new, mask in zip(more, masks, strict=True)):
+            break
+        masks = [mask | new for mask, new in zip(masks, more, strict=True)]
+        signals = [
+            (wild.repaired(u, mask), wild.repaired(y, mask))
+            for (u, y), mask in zip(signals, masks, strict=True)
+        ]
+        fitted = on(signals, form=fitted.form, kept=[~mask for mask in masks])
+    return fitted, masks
+
+
+def _with_wild(model: Model, run: Run, masks: Sequence[BoolArray]) -> Model:
+    """Return the model with what was left out of its fit, of the first run as it was measured."""
+    assert model.fit is not None
+    first = masks[0]
+    fit = replace(
+        model.fit,
+        masked_samples=sum(int(mask.sum()) for mask in masks),
+        wild_input=run.input[first] if first.any() else None,
+        wild_output=run.output[first] if first.any() else None,
+    )
+    return replace(model, fit=fit)
+
+
+def _levels(runs: Sequence[Run], notes: list[str]) -> int:
+    """Return as many levels as the records support, and say so where they are few."""
+    samples = sum(run.input.size for run in runs)
+    supported = max(samples // 2, FEWEST_LEVELS)
+    if supported < LEVELS:
+        notes.append(f"the record is short: {samples} samples support {supported} levels, not {LEVELS}")
+    return min(supported, LEVELS)
 
 
 def input_range(run: Run) -> tuple[float, float]:

@@ -196,7 +196,7 @@ def _described() -> dict[str, dict[str, list[str]]]:
 def _compare(group: h5py.Group, rows: dict[str, list[str]], pages: dict, where: str) -> int:
     """Hold one group of a file against its table, and its parts against theirs; return how many were held."""
     held = 0
-    scales = {"time", "level", "cell", "repeat", "group", "beat", "question"}
+    scales = {"time", "level", "cell", "repeat", "group", "beat", "question", "wild"}
     described = {name.partition("/")[0] for name in rows}
     unknown = set(group) - described - scales
     assert not unknown, f"{where}: {unknown} are in the file, not on the page"

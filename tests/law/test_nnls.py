@@ -34,6 +34,16 @@ def test_same_objective_as_scipy(problem):
 
 
 @given(problems())
+def test_the_active_set_ends_what_exchanges_leave(problem):
+    """After a single system scipy goes on, on a root of the normal equations, to the same objective."""
+    matrix, right = problem
+    x = nnls.solve(matrix.T @ matrix, matrix.T @ right, max_iterations=1).x
+    _, norm = optimize.nnls(matrix, right, maxiter=10_000)
+    assert np.all(x >= 0)
+    assert np.sum((matrix @ x - right) ** 2) == pytest.approx(norm**2, rel=1e-6, abs=1e-9 * (right @ right))
+
+
+@given(problems())
 def test_same_minimiser_as_scipy_where_there_is_one(problem):
     """A well-conditioned problem has one minimiser, and both find it."""
     matrix, right = problem

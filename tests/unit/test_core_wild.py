@@ -1,0 +1,129 @@
+"""Wild samples are found, left out and counted; clean records lose none."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import form_devices as devices
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from pulsetrainer.core import wild
+from pulsetrainer.report.figures import draw
+
+KINDS = {
+    "normal": lambda rng, n: rng.normal(size=n),
+    "exponential": lambda rng, n: rng.laplace(size=n) / np.sqrt(2.0),
+    "even": lambda rng, n: rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), n),
+    "coloured": lambda rng, n: np.convolve(rng.normal(size=n), np.ones(5) / np.sqrt(5.0), "same"),
+    "none": lambda rng, n: 0.0 * rng.normal(size=n),
+}
+
+
+def clean(seed, n=2000, kind="normal"):
+    """A device, its input and its output with noise of 0.3 % of the span."""
+    rng = np.random.default_rng(seed)
+    device = (devices.play_sum, devices.stop_sum)[seed % 2](rng)
+    u = devices.record(rng, n)
+    y = device(u)
+    return device, u, y + 0.003 * np.ptp(y) * KINDS[kind](rng, n), rng
+
+
+def spoilt(values, share, rng):
+    """The same with a share of wild samples, anywhere within three times the range."""
+    span = np.ptp(values)
+    at = rng.random(values.size) < share
+    middle = 0.5 * (values.min() + values.max())
+    return np.where(at, middle + rng.uniform(-1.5, 1.5, values.size) * span, values), at
+
+
+def fitted(u, y):
+    """A model of a record."""
+    return pt.identify(pt.Run(time_s=np.arange(u.size) / 100.0, input=u, output=y), levels=16)
+
+
+@cache
+def unspoilt(seed):
+    """Error of the model of a clean record."""
+    device, u, y, _ = clean(seed)
+    return error(fitted(u, y), device)
+
+
+def error(model, device, seed=0):
+    """Error on a clean held-out signal, in percent of the span."""
+    turns = np.random.default_rng(seed).uniform(0.0, 1.0, 60)
+    u = np.interp(np.linspace(0, 62, 3000), np.arange(63), np.concatenate(([0.0, 1.0, 0.0], turns)))
+    y = device(u)
+    return 100.0 * np.sqrt(np.mean((model.predict(u) - y) ** 2)) / np.ptp(y)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_of_a_clean_record_is_wild(kind):
+    """At most one sample of ten thousand, of input, output and residual, under noise of any kind."""
+    count = size = 0
+    for seed in range(100, 104):
+        device, u, y, _ = clean(seed, 10_000, kind)
+        (found,) = wild.tame([(u, y)])
+        (off,) = wild.off([y - device(u)], float(np.ptp(y)))
+        count += int(np.count_nonzero(found.wild | off))
+        size += u.size
+    assert count <= size / 10_000
+
+
+def test_coarse_steps_are_not_wild():
+    """A converter that flickers between two steps of 5 % of the span."""
+    _, u, y, rng = clean(101, 10_000)
+    step = 0.05 * np.ptp(y)
+    coarse = step * np.round((y + 0.003 * rng.normal(size=y.size)) / step)
+    (found,) = wild.tame([(u, coarse)])
+    assert not found.wild.any()
+
+
+def test_a_reversal_curve_that_saturates_for_one_sample_is_real():
+    """A short excursion of the input that the output's memory shows is kept."""
+    device, _, _, _ = clean(100)
+    back = np.linspace(0.0, 0.95, 30)
+    u = np.concatenate([np.concatenate(([1.0], np.linspace(b, b + 0.3, 20))) for b in 0.7 * back])
+    u = np.concatenate(([0.0], u))
+    assert wild.isolated(u).any()
+    (found,) = wild.tame([(u, device(u))])
+    np.testing.assert_array_equal(found.input, u)
+
+
+@pytest.mark.parametrize("share", [0.003, 0.01, 0.03])
+@pytest.mark.parametrize("where", ["input", "output"])
+def test_wild_samples_do_not_move_the_fit(share, where):
+    """Held-out error on clean data at most 1.1 times that of the clean record, over three devices."""
+    ratios = []
+    for seed in range(200, 203):
+        device, u, y, rng = clean(seed)
+        bad, at = spoilt(u if where == "input" else y, share, rng)
+        model = fitted(bad, y) if where == "input" else fitted(u, bad)
+        assert model.fit.masked_samples >= 0.8 * at.sum()
+        ratios.append(error(model, device) / unspoilt(seed))
+    assert np.median(ratios) <= 1.1
+
+
+def test_what_was_left_out_is_counted_kept_and_drawn(tmp_path):
+    """In the note, in the file and in the figure."""
+    _, u, y, rng = clean(300)
+    bad, _ = spoilt(y, 0.01, rng)
+    model = fitted(u, bad)
+    count = model.fit.masked_samples
+    assert any(str(count) in note and "wild" in note for note in model.fit.notes)
+    pt.save(model, tmp_path / "m.h5")
+    again = pt.load(tmp_path / "m.h5").fit
+    assert again.masked_samples == count == again.wild_output.size == again.wild_input.size
+    lines = [line for axes in draw(model).axes for line in axes.get_lines()]
+    assert any(line.get_label() == "left out" for line in lines)
+
+
+def test_a_median_of_neighbours_is_what_it_says():
+    """Isolated samples against a loop over windows: one spike among slow samples, and none."""
+    u = np.linspace(0.0, 1.0, 200)
+    assert not wild.isolated(u).any()
+    u[77] = 3.0
+    assert np.flatnonzero(wild.isolated(u)).tolist() == [77]
+    assert wild.repaired(u, wild.isolated(u))[77] == pytest.approx(0.5 * (u[76] + u[78]))
+    assert not wild.isolated(u[:40]).any()
