@@ -22,6 +22,7 @@ class Cause:
     parameters: tuple[Parameter, ...] = ()
     confounded_with: tuple[str, ...] = ()
     text: str = ""  # in words
+    doubts: tuple[str, ...] = ()  # what speaks against a cause that was found, in words
 
 
 @dataclass(frozen=True, slots=True)

@@ -122,6 +122,8 @@ def shown(unit: str) -> str:
 def with_seconds(seconds: float) -> str:
     """Return a time in the unit in which it is easily read: ``2.5 ms``, ``20 ns``, ``173 s``."""
     size = abs(seconds)
+    if size >= 100.0:
+        return f"{seconds:.0f} s"
     for unit, one in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("ps", 1e-12)):
         if size >= one:
             return f"{seconds / one:.3g} {unit}"

@@ -67,7 +67,15 @@ def _show(job: Job, found: Diagnosis) -> None:
 def _payload(found: Diagnosis) -> dict[str, Any]:
     """Return the contract's JSON object."""
     levels = ("rms", "rms_percent", "noise_percent", "static_percent", "extended_percent", "floor_percent")
-    figures = ("found", "p_value", "explains_percent", "confounded_with", "held_out_gain_percent", "text")
+    figures = (
+        "found",
+        "p_value",
+        "explains_percent",
+        "confounded_with",
+        "held_out_gain_percent",
+        "text",
+        "doubts",
+    )
     return {
         "verdict": found.verdict,
         "quick": found.quick,

@@ -44,7 +44,9 @@ def diagnosis_of(state: State) -> Diagnosis:
         floor_percent=state.floor.rms * percent,
         causes=tuple(_cause(finding, words) for finding in state.findings),
         evidence=tuple(wording.sentence(one, words) for one in state.evidence),
-        next_experiment=wording.advice(state.advice),
+        next_experiment=wording.advice(
+            state.advice, wording.Bench(scale, model.input_unit, state.question.timed, given.ours)
+        ),
         profiles=_profiles(state, words),
         time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
         input=scale.inputs(problem.bins.average([r.input for r in problem.records]))[thin],
@@ -105,6 +107,7 @@ def _cause(finding: Finding, words: Words) -> Cause:
         parameters=_parameters(finding.parameters, words),
         confounded_with=finding.confounded_with,
         text=wording.cause_text(finding, words),
+        doubts=tuple(wording.DOUBTS[one] for one in finding.doubts),
     )
 
 

@@ -45,7 +45,11 @@ def question_of(
             stamps.append(times)
         if not run.complete:
             notes.append(f"{name} is incomplete; diagnosing the {run.input.size} samples it has")
-    given = Given(model, runs[0].input_quantity, runs[0].output_quantity)
+    ours = all(
+        run.reference is not None and (run.input_quantity, run.output_quantity) == ("current", "force")
+        for run in runs
+    )
+    given = Given(model, runs[0].input_quantity, runs[0].output_quantity, ours)
     return Question(records, low, high, rng, quick, progress, given, tuple(notes), stamps)
 
 

@@ -26,13 +26,14 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
 # Inputs in shares of the range, speeds in ranges a second, times in s
 _NESTED = (0.0, 1.0, 0.1, 0.9, 0.2, 0.8, 0.3, 0.7, 0.0)
-_RATES = (0.5, 4.0, 1.5, 8.0)
-_LEVELS = (0.0, 0.9, 0.3, 0.7, 0.1, 0.0)
-_FAST, _HOLD_S = 8.0, 3.0
-_BIASES, _WIDTH = (0.1, 0.3, 0.5, 0.7), 0.15
-_CYCLES = (0.0, *(0.8, 0.2) * 20, 0.0)
-_CYCLE_RATES = (1.5, 6.0)
-_HEATING_S = 30.0
+RATES = (0.5, 4.0, 1.5, 8.0)
+LEVELS = (0.0, 0.9, 0.3, 0.7, 0.1, 0.0)
+_FAST, HOLD_S = 8.0, 3.0
+BIASES, WIDTH = (0.1, 0.3, 0.5, 0.7), 0.15
+CYCLE = (0.8, 0.2)
+_CYCLES = (0.0, *CYCLE * 20, 0.0)
+_CYCLE_RATES = (1.5, 4.0)
+HEATING_S = 30.0
 
 
 @dataclass(frozen=True)
@@ -70,20 +71,18 @@ def _experiments() -> dict[str, FloatArray]:
         return np.full(round(seconds * LIMITS.experiment_Hz), level)
 
     steps = [
-        part
-        for last, level in pairwise(_LEVELS)
-        for part in (path((last, level), _FAST), hold(level, _HOLD_S))
+        part for last, level in pairwise(LEVELS) for part in (path((last, level), _FAST), hold(level, HOLD_S))
     ]
     biases = [
-        path((*above, bias, bias + _WIDTH, bias, bias + _WIDTH, bias, 0.0), 1.0)
-        for bias in _BIASES
+        path((*above, bias, bias + WIDTH, bias, bias + WIDTH, bias, 0.0), 1.0)
+        for bias in BIASES
         for above in ((0.0,), (0.0, 1.0))
     ]
     loop = path((0.0, 1.0, 0.0), 1.0)
     rise, fall = path((0.0, 1.0), 1.0), path((1.0, 0.0), 1.0)
-    heating = (loop, rise, hold(1.0, _HEATING_S), fall, loop, hold(0.0, _HEATING_S), loop)
+    heating = (loop, rise, hold(1.0, HEATING_S), fall, loop, hold(0.0, HEATING_S), loop)
     return {
-        "nested loops": np.concatenate([path(_NESTED, rate) for rate in _RATES]),
+        "nested loops": np.concatenate([path(_NESTED, rate) for rate in RATES]),
         "steps and holds": np.concatenate(steps),
         "equal minor loops": np.concatenate(biases),
         "equal cycles": np.concatenate([path(_CYCLES, rate) for rate in _CYCLE_RATES]),

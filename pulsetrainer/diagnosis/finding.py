@@ -30,4 +30,5 @@ class Finding:
     parameters: tuple[Estimate, ...] = ()
     confounded_with: tuple[str, ...] = ()
     held_out_gain_percent: float = 0.0  # of the reducible part; NaN where it was not measured
+    doubts: tuple[str, ...] = ()  # what speaks against it: see ``wording.DOUBTS``
     seen: Evidence | None = None  # on the raw data, or in what the model as given leaves

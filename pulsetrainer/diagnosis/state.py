@@ -31,6 +31,7 @@ class Given:
     model: Model
     input_quantity: str = "input"
     output_quantity: str = "output"
+    ours: bool = False  # recorded by this program, which can play the experiments that it proposes
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,15 @@ The one place where a diagnosis is put into English, but for the texts that a ca
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
+from pulsetrainer.artefacts.units import with_seconds, with_unit
+from pulsetrainer.diagnosis import experiment
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.scale import Scale
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 # What evidence says, by its kind: figures in braces, and {input} and {output} for what was measured
 TEXTS: Mapping[str, str] = {
@@ -22,6 +27,11 @@ TEXTS: Mapping[str, str] = {
         "explained. What gives it away: {signature}."
     ),
     "extended": "With these causes in the model, {left:.3f} % of the span remains.",
+    "not accepted": (
+        "{names} would explain {explains:.0f} % of the error that can be explained, more than noise does "
+        "(p = {p:.3f}), but refitted with all weights it is too small to matter, or does not predict blocks "
+        "that were left out. It is not named."
+    ),
     "largest": "The remaining error is largest at {names} {at:.3g}, {times:.1f} times its smallest value.",
     "quick": "Quick screen: nothing was refitted, so strengths are linearised and come out too small.",
     "lacks": "The recording is limited: {names}.",
@@ -47,13 +57,9 @@ ADVICE: Mapping[str, str] = {
     "tied, quick": "Run the full diagnosis: a quick screen cannot distinguish between {names}.",
     "tied": (
         "To tell {names} apart, record {experiment}. There the two most alike differ by {there:.2g} % of "
-        "the span (rms, weights refitted); on this recording they differ by {here:.2g} %. The diagnostic "
-        "signal includes it: pulsetrainer capture diagnostic."
+        "the span (rms, weights refitted); on this recording they differ by {here:.2g} %.{command}"
     ),
-    "lacks": (
-        "Make a recording with several rates, holds and repeats (pulsetrainer capture diagnostic -o run.h5)"
-        " and diagnose that; this one has limits: {names}."
-    ),
+    "lacks": "This recording has limits: {names}. Record {missing}, and diagnose that.{command}",
     "unknown": (
         "No known cause fits. Repeat the recording to see whether the remaining error repeats; if it does, "
         "vary one thing at a time: temperature, load, amplitude."
@@ -68,18 +74,76 @@ ADVICE: Mapping[str, str] = {
         "diagnose with the new model."
     ),
 }
+DOUBTS: Mapping[str, str] = {
+    "predicts worse": "with it, blocks that were left out are predicted worse than without it",
+    "spans zero": "the interval of its strength spans zero",
+    "at bound": "a parameter sits at the end of the range in which it was sought",
+}
+OURS = " The diagnostic signal includes it: pulsetrainer capture diagnostic -o run.h5."
 LACKS: Mapping[str, str] = {
     "rates": "only one rate of change",
     "holds": "no holds",
-    "length": "less than 20 s",
+    "length": "few crossings of the range",
+}
+# What to record, with {numbers} for the bench: see ``Bench.numbers``
+MISSING: Mapping[str, str] = {
+    "rates": "the same loops at {slow}, {middle} and {fast}",
+    "holds": "stops of {hold} at {levels}",
+    "length": "{short} or more",
 }
 EXPERIMENTS: Mapping[str, str] = {
-    "nested loops": "nested loops at 0.5, 1.5, 4 and 8 ranges a second",
-    "steps and holds": "fast steps to five levels with holds of three seconds",
-    "equal minor loops": "equal minor loops at four levels, each reached from below and from above",
-    "equal cycles": "twenty equal slow cycles and twenty fast ones",
-    "heating": "major loops before and after half a minute at the top, and again after half a minute at rest",
+    "nested loops": "nested loops between {low} and {high} at {slow}, {middle}, {quick} and {fast}",
+    "steps and holds": "steps at {fast} to {levels}, each followed by a stop of {hold}",
+    "equal minor loops": "minor loops {width} wide from {biases}, each reached from below and from above",
+    "equal cycles": "twenty equal cycles between {bottom} and {top} at {middle}, and twenty at {quick}",
+    "heating": "major loops before and after {heating} at {high}, and again after {heating} at {low}",
 }
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What advice is put in terms of: the device that was recorded."""
+
+    scale: Scale
+    unit: str = "1"  # of the input
+    timed: bool = True
+    ours: bool = False  # recorded by this program, which plays experiments itself
+
+    def numbers(self) -> dict[str, str]:
+        """Levels, rates and times of the experiments, to be set on that bench."""
+        rates = dict(zip(("slow", "middle", "quick", "fast"), sorted(experiment.RATES), strict=True))
+        times = {"hold": experiment.HOLD_S, "heating": experiment.HEATING_S, "short": LIMITS.short_s}
+        shares = {"low": 0.0, "high": 1.0, "bottom": min(experiment.CYCLE), "top": max(experiment.CYCLE)}
+        return {
+            **{name: self._level(share) for name, share in shares.items()},
+            "levels": self._levels(experiment.LEVELS[1:-1]),
+            "biases": self._levels(experiment.BIASES),
+            "width": with_unit(f"{experiment.WIDTH * self.scale.reach:.3g}", self.unit),
+            **{name: self._rate(one) for name, one in rates.items()},
+            **{name: self._time(one) for name, one in times.items()},
+        }
+
+    def _level(self, share: float) -> str:
+        return with_unit(self._number(share), self.unit)
+
+    def _levels(self, shares: Sequence[float]) -> str:
+        *rest, last = [self._number(share) for share in shares]
+        return with_unit(f"{', '.join(rest)} and {last}", self.unit)
+
+    def _number(self, share: float) -> str:
+        value = self.scale.low + share * self.scale.reach
+        return f"{0.0 if abs(value) < LIMITS.same_value * self.scale.reach else value:.4g}"
+
+    def _rate(self, ranges: float) -> str:
+        if not self.timed:
+            return f"{ranges / min(experiment.RATES):.3g} times the slowest rate"
+        per_second = "1/s" if self.unit == "1" else f"{self.unit}/s"
+        return with_unit(f"{ranges * self.scale.reach / self.scale.second:.3g}", per_second)
+
+    def _time(self, seconds: float) -> str:
+        if not self.timed:
+            return "several times as long as a loop takes"
+        return with_seconds(seconds * self.scale.second)
 
 
 def sentence(one: Evidence, words: Mapping[str, str]) -> str:
@@ -110,14 +174,25 @@ def cause_text(finding: Finding, words: Mapping[str, str]) -> str:
     return finding.cause.title.format(**{"input": "input", "output": "output", **words})
 
 
-def advice(one: Evidence) -> str:
-    """Return what to measure next, as a sentence."""
+def advice(one: Evidence, bench: Bench) -> str:
+    """Return what to measure next, as a sentence, in numbers of the bench."""
+    numbers = bench.numbers()
     tied = one.kind == "tied"  # its first name is that of the experiment
-    names, experiment = (one.names[1:], EXPERIMENTS[one.names[0]]) if tied else (one.names, "")
-    return ADVICE[one.kind].format(names=_listed(names), experiment=experiment, **one.figures)
+    names = one.names[1:] if tied else one.names
+    return ADVICE[one.kind].format(
+        names=_listed(names),
+        experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
+        missing=_joined([MISSING[name].format(**numbers) for name in names if name in MISSING]),
+        command=OURS if bench.ours else "",
+        **one.figures,
+    )
 
 
 def _listed(names: Sequence[str]) -> str:
     """Return ``a, b and c``; what a record lacks is spelled out."""
-    *rest, last = [LACKS.get(name, name) for name in names] or [""]
+    return _joined([LACKS.get(name, name) for name in names])
+
+
+def _joined(words: Sequence[str]) -> str:
+    *rest, last = words or [""]
     return f"{', '.join(rest)} and {last}" if rest else last

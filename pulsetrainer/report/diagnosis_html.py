@@ -58,7 +58,8 @@ def render_diagnosis(
 def headline(found: Diagnosis) -> str:
     """Return the verdict as one sentence for a technician."""
     if found.verdict == "none":
-        return "These runs show nothing wrong with the model."
+        limits = ", but they could not have shown everything: see what they lack" if found.lacks else ""
+        return f"These runs show nothing wrong with the model{limits}."
     if found.verdict == "unknown":
         return "Something is wrong that no known cause explains."
     cause = next(one for one in found.causes if one.cause == found.verdict)
@@ -74,9 +75,10 @@ def _words(one: Cause) -> dict[str, str]:
         + (f" (95 %: {p.lower:.3g} to {p.upper:.3g})" if math.isfinite(p.lower) and p.lower < p.upper else "")
         for p in one.parameters
     )
+    doubt = f" In doubt: {'; '.join(one.doubts)}." if one.doubts else ""
     return {
         "id": one.cause,
-        "text": f"{one.text[:1].upper()}{one.text[1:]}",
+        "text": f"{one.text[:1].upper()}{one.text[1:]}{doubt}",
         "parameters": parameters,
         "tied": ", ".join(one.confounded_with),
     }
@@ -97,7 +99,7 @@ def _row(one: Cause) -> dict[str, str | Number]:
     measured = one.found and math.isfinite(one.held_out_gain_percent)
     return {
         "id": one.cause,
-        "found": "yes" if one.found else "no",
+        "found": ("in doubt" if one.doubts else "yes") if one.found else "no",
         "p": Number("") if one.p_value is None else number(one.p_value, f"{one.cause}.p_value", ".3f"),
         "explains": number(one.explains_percent, f"{one.cause}.explains_percent"),
         "gain": number(one.held_out_gain_percent, f"{one.cause}.held_out_gain_percent", ".1f")

@@ -64,14 +64,15 @@ def parameter(one: Parameter) -> str:
 def _said(one: Cause) -> str:
     parameters = "; ".join(map(parameter, one.parameters))
     tied = f"; could equally be {' or '.join(one.confounded_with)}" if one.confounded_with else ""
-    return f"{one.text}{': ' if parameters else ''}{parameters}{tied}"
+    doubt = f"; in doubt: {'; '.join(one.doubts)}" if one.doubts else ""
+    return f"{one.text}{': ' if parameters else ''}{parameters}{tied}{doubt}"
 
 
 def _row(one: Cause) -> tuple[Any, ...]:
     measured = one.found and math.isfinite(one.held_out_gain_percent)
     return (
         one.cause,
-        one.found,
+        "in doubt" if one.found and one.doubts else one.found,
         None if one.p_value is None else f"{one.p_value:.3f}",
         one.explains_percent,
         one.held_out_gain_percent if measured else None,

@@ -439,9 +439,38 @@ def test_every_kind_of_evidence_and_advice_has_words():
         assert "{" not in said
     for kind in wording.ADVICE:
         names = ("heating", "delay", "creep", "step") if kind == "tied" else ("delay", "creep", "step")
-        said = wording.advice(Evidence(kind, figures=figures, names=names))
-        assert "{" not in said
-        assert ("delay, creep and step" in said) is (kind in ("tied", "tied, quick", "lacks"))
+        for bench in (wording.Bench(Scale(), "A", ours=True), wording.Bench(Scale(), timed=False)):
+            said = wording.advice(Evidence(kind, figures=figures, names=names), bench)
+            assert "{" not in said
+            assert ("delay, creep and step" in said) is (kind in ("tied", "tied, quick", "lacks"))
+            # only our own device plays our signals
+            assert ("capture" in said) is (bench.ours and kind in ("tied", "lacks"))
+
+
+@pytest.mark.parametrize("name", wording.EXPERIMENTS)
+def test_every_experiment_is_told_in_numbers_of_the_bench(name):
+    """A piezo from 20 to 120 V whose second is 2 ms: volts, volts a second, milliseconds; never amperes."""
+    bench = wording.Bench(Scale(low=20.0, reach=100.0, second=0.002), "V")
+    figures = {"there": 1.0, "here": 0.5}
+    said = wording.advice(Evidence("tied", figures=figures, names=(name, "delay", "creep")), bench)
+    assert " V" in said
+    assert " A" not in said
+    told = {
+        "nested loops": ["between 20 V and 120 V", "2.5e+04 V/s", "4e+05 V/s"],
+        "steps and holds": ["110, 50, 90 and 30 V", "6 ms"],
+        "equal minor loops": ["15 V wide", "from 30, 50, 70 and 90 V"],
+        "equal cycles": ["between 40 V and 100 V", "7.5e+04 V/s"],
+        "heating": ["60 ms at 120 V", "60 ms at 20 V"],
+    }
+    assert [words for words in told[name] if words not in said] == []
+
+
+def test_what_a_record_lacks_is_asked_for_in_numbers():
+    """Rates, stops and length, for a slow bench in millimetres."""
+    bench = wording.Bench(Scale(low=0.0, reach=2.0, second=100.0), "mm")
+    said = wording.advice(Evidence("lacks", names=("rates", "holds", "length")), bench)
+    for words in ("0.01 mm/s", "0.16 mm/s", "300 s", "1.8, 0.6, 1.4 and 0.2 mm", "2000 s or more"):
+        assert words in said, said
 
 
 def test_evidence_names_its_cause_and_its_record():

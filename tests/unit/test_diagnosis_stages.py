@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pulsetrainer.diagnosis import residual, velocity
+from pulsetrainer.diagnosis import residual, velocity, wording
 from pulsetrainer.diagnosis.causes import condition_change, library
+from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.congruency import Contrast
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
@@ -97,7 +98,10 @@ class StillFloor(Floor):
 
 FLOOR = StillFloor(count=100, span=1.0, noise=1.0, white=1.0)
 PROBLEM = SimpleNamespace(
-    records=("one",), measured=np.asarray([0.0, 1.0]), plane=SimpleNamespace(low=0.0, high=2.0)
+    records=("one",),
+    frames=(Frame(1e-3, np.zeros(10_000), 1.0, 1.0),),
+    measured=np.asarray([0.0, 1.0]),
+    plane=SimpleNamespace(low=0.0, high=2.0),
 )
 
 
@@ -529,6 +533,47 @@ def test_at_one_rate_all_that_widen_the_loop_are_one(monkeypatch):
     assert _rivals(monkeypatch, 999.0, lacks=(residual.RATES,), name="creep")[0] == ()
 
 
+TAU = Estimate("tau", 0.02, "s", 0.01, 0.03)
+
+
+@pytest.mark.parametrize(
+    ("gain", "interval", "value", "doubts"),
+    [
+        (0.9, (0.01, 0.03), 0.02, ()),
+        (-0.27, (0.01, 0.03), 0.02, ("predicts worse",)),
+        (0.9, (0.0, 0.03), 0.02, ("spans zero",)),
+        (0.9, (0.01, 0.5), 0.5, ("at bound",)),
+        (-0.1, (0.0, 0.0), 0.0, ("predicts worse", "spans zero", "at bound")),
+    ],
+)
+def test_what_speaks_against_a_cause_is_written_beside_it(monkeypatch, gain, interval, value, doubts):
+    """A loss on blocks left out, an interval that spans zero, a parameter on its bound; said in words."""
+    monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
+    current = replace(_fit(300.0), terms=(Term(CAUSE["field-lag"], (value,)),))
+    state = _state(
+        current,
+        without={"field-lag": _fit(800.0)},
+        p_values={"field-lag": 0.006},
+        estimates={"field-lag": (replace(TAU, lower=interval[0], upper=interval[1]),)},
+        held_out=HeldOut(gain),
+    )
+    (found,) = rivals.stage(state).findings
+    assert found.doubts == doubts
+    assert all(len(wording.DOUBTS[one]) > 10 for one in doubts)
+
+
+def test_a_score_that_was_not_borne_out_is_explained_where_nothing_is_found(monkeypatch):
+    """The table shows its p-value: a sentence says why it is not named."""
+    scores = Screen((_score("thermal-drift", 900.0, 0.005), _score("step", 800.0, 0.005)))
+    (one,) = (e for e in _accounted(monkeypatch, verdict="none", scores=scores) if e.kind == "not accepted")
+    assert one.names == ("thermal-drift",)
+    assert one.figures["p"] == 0.005
+    kinds = [e.kind for e in _accounted(monkeypatch, verdict="creep", scores=scores)]
+    assert "not accepted" not in kinds
+    scores = Screen((_score("thermal-drift", 900.0, 0.02),))
+    assert "not accepted" not in [e.kind for e in _accounted(monkeypatch, verdict="none", scores=scores)]
+
+
 def test_every_cause_gets_a_finding(monkeypatch):
     """With p-value, share, interval, rivals and held-out gain; those only screened with their score."""
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ("delay",))
@@ -537,11 +582,11 @@ def test_every_cause_gets_a_finding(monkeypatch):
         scores=Screen((_score("step", 50.0, 0.4), _score("field-lag", 1.0))),
         without={"field-lag": _fit(800.0), "load-dependence": _fit(301.0)},
         p_values={"field-lag": 0.006, "load-dependence": 0.002},
-        estimates={"field-lag": ("tau",), "load-dependence": ("k",)},
+        estimates={"field-lag": (TAU,), "load-dependence": (TAU,)},
         held_out=HeldOut(0.9),
     )
     lag, load, step = rivals.stage(state).findings
-    assert (lag.cause.id, lag.found, lag.p_value, lag.parameters) == ("field-lag", True, 0.006, ("tau",))
+    assert (lag.cause.id, lag.found, lag.p_value, lag.parameters) == ("field-lag", True, 0.006, (TAU,))
     assert (lag.explains_percent, lag.held_out_gain_percent) == (pytest.approx(50.0), pytest.approx(90.0))
     assert (lag.confounded_with, load.confounded_with) == (("delay",), ())
     assert (step.cause.id, step.found, step.p_value, step.explains_percent) == (
@@ -633,7 +678,7 @@ def _accounted(monkeypatch, **more):
     monkeypatch.setattr(residual, "groups", lambda problem: groups)
     monkeypatch.setattr(residual, "rms_by", lambda group, left: np.asarray(left))
     current = SimpleNamespace(residual=more.pop("left", (1.0, 1.6)), rms=0.02)
-    baseline = SimpleNamespace(rms=0.05, residual=(1.0, 1.6))
+    baseline = SimpleNamespace(rms=0.05, residual=(1.0, 1.6), squares=1100.0)
     state = replace(
         _state(_fit(1.0)), baseline=baseline, current=current if more.pop("extended", False) else baseline
     )

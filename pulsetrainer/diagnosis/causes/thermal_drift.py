@@ -26,7 +26,7 @@ class ThermalDrift(Cause):
     """A gain that falls with heat."""
 
     id = "thermal-drift"
-    title = "the {output} falls with heat, a slow average of the squared {input}"
+    title = "the {output} falls with a slow average of the squared {input}, as with heat"
     formula = "y - k h (y - y0), tau h' = (u - u0)^2 - h"
     signature = (
         "the error is proportional to the output, follows a slow average of the squared input "

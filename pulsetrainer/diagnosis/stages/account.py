@@ -2,7 +2,7 @@
 
 What the static model leaves and what it would leave if nothing were wrong; for each cause found, what its
 gate saw or its p-value and share; what is left with all of them; where the rest is largest, when nothing
-explains it; what the records lack.
+explains it; which cause screening took for significant, where nothing was found; what the records lack.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ def stage(state: State) -> State:
         said.append(Evidence("extended", figures={"left": percent * state.current.rms}))
     if state.verdict in ("none", "unknown"):
         said += _largest(state)
+    if state.verdict == "none" and not state.question.quick:
+        said += _not_accepted(state)
     if state.question.quick:
         said.append(Evidence("quick"))
     if state.lacks:
@@ -43,6 +45,14 @@ def _of(finding: Finding) -> Evidence:
     assert finding.p_value is not None
     figures = {"p": finding.p_value, "explains": finding.explains_percent}
     return Evidence("tested", finding.cause.id, figures)
+
+
+def _not_accepted(state: State) -> Iterator[Evidence]:
+    """What screening took for significant, and the refit did not bear out: the table shows its p-value."""
+    for score in state.scores.scores[:1]:
+        if score.p_value <= LIMITS.p_max:
+            figures = {"p": score.p_value, "explains": state.explains(score.gain)}
+            yield Evidence("not accepted", figures=figures, names=(score.cause.id,))
 
 
 def _largest(state: State) -> Iterator[Evidence]:

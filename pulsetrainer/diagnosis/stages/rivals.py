@@ -5,10 +5,14 @@ fitted jointly; one that comes as close as two fits of the same data may differ 
 record of one single rate all causes that widen the loop with the rate are named together: there they are
 just a wider loop. Causes that equal loops show have no rivals here: equal loops differ by nothing else that
 is known.
+
+What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
+than the model without it, the interval of its strength spans zero, or a parameter sits on its bound.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 from pulsetrainer.diagnosis import residual
@@ -35,6 +39,7 @@ def stage(state: State) -> State:
 def _finding(state: State, term: Term) -> Finding:
     name = term.cause.id
     without = state.without[name]
+    gain = PERCENT * state.held_out.gain(without, state.current, state.floor)
     return Finding(
         term.cause,
         found=True,
@@ -42,8 +47,22 @@ def _finding(state: State, term: Term) -> Finding:
         explains_percent=state.explains(without.squares - state.current.squares),
         parameters=state.estimates[name],
         confounded_with=() if term.cause.by_contrast else rivals(state, term),
-        held_out_gain_percent=PERCENT * state.held_out.gain(without, state.current, state.floor),
+        held_out_gain_percent=gain,
+        doubts=tuple(_doubts(state, term, gain)),
     )
+
+
+def _doubts(state: State, term: Term, gain: float) -> Iterator[str]:
+    """Yield what speaks against a cause that was found: it is told, but with these words beside it."""
+    if gain < 0:
+        yield "predicts worse"
+    cause, known = term.cause, state.estimates[term.cause.id]
+    strengths = known[: cause.strengths]
+    if strengths and all(one.lower <= 0 <= one.upper for one in strengths):
+        yield "spans zero"
+    bounds = cause.quantities(state.problem.frames[0])
+    if any(value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)):
+        yield "at bound"
 
 
 def rivals(state: State, term: Term) -> tuple[str, ...]:
