@@ -13,6 +13,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.thresholds import DIFFERENCES, LIMITS, NORMAL_MAD, THIRD_DIFFERENCE
+from pulsetrainer.errors import DataError
 
 BoolArray = NDArray[np.bool_]
 
@@ -25,12 +26,21 @@ class Raw:
     low: float
     high: float
     second: float = 1.0  # s: what a second is for the search of causes, see ``scale``
+    stamps: FloatArray | None = None  # s, (n,) times of the samples; None: even steps
     wild: BoolArray | None = None  # samples that are wrong one by one
 
     @property
     def reach(self) -> float:
         """Range of the input."""
         return self.high - self.low
+
+    def beside_gaps(self, near: int) -> BoolArray:
+        """Tell which samples (n,) lie within ``near`` samples of a gap: neighbours there are none in time."""
+        found = np.zeros(self.record.input.size, dtype=bool)
+        if self.stamps is not None:
+            for at in np.flatnonzero(_gaps(self.stamps, self.record.step)).tolist():
+                found[max(at + 1 - near, 0) : at + 1 + near] = True
+        return found
 
     @property
     def calm(self) -> Record:
@@ -58,6 +68,44 @@ class Firing:
     def evidence(self) -> Evidence:
         """What it says."""
         return Evidence(self.kind, self.cause, self.figures)
+
+
+def evenly(record: Record, stamps: FloatArray | None) -> Record:
+    """Return a record at even time steps, straight between samples; what fills a gap has no weight.
+
+    Raises
+    ------
+    DataError
+        More of the record is gaps than samples.
+    """
+    if stamps is None or record.dt_s is None:
+        return record
+    step = max(record.dt_s, float(stamps[-1]) / LIMITS.most_even)
+    grid = np.arange(round(float(stamps[-1]) / step) + 1) * step
+    following = np.clip(np.searchsorted(stamps, grid), 1, stamps.size - 1)
+    hole = _gaps(stamps, step)[following - 1]
+    if np.mean(hole) > LIMITS.least_present:
+        raise DataError(
+            f"a record has {stamps.size} samples where even steps of {step:.4g} s would have {grid.size}: "
+            "most of it is gaps",
+            hint="cut it into several runs at the gaps",
+        )
+    known = np.interp(grid, stamps, record.sample_weight) >= 0.5  # of two neighbours the nearer one
+    reference = None if record.reference is None else np.interp(grid, stamps, record.reference)
+    return Record(
+        np.interp(grid, stamps, record.input),
+        np.interp(grid, stamps, record.output),
+        np.where(hole, 0.0, known.astype(np.float64)),
+        dt_s=step,
+        reference=reference,
+    )
+
+
+def _gaps(stamps: FloatArray, step: float) -> BoolArray:
+    """Tell which steps (n - 1,) between stamps are gaps: longer than those around them, and than usual."""
+    steps = np.diff(stamps)
+    usual = np.maximum(ndimage.median_filter(steps, LIMITS.usual_of, mode="nearest"), step)
+    return np.asarray(steps > LIMITS.gap_steps * usual)
 
 
 def noise_of(y: FloatArray, weight: FloatArray | None = None) -> float:

@@ -136,7 +136,8 @@ class Bench:
 
     def _rate(self, ranges: float) -> str:
         if not self.timed:
-            return f"{ranges / min(experiment.RATES):.3g} times the slowest rate"
+            times = ranges / min(experiment.RATES)
+            return "one rate" if times == 1 else f"{times:.3g} times that rate"
         per_second = "1/s" if self.unit == "1" else f"{self.unit}/s"
         return with_unit(f"{ranges * self.scale.reach / self.scale.second:.3g}", per_second)
 

@@ -20,9 +20,9 @@ from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_f
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.raw import evenly
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import p_value
-from pulsetrainer.diagnosis.stages import raw_data
 from pulsetrainer.errors import DataError
 
 CAUSE = library()
@@ -264,7 +264,7 @@ def _model(**more) -> Model:
 
 def _measured(run: Run, polarity: int = 1) -> Record:
     record, stamps = asked.measured_of("a run", run, polarity, 0.0, 1.0)
-    return raw_data.evenly(record, stamps)
+    return evenly(record, stamps)
 
 
 def test_a_gap_is_filled_and_does_not_count():

@@ -24,7 +24,7 @@ from scipy import ndimage
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause
-from pulsetrainer.diagnosis.raw import Firing, Raw, coarse_step, noise_of
+from pulsetrainer.diagnosis.raw import Firing, Raw, coarse_step, evenly, noise_of
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.fitting import Fitted
@@ -81,10 +81,10 @@ class StickSlip(Cause):
 
     def gate(self, raw: Raw) -> Firing | None:
         """Jumps that last, while the input moves slowly: far more than noise or a smooth branch makes."""
-        record = raw.calm
+        record = evenly(raw.calm, raw.stamps)
         dt_s = record.step / raw.second
         wide = max(_WIDE_LEAST, round(_WIDE_S / dt_s))
-        if record.output.size < _SHORTEST * wide or coarse_step(record.output) > 0:
+        if record.output.size < _SHORTEST * wide or coarse_step(raw.calm.output) > 0:
             return None
         size = _jumps(record.output, wide)
         around = ndimage.median_filter(size[::wide], _AROUND, mode="nearest").repeat(wide)[: size.size]

@@ -17,16 +17,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
 
-from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import gates
-from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
 from pulsetrainer.diagnosis.state import Question
-from pulsetrainer.diagnosis.thresholds import LIMITS
-from pulsetrainer.errors import DataError
 
 
 @dataclass(frozen=True)
@@ -50,7 +46,10 @@ def stage(question: Question) -> Masked:
     low, high = question.low, question.high
     stamps = question.stamps or [None] * len(question.records)
     second = second_of(question.records, stamps, low, high)
-    found = [gates.check(record, low, high, second) for record in question.records]
+    found = [
+        gates.check(record, low, high, second, times)
+        for record, times in zip(question.records, stamps, strict=True)
+    ]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
     even = [evenly(record, times) for record, times in zip(masked, stamps, strict=True)]
     scale = scale_of(even, low, high, second)
@@ -70,36 +69,3 @@ def masked_by(record: Record, firings: Sequence[Firing]) -> Record:
         output = output.copy()
         output[bad] = np.interp(np.flatnonzero(bad), good, output[good])
     return replace(record, sample_weight=weight, output=output)
-
-
-def evenly(record: Record, stamps: FloatArray | None) -> Record:
-    """Return a record at even time steps, straight between samples; what fills a gap has no weight.
-
-    Raises
-    ------
-    DataError
-        More of the record is gaps than samples.
-    """
-    if stamps is None or record.dt_s is None:
-        return record
-    step = max(record.dt_s, float(stamps[-1]) / LIMITS.most_even)
-    grid = np.arange(round(float(stamps[-1]) / step) + 1) * step
-    steps = np.diff(stamps)
-    usual = np.maximum(ndimage.median_filter(steps, LIMITS.usual_of, mode="nearest"), step)
-    following = np.clip(np.searchsorted(stamps, grid), 1, stamps.size - 1)
-    hole = (steps > LIMITS.gap_steps * usual)[following - 1]
-    if np.mean(hole) > LIMITS.least_present:
-        raise DataError(
-            f"a record has {stamps.size} samples where even steps of {step:.4g} s would have {grid.size}: "
-            "most of it is gaps",
-            hint="cut it into several runs at the gaps",
-        )
-    known = np.interp(grid, stamps, record.sample_weight) >= 0.5  # of two neighbours the nearer one
-    reference = None if record.reference is None else np.interp(grid, stamps, record.reference)
-    return Record(
-        np.interp(grid, stamps, record.input),
-        np.interp(grid, stamps, record.output),
-        np.where(hole, 0.0, known.astype(np.float64)),
-        dt_s=step,
-        reference=reference,
-    )
