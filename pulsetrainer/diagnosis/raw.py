@@ -34,12 +34,17 @@ class Raw:
         """Range of the input."""
         return self.high - self.low
 
-    def beside_gaps(self, near: int) -> BoolArray:
-        """Tell which samples (n,) lie within ``near`` samples of a gap: neighbours there are none in time."""
-        found = np.zeros(self.record.input.size, dtype=bool)
+    def beside_breaks(self, near: int) -> BoolArray:
+        """Tell which samples (n,) lie within ``near`` samples of a gap, or of a jump of the input.
+
+        Neighbours there are none in time, and an output that jumps with its input is no fault.
+        """
+        breaks = np.abs(np.diff(self.record.input)) > LIMITS.jump_of_input * self.reach
         if self.stamps is not None:
-            for at in np.flatnonzero(_gaps(self.stamps, self.record.step)).tolist():
-                found[max(at + 1 - near, 0) : at + 1 + near] = True
+            breaks |= _gaps(self.stamps, self.record.step)
+        found = np.zeros(self.record.input.size, dtype=bool)
+        for at in np.flatnonzero(breaks).tolist():
+            found[max(at + 1 - near, 0) : at + 1 + near] = True
         return found
 
     @property

@@ -38,6 +38,7 @@ class Thresholds:
     start_share: float = 6.0  # time constants of such a decay that a record must hold: else it is an offset
     rows_at_once: int = 2000  # rows brought to cell space in one piece: what fits the cache
     same_value: float = 1e-9  # of the span: outputs nearer than this are one value, rounded
+    jump_of_input: float = 0.1  # of its range from one sample to the next: there the output jumps as well
     noise_least: int = 8  # third differences: fewer tell no noise
     coarse_noise: float = 1.5  # times the noise: larger steps of the output do not average out
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -412,3 +414,28 @@ def test_a_new_cause_is_one_file(tmp_path, monkeypatch):
         assert found.findings[0].parameters[0].value == pytest.approx(0.3, rel=0.02)
     finally:
         library.cache_clear()
+
+
+def test_an_output_that_jumps_with_its_input_is_no_fault():
+    """Reversal curves with the way back left out: neither wild samples nor sticking; one wild sample more is."""
+    curve = np.linspace(0.0, 1.0, 40)
+    u = np.concatenate([low + (1.0 - low) * curve for low in np.linspace(0.0, 0.5, 40)])
+    y = 2.0 * u + 0.001 * RNG.standard_normal(u.size)
+    assert not _fires("stick-slip", y, u, dt=0.02)
+    assert not _fires("outliers", y, u)
+    wild = y.copy()
+    wild[[20, 300, 900]] += 0.7
+    assert _fires("outliers", wild, u)
+
+
+def test_a_gap_in_time_hides_no_wild_sample_elsewhere():
+    """Beside it neighbours are none; away from it they are."""
+    y = np.sin(np.linspace(0.0, 9.0, 900)) + 0.001 * RNG.standard_normal(900)
+    stamps = np.arange(900.0)
+    stamps[450:] += 100.0
+    at_gap, elsewhere = y.copy(), y.copy()
+    at_gap[[449, 450, 451]] += [0.5, -0.5, 0.5]
+    elsewhere[[100, 200, 700]] += 0.5
+    for values, fires in ((at_gap, False), (elsewhere, True)):
+        raw = replace(_raw(values, dt=1.0), stamps=stamps)
+        assert (CAUSE["outliers"].gate(raw) is not None) is fires

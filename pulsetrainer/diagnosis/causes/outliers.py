@@ -46,7 +46,7 @@ class Outliers(Cause):
         apart = np.abs(y - ndimage.median_filter(y, _AROUND, mode="nearest"))
         usual = _TIP * float(np.quantile(np.abs(np.diff(y)), _FAST))
         limit = max(_SIGMAS * _DIFFERENCE * noise_of(y), usual, _STEPS * spacing_of(y))
-        wild = (apart > limit) & ~raw.beside_gaps(_AROUND)
+        wild = (apart > limit) & ~raw.beside_breaks(_AROUND)
         for at in np.flatnonzero(wild):  # where a stroke ends with a jump, its last sample still lies on it
             wild[at] = min(_off_line(y, int(at), -1), _off_line(y, int(at), 1)) > limit
         count = np.count_nonzero(wild)

@@ -15,6 +15,7 @@ Astrophysical Journal 263, 1982). Errors of the levels are periodic too, but far
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
@@ -90,7 +91,8 @@ class StickSlip(Cause):
         around = ndimage.median_filter(size[::wide], _AROUND, mode="nearest").repeat(wide)[: size.size]
         least = _SIGMAS * np.sqrt(2.0 / wide) * noise_of(record.output)
         peak = (size == ndimage.maximum_filter1d(size, 2 * wide + 1)) & (size > least)
-        found = _slow(record.input, dt_s, wide, raw.reach) & peak & (size > _SHARPER * around)
+        broken = replace(raw, record=record, stamps=None).beside_breaks(_APART * wide)
+        found = _slow(record.input, dt_s, wide, raw.reach) & peak & (size > _SHARPER * around) & ~broken
         count = np.count_nonzero(found)
         if count < _JUMPS:
             return None
