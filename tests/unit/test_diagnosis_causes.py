@@ -417,7 +417,7 @@ def test_a_new_cause_is_one_file(tmp_path, monkeypatch):
 
 
 def test_an_output_that_jumps_with_its_input_is_no_fault():
-    """Reversal curves with the way back left out: neither wild samples nor sticking; one wild sample more is."""
+    """Reversal curves with the way back left out: neither wild samples nor sticking; wild ones are seen."""
     curve = np.linspace(0.0, 1.0, 40)
     u = np.concatenate([low + (1.0 - low) * curve for low in np.linspace(0.0, 0.5, 40)])
     y = 2.0 * u + 0.001 * RNG.standard_normal(u.size)
