@@ -105,7 +105,7 @@ _SHORT = {
     "right_from_percent": "right, 95 % from",
     "right_to_percent": "right, 95 % to",
     "response_s": "time to the answer, s",
-    "mean_abs_error_percent": "mean error",
+    "pressed.mean_abs_error_percent": "mean error",
 }
 
 

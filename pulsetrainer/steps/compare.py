@@ -23,7 +23,7 @@ HEADLINES = (
     "right_from_percent",
     "right_to_percent",
     "response_s",
-    "mean_abs_error_percent",
+    "pressed.mean_abs_error_percent",
 )
 _RISING = (
     "mean_error_reduction_percent",
@@ -121,7 +121,7 @@ def _figures(evaluations: Sequence[Evaluation]) -> list[dict[str, float]]:
 
 
 def _of_session(one: Session) -> dict[str, float]:
-    found = {f"session.{name}": value for name, value in one.figures().items() if np.isfinite(value)}
+    found = {f"session.pressed.{name}": value for name, value in one.figures().items() if np.isfinite(value)}
     if one.quiz is not None:
         result = score(one.quiz)
         found |= {

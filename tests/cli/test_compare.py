@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
+import pulsetrainer as pt
+from program import pulsetrainer
+from pulsetrainer.artefacts import Beats, Quiz, Session
 from wording import refusal
+
+KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 
 
 @pytest.fixture
@@ -78,3 +86,29 @@ def test_two_evaluations_without_a_common_figure(run, as_built, tmp_path):
     assert run("evaluate", as_built / "run.h5", "--model", model, "-o", tmp_path / "fit.h5").code == 0
     done = run("compare", tmp_path / "fit.h5", as_built / "evaluation-relay.h5", "--json")
     refusal(done, 3, "nothing in common")
+
+
+def _session() -> Session:
+    time, two = np.arange(40) / 1000, np.ones(2)
+    beats = Beats(np.array([0.0, 0.02]), 0.02 * two, np.array([0, 1]), *(two,) * 5)
+    asked = Quiz(("normal", "bifid"), ("normal", "bifid"), ("bifid", "bifid"), two)
+    arrays = (np.ones(40),) * 4
+    return Session(time, *arrays, beats, ("normal", "bifid"), *(1.0,) * 8, mean_force=1.0, quiz=asked)
+
+
+def test_learners_side_by_side(tmp_path):
+    """Share right with its interval, how true the pulses were; sessions do not mix with evaluations."""
+    quiz = pt.load(KEPT / "evaluation.h5")
+    plain = _session()
+    better = replace(plain, quiz=replace(plain.quiz, answered=plain.quiz.asked))
+    for name, artefact in (("anna", plain), ("ben", better), ("other", quiz)):
+        pt.save(artefact, tmp_path / f"{name}.h5")
+    done = pulsetrainer(tmp_path, "compare", "anna.h5", "ben.h5", "--json")
+    assert done.code == 0, done.err
+    found = {m["name"]: m for m in done.json["metrics"]}
+    assert found["quiz.right_percent"]["values"] == [50.0, 100.0]
+    assert found["quiz.right_percent"]["better"] is True
+    low, high = (found[f"quiz.right_{end}_percent"]["values"][0] for end in ("from", "to"))
+    assert low < 50.0 < high
+    assert found["session.pressed.mean_abs_error_percent"]["values"] == [1.0, 1.0]
+    assert pulsetrainer(tmp_path, "compare", "anna.h5", "other.h5").code == 3
