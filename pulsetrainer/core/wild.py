@@ -25,6 +25,7 @@ MOST = 0.1  # of the samples: more of them are no exceptions
 LONGEST = 3  # samples of a run
 _TAIL = 3.2  # times the 95 % quantile: beyond it lie 7 of 100 000 samples with exponential tails
 _NEAR = 0.01  # of the span: what is not further off does no harm
+_FITS = 0.05  # of the span, median: a fit that leaves more tells nothing of single samples
 _WINDOW = 7  # samples of a median: three wild ones do not move it
 _AROUND = 31  # samples whose steps tell how fast the signal moves
 _STEPS = 4.0  # such steps a turn may be away from the median of its neighbours
@@ -50,10 +51,13 @@ def off(residuals: Sequence[FloatArray], span: float) -> list[BoolArray]:
     Parameters
     ----------
     span
-        Of the output; nothing closer than a hundredth of it is wild.
+        Of the output; nothing closer than a hundredth of it is wild, nor anything beside a fit that leaves
+        more than a twentieth of it throughout: that fit tells nothing of single samples.
     """
     return [
-        _far(e, np.full(e.size, _NEAR * span)) if e.size >= FEWEST else np.zeros(e.size, dtype=bool)
+        _far(e, np.full(e.size, _NEAR * span))
+        if e.size >= FEWEST and np.median(np.abs(e)) <= _FITS * span
+        else np.zeros(e.size, dtype=bool)
         for e in residuals
     ]
 

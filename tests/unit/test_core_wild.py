@@ -127,3 +127,13 @@ def test_a_median_of_neighbours_is_what_it_says():
     assert np.flatnonzero(wild.isolated(u)).tolist() == [77]
     assert wild.repaired(u, wild.isolated(u))[77] == pytest.approx(0.5 * (u[76] + u[78]))
     assert not wild.isolated(u[:40]).any()
+
+
+def test_a_fit_that_describes_nothing_calls_nothing_wild():
+    """The same spike beside a small residual and beside a large one."""
+    rng = np.random.default_rng(1)
+    small = 0.003 * rng.normal(size=500)
+    large = small + 0.3 * np.sin(np.arange(500) / 20.0)
+    for residual in (small, large):
+        residual[250] += 0.9
+    assert [int(found.sum()) for found in wild.off([small, large], 1.0)] == [1, 0]
