@@ -17,7 +17,7 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo ideal test test-slow lint faults bench mutate blind docs bounds firmware-mps2 firmware-cost clean help
+.PHONY: demo ideal test test-slow lint faults bench mutate blind docs site bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -124,6 +124,11 @@ docs: $(VENV)/installed-test $(D)/evaluation.h5 $(D)/prediction.h5 ideal  ## the
 	$(BIN)/python docs/demo.py $(D)/evaluation.h5 $(D)/prediction.h5 build/ideal/evaluation.h5
 	$(BIN)/python docs/make.py
 	$(BIN)/python docs/figures.py
+
+site: $(VENV)/installed-test  ## the documentation as a site in build/site, which fetches nothing
+	$(BIN)/python docs/site.py
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --config-file build/mkdocs.yml
+	@echo "site: build/site/index.html; with its search: $(BIN)/python -m http.server -d build/site"
 
 firmware-mps2:  ## the firmware for the emulated Cortex-M4F (Debian: gcc-arm-none-eabi, qemu-system-arm)
 	$(MAKE) -C firmware mps2

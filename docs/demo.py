@@ -9,6 +9,7 @@ pulses on the ideal bench. ``docs/make.py`` writes the README from what is kept.
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ ROWS = {
 }
 METHODS = {"paper": "closest-match", "continuous": "continuous", "extended": "extended"}
 PULSES = ("normal", "bifid")
+BEAT_S = 0.8  # of the normal pulse: 75 a minute
 WORDS = """\
 `paper`: relays, closest match and a smoothing spline, as published. `continuous`: the same weights per
 cell read as a piecewise constant density and inverted exactly. `extended`: the model after `diagnose` has found, without
@@ -53,7 +55,20 @@ def figures(evaluation: Path, prediction: Path, ideal: Path) -> dict[str, Any]:
         "played": _played(evaluation),
         "ideal": _played(ideal),
         "gain_percent": _digits(model.gain_percent),
+        "beat": _beat(evaluation),
     }
+
+
+def _beat(path: Path) -> dict[str, Any]:
+    """Return the last beat of the normal pulse by the extended inverse, a sample every 5 ms: s and N."""
+    one = next(
+        w for w in store.read(path, Evaluation).waveforms if (w.name, w.inversion) == ("normal", "extended")
+    )
+    last = one.time_s > one.time_s[-1] - BEAT_S
+    rows = {"target": one.target, "scaled": one.scaled.output, "compensated": one.compensated.output}
+    kept = {name: [_digits(value) for value in values[last][::5]] for name, values in rows.items()}
+    time = one.time_s[last][::5] - one.time_s[last][0]
+    return {"time_s": [_digits(value) for value in time], **kept}
 
 
 def _played(path: Path) -> dict[str, dict[str, float]]:
@@ -104,4 +119,6 @@ def block(kept: dict[str, Any]) -> str:
 
 
 if __name__ == "__main__":
-    KEPT.write_text(json.dumps(figures(*map(Path, sys.argv[1:])), indent=1) + "\n", encoding="utf-8")
+    text = json.dumps(figures(*map(Path, sys.argv[1:])), indent=1)
+    rows = re.sub(r"\[[^\[\]]*\]", lambda numbers: " ".join(numbers[0].split()), text)  # a list on one line
+    KEPT.write_text(rows + "\n", encoding="utf-8")

@@ -1,15 +1,18 @@
-"""Draw the figures of the theory: ``python docs/figures.py`` writes docs/figures/*.svg.
+"""Draw the figures of the pages: ``python docs/figures.py`` writes docs/figures/*.svg.
 
 A made-up operator, evaluated by the program's own core: what the pages show is what the program computes.
 """  # noqa: INP001 - a folder of pages with its script, not a package
 
 from __future__ import annotations
 
+import json
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from before_after import pictures
+from demo import KEPT
 from matplotlib.figure import Figure
 
 from pulsetrainer.core.inversion import invert
@@ -211,6 +214,9 @@ def main() -> None:
     for name, draw in FIGURES.items():
         (HERE / f"{name}.svg").write_bytes(encode(draw(), "svg"))
         print(f"wrote docs/figures/{name}.svg")
+    for name, picture in pictures(json.loads(KEPT.read_text(encoding="utf-8"))).items():
+        (HERE / name).write_text(picture, encoding="utf-8")
+        print(f"wrote docs/figures/{name}")
 
 
 if __name__ == "__main__":

@@ -122,6 +122,7 @@ MESSAGES = {
     "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),
     "interrupted": Message("stopped by you", None, got=KEPT),
     # --- gates and bugs ----------------------------------------------------------------------------------
+    "no such metric": Message("does not have", "it has", "{metric}"),
     "out of bounds": Message("1 of 1 bounds", "the bound", "{metric}", "[99, 100]", " = 9"),
     "bug": Message("a bug: KeyError: 'force'", "--debug"),
 }

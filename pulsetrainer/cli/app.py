@@ -34,6 +34,7 @@ app = typer.Typer(
     name="pulsetrainer",
     help="Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate.",
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -79,7 +80,7 @@ def root(
     verbose: Annotated[bool, typer.Option("--verbose", help="Say on stderr what is being done.")] = False,
 ) -> None:
     """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate."""
-    if context.resilient_parsing or {"--help"} & set(sys.argv):
+    if context.resilient_parsing or {"-h", "--help"} & set(sys.argv):
         return  # help and completion need no settings, and a bad file must not hide them
     file = settings.find(settings_file, os.environ)
     if file is not None:

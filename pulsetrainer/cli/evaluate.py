@@ -91,10 +91,13 @@ _HINT = "look at what changed; if the new figure is right, change the bound know
 
 def show_tables(screen: Screen, evaluation: Evaluation) -> None:
     """Print the figures of an evaluation beside those of the published device."""
+    from pulsetrainer.artefacts.evaluation import PUBLISHED
     from pulsetrainer.report.text import tables_of
 
     for table in tables_of(evaluation, screen.width):
         screen.table(table.title, table.columns, table.rows)
+    if any(w.name in PUBLISHED for w in evaluation.waveforms):
+        screen.whole("published: the device of Carneiro, Abreu and Restivo, Sensors 2018, 18(5), 1631")
 
 
 def _payload(evaluation: Evaluation) -> dict[str, Any]:

@@ -46,6 +46,11 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:  # noqa: BLE001 - the last resort, which is the point of this function
+        if (
+            type(error).__name__ == "NoArgsIsHelpError"
+        ):  # nothing is wrong with a bare command: this is its help
+            sys.stdout.write(f"{error}\n")
+            return UsageError.exit_code
         problem = _usage_of(error) or _outside_of(error) or _bug_of(error)
         _trace(debug)
     else:

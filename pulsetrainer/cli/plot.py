@@ -8,21 +8,25 @@ from typing import Annotated
 import typer
 
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.cli.options import AsJson, Overwrite
 from pulsetrainer.report.forms import figure_form
 
 
 def plot(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
-    out: Out,
+    out: Annotated[
+        Path | None,
+        typer.Option("-o", "--out", help="File to write; default: beside it, as PNG.", show_default=False),
+    ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Draw an artefact as PNG, SVG or PDF.
 
-    Example: pulsetrainer plot model.h5 -o model.png
+    Example: pulsetrainer plot model.h5
     """
+    out = out or file.with_suffix(".png")
     form = figure_form(out, "a figure")
     job = Job(context, inputs=(file,), outputs=(out,), overwrite=overwrite, as_json=json)
     artefact = job.load_any(file)

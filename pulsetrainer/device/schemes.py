@@ -82,5 +82,10 @@ def find_opener(port: str) -> Opener | None:
 
 
 def redact(port: str) -> str:
-    """Return the port without its parameters, which must never reach a file: they may hold what is hidden."""
-    return port.partition("?")[0]
+    """Return the port without its parameters, which must never reach a file: they may hold what is hidden.
+
+    The seed stays: it says which device, and a command can be replayed by it.
+    """
+    name, _, parameters = port.partition("?")
+    seeds = [one for one in parameters.split("&") if re.fullmatch(r"seed=\d{1,9}", one)]
+    return f"{name}?{seeds[-1]}" if seeds else name

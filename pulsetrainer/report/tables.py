@@ -41,7 +41,8 @@ def drawn(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> 
         table.add_column(Text(name), justify="right" if number else "left", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(text(cell)) for cell in row))
-    console = Console(width=_BROAD, markup=False, highlight=False)
+    # in a notebook the text goes into a page of ours: no escapes, nothing shown beside it
+    console = Console(width=_BROAD, markup=False, highlight=False, force_jupyter=False)
     with console.capture() as captured:
         console.print(table)
     lines = [line.rstrip() for line in captured.get().splitlines()]

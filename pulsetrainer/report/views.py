@@ -280,7 +280,7 @@ def prediction_section(models: Sequence[ModelEvaluation]) -> Section:
                 f"prediction-{k}",
                 f"Prediction by {model.name}",
                 alternatives.prediction(model),
-                f"{model.name} on the held-out run; the dotted lines are at plus and minus the rms.",
+                f"{model.name} on the run; the dotted lines are at plus and minus the rms.",
             )
         )
-    return Section("prediction", "Prediction of a held-out run", (), tuple(rows), tuple(pictures))
+    return Section("prediction", "Prediction of the run", (), tuple(rows), tuple(pictures))

@@ -21,7 +21,7 @@ from pulsetrainer.core import metrics
 from pulsetrainer.core.initial_state import estimated_start, known_from
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.prediction import operator_of, predict
-from pulsetrainer.errors import DataError, QualityError, UsageError
+from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.one_thread import one_thread
 
 TRACE_SAMPLES = 6000  # of a prediction, kept for the figures
@@ -240,13 +240,13 @@ def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) 
 
     Raises
     ------
-    QualityError
+    UsageError
         A bound names a metric that the evaluation does not have.
     """
     figures = evaluation.figures()
     unknown = [name for name in bounds if name not in figures]
     if unknown:
-        raise QualityError(
+        raise UsageError(
             f"the bounds name {unknown[0]}, which this evaluation does not have",
             hint=f"it has {', '.join(sorted(figures)[:4])}, ...",
         )

@@ -64,6 +64,9 @@ def test_show_and_plot_take_every_kind(as_built):
         done = pulsetrainer(as_built, "plot", name, "-o", f"{name}.png")
         assert done.code == 0, done
         assert (as_built / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    done = pulsetrainer(as_built, "plot", "run.h5", "--overwrite", "--json")
+    assert done.json["output"] == "run.png"  # beside it, when no name is given
+    assert (as_built / "run.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_pipe_gets_no_bar_and_a_terminal_does(tmp_path):

@@ -46,6 +46,14 @@ def test_version(run):
 
 
 def test_no_words_show_the_help(run):
-    """The program alone explains itself."""
+    """The program alone explains itself; that is no error, and still no command."""
     done = run()
-    assert "identify" in done.out + done.err
+    assert (done.code, done.err) == (2, "")
+    assert done.out.startswith("Usage: pulsetrainer")
+    assert "identify" in done.out
+
+
+def test_the_short_help_is_the_long_one(run):
+    """-h as everywhere."""
+    assert run("-h").out == run("--help").out
+    assert run("play", "-h").out == run("play", "--help").out

@@ -32,6 +32,20 @@ def script(name: str):
     return module
 
 
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_the_picture_of_the_readme_is_that_of_the_demo(theme):
+    """It shows the beat that is kept, and names the errors of the table below it."""
+    kept = json.loads((ROOT / "docs" / "demo.json").read_text(encoding="utf-8"))
+    picture = (ROOT / "docs" / "figures" / f"before-after-{theme}.svg").read_text(encoding="utf-8")
+    assert f"figures/before-after-{theme}.svg" in (ROOT / "README.md").read_text(encoding="utf-8")
+    drawn = re.search(r"<desc>(.*?)</desc>", picture, re.DOTALL)
+    assert json.loads(drawn[1]) == kept["beat"]
+    errors = kept["played"]["normal.extended"]
+    for drive in ("scaled", "compensated"):
+        assert f"mean error {errors[f'{drive}.mean_abs_error_percent']:.2g} %" in picture
+    assert ("#1b1f24" in picture) is (theme == "light")
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_lead_somewhere(page):
     """Each relative link is a file of the project, its anchor a heading of it."""

@@ -247,7 +247,8 @@ def test_the_environment_names_the_port(monkeypatch):
 
 def test_the_port_is_redacted_for_provenance():
     """The bench's hidden parameters never leave with a port's name; other ports are named in full."""
-    assert redact("bench:?creep=0.05&seed=3") == "bench:"
+    assert redact("bench:?creep=0.05&seed=3&heat=1") == "bench:?seed=3"
+    assert redact("bench:?creep=0.05&wire-seed=3") == "bench:"
     assert redact("bench:") == "bench:"
     assert redact("/dev/ttyUSB0") == "/dev/ttyUSB0"
 

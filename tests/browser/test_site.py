@@ -1,0 +1,116 @@
+"""The site of the documentation in a real browser: whole, quiet, fit for a phone, with its search."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGES = (
+    "index.html",
+    "docs/tutorial.html",
+    "docs/api.html",
+    "docs/commands.html",
+    "docs/notebooks/first-pulse.html",
+)
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def site(made_once) -> Path:
+    """The site as `make site` makes it, but for the notebooks, which tests/docs runs; a warning fails."""
+
+    def fill(here: Path) -> None:
+        subprocess.run([sys.executable, ROOT / "docs" / "site.py"], check=True, cwd=ROOT)
+        words = [
+            sys.executable,
+            "-m",
+            "mkdocs",
+            "build",
+            "--quiet",
+            "--config-file",
+            ROOT / "build" / "mkdocs.yml",
+        ]
+        environment = {**os.environ, "SITE_RUNS_NOTEBOOKS": "false", "NO_MKDOCS_2_WARNING": "1"}
+        done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        shutil.copytree(ROOT / "build" / "site", here, dirs_exist_ok=True)
+
+    return made_once("site", fill)
+
+
+@pytest.fixture(scope="module")
+def served(site) -> Iterator[str]:
+    """The address of the site, served by this computer to itself."""
+    handler = partial(Quiet, directory=site)
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    """A server of files that writes no log."""
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
+
+
+@pytest.fixture
+def visit(browser, served):
+    """Open a page of the site at a phone's width; what the console says and what is asked for is kept."""
+    context = browser.new_context(viewport={"width": 390, "height": 844})
+
+    def open_page(name: str):
+        page = context.new_page()
+        page.said, page.asked = [], []
+        page.on(
+            "console", lambda message: page.said.append(message.text) if message.type == "error" else None
+        )
+        page.on("pageerror", lambda error: page.said.append(str(error)))
+        page.on("request", lambda request: page.asked.append(request.url))
+        page.goto(f"{served}/{name}")
+        return page
+
+    yield open_page
+    context.close()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_quiet_and_fits_a_phone(visit, served, name):
+    """No error, nothing asked of a network, nothing that scrolls sideways, every picture there."""
+    page = visit(name)
+    assert page.said == []
+    assert [url for url in page.asked if not url.startswith((served, "data:"))] == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    pictures = page.evaluate("[...document.images].map(i => [i.src, i.complete && i.naturalWidth > 0])")
+    assert [source for source, drawn in pictures if not drawn] == []
+
+
+def test_the_search_works_without_a_network(visit):
+    """A word of the theory leads to its page."""
+    page = visit("index.html")
+    page.click("label.md-header__button[for=__search]")
+    page.fill("input.md-search__input", "wiping-out")
+    page.wait_for_selector("a.md-search-result__link", timeout=20_000)
+    found = page.eval_on_selector_all("a.md-search-result__link", "links => links.map(l => l.href)")
+    assert any("theory.html" in link for link in found)
+
+
+def test_the_api_page_has_every_name(visit):
+    """Each public verb and artefact, with what it takes."""
+    import pulsetrainer as pt
+
+    text = visit("docs/api.html").inner_text("article")
+    for name in pt.__all__:
+        assert f"pt.{name}" in text or name.startswith("_"), name
+    assert "Parameters" in text or "PARAMETER" in text.upper()
