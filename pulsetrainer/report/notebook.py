@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from pulsetrainer.report import figures, render, text
+from pulsetrainer.report.tables import ESCAPE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,8 +16,9 @@ if TYPE_CHECKING:
 
 def html(artefact: Any) -> str:
     """Return the text of an artefact, and its figure as SVG below it; no file, nothing fetched."""
+    words = ESCAPE.sub("", text.of(artefact))  # a notebook passes for a terminal
     picture = render.encode(figures.draw(artefact), "svg").decode()
-    return f"<pre>{escape(text.of(artefact))}</pre>{picture[picture.index('<svg') :]}"
+    return f"<pre>{escape(words)}</pre>{picture[picture.index('<svg') :]}"
 
 
 def plot(artefact: Any) -> Axes:

@@ -41,7 +41,7 @@ def drawn(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> 
         table.add_column(Text(name), justify="right" if number else "left", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(text(cell)) for cell in row))
-    # in a notebook the text goes into a page of ours: no escapes, nothing shown beside it
+    # in a notebook the text is part of a page: nothing is to be shown beside it
     console = Console(width=_BROAD, markup=False, highlight=False, force_jupyter=False)
     with console.capture() as captured:
         console.print(table)
