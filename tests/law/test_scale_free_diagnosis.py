@@ -107,7 +107,7 @@ def _measured(name: str, *, k=1.0, a=1.0, b=0.0, c=1.0, d=0.0, faster=1) -> pt.R
 
 def _told(fitted: str, asked: str, **moved):
     run = _measured(asked, **moved)
-    return pt.diagnose(run, pt.identify(_measured(fitted, **moved)))
+    return pt.diagnose(run, pt.identify(_measured(fitted, **moved), form="direct"))
 
 
 @pytest.fixture(scope="module")
