@@ -8,13 +8,15 @@
 
 The direct form is fitted first. Only where it leaves more than noise are the others tried, all three on a
 coarse plane and judged by blocks of the records that were not fitted. A form wins over a simpler one only
-where it leaves far less.
+where it leaves far less, and where it is not a lag in time that it imitates.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 from typing import Literal
 
 import numpy as np
@@ -25,6 +27,7 @@ from pulsetrainer.core.edges import plane_for, thinned
 from pulsetrainer.core.equations import NormalEquations, parted_sums
 from pulsetrainer.core.identification import polarity_of
 from pulsetrainer.core.initial_state import record_of
+from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane
@@ -119,12 +122,28 @@ def try_all(signals: Signals, low: float, high: float) -> Tried:
     # the dual form too is rarely much worse as a signed one than by itself
     if left["direct"] < SMALLEST * span or left["signed"] > LOOK * left["direct"]:
         return Tried(left, "direct")
+    if _is_late(records, folds, plane):
+        return Tried(left, "direct")
     left = {"direct": direct.best(), "signed": signed.best(), "dual": _held_out_dual(signals, folds)}
     form: Form = "direct"
     for other in ("dual", "signed"):
         if left[other] < min(BETTER * left[form], DESCRIBES * span):
             form = other
     return Tried(left, form)
+
+
+def _is_late(records: Sequence[Record], folds: Sequence[IntArray], plane: Plane) -> bool:
+    """Tell whether weights of either sign only imitate a lag: the output goes on after a reversal.
+
+    Over a loop that lags, an output that is late has a negative reversible part, the sum of the cells on the
+    diagonal. No static loop has one, however its density changes sign; what is late is a matter of time.
+    """
+    turned, _ = levelled(records, polarity_of(records, plane))
+    whole = _sum([part.dense() for part in parted_sums(plane, turned, "continuous", folds, FOLDS)])
+    masses = nnls.solve_signed(*smoothed(whole, _FIRST))
+    operator = Preisach(plane, masses / plane.areas, whole.offset(masses), signed=True)
+    i, j = plane.cell_indices
+    return loop_of(operator) == "counterclockwise" and float(masses[i == j].sum()) < 0.0
 
 
 class _HeldOut:
@@ -160,10 +179,12 @@ class _HeldOut:
 
 def _each_out(parts: Sequence[NormalEquations]) -> list[tuple[NormalEquations, NormalEquations]]:
     """Each part, and the sums over all the others."""
-    whole = parts[0]
-    for part in parts[1:]:
-        whole = whole + part
+    whole = _sum(parts)
     return [(part, whole - part) for part in parts]
+
+
+def _sum(parts: Sequence[NormalEquations]) -> NormalEquations:
+    return reduce(add, parts)
 
 
 def _held_out_dual(signals: Signals, folds: Sequence[IntArray]) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import form_devices as devices
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import pulsetrainer as pt
 from pulsetrainer.core.forms import try_all
@@ -47,6 +48,22 @@ def named(draws, seeds):
 def test_a_direct_device_is_called_direct():
     """Planes, sums of plays and falling loops."""
     assert named(devices.DIRECT, range(1000, 1009)) == ["direct"] * 9
+
+
+def late(y, samples):
+    """An output that follows with a time constant of so many samples."""
+    kept = np.exp(-1 / samples)
+    return lfilter([1 - kept], [1, -kept], y, zi=[y[0] * kept])[0]
+
+
+def test_a_direct_device_that_is_late_is_still_called_direct():
+    """A lag widens the loop as some weights below zero would; it is for diagnose to find, not a form."""
+    found = []
+    for k in range(24):
+        device, u, _, noise, rng = measured(devices.DIRECT[k % 3], 8000 + k)
+        y = late(device(u), float(np.exp(rng.uniform(np.log(0.5), np.log(30)))))
+        found.append(try_all([(u, y + rng.normal(0, noise, u.size))], u.min(), u.max()).form)
+    assert found == ["direct"] * 24
 
 
 @pytest.mark.slow
