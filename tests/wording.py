@@ -72,7 +72,7 @@ MESSAGES = {
         "goes from", "those rows", "{file}, column {column}", "1e+100", "-1e+308 to 1e+308"
     ),
     # --- numbers -----------------------------------------------------------------------------------------
-    "force out of reach": Message("forces", "--force-max", expected="reaches 0.5", got="40 N"),
+    "force out of reach": Message("is asked for", "--force-max", expected="reaches 0.5", got="40 N"),
     "no such rate": Message("the rate", "1000, 2000 or 5000 Hz", expected="10000 Hz", got="{got} Hz"),
     "too slow": Message("a path of", "speed", got="{got} samples"),
     "too fast": Message("from one sample to the next", "speed", expected="1.5", got="1e+297"),

@@ -97,7 +97,7 @@ def show_tables(screen: Screen, evaluation: Evaluation) -> None:
     for table in tables_of(evaluation, screen.width):
         screen.table(table.title, table.columns, table.rows)
     if any(w.name in PUBLISHED for w in evaluation.waveforms):
-        screen.whole("published: the device of Carneiro, Abreu and Restivo, Sensors 2018, 18(5), 1631")
+        screen.line("published: ", "the device of Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631")
 
 
 def _payload(evaluation: Evaluation) -> dict[str, Any]:

@@ -101,7 +101,7 @@ class Table:
             raise DataError(
                 f"{self.path} has {values[bad[0]]} in column {name}, {self.place(int(bad[0]))} "
                 f"({bad.size} of {values.size} rows are not finite)",
-                hint="leave those rows out with `skip_bad_rows`, or export the recording again",
+                hint="remove those rows, as `skip_bad_rows` of import does, or export the recording again",
             )
         if said := beyond_all_quantities(values):
             raise DataError(f"{self.path}, column {name}, {said}", hint="correct or remove those rows")

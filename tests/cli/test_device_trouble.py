@@ -106,7 +106,7 @@ def test_another_protocol_names_both_versions_and_who_is_older(folder, firmware,
     ("define", "version", "name"),
     [
         ("-DPT_FIRMWARE_MAJOR=1u", "1.", "older program"),
-        ("-DPT_FIRMWARE_MINOR=0u", "0.0.0", "older device"),
+        ("-DPT_FIRMWARE_MINOR=0u", "0.0.", "older device"),
     ],
 )
 def test_another_firmware_names_both_versions_and_who_is_older(folder, firmware, define, version, name):

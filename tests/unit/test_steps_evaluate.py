@@ -11,7 +11,7 @@ import store_examples as examples
 from core_jobs import curves
 
 from pulsetrainer.artefacts import Evaluation, Run
-from pulsetrainer.errors import DataError, QualityError
+from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.compare import compare
 from pulsetrainer.steps.evaluate import breaches, evaluate
 
@@ -76,7 +76,7 @@ def test_a_bound_holds_on_both_sides():
     for low, high in ((value + 1e-9, value + 1.0), (value - 1.0, value - 1e-9)):
         (broken,) = breaches(evaluation, {name: (low, high)})
         assert (broken.metric, broken.value, broken.low, broken.high) == (name, value, low, high)
-    with pytest.raises(QualityError) as caught:
+    with pytest.raises(UsageError) as caught:
         breaches(evaluation, {"none.such": (0.0, 1.0)})
     assert "none.such" in caught.value.message
 

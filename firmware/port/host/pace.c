@@ -7,8 +7,9 @@
  *     give equal numbers however long the pauses between them were;
  *   - armed but not started, and while playing whenever the host has been silent for half the
  *     heartbeat (100 ms of device time), the reference is about to run dry, or telemetry waits for a slow reader, time stands still,
- *     for at most half a second of wall time after the last heartbeat; after that it goes on at the wall clock,
- *     so that a host that is really gone trips the 200 ms heartbeat like on a real device.
+ *     for at most half a second of wall time after the last heartbeat, and three seconds in all; after that it
+ *     goes on at the wall clock, so that a host that is really gone trips the 200 ms heartbeat like on a real device,
+ *     and one that lives but sends no more samples an underrun.
  * A coil that has tripped its heat model cools only while time runs: open a new bench instead of waiting. */
 #include "commands.h"
 #include "control.h"
@@ -19,13 +20,15 @@
 #define TELEMETRY_HIGH 48           /* waiting samples: the reader is behind */
 #define SETTLE_TICKS 2000           /* after the output went off; less than the watchdog waits */
 #define GRACE_NS 500000000          /* wall time that a stalled device waits for its host */
+#define PATIENCE_NS 3000000000      /* the same for one that beats, but has nothing to play */
 #define CATCH_UP_NS 50000000        /* a computer that was busy: what is lost is lost, or the host looks silent */
 
 static enum pace_speed speed;
 static int64_t epoch_ns;       /* real: when tick 0 was due; max: since when device time has been stalled */
 static int64_t epoch_ticks;    /* ticks run since then */
 static bool stalled;
-static uint32_t heard; /* the last heartbeat while stalled */
+static uint32_t heard;         /* the last heartbeat while stalled */
+static int64_t stalled_ns;     /* since when */
 static int32_t settle_ticks;
 
 void pace_init(enum pace_speed chosen, int64_t now_ns)
@@ -35,6 +38,7 @@ void pace_init(enum pace_speed chosen, int64_t now_ns)
     epoch_ticks = 0;
     stalled = false;
     heard = 0;
+    stalled_ns = now_ns;
     settle_ticks = 0;
 }
 
@@ -91,7 +95,9 @@ static int32_t max_ticks(int64_t now_ns)
         stalled = false;
         return BATCH;
     }
-    if (!stalled || heard != commands.beat) {
+    if (!stalled)
+        stalled_ns = now_ns;
+    if (!stalled || (heard != commands.beat && now_ns - stalled_ns < PATIENCE_NS)) {
         stalled = true;
         heard = commands.beat;
         epoch_ns = now_ns + GRACE_NS;
