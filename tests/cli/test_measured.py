@@ -109,7 +109,8 @@ def test_records_shifted_against_each_other_are_fitted_with_an_offset_each(folde
 def test_a_force_that_follows_the_velocity_is_told(folder, name, verdict):
     """Identify and diagnose say that a Preisach model in the displacement is the wrong one."""
     done = _identified(folder, name)
-    tells(done.err, "follows the velocity")
+    screen = pulsetrainer(folder, "identify", f"{name}.h5", "-o", "again.h5", "--overwrite")
+    tells(screen.out.splitlines()[0], "follows the velocity")  # above the figures
     tells(done.json["warning"], "follows the velocity")
     found = _diagnosed(folder, name, name)
     assert found["verdict"] == verdict
