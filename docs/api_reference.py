@@ -34,9 +34,9 @@ as the command does, a notebook adds its figure, `.plot()` returns matplotlib ax
 _SECTIONS = ("Parameters", "Raises", "Examples")
 VERBS = (
     "load", "save", "read_table", "open_device", "capture", "identify", "invert", "play", "evaluate", "compare",
-    "diagnose", "extend",
+    "diagnose", "extend", "session",
 )  # fmt: skip
-NOUNS = ("Run", "Model", "Waveform", "Playback", "Evaluation", "Diagnosis")
+NOUNS = ("Run", "Model", "Waveform", "Playback", "Evaluation", "Diagnosis", "Session")
 
 
 def api_page(mark: str) -> str:

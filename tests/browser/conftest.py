@@ -57,7 +57,7 @@ def diagnosed(evaluated, made_once) -> Path:
 
 def _make(folder: Path, steps: tuple[str, ...]) -> None:
     for step in steps:
-        done = pulsetrainer(folder, *step.split(), env={"PULSETRAINER_PORT": "bench:?seed=1"})
+        done = pulsetrainer(folder, *step.split(), env={"PULSETRAINER_PORT": "bench:?seed=1&field-lag=0.02"})
         assert done.code == 0, (step, done)
 
 
