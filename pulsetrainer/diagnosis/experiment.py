@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -34,6 +34,7 @@ CYCLE = (0.8, 0.2)
 _CYCLES = (0.0, *CYCLE * 20, 0.0)
 _CYCLE_RATES = (1.5, 4.0)
 HEATING_S = 30.0
+FASTER = (1.0, 4.0)  # a slow record may hide what is quicker than its own second
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Experiment:
     name: str  # what it is in words: see ``wording``
     distance: float  # rms, output unit
     distance_here: float
+    faster: float  # its rates in those of ``RATES``; its times are as much shorter
 
 
 def best_experiment(state: State, names: Sequence[str]) -> Experiment:
@@ -52,12 +54,12 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     here = _smallest_distance(state, state.problem, terms, others)
     plane = state.problem.plane
     found = []
-    for name, shares in _experiments().items():
+    for (name, shares), faster in product(_experiments().items(), FASTER):
         u = plane.low + (plane.high - plane.low) * shares
         y = state.current.simulator.operator(u)
-        record = Record(u, y, dt_s=1.0 / LIMITS.experiment_Hz)
+        record = Record(u, y, dt_s=1.0 / (faster * LIMITS.experiment_Hz))
         problem = problem_for([record], plane.low, plane.high, plane.n_h)
-        found.append(Experiment(name, _smallest_distance(state, problem, terms, others), here))
+        found.append(Experiment(name, _smallest_distance(state, problem, terms, others), here, faster))
     return max(found, key=lambda one: one.distance)
 
 

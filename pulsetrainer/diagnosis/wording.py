@@ -109,8 +109,8 @@ class Bench:
     timed: bool = True
     ours: bool = False  # recorded by this program, which plays experiments itself
 
-    def numbers(self) -> dict[str, str]:
-        """Levels, rates and times of the experiments, to be set on that bench."""
+    def numbers(self, faster: float = 1.0) -> dict[str, str]:
+        """Levels, rates and times of the experiments, so much faster, to be set on that bench."""
         rates = dict(zip(("slow", "middle", "quick", "fast"), sorted(experiment.RATES), strict=True))
         times = {"hold": experiment.HOLD_S, "heating": experiment.HEATING_S, "short": LIMITS.short_s}
         shares = {"low": 0.0, "high": 1.0, "bottom": min(experiment.CYCLE), "top": max(experiment.CYCLE)}
@@ -119,8 +119,8 @@ class Bench:
             "levels": self._levels(experiment.LEVELS[1:-1]),
             "biases": self._levels(experiment.BIASES),
             "width": with_unit(f"{experiment.WIDTH * self.scale.reach:.3g}", self.unit),
-            **{name: self._rate(one) for name, one in rates.items()},
-            **{name: self._time(one) for name, one in times.items()},
+            **{name: self._rate(faster * one) for name, one in rates.items()},
+            **{name: self._time(one / faster) for name, one in times.items()},
         }
 
     def _level(self, share: float) -> str:
@@ -177,7 +177,7 @@ def cause_text(finding: Finding, words: Mapping[str, str]) -> str:
 
 def advice(one: Evidence, bench: Bench) -> str:
     """Return what to measure next, as a sentence, in numbers of the bench."""
-    numbers = bench.numbers()
+    numbers = bench.numbers(one.figures.get("faster", 1.0))
     tied = one.kind == "tied"  # its first name is that of the experiment
     names = one.names[1:] if tied else one.names
     return ADVICE[one.kind].format(

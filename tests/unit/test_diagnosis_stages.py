@@ -744,13 +744,13 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
 )
 def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
     """Another model first, then ties, then what the recordings lack, then the verdict."""
-    best = SimpleNamespace(name="heating", distance=0.02, distance_here=0.001)
+    best = SimpleNamespace(name="heating", distance=0.02, distance_here=0.001, faster=4.0)
     monkeypatch.setattr(advice, "best_experiment", lambda state, names: best)
     said = advice.stage(replace(_state(_fit(1.0)), **more)).advice
     assert said.kind == kind
     if kind == "tied":
         assert said.names == ("heating", "field-lag", "delay")
-        assert said.figures == {"there": pytest.approx(2.0), "here": pytest.approx(0.1)}
+        assert said.figures == {"there": pytest.approx(2.0), "here": pytest.approx(0.1), "faster": 4.0}
 
 
 def test_a_quick_look_makes_no_experiment():

@@ -36,7 +36,11 @@ def _advice(state: State) -> Evidence:
             return Evidence("tied, quick", names=names)
         best = best_experiment(state, names)
         percent = PERCENT / float(np.ptp(state.problem.measured))
-        figures = {"there": percent * best.distance, "here": percent * best.distance_here}
+        figures = {
+            "there": percent * best.distance,
+            "here": percent * best.distance_here,
+            "faster": best.faster,
+        }
         return Evidence("tied", figures=figures, names=(best.name, *names))
     if state.lacks:
         return Evidence("lacks", names=state.lacks)
