@@ -243,6 +243,7 @@ def test_brackets_in_names_are_no_markup(run, tmp_path):
     assert "[bold]x[/red].h5" in done.err
 
 
+@pytest.mark.realtime
 def test_control_c_stops_the_output_and_keeps_what_was_recorded(tmp_path):
     """At wall-clock speed: interrupted after some seconds, exit 130, a readable run with complete=false."""
     process = subprocess.Popen(

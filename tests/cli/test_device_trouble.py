@@ -148,6 +148,7 @@ def test_a_second_program_on_the_port(folder, firmware):
         assert device.play([0.1, 0.2], 1000).complete
 
 
+@pytest.mark.realtime
 def test_a_port_that_vanishes_in_mid_capture(folder, firmware):
     """The device pulled out: told as such, what came until then is kept."""
     port, device = firmware("--speed", "real")
@@ -160,6 +161,7 @@ def test_a_port_that_vanishes_in_mid_capture(folder, firmware):
     assert kept(folder, 900) < 10_000
 
 
+@pytest.mark.realtime
 def test_a_host_that_is_stopped_finds_the_device_off(folder):
     """Asleep for a second, buffers full: the device switched off by itself, says why, the part is kept."""
     process = _started(folder, "bench:?speed=real")

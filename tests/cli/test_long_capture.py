@@ -123,6 +123,7 @@ def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
     np.testing.assert_allclose(last[-500:], one[-500:], atol=STEP_A)
 
 
+@pytest.mark.realtime
 def test_what_cannot_be_resumed_says_why(tmp_path):
     """Nothing there, complete, other options, another signal's recording, still being written."""
     words = ("capture", "identification", "--levels", "12", "--speed", "12", "-o", "run.h5")
@@ -158,6 +159,7 @@ def test_what_cannot_be_resumed_says_why(tmp_path):
     assert "not that of this signal" in done.err
 
 
+@pytest.mark.realtime
 def test_it_can_be_read_while_it_grows(tmp_path):
     """Another process shows the capture that is under way, and sees it grow."""
     words = ["capture", "diagnostic", "--port", "bench:?speed=real", "-o", "run.h5"]

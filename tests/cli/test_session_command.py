@@ -126,6 +126,7 @@ def test_what_makes_no_sense_is_told_before_anything_moves(run, tmp_path, words,
     assert not list(tmp_path.glob("s.h5*"))
 
 
+@pytest.mark.realtime
 def test_a_model_of_another_device_is_refused(run, tmp_path):
     """Before the device is touched."""
     rows = "\n".join(f"{k / 100},{np.sin(k / 30)},{2 * np.sin(k / 30)}" for k in range(600))
@@ -158,6 +159,7 @@ def _recorded(folder: Path) -> int:
     return 0
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("after", [200, 2500])
 def test_killed_at_any_moment_the_file_is_readable(tmp_path, after):
     """What was pressed until then is a run: time, reference, current and force."""
@@ -174,6 +176,7 @@ def test_killed_at_any_moment_the_file_is_readable(tmp_path, after):
     assert pulsetrainer(tmp_path, "show", "s.h5.partial").code == 0
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_stopped_by_a_signal_nothing_is_lost(tmp_path, number):
     """The file is whole, holds the beats so far, and the exit code says who stopped it."""
@@ -241,6 +244,7 @@ class Terminal:
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
+@pytest.mark.realtime
 def test_keys_change_the_beats_and_stop(tmp_path):
     """Faster, weaker, another pulse, a pause, on, stop: each is in the beats that follow."""
     terminal = Terminal(tmp_path, *SHORT, "--pulses", "normal,bifid", "--rate", 100, "--minutes", 5)
@@ -268,6 +272,7 @@ def test_keys_change_the_beats_and_stop(tmp_path):
     assert np.diff(beats.start_s).max() > 1.2  # the pause
 
 
+@pytest.mark.realtime
 def test_nothing_gives_a_question_away(tmp_path):
     """Blind: neither screen, nor file names, nor the files, nor the time tell what is asked."""
     words = ("--pulses", "bifid,parvus-et-tardus", "--quiz", 2, "--seed", 7)
@@ -292,6 +297,7 @@ def test_nothing_gives_a_question_away(tmp_path):
     assert np.isfinite(kept.quiz.response_s).all()
 
 
+@pytest.mark.realtime
 def test_a_terminal_that_is_too_small_has_no_view(tmp_path):
     """It is said, and the session goes on without."""
     terminal = Terminal(tmp_path, *SHORT, "--beats", 3, port="bench:", size=(5, 30))
