@@ -26,7 +26,9 @@
 /* One member per row of the table in solenoid_params.c, which holds units, ranges and meanings. */
 struct solenoid_params {
     real seed, noise_seed;
-    real supply, resistance, inductance;
+    real supply, supply_sag, resistance, inductance;
+    real coil;
+    real ambient;
     real noise, current_noise;
 
     real delay;
@@ -105,6 +107,7 @@ struct solenoid {
     uint32_t tick;
     real coil_loss;       /* 1 - exp(-tick R/L) */
     real heat, heat_loss; /* low-passed square of the current, A^2; 1 - exp(-tick/tau) */
+    real ambient_loss;    /* of force, relative, by the room */
     real current;         /* A, true */
     real field;           /* A, what the static hysteresis sees */
     real magnetic;        /* N, static hysteresis alone */

@@ -1,4 +1,4 @@
-/* The integer PID on the simulated solenoid for 100 000 ticks: prints one hash of every PWM value, ADC
+/* The integer PID on the simulated solenoid for 2 x 100 000 ticks: prints one hash of every PWM value, ADC
  * reading and reference. Any compiler, any optimisation, any machine must print the same, for the same
  * precision of the plant. */
 #include "hal.h"
@@ -36,7 +36,7 @@ static int16_t sample(uint32_t k)
     return (int16_t)((k / 800u) % 3u == 2u && v > 9000 ? 9000 : v);
 }
 
-static uint32_t trace(void)
+static void loop(void)
 {
     struct pid pid;
     uint32_t total = TICKS / 10u + 1u;
@@ -47,7 +47,6 @@ static uint32_t trace(void)
     pid.gains.feed_inductance = initial[PT_PARAM_FEED_INDUCTANCE];
     pid.gains.feed_offset = initial[PT_PARAM_FEED_OFFSET];
     pid_reset(&pid);
-    solenoid_as_built(&params);
     solenoid_init(&plant, &params);
     wave_begin(&wave, total, 10, 0);
     for (uint32_t tick = 0; tick < TICKS; tick++) {
@@ -69,6 +68,17 @@ static uint32_t trace(void)
         mix(duty);
         solenoid_step(&plant, duty, HAL_PWM_PERIOD);
     }
+}
+
+/* The device as built, and once more with what the room, the supply and another coil change. */
+static uint32_t trace(void)
+{
+    solenoid_as_built(&params);
+    loop();
+    (void)solenoid_set(&params, "ambient", 20);
+    (void)solenoid_set(&params, "supply-sag", 0.4);
+    (void)solenoid_set(&params, "coil", 7);
+    loop();
     return hash;
 }
 

@@ -9,6 +9,7 @@ import select
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import tempfile
 import time
@@ -20,10 +21,12 @@ from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.simulation.bad_wire import through
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES, firmware_image
-from pulsetrainer.simulation.options import parse_qemu
+from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, parse_qemu
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
+
+    from pulsetrainer.simulation.options import QemuOptions
 
 QEMU_PORT = "qemu:"
 # The line loses nothing but is slow, some 10 kB/s and less on a busy computer: a command repeated early
@@ -42,6 +45,7 @@ _PIECE = 65_536
 _SEND_ROOM = 4_000_000  # the system takes it down to its limit
 _SEED_ADDRESS = 0x2000_0000  # `retained` in port/mps2/mps2.ld
 _BREAKS_ADDRESS = _SEED_ADDRESS + 16  # its break_tick
+_SETTINGS_ADDRESS = _BREAKS_ADDRESS + 4 * len(BREAKS) + 12  # its setting, behind what is kept of the heat
 # 2^5 ns of the device's time an instruction, held to the wall clock: 31 MIPS is what the real board's
 # 25 MHz give about, twice what tick and simulated world need, and light enough for a busy computer.
 _REAL_TIME = "shift=5,align=on"
@@ -51,13 +55,17 @@ _REAL_TIME = "shift=5,align=on"
 _LEASH = '"$@" 3>&1 1>&2 </dev/null & exec 1>&-; read -r _; kill -9 $!; wait'
 
 
-def _loads(breaks: Iterable[tuple[int, float]]) -> list[str]:
-    """Return the emulator's arguments that put the breaks into the device's memory."""
-    words = []
-    for what, second in breaks:
-        tick = int(second * TICK_RATE_HZ) + 1
-        words += ["-device", f"loader,addr={_BREAKS_ADDRESS + 4 * what:#x},data={tick:#x},data-len=4"]
-    return words
+def _loads(options: QemuOptions) -> list[str]:
+    """Return the emulator's arguments that put breaks and settings into the device's memory."""
+    words = [(_BREAKS_ADDRESS + 4 * what, int(second * TICK_RATE_HZ) + 1) for what, second in options.breaks]
+    for name, value in options.settings:
+        (bits,) = struct.unpack("<I", struct.pack("<f", value))
+        words.append((_SETTINGS_ADDRESS + 4 * [*QEMU_SETTINGS].index(name), bits))
+    return [
+        word
+        for address, data in words
+        for word in ("-device", f"loader,addr={address:#x},data={data:#x},data-len=4")
+    ]
 
 
 class SocketTransport:
@@ -134,7 +142,7 @@ class Emulator:
         words += ["-chardev", "socket,id=wire,fd=3", "-serial", "chardev:wire"]
         seed = secrets.randbits(32)
         words += ["-device", f"loader,addr={_SEED_ADDRESS:#x},data={seed:#x},data-len=4"]
-        words += _loads(self.options.breaks)
+        words += _loads(self.options)
         ours, theirs = socket.socketpair()
         # The emulator sends single bytes, each of which takes the room of a kilobyte in here.
         theirs.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_ROOM)

@@ -6,6 +6,7 @@ Told before anything that is slow to load, so that a mistake in it is, too.
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from dataclasses import dataclass
 from urllib.parse import parse_qsl
@@ -19,6 +20,9 @@ BREAKS = (
     "current-low", "current-stuck", "shunt-half", "force-half", "stuck-on",
     "comparator", "tick-lost", "converter",
 )  # fmt: skip
+# What of the plant the emulated device takes, with its ranges: in the order of port/mps2/board.c; a test
+# compares them with what the firmware lists.
+QEMU_SETTINGS = {"ambient": (-60.0, 80.0), "supply-sag": (0.0, 5.0), "coil": (0.0, 16777215.0)}
 LONGEST_S = 1e5
 MAX_RATE = 0.1  # of damaged bytes: beyond that no frame comes through
 _SPEEDS = ("max", "real")
@@ -145,6 +149,7 @@ class QemuOptions:
 
     breaks: tuple[tuple[int, float], ...] = ()  # what, at which second of the play
     wire: Wire = GOOD_WIRE
+    settings: tuple[tuple[str, float], ...] = ()  # of the plant
 
 
 def parse_qemu(port: str) -> QemuOptions:
@@ -153,15 +158,18 @@ def parse_qemu(port: str) -> QemuOptions:
     Raises
     ------
     UsageError
-        if it is not of that form: the plant of the emulated device takes no parameters.
+        if it is not of that form: the plant of the emulated device takes few parameters.
     """
     match = re.fullmatch(r"qemu:(?://)?(?:\?(.+))?", port)
     if match is None:
         raise UsageError(f"{port!r} is not a port", hint='"qemu:" alone, or "qemu:?break=reset@1"')
     breaks: list[tuple[int, float]] = []
     rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
+    settings: list[tuple[str, float]] = []
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
-        if name == "break":
+        if name in QEMU_SETTINGS:
+            settings.append((name, _setting(name, value)))
+        elif name == "break":
             breaks.append(parse_break(value))
         elif name == "wire":
             rate = wire_rate("qemu", value)
@@ -170,9 +178,25 @@ def parse_qemu(port: str) -> QemuOptions:
         else:
             raise UsageError(
                 f"the emulated device has no parameter {name!r}: its image is built once",
-                hint='it takes break, wire and wire-seed; for others the bench: "bench:?seed=3&creep=0.05"',
+                hint=f"it takes break, wire, wire-seed, {', '.join(QEMU_SETTINGS)}; for others the bench: "
+                '"bench:?seed=3&creep=0.05"',
             )
-    return QemuOptions(tuple(breaks), Wire(rate, seed))
+    return QemuOptions(tuple(breaks), Wire(rate, seed), tuple(settings))
+
+
+def _setting(name: str, text: str) -> float:
+    """Return the value of a setting of the emulated device's plant."""
+    low, high = QEMU_SETTINGS[name]
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        raise UsageError(
+            f"qemu parameter {name}={text} is not a number from {low:g} to {high:g}",
+            hint='like this: "qemu:?ambient=20"',
+        )
+    return value
 
 
 def check_port(port: str | None) -> None:

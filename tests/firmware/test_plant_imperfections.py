@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from plant_harness import TICK_S, Run, Vector, call, hold, path, run, with_current
@@ -16,6 +18,8 @@ EFFECTS = {
     "load-dependence": 0.003,
     "accommodation": 0.1,
     "thermal-drift": 0.02,
+    "ambient": 20,
+    "supply-sag": 0.5,
     "coulomb": 0.2,
     "stick-slip": 0.4,
     "resonance": 40,
@@ -51,9 +55,11 @@ def test_the_list_above_is_complete() -> None:
 def test_an_effect_shows_and_at_0_is_absent(name: str) -> None:
     """Nonzero it changes what is read; zero gives the very bits of a device that never heard of it."""
     settings = ("base=as-built", "step-time=0.1", *ALL_ABSENT)
-    without = with_current(TEST_CURRENT, *settings)
-    shown = with_current(TEST_CURRENT, *settings, f"{name}={EFFECTS[name]}")
-    back = with_current(TEST_CURRENT, *settings, f"{name}={EFFECTS[name]}", f"{name}=0")
+    # a current that is imposed asks nothing of the supply
+    play = partial(run, TEST_CURRENT / 1.5) if name == "supply-sag" else partial(with_current, TEST_CURRENT)
+    without = play(*settings)
+    shown = play(*settings, f"{name}={EFFECTS[name]}")
+    back = play(*settings, f"{name}={EFFECTS[name]}", f"{name}=0")
     assert np.any(np.array(shown) != np.array(without))
     np.testing.assert_array_equal(np.array(back), np.array(without))
 
@@ -175,6 +181,36 @@ def test_thermal_drift_of_the_coil() -> None:
     cold = (0.6 * 12 - 0.4 * 0.6) / 5
     assert current.max() == pytest.approx(cold, rel=0.02)
     assert current[-1] * (1 + 2 * k * current[-1] ** 2) == pytest.approx(cold, rel=1e-3)
+
+
+def test_a_warmer_room_takes_force_and_adds_resistance() -> None:
+    """Y (1 - 0.00195 K), R (1 + 0.0039 K), colder the other way round; with heat of its own they add up."""
+    k, tau = 0.02, 0.5
+    for ambient in (20.0, -15.0):
+        room = with_current(hold(1.2, 2), f"ambient={ambient}", f"thermal-drift={k}", f"thermal-tau={tau}")
+        own = k * 1.2**2 * (1 - np.exp(-time_of(20_000) / tau))
+        np.testing.assert_allclose(1 - room.force / room.magnetic, own + 0.00195 * ambient, atol=1e-9)
+        current = run(hold(0.5, 0.2), f"ambient={ambient}").current[-1]
+        assert current == pytest.approx((0.5 * 12 - 0.5 * 0.6) / (5 * (1 + 0.0039 * ambient)), rel=1e-6)
+
+
+def test_a_supply_that_sags() -> None:
+    """The supply gives d i in the mean: i R = d (V - R_s d i) - (1 - d) 0.6 V."""
+    current = run(hold(0.75, 0.2), "supply-sag=0.5").current[-1]
+    assert 5 * current == pytest.approx(0.75 * (12 - 0.5 * 0.75 * current) - 0.25 * 0.6, rel=1e-6)
+
+
+def test_another_coil_is_drawn_over_the_whole_range() -> None:
+    """By free decay: L/R between 0.5 and 50 ms, none like another, and the device around it is the same."""
+    drive = np.r_[hold(0.3, 0.3), hold(0.0, 0.01)]
+    currents = {seed: run(drive, f"coil={seed}").current for seed in range(1, 41)}
+    ends = np.array([current[2999] for current in currents.values()])
+    lowest, highest = (0.3 * 9 - 0.42) / 10, (0.3 * 24 - 0.42) / 2
+    assert lowest < ends.min() < 0.5
+    assert 2.0 < ends.max() < highest
+    assert np.unique(ends).size == 40
+    imposed = path(0, 1.5, 0)
+    np.testing.assert_array_equal(with_current(imposed, "coil=7").force, with_current(imposed).force)
 
 
 def test_coulomb_friction() -> None:

@@ -17,7 +17,7 @@ from pulsetrainer.device.device import open_device
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation import build
 from pulsetrainer.simulation.bench import Bench
-from pulsetrainer.simulation.options import BREAKS, BenchOptions, Wire, parse_bench
+from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, BenchOptions, Wire, parse_bench
 
 
 @pytest.mark.parametrize(
@@ -81,6 +81,14 @@ def test_what_can_break_is_what_the_firmware_lists():
     """One list in Python, one in C: the same names in the same order."""
     told = subprocess.check_output([str(build.firmware_executable()), "--list"], text=True)
     assert tuple(told.partition("\n\n")[2].split()) == BREAKS
+
+
+def test_what_the_emulated_device_takes_has_the_ranges_that_the_firmware_lists():
+    """Its image does not refuse a value itself: the host must know the ranges."""
+    told = subprocess.check_output([str(build.firmware_executable()), "--list"], text=True)
+    rows = [line.split("\t") for line in told.partition("\n\n")[0].splitlines()]
+    ranges = {row[0]: (float(row[2]), float(row[3])) for row in rows}
+    assert {name: ranges[name] for name in QEMU_SETTINGS} == QEMU_SETTINGS
 
 
 def _executable(cache: str) -> str:

@@ -69,6 +69,8 @@ def gone(session: int, seconds: float = 5.0) -> bool:
         ("qemu:?break=hang@soon", "cannot break 'hang@soon'", "break=WHAT@SECONDS"),
         ("qemu:?break=hang@", "cannot break 'hang@'", "break=WHAT@SECONDS"),
         ("qemu:?break=hang@1e9", "cannot break", "break=WHAT@SECONDS"),
+        ("qemu:?ambient=warm", "qemu parameter ambient=warm", "ambient=20"),
+        ("qemu:?coil=-1", "qemu parameter coil=-1", "ambient=20"),
         ("qemu:?wire=1", "qemu parameter wire=1 is not a rate", "wire-seed"),
         ("qemu:?wire-seed=x", "qemu parameter wire-seed=x", "wire-seed"),
     ],
@@ -85,6 +87,7 @@ def test_parameters_that_make_sense():
     assert parse_qemu("qemu:") == parse_qemu("qemu://") == QemuOptions()
     port = "qemu:?break=reset@1.5&wire=1e-4&break=hang&wire-seed=7"
     assert parse_qemu(port) == QemuOptions(((8, 1.5), (9, 0.0)), Wire(1e-4, 7))
+    assert parse_qemu("qemu:?ambient=-20&coil=3").settings == (("ambient", -20.0), ("coil", 3.0))
 
 
 @pytest.mark.parametrize("missing", ["qemu-system-arm", "arm-none-eabi-gcc"])
@@ -331,3 +334,17 @@ def test_commands_take_the_port_unchanged(tmp_path):
         )
         assert done.returncode == 0, done.stderr
     assert "QEMU-0" in done.stdout
+
+
+@needs_emulator
+@pytest.mark.realtime
+@pytest.mark.slow
+def test_a_warmer_room_reaches_the_emulated_device():
+    """40 K: the force is 0.00195 a kelvin lower, with the same current."""
+    means = []
+    for port in ("qemu:", "qemu:?ambient=40"):
+        with open_device(port) as device:
+            recording = device.play(np.full(700, 1.0), 1000)
+        assert recording.complete, recording.fault
+        means.append(recording.force_N[300:].mean())
+    assert means[1] / means[0] == pytest.approx(1 - 0.00195 * 40, rel=0.01)

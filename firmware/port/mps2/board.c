@@ -19,6 +19,9 @@
 #define TICK_PRIORITY 0x40u
 #define LATE_CYCLES (BOARD_TICK_CYCLES + BOARD_TICK_CYCLES / 2u) /* no tick for so long: the output goes off */
 
+#define SETTINGS 3u
+static const char *const settings[SETTINGS] = {"ambient", "supply-sag", "coil"}; /* in the order of options.py */
+
 #ifndef PT_BUILD_HASH
 #define PT_BUILD_HASH 0u
 #endif
@@ -31,6 +34,7 @@ extern volatile struct retained {
     uint32_t cause; /* of the next start */
     uint32_t break_tick[BREAKS_COUNT]; /* by the loader too; plus 1, 0: never */
     struct hal_kept kept;
+    float setting[SETTINGS]; /* by the loader: of the plant; 0: as built */
 } retained;
 typedef char retained_fits_its_place[sizeof(struct retained) <= 256u ? 1 : -1];
 
@@ -100,6 +104,8 @@ void board_init(void)
     hal_pwm_kill();
     read_reset_cause();
     solenoid_as_built(&params);
+    for (uint32_t k = 0; k < SETTINGS; k++)
+        (void)solenoid_set(&params, settings[k], retained.setting[k]);
     solenoid_init(&plant, &params);
     for (int k = 0; k < BREAKS_COUNT; k++)
         breaks_at((enum breaks_what)k, retained.break_tick[k]);
