@@ -37,10 +37,12 @@ void commands_init(void)
 }
 
 /* A new host: nothing that an earlier one left running goes on, nothing that it set holds. */
-void commands_greet(uint8_t major)
+void commands_greet(uint8_t major, uint8_t minor)
 {
     control_stop();
     commands.greeted = major == PT_PROTOCOL_MAJOR;
+    /* As much as both know; a build that says it is older does as an older one. */
+    control.telemetry.with_duty = commands.greeted && minor >= PT_DUTY_SINCE_MINOR && PT_PROTOCOL_MINOR >= PT_DUTY_SINCE_MINOR;
     commands.beat = 0;
     default_params();
 }
@@ -100,7 +102,8 @@ uint8_t commands_arm(uint32_t nonce)
         .limits = {.current_trip_100uA = (int16_t)p[PT_PARAM_CURRENT_TRIP],
                    .force_trip_mN = (int16_t)p[PT_PARAM_FORCE_TRIP],
                    .heartbeat_ticks = (uint16_t)(p[PT_PARAM_HEARTBEAT] * (int32_t)(PT_TICK_RATE_HZ / 1000u)),
-                   .on_ticks = on_ticks_limit()},
+                   .on_ticks = on_ticks_limit(),
+                   .coil_ohms = p[PT_PARAM_FEED_RESISTANCE]},
         .gains = {.kp = p[PT_PARAM_PID_KP],
                   .ki = p[PT_PARAM_PID_KI],
                   .feed_resistance = p[PT_PARAM_FEED_RESISTANCE],

@@ -17,7 +17,7 @@ struct commands {
 extern struct commands commands;
 
 void commands_init(void);
-void commands_greet(uint8_t major);
+void commands_greet(uint8_t major, uint8_t minor);
 void commands_beat(uint32_t counter);
 uint8_t commands_wave_begin(uint32_t total, uint16_t ticks_per_sample, uint32_t crc);
 uint8_t commands_wave_data(uint32_t offset, const uint8_t *samples, uint8_t count);

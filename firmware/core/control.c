@@ -1,11 +1,17 @@
 #include "control.h"
 
+#include <stddef.h>
+
 #include "hal.h"
 #include "units.h"
 
+/* The host counts the duty in the same unit. */
+typedef char control_duty_unit[HAL_PWM_PERIOD == PT_DUTY_FULL ? 1 : -1];
+
 struct control control;
 
-/* On the way down the compiled gains hold, whatever a host has chosen for its run. */
+/* On the way down no gain is stronger than the compiled one, whatever a host has chosen for its run; a weaker one
+ * stays: on a coil of less inductance, or at a higher supply, the compiled ones would ring. */
 static const struct pid_gains own_gains = {
     .kp = PT_DEFAULT_PID_KP,
     .ki = PT_DEFAULT_PID_KI,
@@ -43,6 +49,7 @@ void control_init(void)
     control.slew_100uA_per_tick = 0;
     wave_reset(&control.wave);
     control.pid.gains = own_gains;
+    control.ramp_gains = own_gains;
     pid_reset(&control.pid);
     safety_init(&control.safety, hal_kept(), hal_reset_cause() == PT_RESET_POWER, control.now.force_mN);
     telemetry_init(&control.telemetry);
@@ -87,7 +94,7 @@ static bool transition(uint8_t from, uint8_t to)
         begin_session();
         break;
     case PT_STATE_RAMPING:
-        control.pid.gains = own_gains;
+        control.pid.gains = control.ramp_gains;
         break;
     default:
         output_off();
@@ -202,8 +209,14 @@ static void step(void)
         bool limited = false;
         int16_t asked = asked_reference(&of_wave, &last);
         now->reference_100uA = slew(now->reference_100uA, asked, &limited);
-        struct telemetry_sample s = {control.tick, asked, now->current_100uA, now->force_mN};
-        telemetry_tick(&control.telemetry, &s, limited);
+        struct telemetry_sample *sample = telemetry_tick(&control.telemetry, limited);
+        if (sample != NULL) {
+            sample->tick |= control.tick;
+            sample->reference = asked;
+            sample->current = now->current_100uA;
+            sample->force = now->force_mN;
+            sample->duty = now->duty_counts;
+        }
     } else {
         now->reference_100uA = ramp(now->reference_100uA);
     }
@@ -322,6 +335,23 @@ void control_wave_forget(void)
     hal_critical_exit();
 }
 
+static int32_t lesser(int32_t a, int32_t b)
+{
+    return a < b ? a : b;
+}
+
+static struct pid_gains no_stronger_than_own(const struct pid_gains *g)
+{
+    const struct pid_gains gains = {
+        .kp = lesser(g->kp, own_gains.kp),
+        .ki = lesser(g->ki, own_gains.ki),
+        .feed_resistance = lesser(g->feed_resistance, own_gains.feed_resistance),
+        .feed_inductance = lesser(g->feed_inductance, own_gains.feed_inductance),
+        .feed_offset = lesser(g->feed_offset, own_gains.feed_offset),
+    };
+    return gains;
+}
+
 static uint8_t arm(const struct control_settings *settings)
 {
     if (control.state == PT_STATE_ARMED)
@@ -336,6 +366,7 @@ static uint8_t arm(const struct control_settings *settings)
     if (!transition(PT_STATE_IDLE, PT_STATE_ARMED))
         return PT_NAK_CODE_FAULT;
     control.pid.gains = settings->gains;
+    control.ramp_gains = no_stronger_than_own(&settings->gains);
     control.slew_100uA_per_tick = settings->slew_100uA_per_tick;
     safety_begin(&control.safety, &settings->limits);
     return 0;

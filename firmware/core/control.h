@@ -48,6 +48,7 @@ struct control {
     int16_t slew_100uA_per_tick;      /* main, at ARM */
     struct wave wave;                 /* shared: see wave.h */
     struct pid pid;                   /* shared */
+    struct pid_gains ramp_gains;      /* main, at ARM */
     struct safety safety;             /* shared: see safety.h */
     struct telemetry telemetry;       /* shared: see telemetry.h */
 };

@@ -166,7 +166,7 @@ static uint8_t hello(const uint8_t *p)
     if (get_u32(p + PT_HELLO_MAGIC) != PT_MAGIC)
         return PT_NAK_CODE_VERSION;
     /* Another major version still gets its answer, so that it can name both sides. */
-    commands_greet(p[PT_HELLO_MAJOR]);
+    commands_greet(p[PT_HELLO_MAJOR], p[PT_HELLO_MINOR]);
     reply_hello();
     return 0;
 }
@@ -273,7 +273,7 @@ static void send_telemetry(void)
         uint8_t length = telemetry_pack(&control.telemetry, now, dropped, payload);
         if (length == 0)
             return;
-        uint16_t n = frame_encode(out, PT_TELEMETRY, 0, payload, length, hal_uart_tx_idle());
+        uint16_t n = frame_encode(out, control.telemetry.with_duty ? PT_TELEMETRY_DUTY : PT_TELEMETRY, 0, payload, length, hal_uart_tx_idle());
         hal_uart_tx(out, n);
     }
 }

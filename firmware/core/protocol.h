@@ -10,7 +10,7 @@
 #define PT_PROTOCOL_MAJOR 2u
 #endif
 #ifndef PT_PROTOCOL_MINOR
-#define PT_PROTOCOL_MINOR 1u
+#define PT_PROTOCOL_MINOR 2u
 #endif
 #ifndef PT_FIRMWARE_MAJOR
 #define PT_FIRMWARE_MAJOR 0u
@@ -19,7 +19,7 @@
 #define PT_FIRMWARE_MINOR 2u
 #endif
 #ifndef PT_FIRMWARE_PATCH
-#define PT_FIRMWARE_PATCH 1u
+#define PT_FIRMWARE_PATCH 2u
 #endif
 
 #define PT_MAGIC 0x52545031uL
@@ -30,6 +30,8 @@
 #define PT_MAX_TICKS_PER_SAMPLE 10000u
 #define PT_MAX_DECIMATION 10000u
 #define PT_HEARTBEAT_MAX_MS 200u
+#define PT_DUTY_FULL 7853u
+#define PT_DUTY_SINCE_MINOR 2u
 #define PT_FLAG_LAST 1u
 #define PT_FLAG_SLEW 2u
 #define PT_STATUS_OUTPUT_NOT_OFF 1u
@@ -272,6 +274,16 @@
 #define PT_TELEMETRY_LEN 9u
 #define PT_TELEMETRY_ITEM 6u
 #define PT_TELEMETRY_MAX_ITEMS 19u
+
+#define PT_TELEMETRY_DUTY 0x91u
+#define PT_TELEMETRY_DUTY_SESSION 0u
+#define PT_TELEMETRY_DUTY_FLAGS 1u
+#define PT_TELEMETRY_DUTY_FIRST_TICK 2u
+#define PT_TELEMETRY_DUTY_DROPPED 6u
+#define PT_TELEMETRY_DUTY_COUNT 8u
+#define PT_TELEMETRY_DUTY_LEN 9u
+#define PT_TELEMETRY_DUTY_ITEM 8u
+#define PT_TELEMETRY_DUTY_MAX_ITEMS 14u
 
 /* commands: X(NAME, bytes of one item of the counted tail or 0) */
 #define PT_COMMANDS(X) \

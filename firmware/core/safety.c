@@ -18,7 +18,7 @@ static int16_t at_current(const int16_t *table, int16_t current_100uA)
 
 void safety_init(struct safety *s, struct hal_kept *kept, bool power_on, int16_t force_mN)
 {
-    static const struct safety_limits none = {0, 0, 0, 0};
+    static const struct safety_limits none = {0, 0, 0, 0, 0};
     heat_init(&s->heat, kept, power_on);
     s->not_off = 0;
     s->release_ticks = 0;
@@ -48,6 +48,8 @@ void safety_begin(struct safety *s, const struct safety_limits *limits)
     s->stray = 0;
     still_reset(&s->current_still);
     still_reset(&s->force_still);
+    s->voltage_high_ohms = limits->coil_ohms * SAFETY_VOLTAGE_HIGH_20THS / 20;
+    s->voltage_low_ohms = limits->coil_ohms * SAFETY_VOLTAGE_LOW_20THS / 20;
     s->voltage_samples = 0;
     s->voltage_duty = 0;
     s->voltage_current = 0;
@@ -178,8 +180,8 @@ static uint8_t voltage(struct safety *s, const struct safety_input *in)
     s->voltage_samples = 0;
     s->voltage_duty = 0;
     s->voltage_current = 0;
-    int32_t most = SAFETY_VOLTAGE_OFFSET_COUNTS + SAFETY_VOLTAGE_SPAN_COUNTS + (current * SAFETY_VOLTAGE_HIGH_OHMS >> 16);
-    int32_t least = (current * SAFETY_VOLTAGE_LOW_OHMS >> 16) - SAFETY_VOLTAGE_SPAN_COUNTS;
+    int32_t most = SAFETY_VOLTAGE_OFFSET_COUNTS + SAFETY_VOLTAGE_SPAN_COUNTS + (current * s->voltage_high_ohms >> 16);
+    int32_t least = (current * s->voltage_low_ohms >> 16) - SAFETY_VOLTAGE_SPAN_COUNTS;
     return duty > most || duty < least ? PT_FAULT_CURRENT_IMPLAUSIBLE : PT_FAULT_NONE;
 }
 

@@ -53,15 +53,15 @@
 
 /* Voltage on the coil against the current that is read, averaged over 0.2 s, so that L di/dt falls out: a full
  * stroke within the window is 15000 * 12.5 / 2048 = 91 counts with 20 mH, and SPAN holds 50 mH.
- * duty = OFFSET + i * OHMS / 65536 with the compiled feed-forward (12 V, 0.6 V, 5 ohm). HIGH is 1.55 times the
- * resistive part: copper 80 K warmer 1.31, coil + 5 %, supply - 10 % 1.11, together 1.53. A shunt or gain that lost
- * half reads 2.0. LOW is 0.4: a supply of 24 V instead of 12 V reads 0.51. SPAN is 0.4 V, the spread of a diode's
- * drop and of what a small current rounds to. */
+ * duty = OFFSET + i * OHMS / 65536 with the run's feed-forward of the resistance (compiled: 12 V, 0.6 V, 5 ohm; another
+ * where a host has measured the coil). HIGH is 1.55 times the resistive part: copper 80 K warmer 1.31, coil + 5 %,
+ * supply - 10 % 1.11, together 1.53. A shunt or gain that lost half reads 2.0. LOW is 0.4: a supply of 24 V instead of
+ * 12 V reads 0.51. SPAN is 0.4 V, the spread of a diode's drop and of what a small current rounds to. */
 #define SAFETY_VOLTAGE_SHIFT 9u /* of samples, one in every fourth tick */
 #define SAFETY_VOLTAGE_TICKS (SAFETY_TURNS << SAFETY_VOLTAGE_SHIFT)
 #define SAFETY_VOLTAGE_OFFSET_COUNTS 374
-#define SAFETY_VOLTAGE_HIGH_OHMS 31656
-#define SAFETY_VOLTAGE_LOW_OHMS 8169
+#define SAFETY_VOLTAGE_HIGH_20THS 31
+#define SAFETY_VOLTAGE_LOW_20THS 8
 #define SAFETY_VOLTAGE_SPAN_COUNTS 250
 
 /* Force against current: at least 0.7 of the as-built device's rising branch less MARGIN, at most 1.35 of its
@@ -102,6 +102,7 @@ struct safety_limits {
     int16_t force_trip_mN;
     uint16_t heartbeat_ticks;
     uint32_t on_ticks;
+    int32_t coil_ohms; /* counts for 65536 * 100 uA: what the run takes for the coil's resistance */
 };
 
 struct safety_input {
@@ -151,6 +152,8 @@ struct safety {
     uint8_t turn;
     int16_t floor_margin_mN;    /* from the limits */
     int16_t frozen_force_100uA; /* from the limits */
+    int32_t voltage_high_ohms;  /* from the limits */
+    int32_t voltage_low_ohms;   /* from the limits */
     uint16_t voltage_samples;
     int32_t voltage_duty;    /* sums over the present window */
     int32_t voltage_current;

@@ -1,5 +1,7 @@
 #include "telemetry.h"
 
+#include <stddef.h>
+
 #include "units.h"
 
 #define MASK (TELEMETRY_RING - 1u)
@@ -8,6 +10,7 @@
 void telemetry_init(struct telemetry *t)
 {
     t->decimation = 10;
+    t->with_duty = false;
     telemetry_begin(t, 0);
 }
 
@@ -28,23 +31,24 @@ uint16_t telemetry_waiting(const struct telemetry *t)
     return (uint16_t)(t->head - t->tail);
 }
 
-void telemetry_tick(struct telemetry *t, const struct telemetry_sample *s, bool slewed)
+struct telemetry_sample *telemetry_tick(struct telemetry *t, bool slewed)
 {
     t->slewed = t->slewed || slewed;
     if (--t->countdown != 0)
-        return;
+        return NULL;
     t->countdown = t->decimation;
     t->produced++;
-    if (telemetry_waiting(t) >= TELEMETRY_RING) {
+    struct telemetry_sample *slot = NULL;
+    uint16_t head = t->head; /* once: nobody else writes it */
+    if ((uint16_t)(head - t->tail) >= TELEMETRY_RING) {
         t->dropped++;
     } else {
-        struct telemetry_sample *slot = &t->ring[t->head & MASK];
-        *slot = *s;
-        if (t->slewed)
-            slot->tick |= SLEWED;
-        t->head = (uint16_t)(t->head + 1u);
+        slot = &t->ring[head & MASK];
+        slot->tick = t->slewed ? SLEWED : 0u;
+        t->head = (uint16_t)(head + 1u);
     }
     t->slewed = false;
+    return slot;
 }
 
 void telemetry_end(struct telemetry *t)
@@ -54,16 +58,17 @@ void telemetry_end(struct telemetry *t)
 
 uint8_t telemetry_pack(struct telemetry *t, uint32_t now, uint32_t dropped, uint8_t *payload)
 {
+    uint16_t most = t->with_duty ? PT_TELEMETRY_DUTY_MAX_ITEMS : PT_TELEMETRY_MAX_ITEMS;
     bool ended = t->ended; /* before the count: when it is set, every sample is in the ring */
     uint16_t waiting = telemetry_waiting(t);
     uint32_t first = waiting ? t->ring[t->tail & MASK].tick & ~SLEWED : now;
-    if (!ended && waiting < PT_TELEMETRY_MAX_ITEMS && (waiting == 0 || now - first < TELEMETRY_MAX_AGE))
+    if (!ended && waiting < most && (waiting == 0 || now - first < TELEMETRY_MAX_AGE))
         return 0;
 
     uint8_t flags = 0;
     uint8_t count = 0;
     uint8_t *item = payload + PT_TELEMETRY_LEN;
-    while (count < waiting && count < PT_TELEMETRY_MAX_ITEMS) {
+    while (count < waiting && count < most) {
         const struct telemetry_sample *s = &t->ring[(uint16_t)(t->tail + count) & MASK];
         /* Samples lost on the device leave a gap; a block holds none. */
         if ((s->tick & ~SLEWED) != first + (uint32_t)count * t->decimation)
@@ -74,6 +79,10 @@ uint8_t telemetry_pack(struct telemetry *t, uint32_t now, uint32_t dropped, uint
         put_i16(item + 2, s->current);
         put_i16(item + 4, s->force);
         item += PT_TELEMETRY_ITEM;
+        if (t->with_duty) {
+            put_u16(item, s->duty);
+            item += PT_TELEMETRY_DUTY_ITEM - PT_TELEMETRY_ITEM;
+        }
         count++;
     }
     t->tail = (uint16_t)(t->tail + count);

@@ -15,6 +15,7 @@ struct telemetry_sample {
     int16_t reference;
     int16_t current;
     int16_t force;
+    uint16_t duty; /* counts: of the tick that ends with this sample */
 };
 
 struct telemetry {
@@ -25,6 +26,7 @@ struct telemetry {
     uint16_t decimation;    /* main, not in RUNNING */
     uint16_t countdown;     /* tick only */
     bool slewed;            /* tick only */
+    bool with_duty;         /* main: the host knows blocks that carry it */
     uint8_t session;        /* main, at START */
     uint32_t produced;      /* tick: samples due since the session began, lost ones included */
     uint32_t dropped;       /* tick */
@@ -32,7 +34,11 @@ struct telemetry {
 
 void telemetry_init(struct telemetry *t);
 void telemetry_begin(struct telemetry *t, uint8_t session);
-void telemetry_tick(struct telemetry *t, const struct telemetry_sample *s, bool slewed);
+
+/* Each tick. NULL, or what the tick has to fill in, but for the slew's bit of `tick`, which is set: it is in the ring
+ * already, but the main loop reads nothing before the tick is over. */
+struct telemetry_sample *telemetry_tick(struct telemetry *t, bool slewed);
+
 void telemetry_end(struct telemetry *t);
 uint16_t telemetry_waiting(const struct telemetry *t);
 

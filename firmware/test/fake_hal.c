@@ -204,7 +204,7 @@ void hal_uart_tx(const uint8_t *bytes, uint16_t count)
     for (uint16_t k = 0; k < count; k++) {
         if (!frame_decode(&host, bytes[k], &f))
             continue;
-        if (f.type == PT_TELEMETRY) {
+        if (f.type == PT_TELEMETRY || f.type == PT_TELEMETRY_DUTY) {
             block_length[block_head % 512u] = f.length;
             memcpy(blocks[block_head++ % 512u], f.payload, f.length);
         } else {

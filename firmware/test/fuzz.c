@@ -118,6 +118,7 @@ static void sensible_command(struct tape *t)
     case 0:
         put_u32(p + PT_HELLO_MAGIC, PT_MAGIC);
         p[PT_HELLO_MAJOR] = (uint8_t)(choice < 250u ? PT_PROTOCOL_MAJOR : choice);
+        p[PT_HELLO_MINOR] = (uint8_t)(choice % 4u);
         (void)fake_command(PT_HELLO, p, PT_HELLO_LEN);
         break;
     case 1: {
@@ -284,6 +285,7 @@ static uint8_t exact_length(uint8_t type, const uint8_t *payload, uint8_t length
 #define ROW(name, item) {PT_##name, PT_##name##_LEN, item},
         PT_COMMANDS(ROW)
         ROW(TELEMETRY, PT_TELEMETRY_ITEM)
+        ROW(TELEMETRY_DUTY, PT_TELEMETRY_DUTY_ITEM)
 #undef ROW
     };
     for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
@@ -351,12 +353,13 @@ static struct verdict frames(uint32_t count)
     struct frame f;
     frame_decoder_init(&d);
     for (uint32_t k = 0; k < count; k++) {
-        uint8_t type = (uint8_t)(draw(15) ? 1u + draw(14) : PT_TELEMETRY);
+        uint8_t type = (uint8_t)(draw(15) ? 1u + draw(14) : PT_TELEMETRY + draw(2));
         uint8_t seq = (uint8_t)draw(256);
         for (uint8_t j = 0; j < PT_MAX_PAYLOAD; j++)
             payload[j] = (uint8_t)(draw(3) ? draw(256) : 0u);
         payload[PT_WAVE_DATA_COUNT] = (uint8_t)(1u + draw(PT_WAVE_DATA_MAX_ITEMS));
-        payload[PT_TELEMETRY_COUNT] = (uint8_t)(1u + draw(PT_TELEMETRY_MAX_ITEMS));
+        payload[PT_TELEMETRY_COUNT] =
+            (uint8_t)(1u + draw(type == PT_TELEMETRY ? PT_TELEMETRY_MAX_ITEMS : PT_TELEMETRY_DUTY_MAX_ITEMS));
         uint8_t length = exact_length(type, payload, PT_MAX_PAYLOAD);
         uint16_t n = frame_encode(wire, type, seq, payload, length, draw(2) != 0);
         n = damage(wire, n, 1u + draw(4));

@@ -22,13 +22,18 @@ static uint8_t nak_of(struct frame f)
     return f.type == PT_NAK ? f.payload[PT_NAK_CODE] : 0;
 }
 
-static struct frame hello(uint8_t major)
+static struct frame hello_of(uint8_t major, uint8_t minor)
 {
     uint8_t p[PT_HELLO_LEN];
     put_u32(p + PT_HELLO_MAGIC, PT_MAGIC);
     p[PT_HELLO_MAJOR] = major;
-    p[PT_HELLO_MINOR] = 0;
+    p[PT_HELLO_MINOR] = minor;
     return fake_command(PT_HELLO, p, sizeof p);
+}
+
+static struct frame hello(uint8_t major)
+{
+    return hello_of(major, 0);
 }
 
 static uint32_t crc_of_constant(int16_t value, uint32_t count)
@@ -95,6 +100,13 @@ static struct frame set_param(uint8_t id, int32_t value)
 static struct frame plain(uint8_t type)
 {
     return fake_command(type, NULL, 0);
+}
+
+static struct frame plain_stream(uint16_t decimation)
+{
+    uint8_t p[PT_STREAM_LEN];
+    put_u16(p, decimation);
+    return fake_command(PT_STREAM, p, sizeof p);
 }
 
 /* A constant current of `value`, SAMPLES samples of `ticks` ticks; `total` of them announced. */
@@ -507,6 +519,30 @@ static void readings_that_are_not_new_are_a_fault(void)
 }
 
 /* The slowest slew, the weakest and the wildest gains that a host may choose. */
+/* What would ring on the compiled gains does not ring on the way down either; what is stronger does not press. */
+static void the_way_down_has_the_weaker_gain_of_each_kind(void)
+{
+    ready(9000, 1000, SAMPLES);
+    (void)set_param(PT_PARAM_PID_KP, 500);
+    (void)set_param(PT_PARAM_PID_KI, 9000);
+    (void)set_param(PT_PARAM_FEED_RESISTANCE, 50000);
+    (void)set_param(PT_PARAM_FEED_INDUCTANCE, 7);
+    (void)begin(SAMPLES, 1000, crc_of_constant(900, SAMPLES));
+    (void)data(0, 900, SAMPLES);
+    (void)commit(SAMPLES, crc_of_constant(900, SAMPLES));
+    (void)arm(fake.nonce);
+    (void)plain(PT_START);
+    fake_ticks(20);
+    CHECK_EQUAL(control.pid.gains.ki, 9000);
+    (void)plain(PT_STOP);
+    CHECK_EQUAL(control.state, PT_STATE_RAMPING);
+    CHECK_EQUAL(control.pid.gains.kp, 500);
+    CHECK_EQUAL(control.pid.gains.ki, PT_DEFAULT_PID_KI);
+    CHECK_EQUAL(control.pid.gains.feed_resistance, PT_DEFAULT_FEED_RESISTANCE);
+    CHECK_EQUAL(control.pid.gains.feed_inductance, 7);
+    CHECK_EQUAL(control.pid.gains.feed_offset, PT_DEFAULT_FEED_OFFSET);
+}
+
 static void no_parameter_makes_the_way_down_longer(void)
 {
     for (int wild = 0; wild < 2; wild++) {
@@ -791,6 +827,43 @@ static void a_host_that_does_not_read_costs_samples_not_replies(void)
     CHECK(dropped > 1000);
 }
 
+/* Items of 8 bytes with the duty of the tick before, to a host that knows them; others get theirs. */
+static void telemetry_carries_the_duty_to_a_host_that_knows_it(void)
+{
+    uint8_t p[PT_MAX_PAYLOAD];
+    for (uint8_t minor = 0; minor <= PT_PROTOCOL_MINOR; minor++) {
+        bool knows = minor >= PT_DUTY_SINCE_MINOR;
+        uint16_t item = knows ? PT_TELEMETRY_DUTY_ITEM : PT_TELEMETRY_ITEM;
+        fake_reset();
+        (void)hello_of(PT_PROTOCOL_MAJOR, minor);
+        (void)begin(SAMPLES, 10, crc_of_constant(8000, SAMPLES));
+        (void)data(0, 8000, SAMPLES);
+        (void)commit(SAMPLES, crc_of_constant(8000, SAMPLES));
+        (void)plain_stream(1);
+        (void)arm(fake.nonce);
+        (void)plain(PT_START);
+        uint16_t duty[600];
+        for (uint16_t k = 0; k < 600; k++) {
+            duty[k] = control.now.duty_counts; /* in force until the next tick */
+            fake_ticks(1);
+            if (k == 300)
+                (void)fake_beat();
+        }
+        uint16_t seen = 0;
+        uint16_t length;
+        while ((length = fake_telemetry(p)) != 0) {
+            CHECK_EQUAL(length, PT_TELEMETRY_LEN + item * p[PT_TELEMETRY_COUNT]);
+            CHECK_EQUAL(p[PT_TELEMETRY_COUNT], knows ? PT_TELEMETRY_DUTY_MAX_ITEMS : PT_TELEMETRY_MAX_ITEMS);
+            for (uint8_t k = 0; k < p[PT_TELEMETRY_COUNT]; k++, seen++) {
+                CHECK_EQUAL(get_i16(p + PT_TELEMETRY_LEN + item * k), 8000);
+                if (knows)
+                    CHECK_EQUAL(get_u16(p + PT_TELEMETRY_LEN + item * k + PT_TELEMETRY_ITEM), duty[seen]);
+            }
+        }
+        CHECK(seen >= 560);
+    }
+}
+
 static void the_slew_limit_is_flagged_and_the_asked_value_reported(void)
 {
     uint8_t p[PT_MAX_PAYLOAD];
@@ -872,6 +945,7 @@ int main(void)
     RUN(a_tick_that_stays_away_is_told_by_the_main_loop);
     RUN(readings_that_are_not_new_are_a_fault);
     RUN(no_parameter_makes_the_way_down_longer);
+    RUN(the_way_down_has_the_weaker_gain_of_each_kind);
     RUN(the_worst_is_told_beside_the_first);
     RUN(a_force_that_does_not_fall_is_an_output_that_is_not_off);
     RUN(a_sensor_that_does_not_read_zero_is_not_armed);
@@ -889,6 +963,7 @@ int main(void)
     RUN(a_repeated_command_is_answered_from_memory);
     RUN(an_older_repetition_changes_nothing_and_is_no_refusal);
     RUN(a_host_that_does_not_read_costs_samples_not_replies);
+    RUN(telemetry_carries_the_duty_to_a_host_that_knows_it);
     RUN(the_slew_limit_is_flagged_and_the_asked_value_reported);
     RUN(the_watchdog_wants_both_contexts);
     RUN(a_reset_in_mid_play_is_off_and_remembers_nothing);

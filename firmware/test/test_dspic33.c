@@ -144,7 +144,7 @@ static uint8_t answer(void)
     uint8_t type = 0;
     uint16_t n = xc_shim_sent(bytes, sizeof bytes);
     for (uint16_t k = 0; k < n; k++) {
-        if (frame_decode(&decoder, bytes[k], &f) && f.type != PT_TELEMETRY) {
+        if (frame_decode(&decoder, bytes[k], &f) && f.type != PT_TELEMETRY && f.type != PT_TELEMETRY_DUTY) {
             type = f.type;
             memcpy(payload, f.payload, f.length);
         }

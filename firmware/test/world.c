@@ -45,7 +45,7 @@ bool world_start(const struct solenoid_params *p, int32_t force_trip_mN, world_s
     beats = 0;
     looks = 0;
     board_init(p, PT_RESET_POWER);
-    commands_greet(PT_PROTOCOL_MAJOR);
+    commands_greet(PT_PROTOCOL_MAJOR, PT_PROTOCOL_MINOR);
     return control_coil_heat(0) == 0 && commands_set_param(PT_PARAM_FORCE_TRIP, force_trip_mN) == 0 &&
            commands_wave_begin(count, 10, crc_of_all()) == 0 &&
            (feed(), control_wave_commit(sent, control.wave.crc) == 0) && commands_arm(commands.nonce) == 0 &&

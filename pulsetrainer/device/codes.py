@@ -10,12 +10,12 @@ from enum import IntEnum
 
 MAGIC = 0x52545031  # "1PTR" on the wire: tells our firmware from whatever else sits behind a port
 PROTOCOL_MAJOR = 2
-PROTOCOL_MINOR = 1
+PROTOCOL_MINOR = 2
 FIRMWARE_MAJOR = (
     0  # of the firmware that comes with this program; below 1.0.0 each minor version is another one
 )
 FIRMWARE_MINOR = 2
-FIRMWARE_PATCH = 1
+FIRMWARE_PATCH = 2
 
 MAX_PAYLOAD = 128  # bytes: the longest frame stays under 254, so COBS adds exactly one byte
 TICK_RATE_HZ = 10_000
@@ -24,6 +24,8 @@ WAVE_OPEN = 0xFFFFFFFF  # samples of a wave whose end is not known when it begin
 MAX_TICKS_PER_SAMPLE = 10_000  # one reference sample a second
 MAX_DECIMATION = 10_000
 HEARTBEAT_MAX_MS = 200
+DUTY_FULL = 7853  # counts of the PWM: on all the time
+DUTY_SINCE_MINOR = 2  # of protocol 2: telemetry carries the duty
 CURRENT_UNIT_A = 1e-4
 FORCE_UNIT_N = 1e-3
 HEAT_UNIT = 1e-3  # of the heat at which the device stops: a squared current of HEAT_LIMIT_A2, averaged

@@ -17,7 +17,7 @@ from pulsetrainer.device.feed import Feed
 from pulsetrainer.device.heat import HeatMemory, added, in_words, wait_s
 from pulsetrainer.device.identity import DeviceInfo
 from pulsetrainer.device.plausibility import ForceWatch
-from pulsetrainer.device.player import Player
+from pulsetrainer.device.player import Player, tells_duty
 from pulsetrainer.device.ports import find_device_port
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
 from pulsetrainer.device.schemes import OpenPort, find_opener, redact
@@ -159,6 +159,27 @@ class Device:
     def heat(self) -> float:
         """Heat of the coil now, of the limit at which the device stops."""
         return self._status().heat * codes.HEAT_UNIT
+
+    @property
+    def tells_duty(self) -> bool:
+        """Whether telemetry carries the duty, from which the coil's resistance is told."""
+        return tells_duty(self._hello)
+
+    def needs_duty(self, what: str) -> None:
+        """Refuse what cannot be done without knowing the duty.
+
+        Raises
+        ------
+        DeviceError
+            The device's firmware is from before it told the duty.
+        """
+        if not self.tells_duty:
+            raise DeviceError(
+                f"{what} needs the duty of the coil's voltage; the device's firmware {self.info.firmware} "
+                f"speaks protocol {self.info.protocol}, which does not tell it: it came with "
+                f"{codes.PROTOCOL_MAJOR}.{codes.DUTY_SINCE_MINOR}",
+                hint="flash the firmware that came with this program (make -C firmware)",
+            )
 
     @property
     def longest_play_s(self) -> float:
@@ -437,6 +458,7 @@ class Device:
             reference_A=block.reference_A,
             current_A=block.current_A,
             force_N=block.force_N,
+            duty=block.duty,
             tick_rate_Hz=self.info.tick_rate_Hz,
             dropped_samples=dropped,
             # Interrupted even if it came during the last ramp: the user wants out.

@@ -324,11 +324,23 @@ class Telemetry(Message):
     items: bytes
 
 
+@dataclass(frozen=True, slots=True)
+class TelemetryDuty(Telemetry):
+    """Samples of (reference, current, force, duty): what a host of protocol 2.2 or later gets.
+
+    The duty is that of the tick that ends with the sample, in counts of ``codes.DUTY_FULL``.
+    """
+
+    TYPE: ClassVar[int] = 0x91
+    ITEM: ClassVar[int] = 8
+    MAX_ITEMS: ClassVar[int] = 14
+
+
 COMMANDS: tuple[type[Message], ...] = (
     Hello, Status, Heartbeat, GetParam, SetParam, WaveBegin, WaveData,
     WaveCommit, Arm, Start, Stop, ClearFault, Stream, CoilHeat, WaveCheck,
 )  # fmt: skip
-REPLIES: tuple[type[Message], ...] = (HelloReply, StatusReply, Ack, Nak, ParamReply, Telemetry)
+REPLIES: tuple[type[Message], ...] = (HelloReply, StatusReply, Ack, Nak, ParamReply, Telemetry, TelemetryDuty)
 BY_TYPE: dict[int, type[Message]] = {m.TYPE: m for m in (*COMMANDS, *REPLIES)}
 _ANSWERS: dict[type[Message], type[Message]] = {
     Hello: HelloReply,

@@ -53,6 +53,11 @@ class Outcome:
 NOTHING = m.Telemetry(0, 0, 0, 0, 0, b"")  # in the place of a block that nobody needs any more
 
 
+def tells_duty(hello: m.HelloReply) -> bool:
+    """Return whether the device's telemetry carries the duty."""
+    return (hello.major, hello.minor) >= (codes.PROTOCOL_MAJOR, codes.DUTY_SINCE_MINOR)
+
+
 def _drives(status: m.StatusReply) -> bool:
     return status.state in {codes.State.RUNNING, codes.State.RAMPING}
 
@@ -78,6 +83,7 @@ class Player:
         self._ticks_per_sample = ticks_per_sample
         self.decimation = decimation
         self._hello = hello
+        self._kind = m.TelemetryDuty if tells_duty(hello) else m.Telemetry
         self._monotonic = monotonic
         self._piece_s = piece_s
         self._short = m.WaveData.MAX_ITEMS  # samples a frame while the buffer is well filled
@@ -136,8 +142,8 @@ class Player:
             self.ended.set()
 
     def _take(self, block: m.Telemetry) -> None:
-        if block.session != self._play_session:
-            return  # stale bytes of an earlier play
+        if block.session != self._play_session or type(block) is not self._kind:
+            return  # stale bytes of an earlier play, or of an older host's
         last_tick = block.first_tick + (block.count - 1) * self.decimation
         if block.count:
             if block.first_tick <= self._recorded_tick or block.first_tick % self.decimation:

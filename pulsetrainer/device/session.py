@@ -22,6 +22,7 @@ from pulsetrainer.device.messages import (
     Message,
     Nak,
     Telemetry,
+    TelemetryDuty,
     answers,
 )
 from pulsetrainer.device.schemes import TIMEOUTS_S
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 _HELLO_S = 3.0
 _HELLO_TRY_S = 0.2
 _GREETING_AT_LEAST = 9  # bytes: magic, protocol and firmware version, which no version moves
+_TELEMETRY = {kind.TYPE: kind for kind in (Telemetry, TelemetryDuty)}
 _NAMES = {c.TYPE: c.__name__ for c in COMMANDS}
 
 
@@ -95,9 +97,10 @@ class Session:
         data = self._transport.read()
         self._heard += len(data)
         for frame in self._reader.feed(data):
-            if frame.type == Telemetry.TYPE:
+            kind = _TELEMETRY.get(frame.type)
+            if kind is not None:
                 try:
-                    block = Telemetry.parse(frame.payload)
+                    block = kind.parse(frame.payload)
                 except ValueError:
                     self.rejected += 1
                     continue

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pulsetrainer.device.codes import CURRENT_UNIT_A, FORCE_UNIT_N
+from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, FORCE_UNIT_N
+from pulsetrainer.device.messages import TelemetryDuty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,26 +22,33 @@ Int64Array = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Telemetry samples in order, of one or many wire blocks: tick of the play, A, A, N; shapes (n,)."""
+    """Telemetry samples in order, of one or many wire blocks: tick of the play, A, A, N, 1; shapes (n,).
+
+    ``duty`` is the share of the tick before the sample in which the coil was switched on; NaN from a device
+    that does not tell it.
+    """
 
     tick: Int64Array
     reference_A: FloatArray
     current_A: FloatArray
     force_N: FloatArray
+    duty: FloatArray
 
     @classmethod
     def from_wire(cls, messages: Sequence[Telemetry], decimation: int) -> Block:
         """Return the samples of ``messages``, ``decimation`` ticks apart within each."""
-        samples = np.frombuffer(b"".join(m.items for m in messages), dtype="<i2").reshape(-1, 3)
+        told = any(isinstance(m, TelemetryDuty) for m in messages)
+        items = np.frombuffer(b"".join(m.items for m in messages), dtype="<i2").reshape(-1, 4 if told else 3)
         starts = np.array([m.first_tick for m in messages], dtype=np.int64)
         counts = np.array([m.count for m in messages], dtype=np.int64)
         within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        scaled = samples * (CURRENT_UNIT_A, CURRENT_UNIT_A, FORCE_UNIT_N)
+        scaled = items[:, :3] * (CURRENT_UNIT_A, CURRENT_UNIT_A, FORCE_UNIT_N)
         return cls(
             tick=np.repeat(starts, counts) + decimation * within,
             reference_A=scaled[:, 0].copy(),
             current_A=scaled[:, 1].copy(),
             force_N=scaled[:, 2].copy(),
+            duty=items[:, 3] / DUTY_FULL if told else np.full(len(items), np.nan),
         )
 
     def time_s(self, tick_rate_Hz: float) -> FloatArray:
@@ -59,6 +67,7 @@ class Trace:
     reference_A: FloatArray
     current_A: FloatArray
     force_N: FloatArray
+    duty: FloatArray
     tick_rate_Hz: float
     dropped_samples: int
     complete: bool  # the reference was played to its end

@@ -11,11 +11,13 @@ from link_wire import within
 
 from pulsetrainer.device import player
 from pulsetrainer.device.codes import CURRENT_UNIT_A, PARAMETERS
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.device import Device, open_device
 from pulsetrainer.device.messages import GetParam
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DeviceError, UsageError
+from pulsetrainer.simulation import build
+from pulsetrainer.simulation.bench import open_bench
 
 
 def test_handshake_says_who_and_how_much(device):
@@ -46,6 +48,31 @@ def test_interpolation_is_linear_at_the_tick(device):
     expected = np.interp(recording.tick, 100 * np.arange(4), corners)
     assert len(recording.tick) == 301
     np.testing.assert_allclose(recording.reference_A, expected, atol=1.01 * CURRENT_UNIT_A)
+
+
+def test_duty_and_current_tell_the_resistance(device):
+    """At rest d (V + 0.6 V) - 0.6 V = R i: of two holds, 12 V and 5 ohm."""
+    recording = device.play(np.repeat([0.3, 0.9], 1000), 1000)
+    assert recording.complete
+    duty, current = (
+        values.reshape(2, 1000)[:, 500:].mean(axis=1) for values in (recording.duty, recording.current_A)
+    )
+    np.testing.assert_allclose(duty * 12.6 - 0.6, 5.0 * current * (1 + 0.012 * 0.05), rtol=2e-3)
+
+
+def test_firmware_that_does_not_tell_the_duty_is_told_apart(pulse):
+    """Protocol 2.1: everything else is as ever, the duty is unknown; what needs it names both versions."""
+    executable = build.firmware_executable(("-DPT_PROTOCOL_MINOR=1u",))
+    with Device(open_bench("bench:", time.monotonic, executable)) as device:
+        recording = device.play(pulse, 1000)
+        assert recording.complete
+        assert np.abs(recording.current_A - recording.reference_A).max() < 0.015
+        assert np.all(np.isnan(recording.duty))
+        assert recording.duty.shape == recording.force_N.shape
+        with pytest.raises(DeviceError) as raised:
+            device.needs_duty("a measurement")
+        assert "2.1" in raised.value.message
+        assert "2.2" in raised.value.message
 
 
 @pytest.mark.parametrize(("rate_Hz", "decimation"), [(10_000, 1), (1000, 7), (250, 100), (2, 1000)])

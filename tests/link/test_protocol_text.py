@@ -73,6 +73,8 @@ def test_limits_are_the_compiled_ones():
         f"payload 0..{codes.MAX_PAYLOAD} bytes",
         f"The buffer holds {codes.WAVE_BUFFER_SAMPLES}.",
         f"at {m.Telemetry.MAX_ITEMS} samples or every 50 ms",
+        f"at most {m.TelemetryDuty.MAX_ITEMS} samples of",
+        f"duty u16 [1/{codes.DUTY_FULL}]",
         f"at `ticks per sample` ticks of {1e6 / codes.TICK_RATE_HZ:.0f} us",
         f"no sign of life for {codes.HEARTBEAT_MAX_MS} ms",
         f"one sample above {codes.PARAMETERS[1].maximum * codes.CURRENT_UNIT_A:g} A",
@@ -127,8 +129,8 @@ def test_what_the_safety_unit_counts_is_what_is_told():
         ],
         "CURRENT_IMPLAUSIBLE": [
             f"{turns * 2 ** number['VOLTAGE_SHIFT'] / 10:g} ms",
-            f"{number['VOLTAGE_HIGH_OHMS'] / codes.PARAMETERS[8].default:.2f}",
-            f"{number['VOLTAGE_LOW_OHMS'] / codes.PARAMETERS[8].default:.1f} times",
+            f"{number['VOLTAGE_HIGH_20THS'] / 20:g} or",
+            f"{number['VOLTAGE_LOW_20THS'] / 20:g} times",
             f"{number['VOLTAGE_SPAN_COUNTS']} counts",
         ],
         "NO_FORCE": [
