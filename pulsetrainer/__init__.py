@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pulsetrainer.steps.extend import extend
     from pulsetrainer.steps.identify import identify
     from pulsetrainer.steps.play import play
+    from pulsetrainer.steps.refine import refine
 
 __all__ = [
     "Diagnosis",
@@ -47,6 +48,7 @@ __all__ = [
     "open_device",
     "play",
     "read_table",
+    "refine",
     "save",
     "session",
 ]
@@ -57,7 +59,7 @@ _HOME = {
     **dict.fromkeys(("invert", "load", "open_device", "read_table", "save", "session"), "api"),
     **{
         verb: f"steps.{verb}"
-        for verb in ("capture", "compare", "diagnose", "evaluate", "extend", "identify", "play")
+        for verb in ("capture", "compare", "diagnose", "evaluate", "extend", "identify", "play", "refine")
     },
 }
 

@@ -34,6 +34,7 @@ WRITERS = (
     Writer("identify", ("identify", "run.h5", "--levels", "12"), _h5(), ("run.h5",)),
     Writer("invert", ("invert", "normal", "--model", "model.h5", "--periods", "1"), _h5(), ("model.h5",)),
     Writer("play", ("play", "drive.h5", "--repeats", "1"), _h5(), ("drive.h5",)),
+    Writer("refine", ("refine", "drive.h5", "--passes", "2"), _h5(), ("drive.h5",)),
     Writer(
         "session",
         ("session", "--model", "model.h5", "--beats", "3", "--pulses", "normal,bifid"),

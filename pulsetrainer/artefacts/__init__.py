@@ -9,7 +9,7 @@ from pulsetrainer.artefacts.model import Extension, Fit, Model, Parameter
 from pulsetrainer.artefacts.playback import DrivePlayback, Playback
 from pulsetrainer.artefacts.run import Run
 from pulsetrainer.artefacts.session import Beats, Quiz, Score, Session
-from pulsetrainer.artefacts.waveform import Waveform
+from pulsetrainer.artefacts.waveform import RefinePass, Waveform
 
 __all__ = [
     "KINDS",
@@ -32,6 +32,7 @@ __all__ = [
     "Playback",
     "Profile",
     "Quiz",
+    "RefinePass",
     "Run",
     "Score",
     "Session",

@@ -13,6 +13,16 @@ from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.errors import DataError
 
 
+@dataclass(frozen=True, slots=True)
+class RefinePass:
+    """The errors of one pass of refining, in percent of the full force, over all scored samples."""
+
+    repeats: int
+    mean_abs_error_percent: Annotated[float, Data("percent", "mean absolute error, of full force")]
+    max_abs_error_percent: Annotated[float, Data("percent", "largest absolute error, of full force")]
+    noise_percent: Annotated[float, Data("percent", "mean size of what repeats differ by, of full force")]
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Waveform(Shown):
     """A target force and the two currents that shall press it: compensated and merely scaled."""
@@ -28,18 +38,20 @@ class Waveform(Shown):
         FloatArray, Data("@input_unit", "scaled drive", "time", path="drive/scaled", finite=True)
     ]  # (n,)
     predicted: Annotated[
-        FloatArray, Data("@output_unit", "output the model predicts for the compensated drive", "time")
-    ]
+        FloatArray, Data("@output_unit", "output expected of the compensated drive", "time")
+    ]  # (n,) by the model; of a refined drive what the device gave
     scored: Annotated[BoolArray, Data("1", "sample counts in the evaluation", "time")]  # (n,) not the lead-in
     name: str
     source: str  # where the shape comes from, in words
-    inversion: str  # "continuous" | "closest-match" | "extended"
+    inversion: str  # "continuous" | "closest-match" | "extended" | "refined"
     clipped_samples: int  # targets outside the reachable range
     input_unit: str = "A"
     output_unit: str = "N"
     model: Model | None = None
     period_s: float = float("nan")  # of one beat
     notes: tuple[str, ...] = ()  # what a person should know about the inverse
+    passes: tuple[RefinePass, ...] = ()  # of refining, in their order
+    kept: int = 0  # number of the pass whose drive this is, from 1
 
     def __post_init__(self) -> None:
         check_equal_length(self, ("time_s", "target", "compensated", "scaled", "predicted", "scored"))

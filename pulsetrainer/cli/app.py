@@ -23,6 +23,7 @@ from pulsetrainer.cli import (
     play,
     plot,
     ports,
+    refine,
     session,
     settings,
     show,
@@ -50,6 +51,7 @@ app.command("diagnose")(diagnose.diagnose)
 app.command("extend")(extend.extend)
 app.command("export")(export.export)
 app.command("session")(session.session)
+app.command("refine")(refine.refine)
 app.command("show")(show.show)
 app.command("plot")(plot.plot)
 app.command("ports")(ports.ports)

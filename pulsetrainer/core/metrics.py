@@ -79,6 +79,15 @@ def repeat_spread(measured: ArrayLike) -> float:
     return float(np.sqrt(np.nanmean(np.nanvar(repeats, axis=0, ddof=1))))
 
 
+def mean_over_repeats(measured: FloatArray) -> FloatArray:
+    """Mean (n,) over repeats (r, n); a sample that no repeat has is taken between its neighbours."""
+    present = np.isfinite(measured)
+    count = present.sum(axis=0)
+    total = np.where(present, measured, 0.0).sum(axis=0)
+    known = np.flatnonzero(count)
+    return np.interp(np.arange(count.size), known, total[known] / count[known])
+
+
 class Prediction(NamedTuple):
     """Errors of a predicted output."""
 

@@ -2,12 +2,8 @@
 
     M(u) = (output causes) o P o (input causes) (u)
 
-One inverse serves every extension. With P^-1 the exact inverse of the static part iterate
-
-    r <- r + 0.8 F[y_ref - M(u)],   u <- P^-1(r),   from r = y_ref,
-
-F a zero-phase low-pass at the band of the reference: what the causes do faster than the reference asks
-for cannot be undone and would make the iteration diverge.
+One inverse serves every extension: iterative learning (``core.learning``) around the exact inverse of the
+static part, with M in the device's place.
 """
 
 from __future__ import annotations
@@ -16,10 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
 
-from pulsetrainer.core import inversion
-from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core import inversion, learning
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import cause_named
@@ -141,32 +135,21 @@ class Extended:
         upright = Extended(self.static, self.terms)
         target = self.polarity * np.asarray(target)
         state = self.static.run(lead)[1] if lead.size else None
-        smooth = low_pass_of(band_Hz, dt_s)
-        wanted, best = target, None
-        for k in range(steps + 1):
-            found = inversion.invert(self.static, wanted, state)
-            predicted = upright(np.concatenate((lead, found.input)), dt_s)[lead.size :]
-            error = target - predicted
-            rms = root_mean_square(error)
-            if best is None:
-                best = Tracked(found.input, predicted, found.clipped, 0, rms, rms)
-            elif rms < best.rms:
-                best = Tracked(found.input, predicted, found.clipped, k, rms, best.rms_static)
-            elif k > best.steps + LIMITS.inverse_patience:
+        best = None
+        for tried in learning.passes(
+            target,
+            lambda wanted: inversion.invert(self.static, wanted, state),
+            lambda u: upright(np.concatenate((lead, u)), dt_s)[lead.size :],
+            smooth=learning.LowPass(band_Hz, dt_s),
+        ):
+            if best is None or tried.rms < best.rms:
+                static = best.rms_static if best else tried.rms
+                best = Tracked(
+                    tried.inverse.input, tried.output, tried.inverse.clipped, tried.number, tried.rms, static
+                )
+            elif tried.number > best.steps + LIMITS.inverse_patience:
                 break
-            wanted = wanted + LIMITS.inverse_step * smooth(error)
+            if tried.number == steps:
+                break
         assert best is not None
         return best
-
-
-def low_pass_of(band_Hz: float | None, dt_s: float) -> Callable[[FloatArray], FloatArray]:
-    """A zero-phase low-pass, or nothing where the band is as wide as the samples allow."""
-    if band_Hz is None or band_Hz * dt_s >= LIMITS.inverse_band:
-        return lambda x: x
-    b, a = signal.butter(LIMITS.inverse_order, 2.0 * band_Hz * dt_s)
-
-    def smooth(x: FloatArray) -> FloatArray:
-        pad = min(x.size - 1, round(LIMITS.inverse_pad / (band_Hz * dt_s)))
-        return np.asarray(signal.filtfilt(b, a, x, padlen=pad))
-
-    return smooth

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pulsetrainer.core import inversion
+from pulsetrainer.core import inversion, learning
 from pulsetrainer.core.memory import State, negative_saturation
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.extended import Extended, chain, low_pass_of
+from pulsetrainer.diagnosis.extended import Extended, chain
 from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -63,8 +63,8 @@ class Piecewise:
         self._slew_per_s = slew_per_s
         plane = extended.static.plane
         self.reach = int(np.ceil((plane.high - plane.low) / (slew_per_s * dt_s))) + 1
-        self._smooth = low_pass_of(band_Hz, dt_s)
-        self._kept = round(_CARRIED * LIMITS.inverse_pad / (band_Hz * dt_s)) if band_Hz else 0
+        self._smooth = learning.LowPass(band_Hz, dt_s)
+        self._kept = round(_CARRIED * learning.PAD / (band_Hz * dt_s)) if band_Hz else 0
         self._relays: State = negative_saturation(plane.low)  # of the model
         self._turns: State = self._relays  # of the inverse
         self._past = Past()
@@ -102,7 +102,7 @@ class Piecewise:
             best = rms, lift, inputs, exact.input, error
             if rms < _ENOUGH * 2.0 * self._upright.static.total:
                 break
-            lift = lift + LIMITS.inverse_step * self._correction(error)
+            lift = lift + learning.STEP * self._correction(error)
         assert best is not None
         _, lift, inputs, wished, error = best
         final = inversion.invert(self._upright.static, (wanted + lift)[:n], self._turns)

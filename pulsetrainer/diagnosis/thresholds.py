@@ -153,12 +153,8 @@ class Thresholds:
     short_s: float = 20.0  # a shorter record is called short
 
     # The extended model
-    inverse_step: float = 0.8  # of the error fed back in the inverse: 1 is the fastest that cannot overshoot
     inverse_rounds: int = 16  # of the inverse
     inverse_patience: int = 3  # rounds without gain that end it
-    inverse_band: float = 0.4  # of the sample rate: a reference that wide is not filtered
-    inverse_order: int = 2  # of the low-pass in the inverse
-    inverse_pad: float = 3.0  # periods of the band that pad its ends
     feedback_passes: int = 6  # each multiplies the error of a fed back output by some per cent
     extended_levels: int = 64  # at most: the joint refit holds dense rows
     trace_samples: int = 6000  # kept for the figures

@@ -117,6 +117,16 @@ def _waveform(waveform: Waveform) -> dict[str, Any]:
         "compensated drive": _span(waveform.compensated, waveform.input_unit),
         "clipped_samples": waveform.clipped_samples,
         "source": waveform.source,
+        **(_refined(waveform) if waveform.passes else {}),
+    }
+
+
+def _refined(waveform: Waveform) -> dict[str, Any]:
+    kept = waveform.passes[waveform.kept - 1]
+    return {
+        "refined": f"pass {waveform.kept} of {len(waveform.passes)}, {kept.repeats} repeats",
+        "mean_abs_error_percent": kept.mean_abs_error_percent,
+        "max_abs_error_percent": kept.max_abs_error_percent,
     }
 
 

@@ -107,9 +107,15 @@ def run(record: Run) -> Figure:
 
 @styled
 def waveform(drive: Waveform) -> Figure:
-    """Return a target and its drives; what does not count in the evaluation is shaded."""
-    figure = _sheet(1.5 * COLUMN_IN)
-    panels.drives(figure, drive)
+    """Return a target and its drives, and of a refined one its passes; what is not scored is shaded."""
+    if not drive.passes:
+        figure = _sheet(1.5 * COLUMN_IN)
+        panels.drives(figure, drive)
+        return figure
+    figure = _sheet(1.5 * COLUMN_IN, 1.6 * _ROW_IN)
+    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.8, 1.0))[:, 0]
+    panels.drives(above, drive)
+    panels.passes(below, drive)
     return figure
 
 

@@ -9,6 +9,7 @@ from matplotlib import colormaps
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.patches import Polygon
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report.style import (
@@ -249,7 +250,8 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     """Draw what a waveform asks for and the two currents that shall press it."""
     above, below = panel.subplots(2, 1, sharex=True)
     trace(above, waveform.time_s, waveform.target, **TARGET, label="target")
-    trace(above, waveform.time_s, waveform.predicted, **MODEL, label="predicted by the model")
+    measured = "pressed in the kept pass, mean" if waveform.passes else "predicted by the model"
+    trace(above, waveform.time_s, waveform.predicted, **MODEL, label=measured)
     above.set_ylabel(label("output", waveform.output_unit))
     above.set_title(f"{waveform.name}: target")
     trace(below, waveform.time_s, waveform.scaled, **SCALED, label="scaled")
@@ -259,6 +261,25 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     for axes in (above, below):
         headroom(axes)
         unscored(axes, waveform)
+
+
+def passes(panel: FigureBase, waveform: Waveform) -> None:
+    """Draw how the error of a refined drive fell from pass to pass, down to the noise."""
+    axes = panel.subplots()
+    numbers = np.arange(1, len(waveform.passes) + 1)
+    for name, style in (("max", SCALED), ("mean", COMPENSATED)):
+        values = [getattr(one, f"{name}_abs_error_percent") for one in waveform.passes]
+        axes.semilogy(numbers, values, marker="o", **style, label=f"{name} error")
+    noise = [one.noise_percent for one in waveform.passes]
+    axes.semilogy(numbers, noise, **TARGET, label="noise alone, mean")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.axvline(waveform.kept, **GUIDE)
+    axes.set_xticks(numbers)
+    axes.set_xlabel(f"pass; pass {waveform.kept} is kept")
+    axes.set_ylabel("error [% of full force]")
+    panel.legend(loc="outside lower center", ncols=3)
 
 
 def unscored(axes: Axes, waveform: Waveform) -> None:

@@ -15,9 +15,10 @@ import numpy as np
 
 from pulsetrainer.core import excitations
 from pulsetrainer.core.heartbeat import Pulse
+from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
-from pulsetrainer.steps.invert import EXTENDED_BAND_HZ, RAMP_S
+from pulsetrainer.steps.invert import RAMP_S
 from pulsetrainer.steps.invertible import CONDITIONING_TIME_S
 from pulsetrainer.steps.invertible import REST_S as LEAD_REST_S
 
@@ -127,7 +128,7 @@ class Conductor:
 
         self._pulses, self._reach, self._rhythm = tuple(pulses), reach, rhythm
         self._decide, self._give = decide, give
-        self._inverse = Piecewise(extended, 1.0 / RATE_HZ, slew_per_s=SLEW_A_PER_S, band_Hz=EXTENDED_BAND_HZ)
+        self._inverse = Piecewise(extended, 1.0 / RATE_HZ, slew_per_s=SLEW_A_PER_S, band_Hz=BAND_HZ)
         self._plane = extended.static.plane
         self._rest_force = extended.polarity * (extended.static.offset - extended.static.total)
         self._heat, self._heated, self._cooling_s = heat, heated, cooling_s

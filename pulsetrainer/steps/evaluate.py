@@ -121,7 +121,7 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
     full, scored = waveform.full_force, waveform.scored
     target, output = waveform.target[scored], drive.output[:, scored]
     errors = metrics.tracking(target, output, full)
-    mean_output = _mean_over_repeats(output)
+    mean_output = metrics.mean_over_repeats(output)
     tracking = np.abs(drive.input - drive.reference)
     return DriveError(
         mean_abs_error_percent=errors.mean_abs_percent,
@@ -132,15 +132,6 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
         output=mean_output,
         output_unit=waveform.output_unit,
     )
-
-
-def _mean_over_repeats(measured: FloatArray) -> FloatArray:
-    """Mean (n,) over repeats (r, n); a sample that no repeat has is taken between its neighbours."""
-    present = np.isfinite(measured)
-    count = present.sum(axis=0)
-    total = np.where(present, measured, 0.0).sum(axis=0)
-    known = np.flatnonzero(count)
-    return np.interp(np.arange(count.size), known, total[known] / count[known])
 
 
 def _beats(target: FloatArray) -> int:

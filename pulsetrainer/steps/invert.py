@@ -11,6 +11,7 @@ from pulsetrainer.artefacts import Model, Waveform
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core import inversion
 from pulsetrainer.core.beats import find_beats
+from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
@@ -25,7 +26,6 @@ Inversion = Literal["continuous", "closest-match", "extended"]
 
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
-EXTENDED_BAND_HZ = 30.0  # an arterial pulse holds little above
 RAMP_S = 0.4  # from rest to the first target, and back after the last
 
 
@@ -109,7 +109,7 @@ def invert(
         exact, clipped = _compensated(part, chosen, layout)
     if clipped:
         notes.append(f"{clipped} samples of the target were out of reach and were clipped")
-    limit = _slew(slew, model)
+    limit = slew_limit(slew, model)
     current = exact if limit is None else inversion.slew_limited(exact, rate_Hz, limit)
     compensated = np.concatenate((part.lead, current, part.tail))
     progress(0.9)
@@ -150,8 +150,14 @@ def _check_describes(model: Model, name: str, *, despite_warning: bool) -> None:
         )
 
 
-def _slew(asked: float | None, model: Model) -> float | None:
-    """Return the limit that was asked for, else that of our own device for its own models, else none."""
+def slew_limit(asked: float | None, model: Model) -> float | None:
+    """Return the limit that was asked for, else that of our own device for its own models, else none.
+
+    Raises
+    ------
+    ArgumentError
+        The limit is not positive.
+    """
     if asked is not None:
         positive(slew=asked)
         return asked
@@ -364,9 +370,7 @@ def _compensated(part: Invertible, method: Inversion, layout: _Layout) -> tuple[
 
 def _tracked(model: Model, layout: _Layout, notes: list[str]) -> tuple[FloatArray, int]:
     """Return the input that makes the extended model give what is wanted, and what was clipped."""
-    found = extended_of(model).invert(
-        layout.wanted, 1.0 / layout.rate_Hz, lead=layout.lead, band_Hz=EXTENDED_BAND_HZ
-    )
+    found = extended_of(model).invert(layout.wanted, 1.0 / layout.rate_Hz, lead=layout.lead, band_Hz=BAND_HZ)
     notes.append(
         f"by the extended model the rms tracking error is {with_unit(f'{found.rms:.3g}', model.output_unit)} "
         f"after {found.steps} steps, {found.rms_static:.3g} with the static inverse"

@@ -20,6 +20,8 @@ from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from pulsetrainer.device.device import Device
     from pulsetrainer.device.trace import Trace
 
@@ -83,23 +85,24 @@ def play(drive: Waveform, device: Device, *, repeats: int = 5, progress: Progres
     (True, 1)
     """
     _check(drive, repeats)
-    decimation = round(device.info.tick_rate_Hz / drive.rate_Hz)
     currents = {"compensated": drive.compensated, "scaled": drive.scaled}
     kept: dict[str, list[FloatArray]] = {name: [] for name in DRIVES}
     dropped, fault, remedy = 0, "", ""
     for number in range(repeats * len(DRIVES)):
         name = DRIVES[number % len(DRIVES)]
         _LOG.info("repeat %d of %d, %s drive", number // len(DRIVES) + 1, repeats, name)
-        recording = device.play(currents[name], drive.rate_Hz, decimation=decimation)
-        dropped += recording.dropped_samples
-        fault, remedy = recording.fault, recording.remedy
+        once = play_once(
+            drive,
+            device,
+            currents[name],
+            expected=drive.predicted if name == "compensated" else None,
+            earlier=[rows[2] for rows in kept[name]],
+        )
+        dropped += once.dropped_samples
+        fault, remedy = once.fault, once.remedy
         if fault:
             break
-        grid = _on_grid(recording, drive.time_s.size, decimation)
-        fault, remedy = _judge(drive, name, kept[name], grid[2]), FORCE_REMEDY
-        if fault:
-            break
-        kept[name].append(grid)
+        kept[name].append(once.rows)
         progress((number + 1) / (repeats * len(DRIVES)))
     whole = min(len(rows) for rows in kept.values())
     model = drive.model
@@ -128,6 +131,17 @@ def _check(drive: Waveform, repeats: int) -> None:
     if repeats < 1:
         raise ArgumentError(f"repeats must be at least 1, got {repeats}", hint="5 is usual")
     check_size(repeats, 2 * drive.compensated.size)
+    check_current(drive)
+
+
+def check_current(drive: Waveform) -> None:
+    """Refuse a drive that is no current.
+
+    Raises
+    ------
+    DataError
+        Its input is not in A.
+    """
     if drive.input_unit != "A":
         raise DataError(
             f"the drive {drive.name} is in {drive.input_unit}; the device takes a current in A",
@@ -135,13 +149,38 @@ def _check(drive: Waveform, repeats: int) -> None:
         )
 
 
-def _judge(drive: Waveform, name: str, earlier: list[FloatArray], force: FloatArray) -> str:
-    """Return what is wrong with a force by the model, which foretells it, and by the repeat before."""
-    fault = judge_against(drive.time_s, drive.predicted, force) if name == "compensated" else ""
-    if fault or not earlier:
-        return fault
-    begun = slice(int(np.argmax(drive.scored)), None)  # the first beat shows what was before
-    return judge_repeat(drive.time_s[begun], earlier[-1][2][begun], force[begun])
+@dataclass(frozen=True, slots=True)
+class Once:
+    """What one play of a drive brought back."""
+
+    rows: FloatArray  # (3, n) reference and current in A, force in N; NaN where a block was lost
+    dropped_samples: int
+    fault: str  # why it did not end, or why its force is not to be trusted; empty where neither
+    remedy: str
+
+
+def play_once(
+    drive: Waveform,
+    device: Device,
+    current: FloatArray,
+    *,
+    expected: FloatArray | None,
+    earlier: Sequence[FloatArray],
+) -> Once:
+    """Play a current (n,) on the samples of a drive, and judge the force that comes back.
+
+    ``expected`` (n,) is the force that is foretold, N; ``earlier`` are the forces of the repeats before.
+    """
+    decimation = round(device.info.tick_rate_Hz / drive.rate_Hz)
+    recording = device.play(current, drive.rate_Hz, decimation=decimation)
+    rows = _on_grid(recording, drive.time_s.size, decimation)
+    if recording.fault:
+        return Once(rows, recording.dropped_samples, recording.fault, recording.remedy)
+    fault = "" if expected is None else judge_against(drive.time_s, expected, rows[2])
+    if not fault and earlier:
+        begun = slice(int(np.argmax(drive.scored)), None)  # the first beat shows what was before
+        fault = judge_repeat(drive.time_s[begun], earlier[-1][begun], rows[2][begun])
+    return Once(rows, recording.dropped_samples, fault, FORCE_REMEDY)
 
 
 def _on_grid(recording: Trace, samples: int, decimation: int) -> FloatArray:

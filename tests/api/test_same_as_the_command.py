@@ -113,6 +113,15 @@ def test_diagnose_and_extend(tmp_path, quick):
         same(by_command(tmp_path, *words), stored(extended, tmp_path))
 
 
+def test_refine(tmp_path):
+    """On two benches that are alike in every bit."""
+    drive = KEPT / "drive.h5"
+    with pt.open_device("bench:?seed=5") as device:
+        refined = pt.refine(pt.load(drive), device, passes=3)
+    words = ("refine", drive, "--passes", 3, "--port", "bench:?seed=5")
+    same(by_command(tmp_path, *words), stored(refined, tmp_path))
+
+
 def test_compare(tmp_path):
     """The same figures, and the same words for what became better."""
     evaluation = pt.load(KEPT / "evaluation.h5")

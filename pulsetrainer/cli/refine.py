@@ -1,0 +1,69 @@
+"""``pulsetrainer refine``: learn a drive at the calibration stand, with the force sensor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port
+
+
+def refine(
+    context: typer.Context,
+    drive: Annotated[Path, typer.Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
+    out: Out,
+    port: Port = None,
+    passes: Annotated[
+        int, typer.Option(min=1, help="Most passes; the first one plays the drive as it is.")
+    ] = 5,
+    limit_current_A: LimitCurrent = None,
+    limit_force_N: LimitForce = None,
+    overwrite: Overwrite = False,
+    json: AsJson = False,
+) -> None:
+    """Learn a drive on the device itself, with the force sensor in place.
+
+    Each pass plays the drive and corrects it by the force that was missed; the best is written.
+
+    Example: pulsetrainer refine drive.h5 -o refined.h5
+    """
+    from pulsetrainer.simulation.options import check_port
+
+    check_port(port)
+    job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
+    from pulsetrainer.api import open_device
+    from pulsetrainer.artefacts import Waveform
+    from pulsetrainer.device.device import Limits
+    from pulsetrainer.steps.refine import check
+    from pulsetrainer.steps.refine import refine as learn
+
+    waveform = job.load(drive, Waveform)
+    check(waveform, passes)
+    limits = Limits(limit_current_A, limit_force_N)
+    with job.working(f"refining {drive.name}") as progress, open_device(port, limits=limits) as device:
+        refined = learn(waveform, device, passes=passes, progress=progress)
+        info = device.info
+    title = f"{refined.name} refined on {info.serial}"
+    job.save(out, refined, title, device=job.device(info))
+    job.notes(refined.notes[len(waveform.notes) :])
+    job.screen.result(
+        {
+            "output": out,
+            "name": refined.name,
+            "passes": [plain(one) for one in refined.passes],
+            "kept": refined.kept,
+            "serial": info.serial,
+        }
+    )
+    rows = {
+        f"pass {number}{', kept' if number == refined.kept else ''}": (
+            f"mean {one.mean_abs_error_percent:.3f} %, max {one.max_abs_error_percent:.2f} % of full force, "
+            f"{one.repeats} repeats"
+        )
+        for number, one in enumerate(refined.passes, 1)
+    }
+    job.screen.facts(f"{out}: {title}", rows)

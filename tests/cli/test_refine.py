@@ -1,0 +1,54 @@
+"""`refine` at the command line: learns on the bench, tells its passes, leaves nothing when it fails."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+import pulsetrainer as pt
+from program import pulsetrainer
+
+KEPT = Path(__file__).parents[1] / "data/files-0.1"
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="the bench needs a pty")
+
+
+def test_a_refined_drive_is_better_where_it_is_played(tmp_path):
+    """Played again beside the drive it came from, and figured by `evaluate`."""
+    drive = KEPT / "drive.h5"
+    done = pulsetrainer(tmp_path, "refine", drive, "-o", "refined.h5", "--port", "bench:?seed=3", "--json")
+    assert done.code == 0, done.err
+    passes, kept = done.json["passes"], done.json["kept"]
+    assert {"mean_abs_error_percent", "max_abs_error_percent"} <= set(passes[0])
+    mean = [one["mean_abs_error_percent"] for one in passes]
+    assert len(passes) <= 5
+    assert mean[kept - 1] == min(mean)
+    for name, file in (("before", drive), ("after", "refined.h5")):
+        words = ("play", file, "-o", f"{name}.h5", "--repeats", 2, "--port", "bench:?seed=3")
+        assert pulsetrainer(tmp_path, *words).code == 0
+    before, after = (
+        pt.evaluate(pt.load(tmp_path / f"{name}.h5")).waveforms[0].compensated for name in ("before", "after")
+    )
+    assert after.mean_abs_error_percent < 0.5 * before.mean_abs_error_percent
+    assert pulsetrainer(tmp_path, "plot", "refined.h5", "-o", "refined.png").code == 0
+    shown = pulsetrainer(tmp_path, "show", "refined.h5", "--json")
+    assert f"pass {kept} of {len(passes)}" in str(shown.json)
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (("drive.h5", "--port", "bench:?break=force-zero@0"), 4),
+        (("drive.h5", "--port", "bench:?break=force-frozen@2"), 4),
+        (("drive.h5", "--passes", "0"), 2),
+        (("model.h5",), 3),
+        (("drive.h5", "--port", "bench:?nonsense=1"), 2),
+    ],
+    ids=["no sensor", "stuck sensor", "no pass", "a model", "no such bench"],
+)
+def test_what_cannot_be_refined_writes_nothing(tmp_path, words, code):
+    """Exit code and an empty folder."""
+    done = pulsetrainer(tmp_path, "refine", KEPT / words[0], *words[1:], "-o", "refined.h5")
+    assert done.code == code, done.err
+    assert list(tmp_path.iterdir()) == []
