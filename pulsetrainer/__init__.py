@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from pulsetrainer.version import __version__
 
 if TYPE_CHECKING:
-    from pulsetrainer.api import invert, load, open_device, read_table, save, session
+    from pulsetrainer.api import invert, load, open_device, read_table, save, session, tune
     from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
     from pulsetrainer.steps.capture import capture
     from pulsetrainer.steps.compare import compare
@@ -51,12 +51,13 @@ __all__ = [
     "refine",
     "save",
     "session",
+    "tune",
 ]
 
 _NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Session", "Waveform")
 _HOME = {
     **dict.fromkeys(_NOUNS, "artefacts"),
-    **dict.fromkeys(("invert", "load", "open_device", "read_table", "save", "session"), "api"),
+    **dict.fromkeys(("invert", "load", "open_device", "read_table", "save", "session", "tune"), "api"),
     **{
         verb: f"steps.{verb}"
         for verb in ("capture", "compare", "diagnose", "evaluate", "extend", "identify", "play", "refine")

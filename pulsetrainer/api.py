@@ -15,12 +15,17 @@ from pulsetrainer.artefacts import Waveform
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device import device as _device
 from pulsetrainer.device.device import Device, Limits
+from pulsetrainer.device.gains import Gains
+from pulsetrainer.errors import ArgumentError, UsageError
 from pulsetrainer.files import provenance, pulses, store
 from pulsetrainer.files.run_from_table import run_from_table
+from pulsetrainer.files.tuning import read_tuned
 from pulsetrainer.steps.import_ import import_parts
 from pulsetrainer.steps.invert import invert as _invert
 from pulsetrainer.steps.invert import shape_of
 from pulsetrainer.steps.session import session as _session
+from pulsetrainer.steps.tune import Tuned
+from pulsetrainer.steps.tune import tune as _tune
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import Model, Run, Session
@@ -69,15 +74,18 @@ def save(artefact: Any, path: Path | str, *, overwrite: bool = False, title: str
     store.write(path, artefact, header, overwrite=overwrite)
 
 
-def open_device(port: str | None = None, *, limits: Limits | None = None) -> Device:
+def open_device(
+    port: str | None = None, *, limits: Limits | None = None, tuned: Path | str | None = None
+) -> Device:
     """Open a device: ``bench:``, ``qemu:``, a serial port, ``socket://host:port``; None: the default.
 
-    Use it as a context manager: leaving it stops and disarms the device, always.
+    Use it as a context manager: leaving it stops and disarms the device, always. ``tuned`` is a file of
+    settings; gains that `tune` wrote there under the device's serial number are set.
 
     Raises
     ------
     UsageError
-        The text names no kind of port.
+        The text names no kind of port, or the file of settings cannot be used.
     DeviceError
         There is no such device, or it does not answer.
     ArgumentError
@@ -90,7 +98,50 @@ def open_device(port: str | None = None, *, limits: Limits | None = None) -> Dev
     ...     device.info.current_limit_A
     1.5
     """
-    return _device.open_device(port, limits=limits)
+    entries = {} if tuned is None else read_tuned(tuned)
+    known = {serial: _gains(tuned, entry) for serial, entry in entries.items()}
+    device = _device.open_device(port, limits=limits)
+    try:
+        if device.info.serial in known:
+            device.set_gains(known[device.info.serial])
+    except BaseException:
+        device.close()
+        raise
+    return device
+
+
+def _gains(path: Path | str | None, entry: dict[str, Any]) -> Gains:
+    try:
+        return Gains.of(entry)
+    except ArgumentError as error:
+        raise UsageError(f"{path}: {error.message}", hint=error.hint) from error
+
+
+def tune(
+    device: Device,
+    *,
+    pulses: Sequence[str | Waveform | Shape | tuple[ArrayLike, ArrayLike]] = ("normal", "bifid"),
+    **options: Any,
+) -> Tuned:
+    """Measure the coil, set the gains of the current loop by a rule, and verify them on pulses.
+
+    Everything else is as in ``steps.tune.tune``, which this calls. The gains stay set until the device is
+    closed.
+
+    Raises
+    ------
+    DeviceError
+        No coil, a shorted one, one that the supply cannot drive over the pulses, or a force at rest.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> with pt.open_device("bench:") as device:
+    ...     tuned = pt.tune(device, pulses=["normal"])
+    >>> round(tuned.resistance_ohm, 1), tuned.tracking_percent.after < 1.0
+    (5.0, True)
+    """
+    return _tune(device, pulses=[_shape(one) for one in pulses], **options)
 
 
 def invert(

@@ -61,6 +61,9 @@ WRITERS = (
     ),
 )
 READS_ONLY = (
+    Writer(
+        "tune", ("tune",), (), ()
+    ),  # what it writes is added to a file of its owner's, see test_tune_command
     Writer("show", ("show", "run.h5"), (), ("run.h5",)),
     Writer("show (any kind)", ("show", "played.h5"), (), ("played.h5",)),
     Writer("show (diagnosis)", ("show", "diagnosis.h5"), (), ("diagnosis.h5",)),

@@ -18,7 +18,7 @@ static int16_t at_current(const int16_t *table, int16_t current_100uA)
 
 void safety_init(struct safety *s, struct hal_kept *kept, bool power_on, int16_t force_mN)
 {
-    static const struct safety_limits none = {0, 0, 0, 0, 0};
+    static const struct safety_limits none = {0, 0, 0, 0, 0, 0};
     heat_init(&s->heat, kept, power_on);
     s->not_off = 0;
     s->release_ticks = 0;
@@ -50,6 +50,8 @@ void safety_begin(struct safety *s, const struct safety_limits *limits)
     still_reset(&s->force_still);
     s->voltage_high_ohms = limits->coil_ohms * SAFETY_VOLTAGE_HIGH_20THS / 20;
     s->voltage_low_ohms = limits->coil_ohms * SAFETY_VOLTAGE_LOW_20THS / 20;
+    int32_t stroke = limits->coil_henries * 15 / 524 + SAFETY_VOLTAGE_DIODE_COUNTS; /* 15000 / 256 / 2048 */
+    s->voltage_span = (int16_t)(stroke > SAFETY_VOLTAGE_SPAN_COUNTS ? stroke : SAFETY_VOLTAGE_SPAN_COUNTS);
     s->voltage_samples = 0;
     s->voltage_duty = 0;
     s->voltage_current = 0;
@@ -180,8 +182,8 @@ static uint8_t voltage(struct safety *s, const struct safety_input *in)
     s->voltage_samples = 0;
     s->voltage_duty = 0;
     s->voltage_current = 0;
-    int32_t most = SAFETY_VOLTAGE_OFFSET_COUNTS + SAFETY_VOLTAGE_SPAN_COUNTS + (current * s->voltage_high_ohms >> 16);
-    int32_t least = (current * s->voltage_low_ohms >> 16) - SAFETY_VOLTAGE_SPAN_COUNTS;
+    int32_t most = SAFETY_VOLTAGE_OFFSET_COUNTS + s->voltage_span + (current * s->voltage_high_ohms >> 16);
+    int32_t least = (current * s->voltage_low_ohms >> 16) - s->voltage_span;
     return duty > most || duty < least ? PT_FAULT_CURRENT_IMPLAUSIBLE : PT_FAULT_NONE;
 }
 

@@ -52,7 +52,8 @@
 #define SAFETY_WEAK_TICKS 300u
 
 /* Voltage on the coil against the current that is read, averaged over 0.2 s, so that L di/dt falls out: a full
- * stroke within the window is 15000 * 12.5 / 2048 = 91 counts with 20 mH, and SPAN holds 50 mH.
+ * stroke within the window is 15000 * 12.5 / 2048 = 91 counts with 20 mH, and SPAN holds 50 mH: where the run takes
+ * the coil for one of more, it is that stroke and DIODE.
  * duty = OFFSET + i * OHMS / 65536 with the run's feed-forward of the resistance (compiled: 12 V, 0.6 V, 5 ohm; another
  * where a host has measured the coil). HIGH is 1.55 times the resistive part: copper 80 K warmer 1.31, coil + 5 %,
  * supply - 10 % 1.11, together 1.53. A shunt or gain that lost half reads 2.0. LOW is 0.4: a supply of 24 V instead of
@@ -63,6 +64,7 @@
 #define SAFETY_VOLTAGE_HIGH_20THS 31
 #define SAFETY_VOLTAGE_LOW_20THS 8
 #define SAFETY_VOLTAGE_SPAN_COUNTS 250
+#define SAFETY_VOLTAGE_DIODE_COUNTS 22
 
 /* Force against current: at least 0.7 of the as-built device's rising branch less MARGIN, at most 1.35 of its
  * falling one plus 1.5 N (tables in safety.c, measured on the simulated device; 40 drawn ones lie within 0.74 and
@@ -102,7 +104,8 @@ struct safety_limits {
     int16_t force_trip_mN;
     uint16_t heartbeat_ticks;
     uint32_t on_ticks;
-    int32_t coil_ohms; /* counts for 65536 * 100 uA: what the run takes for the coil's resistance */
+    int32_t coil_ohms;    /* counts for 65536 * 100 uA: what the run takes for the coil's resistance */
+    int32_t coil_henries; /* counts for 256 * 100 uA a tick: and for its inductance */
 };
 
 struct safety_input {
@@ -154,6 +157,7 @@ struct safety {
     int16_t frozen_force_100uA; /* from the limits */
     int32_t voltage_high_ohms;  /* from the limits */
     int32_t voltage_low_ohms;   /* from the limits */
+    int16_t voltage_span;       /* from the limits */
     uint16_t voltage_samples;
     int32_t voltage_duty;    /* sums over the present window */
     int32_t voltage_current;

@@ -22,7 +22,7 @@ static bool near(int32_t got, int32_t expected, int32_t by)
 
 static void normal(void)
 {
-    static const struct safety_limits limits = {16500, 15000, 2000, 9000000, PT_DEFAULT_FEED_RESISTANCE};
+    static const struct safety_limits limits = {16500, 15000, 2000, 9000000, PT_DEFAULT_FEED_RESISTANCE, PT_DEFAULT_FEED_INDUCTANCE};
     safety_init(&s, &kept, true, 0);
     (void)heat_tell(&s.heat, 0);
     safety_begin(&s, &limits);
@@ -199,7 +199,7 @@ static void the_voltage_has_to_fit_the_coil_of_the_run(void)
         for (uint16_t j = 0; j < 5; j++) {
             uint8_t fault = 0;
             normal();
-            safety_begin(&s, &(const struct safety_limits){16500, 15000, 60000, 9000000, ohms[k]});
+            safety_begin(&s, &(const struct safety_limits){16500, 15000, 60000, 9000000, ohms[k], PT_DEFAULT_FEED_INDUCTANCE});
             in.reference_100uA = 7000;
             drive(7000);
             in.force_mN = 6500;
@@ -208,6 +208,25 @@ static void the_voltage_has_to_fit_the_coil_of_the_run(void)
             bool wrong = percents[j] == 200 || (percents[j] == 20 && k > 0); /* where k is 0 that is within a diode's spread */
             CHECK_EQUAL(ticks, wrong ? WINDOW : 0);
             CHECK(ticks == 0 || fault == PT_FAULT_CURRENT_IMPLAUSIBLE);
+        }
+    }
+}
+
+/* A full stroke within the window takes what the coil's inductance asks for and no more. */
+static void a_stroke_through_a_coil_of_more_inductance_is_honest(void)
+{
+    static const int32_t henries[] = {PT_DEFAULT_FEED_INDUCTANCE, 7900, 15900, 21000};
+    for (uint16_t k = 0; k < 4; k++) {
+        int32_t allowed = henries[k] < 7980 ? SAFETY_VOLTAGE_SPAN_COUNTS : henries[k] * 15 / 524 + SAFETY_VOLTAGE_DIODE_COUNTS;
+        for (int32_t beyond = 0; beyond < 2; beyond++) {
+            uint8_t fault = 0;
+            normal();
+            safety_begin(&s, &(const struct safety_limits){16500, 15000, 60000, 9000000, 10000, henries[k]});
+            in.reference_100uA = 7000;
+            drive(7000);
+            in.force_mN = 6500;
+            in.duty_counts = (uint16_t)(374 + (7000 * 15500 >> 16) + allowed + beyond);
+            CHECK_EQUAL(until_fault(4096, &fault, true, true), beyond ? WINDOW : 0);
         }
     }
 }
@@ -228,7 +247,7 @@ static int16_t frozen_stroke(int16_t force_trip_mN)
 {
     uint8_t fault = PT_FAULT_NONE;
     normal();
-    safety_begin(&s, &(const struct safety_limits){16500, force_trip_mN, 60000, 9000000, PT_DEFAULT_FEED_RESISTANCE});
+    safety_begin(&s, &(const struct safety_limits){16500, force_trip_mN, 60000, 9000000, PT_DEFAULT_FEED_RESISTANCE, PT_DEFAULT_FEED_INDUCTANCE});
     in.force_mN = (int16_t)(force_trip_mN - 10); /* at which no floor speaks first */
     int16_t k = 0;
     for (; k <= 12000 && fault == PT_FAULT_NONE; k = (int16_t)(k + 10)) {
@@ -281,7 +300,7 @@ static void full_drive_without_current_trips(void)
 static int32_t until_force_fault(int16_t force_trip_mN, int16_t current_100uA, int16_t force_mN, uint8_t *fault)
 {
     normal();
-    safety_begin(&s, &(const struct safety_limits){16500, force_trip_mN, 60000, 9000000, PT_DEFAULT_FEED_RESISTANCE});
+    safety_begin(&s, &(const struct safety_limits){16500, force_trip_mN, 60000, 9000000, PT_DEFAULT_FEED_RESISTANCE, PT_DEFAULT_FEED_INDUCTANCE});
     drive(current_100uA);
     in.reference_100uA = current_100uA;
     in.force_mN = force_mN;
@@ -427,7 +446,7 @@ static void the_heat_model_stops_a_constant_overload(void)
     CHECK_EQUAL(fault, PT_FAULT_COIL_HEAT);
     CHECK(k > 1230000 && k < 1260000);
     /* ARM does not forget the heat; it cools while the output is off. */
-    safety_begin(&s, &(const struct safety_limits){16500, 15000, 2000, 9000000, PT_DEFAULT_FEED_RESISTANCE});
+    safety_begin(&s, &(const struct safety_limits){16500, 15000, 2000, 9000000, PT_DEFAULT_FEED_RESISTANCE, PT_DEFAULT_FEED_INDUCTANCE});
     CHECK_EQUAL(until_fault(1, &fault, true, true), 1);
     in.armed = in.awaited = in.driving = false;
     in.reference_100uA = 0;
@@ -476,6 +495,7 @@ int main(void)
     RUN(a_frozen_current_reading_trips_as_the_loop_winds_up);
     RUN(the_voltage_has_to_fit_the_current);
     RUN(the_voltage_has_to_fit_the_coil_of_the_run);
+    RUN(a_stroke_through_a_coil_of_more_inductance_is_honest);
     RUN(a_frozen_force_reading_trips_after_a_stroke);
     RUN(a_lost_current_reading_is_not_blamed_on_the_force);
     RUN(full_drive_without_current_trips);

@@ -27,6 +27,7 @@ from pulsetrainer.cli import (
     session,
     settings,
     show,
+    tune,
 )
 from pulsetrainer.version import __version__
 
@@ -52,6 +53,7 @@ app.command("extend")(extend.extend)
 app.command("export")(export.export)
 app.command("session")(session.session)
 app.command("refine")(refine.refine)
+app.command("tune")(tune.tune)
 app.command("show")(show.show)
 app.command("plot")(plot.plot)
 app.command("ports")(ports.ports)
@@ -85,6 +87,7 @@ def root(
     if context.resilient_parsing or {"-h", "--help"} & set(sys.argv):
         return  # help and completion need no settings, and a bad file must not hide them
     file = settings.find(settings_file, os.environ)
+    context.obj = file
     if file is not None:
         context.default_map = settings.defaults(settings.read(file))
 

@@ -86,7 +86,6 @@ def capture(
     job = Job(context, outputs=() if resume else (out,), overwrite=overwrite, as_json=json)
     if resume:
         check_resumable(out)
-    from pulsetrainer.api import open_device
     from pulsetrainer.core.course import Course
     from pulsetrainer.device.device import Limits
     from pulsetrainer.files.resume import earlier_of
@@ -113,7 +112,7 @@ def capture(
     try:
         with (
             job.working(f"capturing {signal}") as progress,
-            open_device(port, limits=Limits(limit_current_A, limit_force_N)) as device,
+            job.open_device(port, Limits(limit_current_A, limit_force_N)) as device,
         ):
             payload = _record(
                 job, out, course, device, earlier, condition=condition, levels=levels, progress=progress

@@ -18,8 +18,10 @@ from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
 
 if TYPE_CHECKING:
+    from pulsetrainer.device.device import Device, Limits
     from pulsetrainer.device.identity import DeviceInfo
-    from pulsetrainer.files.provenance import Device, Header
+    from pulsetrainer.files.provenance import Device as Measurer
+    from pulsetrainer.files.provenance import Header
 
 K = TypeVar("K")
 # what is no parameter of the work: files have digests, a port may hold what no file may know
@@ -51,6 +53,7 @@ class Job:
     ) -> None:
         self.screen = Screen(str(context.info_name), as_json=as_json)
         self._parameters = context.params
+        self._settings: Path | None = context.find_root().obj
         self.overwrite = overwrite
         self._artefacts: list[Path] = []  # loaded, in their order
         self._tables: list[Path] = []
@@ -71,6 +74,27 @@ class Job:
         with self.screen.bar(label) as progress:
             yield progress
         self.seconds = time.perf_counter() - begun
+
+    def open_device(self, port: str | None, limits: Limits | None = None) -> Device:
+        """Open a device with the gains that the file of settings has for it.
+
+        Raises
+        ------
+        UsageError, ArgumentError, DeviceError
+            As ``api.open_device``.
+        """
+        from pulsetrainer.api import open_device
+        from pulsetrainer.device.gains import DELIVERED
+
+        device = open_device(port, limits=limits, tuned=self._settings)
+        if self._settings is not None and device.gains == DELIVERED:
+            from pulsetrainer.files.tuning import read_tuned
+
+            known = read_tuned(self._settings)
+            if known and device.info.serial not in known:
+                said = f"{self._settings} has gains for {', '.join(known)} and none for {device.info.serial}"
+                self.notes([f"{said}, which plays with those delivered; `pulsetrainer tune` measures it"])
+        return device
 
     def load(self, path: Path, kind: type[K]) -> K:
         """Return the artefact of this kind in an input file.
@@ -104,7 +128,9 @@ class Job:
         """Name a parameter of the work that the command line left open."""
         self._parameters = {**self._parameters, name: value}
 
-    def header(self, title: str, *, device: Device | None = None, ancestors: Sequence[Header] = ()) -> Header:
+    def header(
+        self, title: str, *, device: Measurer | None = None, ancestors: Sequence[Header] = ()
+    ) -> Header:
         """Return what the result says about itself: command, parameters, inputs and their history."""
         from pulsetrainer.files import provenance, store
 
@@ -126,14 +152,14 @@ class Job:
             libraries=provenance.library_versions(),
         )
 
-    def device(self, info: DeviceInfo) -> Device:
+    def device(self, info: DeviceInfo) -> Measurer:
         """Return who measured, and on which port, as a header names it."""
         from pulsetrainer.device.schemes import redact
         from pulsetrainer.files.provenance import Device
 
         return Device(info.serial, info.firmware, redact(self._parameters.get("port") or ""))
 
-    def save(self, path: Path | None, noun: Any, title: str, *, device: Device | None = None) -> Header:
+    def save(self, path: Path | None, noun: Any, title: str, *, device: Measurer | None = None) -> Header:
         """Write an artefact, if there is a file to write it to, and return its header."""
         from pulsetrainer.files import store
 

@@ -42,7 +42,6 @@ def play(
 
     check_port(port)
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.api import open_device
     from pulsetrainer.artefacts import Playback, Waveform
     from pulsetrainer.device.device import Limits
     from pulsetrainer.errors import PulsetrainerError
@@ -53,7 +52,7 @@ def play(
         _plan(job, out, port, waveform, repeats)
         return
     stopped: PulsetrainerError | None = None
-    with job.working(f"playing {drive.name}") as progress, open_device(port, limits=limits) as device:
+    with job.working(f"playing {drive.name}") as progress, job.open_device(port, limits) as device:
         info = device.info
         try:
             played = press(waveform, device, repeats=repeats, progress=progress)

@@ -35,7 +35,6 @@ def refine(
 
     check_port(port)
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.api import open_device
     from pulsetrainer.artefacts import Waveform
     from pulsetrainer.device.device import Limits
     from pulsetrainer.steps.refine import check
@@ -44,7 +43,7 @@ def refine(
     waveform = job.load(drive, Waveform)
     check(waveform, passes)
     limits = Limits(limit_current_A, limit_force_N)
-    with job.working(f"refining {drive.name}") as progress, open_device(port, limits=limits) as device:
+    with job.working(f"refining {drive.name}") as progress, job.open_device(port, limits) as device:
         refined = learn(waveform, device, passes=passes, progress=progress)
         info = device.info
     title = f"{refined.name} refined on {info.serial}"

@@ -183,7 +183,6 @@ def _press(
     limits: Any,
 ) -> None:
     """Press, record, save and say."""
-    from pulsetrainer.api import open_device
     from pulsetrainer.cli import live
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.errors import UsageError
@@ -210,7 +209,7 @@ def _press(
     if dark and "small" in dark:
         job.notes([f"{dark}; there are no keys"])
     view, decide, screen = _steered(asked, chosen, shapes, dark)
-    with open_device(port, limits=limits) as device:
+    with job.open_device(port, limits) as device:
         info = device.info
         recorder = SessionRecorder(
             out, job.header("a session under way"), overwrite=job.overwrite, signal="session"

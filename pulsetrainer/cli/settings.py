@@ -41,7 +41,13 @@ def variable(key: str) -> str:
 
 
 SETTINGS = (
-    Setting("port", str, "", "the device", (("capture", "port"), ("play", "port"), ("doctor", "port"))),
+    Setting(
+        "port",
+        str,
+        "",
+        "the device",
+        (("capture", "port"), ("play", "port"), ("doctor", "port"), ("tune", "port")),
+    ),
     Setting("levels", int, "", "levels of the plane", (("capture", "levels"), ("identify", "levels"))),
     Setting("current_max_A", float, "A", "top of the range of a capture", (("capture", "current_max_A"),)),
     Setting("speed_A_per_s", float, "A/s", "speed of identification", (("capture", "speed_A_per_s"),)),
@@ -54,14 +60,14 @@ SETTINGS = (
         float,
         "A",
         "the device refuses more",
-        (("capture", "limit_current_A"), ("play", "limit_current_A")),
+        (("capture", "limit_current_A"), ("play", "limit_current_A"), ("tune", "limit_current_A")),
     ),
     Setting(
         "limits.force_N",
         float,
         "N",
         "the device switches off above",
-        (("capture", "limit_force_N"), ("play", "limit_force_N")),
+        (("capture", "limit_force_N"), ("play", "limit_force_N"), ("tune", "limit_force_N")),
     ),
 )
 
@@ -104,6 +110,7 @@ def read(path: Path) -> dict[str, Any]:
         raise UsageError(
             f"the settings in {path} cannot be read: {error}", hint="correct the file"
         ) from error
+    tree.pop("tuned", None)  # what `tune` wrote: looked at when a device is opened
     return {key: _value(path, key, value) for key, value in _leaves(tree)}
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.feed import Feed
+from pulsetrainer.device.gains import DELIVERED, Gains
 from pulsetrainer.device.heat import HeatMemory, added, in_words, wait_s
 from pulsetrainer.device.identity import DeviceInfo
 from pulsetrainer.device.plausibility import ForceWatch
@@ -84,6 +85,7 @@ class Device:
         self._sleep = sleep
         self._player: Player | None = None
         self._turn = threading.Lock()  # held by whoever talks to the device, and to change who plays
+        self._gains = DELIVERED
         self._greet()
 
     def _greet(self) -> None:
@@ -238,6 +240,17 @@ class Device:
             self._hello = replace(self._hello, **limit)
             self.info = DeviceInfo.from_wire(self._hello, self.info.latched_fault)
         return reply.value
+
+    @property
+    def gains(self) -> Gains:
+        """Gains of the current loop that the next play has."""
+        return self._gains
+
+    def set_gains(self, gains: Gains) -> None:
+        """Set the gains of the current loop; a new greeting would restore those delivered."""
+        for name, value in gains.values().items():
+            self.set_parameter(name, value)
+        self._gains = gains
 
     def lower(self, limits: Limits) -> None:
         """Put limits in force that are stricter than the device's own.
@@ -467,6 +480,7 @@ class Device:
             samples=received,
             remedy=outcome.remedy or (FORCE_REMEDY if implausible else ""),
             underrun=bool(outcome.fault) and player.seen[0] == codes.Fault.UNDERRUN,
+            fault_code=player.seen[0] if outcome.fault else 0,
         )
 
 

@@ -75,6 +75,7 @@ class Trace:
     samples: int  # received, also where they were not kept
     remedy: str = ""  # what to do about it, where that is known
     underrun: bool = False  # the device had to stop because a sample came too late
+    fault_code: int = 0  # the device's first cause, a codes.Fault; 0 where it had none
 
     @property
     def time_s(self) -> FloatArray:

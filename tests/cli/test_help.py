@@ -9,7 +9,7 @@ import pytest
 
 COMMANDS = (
     *("capture", "import", "identify", "invert", "play", "evaluate", "diagnose", "extend"),
-    *("session", "refine", "export", "show", "plot", "ports", "compare", "doctor"),
+    *("session", "refine", "tune", "export", "show", "plot", "ports", "compare", "doctor"),
 )
 HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich")
 

@@ -1,0 +1,92 @@
+"""``pulsetrainer tune``: measure the coil and set the gains of its current loop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Overwrite, Port, positive
+
+if TYPE_CHECKING:
+    from pulsetrainer.steps.tune import Tuned
+
+
+def tune(
+    context: typer.Context,
+    port: Port = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            help="File of settings to write the gains into, such as pulsetrainer.toml.",
+            show_default=False,
+        ),
+    ] = None,
+    supply_V: Annotated[
+        float | None,
+        typer.Option(
+            "--supply",
+            callback=positive,
+            help="Voltage of the supply, V, where you have measured it; default: told by the diode's 0.6 V.",
+            show_default=False,
+        ),
+    ] = None,
+    limit_current_A: LimitCurrent = None,
+    limit_force_N: LimitForce = None,
+    overwrite: Overwrite = False,
+    json: AsJson = False,
+) -> None:
+    """Measure the coil and set the gains of its current loop.
+
+    Nobody's finger should be on the device meanwhile. The other commands take the gains from the file of
+    settings for the device whose serial number they stand under. --overwrite replaces what an earlier tuning
+    of the device wrote there; the rest of the file stays.
+
+    Example: pulsetrainer tune -o pulsetrainer.toml
+    """
+    from pulsetrainer.files.atomic_write import check_output
+    from pulsetrainer.simulation.options import check_port
+
+    check_port(port)
+    if out is not None:
+        check_output(out, overwrite=True)
+    job = Job(context, as_json=json)
+    from pulsetrainer.api import open_device
+    from pulsetrainer.api import tune as measure
+    from pulsetrainer.device.device import Limits
+    from pulsetrainer.files.tuning import check_tuned, write_tuned
+
+    limits = Limits(limit_current_A, limit_force_N)
+    with job.working("tuning") as progress, open_device(port, limits=limits) as device:
+        if out is not None:
+            check_tuned(out, device.info.serial, overwrite=overwrite)
+        found = measure(device, supply_V=supply_V, progress=progress)
+    if out is not None:
+        measured = {"resistance_ohm": found.resistance_ohm, "inductance_H": found.inductance_H}
+        write_tuned(out, found.serial, measured | found.gains.values(), overwrite=overwrite)
+    _show(job, out, found)
+
+
+def _show(job: Job, out: Path | None, found: Tuned) -> None:
+    job.notes(found.notes)
+    if out is None:
+        job.notes(["the gains are not kept: give `out` pulsetrainer.toml to write them down"])
+    job.screen.result(plain(found) | {"output": out})
+    before, after = found.tracking_percent.before, found.tracking_percent.after
+    job.screen.facts(
+        f"{out or 'not kept'}: {found.serial}",
+        {
+            "coil": f"{found.resistance_ohm:.2f} ohm, {1e3 * found.inductance_H:.1f} mH, supply "
+            f"{found.supply_V:.1f} V",
+            "gains": ", ".join(f"{name} {value}" for name, value in found.gains.values().items()),
+            "margins": f"gain {found.margins.gain:.1f}, phase {found.margins.phase_deg:.0f} degrees",
+            "tracking": f"{after:.2f} % of the range at worst"
+            + ("" if before is None else f", {before:.2f} % before"),
+            "step": f"settled after {found.settle_ms:.1f} ms, overshoot {found.overshoot_percent:.1f} %",
+        },
+    )

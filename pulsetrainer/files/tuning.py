@@ -1,0 +1,91 @@
+"""What `tune` found, kept in the file of settings: a table ``[tuned."SERIAL"]`` for each device.
+
+The rest of the file, comments too, stays as its owner wrote it.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pulsetrainer.errors import ExistsError, UsageError
+from pulsetrainer.files.atomic_write import check_output, replacing
+
+TABLE = "tuned"
+Found = Mapping[str, float]
+
+
+def read_tuned(path: Path | str) -> dict[str, dict[str, Any]]:
+    """Return what was found for each device, by its serial number.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or what is there is no table of numbers.
+    """
+    try:
+        tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UsageError(
+            f"the settings in {path} cannot be read: {error}", hint="correct the file"
+        ) from error
+    table = tree.get(TABLE, {})
+    entries = table.values() if isinstance(table, dict) else [None]
+    for entry in entries:
+        numbers = isinstance(entry, dict) and all(type(value) in (int, float) for value in entry.values())
+        if not numbers:
+            raise UsageError(
+                f"{path}: [{TABLE}] holds something that `tune` did not write",
+                hint=f"delete its tables [{TABLE}...] and tune again",
+            )
+    return table
+
+
+def check_tuned(path: Path, serial: str, *, overwrite: bool) -> None:
+    """Refuse a file that cannot take a device's entry, before the work that would be lost.
+
+    Raises
+    ------
+    UsageError
+        It cannot be written or read, or has an entry of this device and ``overwrite`` is not set.
+    """
+    check_output(path, overwrite=True)
+    if path.exists() and serial in read_tuned(path) and not overwrite:
+        raise ExistsError(path, f"{path} already has the gains of the device {serial}")
+
+
+def write_tuned(path: Path, serial: str, found: Found, *, overwrite: bool) -> None:
+    """Write a device's entry into a file of settings, which is made where there is none.
+
+    Raises
+    ------
+    UsageError
+        As ``check_tuned``; or the entry stands there in a form that cannot be replaced.
+    DataError
+        The disk is full or failed.
+    """
+    check_tuned(path, serial, overwrite=overwrite)
+    before = path.read_text(encoding="utf-8") if path.exists() else ""
+    header = f"[{TABLE}.{json.dumps(serial)}]"
+    kept, inside = [], False
+    for line in before.splitlines():
+        if line.lstrip().startswith("["):
+            inside = line.strip() == header
+        if not inside:
+            kept.append(line)
+    while kept and not kept[-1].strip():
+        kept.pop()
+    entry = [header, *(f"{name} = {value!r}" for name, value in found.items())]
+    text = "\n".join([*kept, *([""] if kept else []), *entry, ""])
+    try:
+        tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(
+            f"the entry of {serial} cannot be replaced in {path}: {error}",
+            hint=f"delete what stands there under {TABLE}, then tune again",
+        ) from error
+    with replacing(path, overwrite=True) as temporary:
+        temporary.write_text(text, encoding="utf-8")
