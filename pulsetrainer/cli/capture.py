@@ -18,6 +18,7 @@ from pulsetrainer.cli.options import (
     Out,
     Overwrite,
     Port,
+    ShowLive,
     positive,
 )
 from pulsetrainer.cli.settings import variable
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.files.resume import Earlier
     from pulsetrainer.steps.capture import Plan
+    from pulsetrainer.steps.recording import Watch
 
 
 def capture(
@@ -68,6 +70,7 @@ def capture(
     ] = False,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
+    live: ShowLive = False,
     dry_run: DryRun = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
@@ -109,14 +112,14 @@ def capture(
         earlier = earlier_of(out, asked, overwrite=overwrite)
     else:
         _note_leftovers(job, out)
+    limits = Limits(limit_current_A, limit_force_N)
+    view = job.view(float(played.value.max()), live=live)
     try:
-        with (
-            job.working(f"capturing {signal}") as progress,
-            job.open_device(port, Limits(limit_current_A, limit_force_N)) as device,
-        ):
+        with job.working(f"capturing {signal}", view) as progress, job.open_device(port, limits) as device:
             payload = _record(
-                job, out, course, device, earlier, condition=condition, levels=levels, progress=progress
-            )
+                job, out, course, device, earlier,
+                condition=condition, levels=levels, progress=progress, watch=view.take if view else None,
+            )  # fmt: skip
     finally:
         if earlier is not None:
             earlier.lease.end()
@@ -137,6 +140,7 @@ def _record(
     condition: bool,
     levels: int,
     progress: Callable[[float], None],
+    watch: Watch | None,
 ) -> dict[str, Any]:
     """Record into the file, or go on with one that was cut off, and return the figures."""
     from pulsetrainer.errors import DeviceError, Interrupted
@@ -172,8 +176,9 @@ def _record(
     try:
         with recorder:
             ending = record(
-                course, device, recorder, tally, at=at, condition_first=condition, progress=progress
-            )
+                course, device, recorder, tally,
+                at=at, condition_first=condition, progress=progress, watch=watch,
+            )  # fmt: skip
             recorder.finish(complete=ending.complete)
         raise_if_stopped(ending.fault, ending.remedy, "the capture")
     except (DeviceError, Interrupted) as error:

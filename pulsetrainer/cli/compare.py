@@ -78,10 +78,11 @@ def compare(
 
 
 def _csv(files: Sequence[Path], metrics: Sequence[Metric]) -> str:
+    """Return a tidy table: a row for each file, a column for each figure."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["metric", *map(str, files), "change"])
-    writer.writerows([m.name, *m.values, m.change] for m in metrics)
+    writer.writerow(["file", *(m.name for m in metrics)])
+    writer.writerows([str(file), *(m.values[k] for m in metrics)] for k, file in enumerate(files))
     return text.getvalue()
 
 

@@ -34,14 +34,8 @@ def export(
         )
     job = Job(context, inputs=(file,), outputs=(out,), overwrite=overwrite, as_json=json)
     artefact = job.load_any(file)
-    from pulsetrainer.files import store
-    from pulsetrainer.files.series import series_of
-    from pulsetrainer.files.table import write_table
-
     with job.working(f"exporting {file.name}"):
-        columns = series_of(artefact)
-        title = f"{artefact.kind}: {store.read_header(file).title}"
-        write_table(out, columns, comments=(title,), overwrite=overwrite)
+        columns = job.table(out, artefact, file)
     rows = next(iter(columns.values())).size
     job.screen.result({"output": out, "kind": artefact.kind, "columns": list(columns), "rows": rows})
     job.screen.whole(f"wrote {out}: {artefact.kind}, {rows} rows of {', '.join(columns)}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,6 +18,8 @@ from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
 
 if TYPE_CHECKING:
+    from pulsetrainer.artefacts import FloatArray
+    from pulsetrainer.cli.loop_view import LoopView
     from pulsetrainer.device.device import Device, Limits
     from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.files.provenance import Device as Measurer
@@ -68,10 +70,13 @@ class Job:
         self.seconds = 0.0
 
     @contextmanager
-    def working(self, label: str) -> Iterator[Any]:
-        """Give a callable that takes the share of the work done, and measure how long it takes."""
+    def working(self, label: str, view: LoopView | None = None) -> Iterator[Any]:
+        """Give a callable that takes the share of the work done, and measure how long it takes.
+
+        It moves a bar, or ``view`` where there is one.
+        """
         begun = time.perf_counter()
-        with self.screen.bar(label) as progress:
+        with self.screen.bar(label) if view is None else view.on_screen(label) as progress:
             yield progress
         self.seconds = time.perf_counter() - begun
 
@@ -95,6 +100,19 @@ class Job:
                 said = f"{self._settings} has gains for {', '.join(known)} and none for {device.info.serial}"
                 self.notes([f"{said}, which plays with those delivered; `pulsetrainer tune` measures it"])
         return device
+
+    def view(self, *ends: float, live: bool) -> LoopView | None:
+        """Return a live view with these ends of its axes, if asked for and the terminal can show it."""
+        if not live or self.screen.as_json or not sys.stderr.isatty():
+            return None
+        from pulsetrainer.cli.loop_view import SMALLEST, LoopView
+
+        view = LoopView(*ends)
+        if view.fits and (sys.stderr.encoding or "").lower().startswith("utf"):
+            return view
+        least = " x ".join(map(str, SMALLEST))
+        self.screen.note(f"no live view: it needs a terminal of {least} characters that shows Unicode")
+        return None
 
     def load(self, path: Path, kind: type[K]) -> K:
         """Return the artefact of this kind in an input file.
@@ -174,6 +192,17 @@ class Job:
 
         with replacing(path, overwrite=self.overwrite) as temporary:
             temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+    def table(self, path: Path, noun: Any, source: Path) -> Mapping[str, FloatArray]:
+        """Write the series of an artefact as CSV, and return its columns."""
+        from pulsetrainer.files import store
+        from pulsetrainer.files.series import series_of
+        from pulsetrainer.files.table import write_table
+
+        columns = series_of(noun)
+        title = f"{noun.kind}: {store.read_header(source).title}"
+        write_table(path, columns, comments=(title,), overwrite=self.overwrite)
+        return columns
 
     def page(self, path: Path, render: Callable[..., str], noun: Any, header: Header) -> None:
         """Write the page about an artefact."""

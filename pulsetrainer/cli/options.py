@@ -33,6 +33,9 @@ Port = Annotated[
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say what would be played; touch no port, write nothing.")
 ]
+ShowLive = Annotated[
+    bool, typer.Option("--live", help="Draw the loop on the terminal while it grows; quiet in a pipe.")
+]
 LimitCurrent = Annotated[
     float | None,
     typer.Option(

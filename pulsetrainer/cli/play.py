@@ -9,12 +9,15 @@ import typer
 
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port
+from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port, ShowLive
 from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Playback, Waveform
+    from pulsetrainer.artefacts import FloatArray, Playback, Waveform
+    from pulsetrainer.cli.loop_view import LoopView
+    from pulsetrainer.core.plane import IntArray
     from pulsetrainer.device.identity import DeviceInfo
+    from pulsetrainer.steps.play import Watch
 
 
 def play(
@@ -28,6 +31,7 @@ def play(
     ] = 5,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
+    live: ShowLive = False,
     dry_run: DryRun = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
@@ -52,10 +56,12 @@ def play(
         _plan(job, out, port, waveform, repeats)
         return
     stopped: PulsetrainerError | None = None
-    with job.working(f"playing {drive.name}") as progress, job.open_device(port, limits) as device:
+    view = job.view(*_ends(waveform), live=live)
+    watch = _shown_by(view, waveform) if view else None
+    with job.working(f"playing {drive.name}", view) as progress, job.open_device(port, limits) as device:
         info = device.info
         try:
-            played = press(waveform, device, repeats=repeats, progress=progress)
+            played = press(waveform, device, repeats=repeats, progress=progress, watch=watch)
         except PulsetrainerError as error:
             if not isinstance(error.kept, Playback):
                 raise
@@ -71,6 +77,33 @@ def play(
         stopped.message += f"; {whole} of {repeats} repeats were kept in {out}"
         raise stopped
     _show(job, out, played, info)
+
+
+def _ends(drive: Waveform) -> tuple[float, float]:
+    """Ends of the axes of the live view: a little beyond what is asked for."""
+    return 1.05 * float(max(drive.compensated.max(), drive.scaled.max())), 1.1 * float(drive.target.max())
+
+
+def _shown_by(view: LoopView, drive: Waveform) -> Watch:
+    """Return what shows a play on a live view: loop and error of each drive as they grow."""
+    import numpy as np
+
+    errors: dict[str, list[float]] = {}
+
+    def watch(name: str, repeat: int, place: IntArray, current: FloatArray, force: FloatArray) -> None:
+        total = errors.setdefault(name, [0.0, 0.0, 0.0])  # sum, largest, count
+        counts = place < drive.scored.size
+        counts[counts] = drive.scored[place[counts]] & np.isfinite(force[counts])
+        if counts.any():
+            error = np.abs(force[counts] - drive.target[place[counts]]) * (100.0 / drive.full_force)
+            total[:] = total[0] + error.sum(), max(total[1], float(error.max())), total[2] + error.size
+        said = [
+            f"{one}: mean {add / max(n, 1):.2f} %, max {most:.1f} %" for one, (add, most, n) in errors.items()
+        ]
+        view.figures = f"repeat {repeat}, {'; '.join(said)}"
+        view.take(current, force)
+
+    return watch
 
 
 def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:

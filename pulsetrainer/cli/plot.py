@@ -19,6 +19,9 @@ def plot(
         Path | None,
         typer.Option("-o", "--out", help="File to write; default: beside it, as PNG.", show_default=False),
     ] = None,
+    data: Annotated[
+        bool, typer.Option("--data", help="Write what is drawn as a table too, beside the figure, as CSV.")
+    ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
@@ -28,7 +31,8 @@ def plot(
     """
     out = out or file.with_suffix(".png")
     form = figure_form(out, "a figure")
-    job = Job(context, inputs=(file,), outputs=(out,), overwrite=overwrite, as_json=json)
+    table = out.with_suffix(".csv") if data else None
+    job = Job(context, inputs=(file,), outputs=(out, table), overwrite=overwrite, as_json=json)
     artefact = job.load_any(file)
     from pulsetrainer.errors import DataError
     from pulsetrainer.report import figures, render
@@ -41,5 +45,8 @@ def plot(
                 f"{file} cannot be drawn: {error}", hint=f"look at its values: pulsetrainer show {file}"
             ) from error
         job.write(out, picture)
-    job.screen.result({"output": out, "kind": artefact.kind})
+        if table is not None:
+            job.table(table, artefact, file)
+    job.screen.result({"output": out, "kind": artefact.kind} | ({"data": table} if data else {}))
     job.screen.whole(f"wrote {out}: {artefact.kind}")
+    job.wrote(table)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +13,7 @@ import numpy as np
 from pulsetrainer.artefacts import DrivePlayback, Model, Playback, Waveform
 from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
@@ -23,10 +25,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from pulsetrainer.device.device import Device
-    from pulsetrainer.device.trace import Trace
+    from pulsetrainer.device.trace import Block, Trace
 
 _LOG = logging.getLogger(__name__)
 DRIVES = ("compensated", "scaled")
+Watch = Callable[[str, int, IntArray, FloatArray, FloatArray], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +62,18 @@ def plan(drive: Waveform, *, repeats: int = 5) -> Plan:
     )
 
 
-def play(drive: Waveform, device: Device, *, repeats: int = 5, progress: Progress = silent) -> Playback:
+def play(
+    drive: Waveform,
+    device: Device,
+    *,
+    repeats: int = 5,
+    progress: Progress = silent,
+    watch: Watch | None = None,
+) -> Playback:
     """Play both drives of a waveform alternately, ``repeats`` times each, and return what was measured.
+
+    ``watch`` is shown what comes back as it comes: name of the drive, number of the repeat, places (m,) on
+    the samples of the drive, current and force (m,).
 
     Arrays of the playback are (repeats, n), in A and N; NaN where the wire lost a block.
 
@@ -90,13 +103,15 @@ def play(drive: Waveform, device: Device, *, repeats: int = 5, progress: Progres
     dropped, fault, remedy = 0, "", ""
     for number in range(repeats * len(DRIVES)):
         name = DRIVES[number % len(DRIVES)]
-        _LOG.info("repeat %d of %d, %s drive", number // len(DRIVES) + 1, repeats, name)
+        repeat = number // len(DRIVES) + 1
+        _LOG.info("repeat %d of %d, %s drive", repeat, repeats, name)
         once = play_once(
             drive,
             device,
             currents[name],
             expected=drive.predicted if name == "compensated" else None,
             earlier=[rows[2] for rows in kept[name]],
+            watch=None if watch is None else partial(watch, name, repeat),
         )
         dropped += once.dropped_samples
         fault, remedy = once.fault, once.remedy
@@ -166,13 +181,19 @@ def play_once(
     *,
     expected: FloatArray | None,
     earlier: Sequence[FloatArray],
+    watch: Callable[[IntArray, FloatArray, FloatArray], None] | None = None,
 ) -> Once:
     """Play a current (n,) on the samples of a drive, and judge the force that comes back.
 
     ``expected`` (n,) is the force that is foretold, N; ``earlier`` are the forces of the repeats before.
     """
     decimation = round(device.info.tick_rate_Hz / drive.rate_Hz)
-    recording = device.play(current, drive.rate_Hz, decimation=decimation)
+
+    def show(block: Block) -> None:
+        if watch is not None:
+            watch(block.tick // decimation, block.current_A, block.force_N)
+
+    recording = device.play(current, drive.rate_Hz, decimation=decimation, on_block=show)
     rows = _on_grid(recording, drive.time_s.size, decimation)
     if recording.fault:
         return Once(rows, recording.dropped_samples, recording.fault, recording.remedy)

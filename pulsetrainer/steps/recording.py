@@ -9,6 +9,7 @@ with a known memory, and the run says where each begins: ``Run.seam``.
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -35,6 +36,9 @@ CONDITIONING_REST_S = 0.2
 PAUSE_S = 1.0  # between two parts, on the time axis; how long it was in truth nobody knows after a crash
 _MATCH_A = 1.5e-4  # the device tells the reference in steps of 0.1 mA
 _MOST_TURNS = 20_000  # of the reference, kept until the part ends
+
+
+Watch = Callable[[FloatArray, FloatArray], None]  # current and force, arrays (n,) in A and N
 
 
 class Sink(Protocol):
@@ -175,8 +179,11 @@ def record(
     at: int = 0,
     condition_first: bool = True,
     progress: Progress = silent,
+    watch: Watch | None = None,
 ) -> Ending:
     """Play a course from sample ``at`` to its end, or until the device or the user stops it.
+
+    ``watch`` is shown the current and the force as they come.
 
     Raises
     ------
@@ -210,6 +217,8 @@ def record(
         def keep(block: Block, begun_s: float = begun_s, done: int = at, lead: int = lead.size) -> None:
             sink.append(begun_s + block.tick / step, block.reference_A, block.current_A, block.force_N)
             tally.add(block.reference_A, block.current_A, block.force_N)
+            if watch is not None:
+                watch(block.current_A, block.force_N)
             played = int(block.tick[-1]) // decimation + 1 - lead
             progress((done + max(played, 0)) / course.size)
 

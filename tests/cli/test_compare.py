@@ -66,8 +66,12 @@ def test_as_figure_and_as_table(folder, tmp_path):
     assert folder("-o", tmp_path / "c.csv").code == 0
     with (tmp_path / "c.csv").open() as file:
         rows = list(csv.reader(file))
-    assert rows[0][0] == "metric"
-    assert float(rows[1][3]) == pytest.approx(float(rows[1][2]) - float(rows[1][1]))
+    assert rows[0][0] == "file"
+    metrics = {one["name"]: one["values"] for one in folder("--json").json["metrics"]}
+    assert rows[0][1:] == list(metrics)
+    assert [list(map(float, row[1:])) for row in rows[1:]] == [
+        pytest.approx([values[k] for values in metrics.values()]) for k in range(2)
+    ]
     assert folder("-o", tmp_path / "c.csv").code == 2
     assert folder("-o", tmp_path / "c.docx").code == 2
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from program import pulsetrainer
 from pulsetrainer.artefacts import Run
 from pulsetrainer.files import store
+from wording import refusal
+
+KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 
 
 @pytest.fixture
@@ -47,3 +52,23 @@ def test_an_existing_table_is_kept_unless_it_may_go(folder):
     assert pulsetrainer(folder, "export", "run.h5", "-o", "run.csv", "--overwrite").code == 0
     assert pulsetrainer(folder, "export", "run.h5", "-o", "table.h5").code == 2
     assert not (folder / "table.h5").exists()
+
+
+@pytest.mark.parametrize("name", ["run", "model", "drive", "played", "evaluation", "diagnosis"])
+def test_a_figure_with_its_data(tmp_path, name):
+    """`plot --data`: beside the figure the table that `export` writes, word for word."""
+    file = KEPT / f"{name}.h5"
+    done = pulsetrainer(tmp_path, "plot", file, "-o", "figure.png", "--data", "--json")
+    assert done.code == 0, done.err
+    assert done.json["data"] == "figure.csv"
+    assert pulsetrainer(tmp_path, "export", file, "-o", "table.csv").code == 0
+    assert (tmp_path / "figure.csv").read_bytes() == (tmp_path / "table.csv").read_bytes()
+    assert pulsetrainer(tmp_path, "plot", file, "-o", "other.png", "--data").code == 0
+    (tmp_path / "figure.png").unlink()
+    refusal(
+        pulsetrainer(tmp_path, "plot", file, "-o", "figure.png", "--data", "--json"),
+        2,
+        "exists",
+        file="figure.csv",
+    )
+    assert not (tmp_path / "figure.png").exists()

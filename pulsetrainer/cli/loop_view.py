@@ -1,0 +1,96 @@
+"""The loop of force over current, drawn in the terminal while a device plays; elsewhere nothing is drawn.
+
+Each character is a grid of 2 x 4 dots (Unicode braille); a dot is set once some sample fell on it, so a point
+costs the same however long the play lasts.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.steps.progress import Progress
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from pulsetrainer.artefacts import FloatArray
+
+FULL_SCALE_N = 15.0  # of the force sensor: the axis where no force is foretold
+SMALLEST = (40, 12)  # columns and lines
+_HIGHEST = 16  # lines of the loop
+_DRAWN_EACH_S = 0.3  # of the wall clock: a drawing takes 3 ms, so a hundredth of the time
+_BRAILLE = 0x2800
+_DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint16)  # row, column
+
+
+class LoopView:
+    """Takes samples, and shows the loop that they make with one line of figures below it.
+
+    Parameters
+    ----------
+    current_A, force_N
+        Upper ends of the two axes, which begin at 0; what is beyond them is drawn on the edge.
+    """
+
+    def __init__(self, current_A: float, force_N: float = FULL_SCALE_N) -> None:
+        columns, lines = shutil.get_terminal_size()
+        self.fits = columns >= SMALLEST[0] and lines >= SMALLEST[1]
+        self._size = max(min(columns - 2, 72), 1), max(min(lines - 4, _HIGHEST), 1)
+        self._ends = max(current_A, 1e-9), max(force_N, 1e-9)
+        self._cells = np.zeros(self._size[::-1], dtype=np.uint16)
+        self._share, self._label = 0.0, ""
+        self._drawn_s = -np.inf
+        self._show: Callable[[RenderableType], None] = lambda _drawn: None
+        self.figures = ""
+
+    def take(self, current_A: FloatArray, force_N: FloatArray) -> None:
+        """Take in samples (n,); those that were lost are NaN."""
+        there = np.isfinite(current_A) & np.isfinite(force_N)
+        width, height = self._size
+        column = np.clip(current_A[there] / self._ends[0] * (2 * width - 1), 0, 2 * width - 1).astype(int)
+        row = np.clip((1.0 - force_N[there] / self._ends[1]) * (4 * height - 1), 0, 4 * height - 1).astype(
+            int
+        )
+        np.bitwise_or.at(self._cells, (row // 4, column // 2), _DOTS[row % 4, column % 2])
+        self._draw()
+
+    def begin(self) -> None:
+        """Clear the loop."""
+        self._cells[:] = 0
+
+    @contextmanager
+    def on_screen(self, label: str) -> Iterator[Progress]:
+        """Draw on the terminal, and give a callable that takes the share of the work done."""
+        from rich.console import Console
+        from rich.live import Live as Screen
+
+        self._label = label
+        with Screen(console=Console(stderr=True), transient=True, auto_refresh=False) as screen:
+            self._show = lambda drawn: screen.update(drawn, refresh=True)
+            yield self._progress
+
+    def _progress(self, share: float) -> None:
+        self._share = share
+        self._draw()
+
+    def _draw(self) -> None:
+        now = time.monotonic()
+        if now - self._drawn_s >= _DRAWN_EACH_S:
+            self._drawn_s = now
+            self._show(self.text())
+
+    def text(self) -> RenderableType:
+        """Return the loop with its axes, and the figures."""
+        from rich.text import Text
+
+        loop = ["│" + "".join(chr(_BRAILLE + int(cell)) for cell in row) for row in self._cells]
+        axis = f"└{'─' * self._size[0]}"
+        ends = f"up to {self._ends[0]:.3g} A and {self._ends[1]:.3g} N"
+        said = f"{self._label}: {100.0 * self._share:.0f} %, {ends}"
+        return Text("\n".join([*loop, axis, said, self.figures]), no_wrap=True, overflow="crop")
