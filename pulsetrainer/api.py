@@ -14,8 +14,9 @@ import pulsetrainer.simulation  # noqa: F401 - announces the ports bench: and qe
 from pulsetrainer.artefacts import Waveform
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device import device as _device
-from pulsetrainer.device.device import Device, Limits
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.gains import Gains
+from pulsetrainer.device.limits import Limits
 from pulsetrainer.errors import ArgumentError, UsageError
 from pulsetrainer.files import provenance, pulses, store
 from pulsetrainer.files.run_from_table import run_from_table

@@ -108,10 +108,12 @@ MESSAGES = {
     "nobody answers": Message("nobody answers", "has power", "{port}"),
     "older device": Message("the device is older", "flash the firmware", "", "{ours}", "{theirs}"),
     "older program": Message("the program is older", "pip install --upgrade", "", "{ours}", "{theirs}"),
-    "beyond the limit": Message("the reference", "into the range", "sample", "0..0.4 A", "0.402 A"),
+    "beyond the limit": Message(
+        "the current", "--current-max", expected="the limit in force is {limit} A", got="goes up to {got} A"
+    ),
     "limit raised": Message("limit", "lowered", expected="1.5 A", got="9 A"),
-    "tripped while conditioning": Message("force above its limit", "cause", "conditioning", got=" N"),
-    "force-high": Message("force above its limit", "cause", "during the capture", got=KEPT),
+    "tripped while conditioning": Message("force above its limit", "--limit-force", "conditioning", got=" N"),
+    "force-high": Message("force above its limit", "--limit-force", "during the capture", got=KEPT),
     "current-rail": Message("current above its hard limit", "plug", "during the capture", got=KEPT),
     "force-frozen": Message("force reading", "cause", "during the capture", got=KEPT),
     "force reading": Message("force", "sensor"),

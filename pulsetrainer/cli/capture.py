@@ -90,9 +90,10 @@ def capture(
     if resume:
         check_resumable(out)
     from pulsetrainer.core.course import Course
-    from pulsetrainer.device.device import Limits
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.resume import earlier_of
     from pulsetrainer.steps.capture import excitation, plan
+    from pulsetrainer.steps.recording import samples_played
 
     played = excitation(
         signal if table is None else read_signal(table, rate_Hz),
@@ -103,21 +104,24 @@ def capture(
     )
     if table is not None:
         job.uses(table)
-    if dry_run:
-        _show_plan(job, out, port, plan(played, levels=levels, condition=condition, repeats=repeats))
-        return
-    course, earlier = Course(played, repeats), None
+    limits = Limits(limit_current_A, limit_force_N)
+    course, earlier, at = Course(played, repeats), None, 0
     if resume:
         asked = {name: context.params[name] for name in _SAME}
         earlier = earlier_of(out, asked, overwrite=overwrite)
-    else:
-        _note_leftovers(job, out)
-    limits = Limits(limit_current_A, limit_force_N)
-    view = job.view(float(played.value.max()), live=live)
     try:
+        if earlier is not None:
+            at = samples_played(earlier.run, course)
+        if dry_run:
+            planned = plan(played, levels=levels, condition=condition, repeats=repeats, limits=limits, at=at)
+            _show_plan(job, out, port, planned, at / course.size)
+            return
+        if not resume:
+            _note_leftovers(job, out)
+        view = job.view(float(played.value.max()), live=live)
         with job.working(f"capturing {signal}", view) as progress, job.open_device(port, limits) as device:
             payload = _record(
-                job, out, course, device, earlier,
+                job, out, course, device, earlier, at,
                 condition=condition, levels=levels, progress=progress, watch=view.take if view else None,
             )  # fmt: skip
     finally:
@@ -136,6 +140,7 @@ def _record(
     course: Course,
     device: Device,
     earlier: Earlier | None,
+    at: int,
     *,
     condition: bool,
     levels: int,
@@ -146,15 +151,14 @@ def _record(
     from pulsetrainer.errors import DeviceError, Interrupted
     from pulsetrainer.files.recorder import RunRecorder
     from pulsetrainer.steps.capture import tally_of
-    from pulsetrainer.steps.recording import decimation_for, record, samples_played
+    from pulsetrainer.steps.recording import decimation_for, record
     from pulsetrainer.steps.stopped import raise_if_stopped
 
     info, signal = device.info, course.signal
     decimation_for(info.tick_rate_Hz, signal.rate_Hz)  # before anything is written
-    tally, at = tally_of(signal, levels), 0
+    tally = tally_of(signal, levels)
     if earlier is not None:
         _check_device(earlier, info)
-        at = samples_played(earlier.run, course)
         job.uses(earlier.path)
         share = 100.0 * at / course.size
         job.notes(
@@ -245,15 +249,18 @@ def _show(job: Job, got: dict[str, Any]) -> None:
     )
 
 
-def _show_plan(job: Job, out: Path, port: str | None, planned: Plan) -> None:
+def _show_plan(job: Job, out: Path, port: str | None, planned: Plan, done: float) -> None:
     """Say what would be played."""
     from pulsetrainer.device.device import DEFAULT_PORT
     from pulsetrainer.device.schemes import redact
 
     where = redact(port or DEFAULT_PORT)
     job.screen.result(plain(planned) | {"port": where, "output": out, "dry_run": True})
+    does = (
+        f"would continue {planned.signal} at {100 * done:.0f} %" if done else f"would play {planned.signal}"
+    )
     job.screen.facts(
-        f"would play {planned.signal} on {where} and write {out}; nothing was done",
+        f"would {does} on {where} and write {out}; nothing was done",
         {
             "length": f"{planned.seconds:.1f} s, {planned.samples} samples, {planned.rate_Hz:g} a second",
             "current": f"{planned.peak_current_A:.3f} A at most, {planned.rms_current_A:.3f} A rms",

@@ -20,8 +20,9 @@ from pulsetrainer.files.input_file import check_artefact, check_file
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import FloatArray
     from pulsetrainer.cli.loop_view import LoopView
-    from pulsetrainer.device.device import Device, Limits
+    from pulsetrainer.device.device import Device
     from pulsetrainer.device.identity import DeviceInfo
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.provenance import Device as Measurer
     from pulsetrainer.files.provenance import Header
 

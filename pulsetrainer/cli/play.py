@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pulsetrainer.cli.loop_view import LoopView
     from pulsetrainer.core.plane import IntArray
     from pulsetrainer.device.identity import DeviceInfo
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.steps.play import Watch
 
 
@@ -47,13 +48,13 @@ def play(
     check_port(port)
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.artefacts import Playback, Waveform
-    from pulsetrainer.device.device import Limits
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.errors import PulsetrainerError
     from pulsetrainer.steps.play import play as press
 
     waveform, limits = job.load(drive, Waveform), Limits(limit_current_A, limit_force_N)
     if dry_run:
-        _plan(job, out, port, waveform, repeats)
+        _plan(job, out, port, waveform, repeats, limits)
         return
     stopped: PulsetrainerError | None = None
     view = job.view(*_ends(waveform), live=live)
@@ -137,13 +138,13 @@ def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
     )
 
 
-def _plan(job: Job, out: Path, port: str | None, drive: Waveform, repeats: int) -> None:
+def _plan(job: Job, out: Path, port: str | None, drive: Waveform, repeats: int, limits: Limits) -> None:
     """Say what would be played."""
     from pulsetrainer.device.device import DEFAULT_PORT
     from pulsetrainer.device.schemes import redact
     from pulsetrainer.steps.play import plan
 
-    planned, where = plan(drive, repeats=repeats), redact(port or DEFAULT_PORT)
+    planned, where = plan(drive, repeats=repeats, limits=limits), redact(port or DEFAULT_PORT)
     job.screen.result(
         {"name": drive.name, "inversion": drive.inversion, "repeats": repeats}
         | plain(planned)

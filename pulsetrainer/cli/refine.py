@@ -36,7 +36,7 @@ def refine(
     check_port(port)
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.artefacts import Waveform
-    from pulsetrainer.device.device import Limits
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.steps.refine import check
     from pulsetrainer.steps.refine import refine as learn
 

@@ -118,7 +118,7 @@ def session(
         answers,
     )
     from pulsetrainer.artefacts import Model
-    from pulsetrainer.device.device import Limits
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.steps.session import check_model
 
     loaded = job.load(model, Model)

@@ -58,7 +58,7 @@ def tune(
     job = Job(context, as_json=json)
     from pulsetrainer.api import open_device
     from pulsetrainer.api import tune as measure
-    from pulsetrainer.device.device import Limits
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.tuning import check_tuned, write_tuned
 
     limits = Limits(limit_current_A, limit_force_N)

@@ -8,7 +8,7 @@ import math
 import os
 import threading
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Self
 
 from pulsetrainer.device import codes
@@ -17,6 +17,7 @@ from pulsetrainer.device.feed import Feed
 from pulsetrainer.device.gains import DELIVERED, Gains
 from pulsetrainer.device.heat import HeatMemory, added, in_words, wait_s
 from pulsetrainer.device.identity import DeviceInfo
+from pulsetrainer.device.limits import RAMP_S, Limits, checked_wire, too_hot_ever
 from pulsetrainer.device.plausibility import ForceWatch
 from pulsetrainer.device.player import Player, tells_duty
 from pulsetrainer.device.ports import find_device_port
@@ -45,7 +46,6 @@ DEFAULT_PORT = "bench:"
 _INTERRUPTED = "interrupted"
 _STOPPED = "stopped"
 _REST_S = 0.5  # for a run that an earlier program left to come to rest
-_RAMP_S = 0.11  # the device counts its way back to zero as on-time
 # The limits that the greeting tells, by their parameters' names.
 _GREETED = {
     **{name: name for name in ("current_limit", "current_trip", "force_trip", "slew_limit")},
@@ -54,14 +54,6 @@ _GREETED = {
 }
 _STREAMS_SINCE = (2, 1)  # the protocol of the first firmware that takes a wave without a known end
 _TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits that shall be in force; None leaves the device's own. They can only be lowered."""
-
-    current_A: float | None = None
-    force_N: float | None = None
 
 
 class Device:
@@ -126,10 +118,7 @@ class Device:
         heat = status.heat * codes.HEAT_UNIT
         seconds = wait_s(heat, reference_A, rate_Hz)
         if math.isinf(seconds):
-            raise ArgumentError(
-                "this reference heats the coil beyond its limit, however cold it is at the start",
-                hint="play less of it at a time, or at a lower current",
-            )
+            raise too_hot_ever()
         if seconds > 0:
             assumed = status.flags & codes.STATUS_HEAT_ASSUMED
             raise DeviceError(
@@ -186,7 +175,7 @@ class Device:
     @property
     def longest_play_s(self) -> float:
         """Longest reference that the device plays in one go, s."""
-        return self.info.on_time_limit_s - _RAMP_S
+        return self.info.on_time_limit_s - RAMP_S
 
     def stop(self) -> None:
         """Ramp the current to zero and disarm; any thread may ask, at any time.
@@ -260,20 +249,12 @@ class Device:
         ArgumentError
             if a limit is not positive, or above the device's own.
         """
-        info = self.info
-        for what, parameter, wanted, own, quantum, unit in (
-            ("current", "current_limit", limits.current_A, info.current_limit_A, codes.CURRENT_UNIT_A, "A"),
-            ("force", "force_trip", limits.force_N, info.force_limit_N, codes.FORCE_UNIT_N, "N"),
-        ):
-            if wanted is None:
-                continue
-            if not 0 < wanted <= own:
-                raise ArgumentError(
-                    f"a {what} limit of {wanted:g} {unit} was asked for; the device's own is {own:g} {unit}",
-                    hint="a limit can only be lowered",
-                )
-            self.set_parameter(parameter, round(wanted / quantum))
-            _LOG.info("%s limit lowered from %g to %g %s", what, own, wanted, unit)
+        current_A, force_N = limits.within(self.info.current_limit_A, self.info.force_limit_N)
+        if limits.current_A is not None:
+            self.set_parameter("current_limit", round(current_A / codes.CURRENT_UNIT_A))
+        if limits.force_N is not None:
+            self.set_parameter("force_trip", round(force_N / codes.FORCE_UNIT_N))
+        _LOG.info("in force: at most %g A and %g N", current_A, force_N)
 
     def play(
         self,
@@ -302,14 +283,13 @@ class Device:
             if the device cannot be talked to before it starts.
         """
         step = ticks_per_sample(rate_Hz, self.info.tick_rate_Hz)
-        wire = to_wire(reference_A, limit_A=self.info.current_limit_A)
-        seconds = (wire.size - 1) * step / self.info.tick_rate_Hz
-        if seconds > self.longest_play_s:
-            raise ArgumentError(
-                f"the reference is {seconds:g} s long; the device stays on for at most "
-                f"{self.info.on_time_limit_s:g} s",
-                hint="play it in several pieces",
-            )
+        wire = checked_wire(
+            reference_A,
+            rate_Hz,
+            current_A=self.info.current_limit_A,
+            on_time_s=self.info.on_time_limit_s,
+            tick_rate_Hz=self.info.tick_rate_Hz,
+        )
         if not 1 <= decimation <= codes.MAX_DECIMATION:
             raise ArgumentError(
                 f"decimation {decimation} is outside 1..{codes.MAX_DECIMATION}",

@@ -15,10 +15,19 @@ from pulsetrainer.core.excitations import Signal
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.device.codes import TICK_RATE_HZ
+from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.steps.asked import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
-from pulsetrainer.steps.recording import Memory, Tally, conditioning_loop, decimation_for, record
+from pulsetrainer.steps.recording import (
+    Memory,
+    Tally,
+    check_top,
+    conditioning_loop,
+    decimation_for,
+    parts_of,
+    record,
+)
 from pulsetrainer.steps.stopped import raise_if_stopped
 
 if TYPE_CHECKING:
@@ -126,7 +135,7 @@ class Plan:
 
     signal: str
     samples: int
-    seconds: float  # the conditioning loop included
+    seconds: float  # conditioning loops and what brings the memory back included
     rate_Hz: float
     reversals: int
     coverage_percent: float
@@ -134,22 +143,39 @@ class Plan:
     rms_current_A: float
 
 
-def plan(signal: Signal, *, levels: int = 48, condition: bool = True, repeats: int = 1) -> Plan:
-    """Return what a capture of a signal would play.
+def plan(
+    signal: Signal,
+    *,
+    levels: int = 48,
+    condition: bool = True,
+    repeats: int = 1,
+    limits: Limits | None = None,
+    at: int = 0,
+) -> Plan:
+    """Return what a capture would play from sample ``at`` on, on a device as it is delivered and cold.
 
     Raises
     ------
-    ArgumentError
-        It would be longer than anything that can be recorded.
+    ArgumentError, DeviceError
+        It would be longer than anything that can be recorded, or the device would refuse it; how large the
+        force will be, nobody knows before it is measured.
     """
     course = Course(signal, repeats)
+    rehearsal = Rehearsal(limits or Limits())
+    check_top(signal, rehearsal.current_A)
     top = float(signal.value.max())
-    first = conditioning_loop(top, signal.rate_Hz).size / signal.rate_Hz if condition else 0.0
+    loop = conditioning_loop(top, signal.rate_Hz) if condition else np.zeros(0)
+    played = 0
+    for part in parts_of(course, at, ON_TIME_S - RAMP_S):
+        for piece in (loop, part.reference):
+            if piece.size:
+                rehearsal.play(piece, signal.rate_Hz)
+            played += piece.size
     covered = coverage(Plane.uniform(0.0, top, levels), [signal.value]) if top > 0 else np.zeros(1)
     return Plan(
         signal=signal.name,
-        samples=course.size,
-        seconds=course.duration_s + first,
+        samples=course.size - at,
+        seconds=played / signal.rate_Hz,
         rate_Hz=signal.rate_Hz,
         reversals=course.reversals,
         coverage_percent=100.0 * float(covered.mean()),

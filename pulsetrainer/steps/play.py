@@ -14,6 +14,7 @@ from pulsetrainer.artefacts import DrivePlayback, Model, Playback, Waveform
 from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
@@ -43,15 +44,20 @@ class Plan:
     rms_current_A: float
 
 
-def plan(drive: Waveform, *, repeats: int = 5) -> Plan:
-    """Return what ``play`` would play.
+def plan(drive: Waveform, *, repeats: int = 5, limits: Limits | None = None) -> Plan:
+    """Return what ``play`` would play on a device as it is delivered, with a cold coil.
 
     Raises
     ------
-    ArgumentError, DataError
-        As ``play``.
+    ArgumentError, DataError, DeviceError
+        As ``play``, as far as the drive and its model tell.
     """
     _check(drive, repeats)
+    rehearsal = Rehearsal(limits or Limits())
+    _check_peak(drive, rehearsal.current_A)
+    for _ in range(repeats):
+        rehearsal.play(drive.compensated, drive.rate_Hz, drive.predicted)
+        rehearsal.play(drive.scaled, drive.rate_Hz)
     drives = np.stack((drive.compensated, drive.scaled))
     return Plan(
         samples=drive.time_s.size,
@@ -98,6 +104,7 @@ def play(
     (True, 1)
     """
     _check(drive, repeats)
+    _check_peak(drive, device.info.current_limit_A)
     currents = {"compensated": drive.compensated, "scaled": drive.scaled}
     kept: dict[str, list[FloatArray]] = {name: [] for name in DRIVES}
     dropped, fault, remedy = 0, "", ""
@@ -147,6 +154,11 @@ def _check(drive: Waveform, repeats: int) -> None:
         raise ArgumentError(f"repeats must be at least 1, got {repeats}", hint="5 is usual")
     check_size(repeats, 2 * drive.compensated.size)
     check_current(drive)
+
+
+def _check_peak(drive: Waveform, limit_A: float) -> None:
+    hint = "invert again with a lower `force_max`, or raise `limit_current_A` where it was lowered"
+    check_peak(np.concatenate((drive.compensated, drive.scaled)), limit_A, hint=hint)
 
 
 def check_current(drive: Waveform) -> None:

@@ -9,7 +9,7 @@ with a known memory, and the run says where each begins: ``Run.seam``.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -22,7 +22,9 @@ from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.device.codes import MAX_DECIMATION
+from pulsetrainer.device.limits import check_peak
 from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.steps.asked import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -195,37 +197,29 @@ def record(
         The device could not be conditioned; what was recorded before is kept.
     """
     info, rate_Hz = device.info, course.signal.rate_Hz
+    check_top(course.signal, info.current_limit_A)
     decimation = decimation_for(info.tick_rate_Hz, rate_Hz)
-    longest = int(device.longest_play_s * rate_Hz) + 1
     high, parts, step = float(course.signal.value.max()), 0, info.tick_rate_Hz
-    while at < course.size:
+    for part in parts_of(course, at, device.longest_play_s):
         if condition_first:
             _LOG.info("conditioning: once around the major loop")
             condition(device, high, rate_Hz)
-        lead = course.lead_in(at, speed=CONDITIONING_SPEED_A_PER_S, rest_s=CONDITIONING_REST_S)
-        if lead.size >= longest:
-            raise ArgumentError(
-                f"bringing the memory back takes {lead.size / rate_Hz:g} s, the device stays on for "
-                f"{info.on_time_limit_s:g} s",
-                hint="raise the device's on-time limit",
-            )
-        end = course.part_end(at, longest - lead.size)
         begun_s = sink.end_s + PAUSE_S if sink.samples else 0.0
         if sink.samples:
             sink.begin_part()
 
-        def keep(block: Block, begun_s: float = begun_s, done: int = at, lead: int = lead.size) -> None:
+        def keep(block: Block, begun_s: float = begun_s, part: Part = part) -> None:
             sink.append(begun_s + block.tick / step, block.reference_A, block.current_A, block.force_N)
             tally.add(block.reference_A, block.current_A, block.force_N)
             if watch is not None:
                 watch(block.current_A, block.force_N)
-            played = int(block.tick[-1]) // decimation + 1 - lead
-            progress((done + max(played, 0)) / course.size)
+            played = int(block.tick[-1]) // decimation + 1 - part.lead.size
+            progress((part.start + max(played, 0)) / course.size)
 
-        _LOG.info("playing samples %d to %d of %d at %g Hz", at, end, course.size, rate_Hz)
+        _LOG.info("playing samples %d to %d of %d at %g Hz", part.start, part.end, course.size, rate_Hz)
         before = sink.samples
         played = device.play(
-            np.concatenate((lead, course.values(at, end))) if lead.size else course.values(at, end),
+            part.reference,
             rate_Hz,
             decimation=decimation,
             on_block=keep,
@@ -237,8 +231,54 @@ def record(
         sink.dropped_samples += played.dropped_samples + played.samples - (sink.samples - before)
         if played.fault or not played.complete:
             return Ending(complete=False, fault=played.fault, remedy=played.remedy, parts=parts)
-        at = end
     return Ending(complete=True, fault="", remedy="", parts=parts)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What is played in one go."""
+
+    lead: FloatArray  # (m,) brings the memory back to where the part before ended
+    reference: FloatArray  # (n,) with the lead
+    start: int  # of the course
+    end: int
+
+
+def parts_of(course: Course, at: int, longest_s: float) -> Iterator[Part]:
+    """Give the parts of a course from sample ``at`` on, each at most ``longest_s`` long.
+
+    Raises
+    ------
+    ArgumentError
+        Bringing the memory back alone takes longer.
+    """
+    rate_Hz = course.signal.rate_Hz
+    longest = int(longest_s * rate_Hz) + 1
+    while at < course.size:
+        lead = course.lead_in(at, speed=CONDITIONING_SPEED_A_PER_S, rest_s=CONDITIONING_REST_S)
+        if lead.size >= longest:
+            raise ArgumentError(
+                f"bringing the memory back takes {lead.size / rate_Hz:g} s, the device plays at most "
+                f"{longest_s:g} s in one go",
+                hint="raise the device's on-time limit",
+            )
+        end = course.part_end(at, longest - lead.size)
+        values = course.values(at, end)
+        yield Part(lead, np.concatenate((lead, values)) if lead.size else values, at, end)
+        at = end
+
+
+def check_top(signal: excitations.Signal, limit_A: float) -> None:
+    """Refuse a signal that goes beyond the limit in force.
+
+    Raises
+    ------
+    ArgumentError
+        It does.
+    """
+    ours = signal.name in EXCITATIONS
+    lower = f"give `current_max_A` at most {limit_A:g}" if ours else "scale the table into the range"
+    check_peak(signal.value, limit_A, hint=f"{lower}, or raise `limit_current_A` where it was lowered")
 
 
 def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:

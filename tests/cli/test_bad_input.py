@@ -142,7 +142,10 @@ def test_numbers_no_device_can_follow_are_refused_before_anything_moves(tmp_path
     """The smallest and the largest number of the machine: in words, also in a dry run."""
     for signal_ in ("identification", "diagnostic") if option != "--speed" else ("identification",):
         words = ["capture", signal_, option, value, "--dry-run", "-o", "never.h5"]
-        refused(tmp_path, words, 3, name, got=got)
+        if (signal_, option) == ("diagnostic", "--current-max"):  # it takes the same time for any range
+            refused(tmp_path, words, 3, "beyond the limit", limit="1.5", got=value.replace("e", "e+"))
+        else:
+            refused(tmp_path, words, 3, name, got=got)
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def test_limits_are_in_force_on_the_device(run, tmp_path):
     """What goes beyond is refused before anything moves; a force beyond switches off."""
     capture = ("capture", "identification", "--json")
     lowered = run(*capture, "--limit-current", "0.4", "--current-max", "0.5", "-o", "a.h5")
-    refusal(lowered, 3, "beyond the limit")
+    refusal(lowered, 3, "beyond the limit", limit="0.4", got="0.5")
     refusal(run(*capture, "--limit-force", "5", "-o", "b.h5"), 4, "tripped while conditioning")
     refusal(run(*capture, "--limit-current", "9", "-o", "c.h5"), 3, "limit raised")
 

@@ -7,8 +7,8 @@ import pytest
 
 import pulsetrainer as pt
 from pulsetrainer.device.codes import State
-from pulsetrainer.device.device import Limits
 from pulsetrainer.device.gains import DELIVERED
+from pulsetrainer.device.limits import Limits
 from pulsetrainer.errors import DeviceError
 
 RANGE_A = 1.5

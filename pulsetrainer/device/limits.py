@@ -1,0 +1,142 @@
+"""What a device may play: its limits, which can only be lowered, and a rehearsal against them without it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.device import codes
+from pulsetrainer.device.heat import added, cooled, wait_s
+from pulsetrainer.device.reference import ticks_per_sample, to_wire
+from pulsetrainer.errors import ArgumentError, DeviceError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from pulsetrainer.device.trace import FloatArray
+
+RAMP_S = 0.11  # the device counts its way back to zero as on-time
+_PARAMETER = {parameter.name: parameter.default for parameter in codes.PARAMETERS}
+CURRENT_A = _PARAMETER["current_limit"] * codes.CURRENT_UNIT_A  # of a device as it is delivered
+FORCE_N = _PARAMETER["force_trip"] * codes.FORCE_UNIT_N
+ON_TIME_S = float(_PARAMETER["on_time"])
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Limits that shall be in force; None leaves the device's own. They can only be lowered."""
+
+    current_A: float | None = None
+    force_N: float | None = None
+
+    def within(self, current_A: float, force_N: float) -> tuple[float, float]:
+        """Return what is in force on a device with these limits of its own, A and N.
+
+        Raises
+        ------
+        ArgumentError
+            A limit is not positive, or above the device's own.
+        """
+        for what, wanted, own, unit in (
+            ("current", self.current_A, current_A, "A"),
+            ("force", self.force_N, force_N, "N"),
+        ):
+            if wanted is not None and not 0 < wanted <= own:
+                raise ArgumentError(
+                    f"a {what} limit of {wanted:g} {unit} was asked for; the device's own is {own:g} {unit}",
+                    hint=f"a limit can only be lowered: give `limit_{what}_{unit}` at most {own:g}",
+                )
+        return (
+            current_A if self.current_A is None else self.current_A,
+            force_N if self.force_N is None else self.force_N,
+        )
+
+
+def checked_wire(
+    reference_A: ArrayLike, rate_Hz: float, *, current_A: float, on_time_s: float, tick_rate_Hz: float
+) -> NDArray[np.int16]:
+    """Return a reference (n,) in A as it goes over the wire, if a device with these limits can play it.
+
+    Raises
+    ------
+    ArgumentError
+        A sample is no number or beyond the current, or all of it takes longer than the device stays on.
+    """
+    step = ticks_per_sample(rate_Hz, tick_rate_Hz)
+    wire = to_wire(reference_A, limit_A=current_A)
+    seconds = (wire.size - 1) * step / tick_rate_Hz
+    if seconds > on_time_s - RAMP_S:
+        raise ArgumentError(
+            f"the reference is {seconds:g} s long; the device stays on for at most {on_time_s:g} s",
+            hint="play it in several pieces",
+        )
+    return wire
+
+
+def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str) -> None:
+    """Refuse a reference (n,) in A that goes beyond the limit in force, and say what would mend it.
+
+    Raises
+    ------
+    ArgumentError
+        It does.
+    """
+    peak = float(np.max(reference_A, initial=0.0))
+    if peak > limit_A + codes.CURRENT_UNIT_A / 2:
+        raise ArgumentError(
+            f"the current goes up to {peak:.4g} A; the limit in force is {limit_A:g} A", hint=hint
+        )
+
+
+class Rehearsal:
+    """A device as it is delivered, with a cold coil: it plays nothing, and refuses what the device would."""
+
+    def __init__(self, limits: Limits) -> None:
+        self.current_A, self.force_N = limits.within(CURRENT_A, FORCE_N)
+        self._heat = 0.0
+
+    def play(self, reference_A: FloatArray, rate_Hz: float, expected_N: FloatArray | None = None) -> None:
+        """Take a reference (n,) in A as played, and the force (n,) in N that it is foretold to give.
+
+        Raises
+        ------
+        ArgumentError
+            The device would not play it.
+        DeviceError
+            It would stop: the coil becomes too hot by then, or the force too high.
+        """
+        wire = checked_wire(
+            reference_A,
+            rate_Hz,
+            current_A=self.current_A,
+            on_time_s=ON_TIME_S,
+            tick_rate_Hz=codes.TICK_RATE_HZ,
+        )
+        current = codes.CURRENT_UNIT_A * wire.astype(float)
+        waits_s = wait_s(self._heat, current, rate_Hz)
+        if math.isinf(waits_s):
+            raise too_hot_ever()
+        if waits_s > 0:
+            raise DeviceError(
+                f"the coil would be too hot: at {100 * self._heat:.0f} % of its limit by then",
+                hint="play fewer repeats, or at a lower current",
+            )
+        gained = float(added(current, rate_Hz)[-1])
+        self._heat = cooled(self._heat, current.size / rate_Hz) + gained
+        if expected_N is not None and np.nanmax(expected_N) > self.force_N:
+            raise DeviceError(
+                f"the device would stop: {np.nanmax(expected_N):.3g} N are foretold, and its force limit is "
+                f"{self.force_N:g} N",
+                hint="raise `limit_force_N`, or invert again with a lower `force_max`",
+            )
+
+
+def too_hot_ever() -> ArgumentError:
+    """Return the refusal of what heats even a cold coil beyond its limit."""
+    return ArgumentError(
+        "this reference heats the coil beyond its limit, however cold it is at the start",
+        hint="play less of it at a time, or at a lower current",
+    )
