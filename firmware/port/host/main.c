@@ -35,7 +35,7 @@ static int64_t now_ns(void)
 static int list(void)
 {
     for (int32_t k = 0; k < plant_parameter_count; k++)
-        printf("%s\t%s\t%g\t%g\t%s\n", plant_parameters[k].name, plant_parameters[k].unit,
+        printf("%s\t%s\t%.9g\t%.9g\t%s\n", plant_parameters[k].name, plant_parameters[k].unit,
                plant_parameters[k].low, plant_parameters[k].high, plant_parameters[k].meaning);
     printf("\n");
     board_list_breaks();
