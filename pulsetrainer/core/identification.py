@@ -24,7 +24,7 @@ from pulsetrainer.core.equations import NormalEquations, node_sums, normal_equat
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.core.record import Record, levelled
-from pulsetrainer.core.smoothing import choose, smoothed
+from pulsetrainer.core.smoothing import LEAST_SIGNED, choose, smoothed
 from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
@@ -53,8 +53,6 @@ _DENSE_COPIES = 10
 CLEAR = 0.5
 _SIGN_LEVELS = 24
 _SIGN_SMOOTHING = 0.05
-# Weights of either sign are not determined without some smoothing.
-LEAST_SIGNED = 0.0125
 # Below this share of the output's span the fit is good, and no stiffer density is tried.
 _POOR = 0.02
 # Records get an offset each where that lowers the rms error by at least this share.

@@ -20,7 +20,7 @@ over n_h instead: what is smoothed away is narrower there too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,8 +28,10 @@ import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
 
 from pulsetrainer.core import nnls
+from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.edges import thinned
-from pulsetrainer.core.equations import NodeSums, NormalEquations, parted_sums
+from pulsetrainer.core.equations import NodeSums, NormalEquations, normal_equations, parted_sums
+from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
@@ -37,17 +39,27 @@ from pulsetrainer.errors import ArgumentError
 # Blocks are dealt out to this many folds in turn, so that each fold is spread over the whole record.
 FOLDS = 5
 BLOCKS = 40
+# A block left out leaves a hole in the data, and a long one asks how well the fit bridges holes that the
+# whole record does not have: the smooth answer wins. So blocks are short, but longer than the residual
+# remembers.
+_MOST_BLOCKS = 200
+_APART = 2.0  # correlation times of the residual a block lasts at least
+_PILOT = 0.0177  # s of the fit whose residual is looked at
 # From far below a cell of any plane that fits in memory to a fifth of the range.
-_COARSE = 0.0125 * 2.0 ** (np.arange(9) / 2.0)
+_GRID = 0.0125 * 2.0 ** (np.arange(-1, 9) / 2.0)
+_MIDDLE = 4  # of the grid, where the search begins
+_HOPELESS = 1.5  # times the least error so far: smoother ones are not tried
 # The choice is made on at most this many levels: s does not depend on them, the time does, as n_h^6.
 CHOICE_LEVELS = 32
+# Weights of either sign are not determined without some smoothing.
+LEAST_SIGNED = 0.0125
 # Measured on four plants: 10 is better than 0.1 or 1 by a few hundredths of the error, and never worse.
 _DIAGONAL = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The smoothing chosen by held-out blocks, and all that were tried."""
+    """The smoothing chosen by held-out blocks, and all that were tried on the way to it."""
 
     smoothing: float  # s, share of the input's range
     tried: tuple[tuple[float, float], ...]  # (s, rms error on held-out blocks, output unit), s rising
@@ -179,7 +191,12 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
 
     Each of ``FOLDS`` fits leaves out every fifth block; all are simulated from the start of their record.
     The sums of the whole minus those of the left-out blocks give the fit, the latter alone its error. The
-    grid is walked downhill, in steps of a factor 2^(1/2), then 2^(1/4).
+    grid is tried in steps of a factor 2^(1/2), and no smoothing as its lower end. Where the held-out error
+    e(s) is flat its minimum is chance, so s is the mean of the grid, in logarithms, weighted by
+
+        exp(-(n / tau) (e(s)^2 / e_min^2 - 1) / 2)
+
+    as likelihoods of n samples whose errors remember themselves for tau.
 
     Raises
     ------
@@ -187,7 +204,12 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
         Too few samples with weight to hold any out.
     """
     coarse = thinned(plane, CHOICE_LEVELS)
-    folds = [blocks(r.input, plane.low, plane.high) % FOLDS for r in records]
+    memory = _memory_of_residual(records, coarse, reading, signed=signed)
+    counts = [int(np.clip(r.input.size / (_APART * memory), BLOCKS, _MOST_BLOCKS)) for r in records]
+    folds = [
+        blocks(r.input, plane.low, plane.high, count) % FOLDS
+        for r, count in zip(records, counts, strict=True)
+    ]
     sums = parted_sums(coarse, records, reading, folds, FOLDS)
     held_out = [part for part in sums if part.weight_sum > 0]
     if len(held_out) < 2:
@@ -196,7 +218,18 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
             f"got {sum(r.input.size for r in records)}",
             hint="give smoothing as a number",
         )
-    return _walk(_HeldOut(held_out, signed=signed))
+    error = _HeldOut(held_out, signed=signed)
+    tried = _tried(error)
+    return Choice(_mean_length(tried, error.whole.weight_sum / memory), tried)
+
+
+def _memory_of_residual(records: Sequence[Record], plane: Plane, reading: Reading, *, signed: bool) -> float:
+    """Samples for which the residual of a little smoothed fit remembers itself."""
+    equations = normal_equations(plane, records, reading)
+    gram, rhs = smoothed(equations, _PILOT)
+    masses = nnls.solve_signed(gram, rhs) if signed else nnls.solve(gram, rhs).x
+    operator = Preisach(plane, masses / plane.areas, equations.offset(masses), reading, signed=signed)
+    return correlation_time([(r.output - operator(r.input, r.start))[r.sample_weight > 0] for r in records])
 
 
 class _HeldOut:
@@ -230,15 +263,23 @@ class _HeldOut:
         return self.parts[k].sum_of_squares(masses, rest.offset(masses))
 
 
-def _walk(error: _HeldOut) -> Choice:
-    """Walk the coarse grid downhill from its middle, try both half steps around its best, and none at all."""
-    grid: list[float] = _COARSE.tolist()
-    k = grid.index(_COARSE[3])
-    direction = -1 if error(grid[k - 1]) < error(grid[k]) else 1
-    while 0 <= k + direction < len(grid) and error(grid[k + direction]) < error(grid[k]):
-        k += direction
-    around: Iterable[float] = (grid[k] * 2.0**-0.25, grid[k] * 2.0**0.25)
-    best = min((grid[k], *around), key=error)
-    if not error.signed and best <= grid[0] and error(0.0) <= error(best):
-        best = 0.0
-    return Choice(best, tuple(sorted(error.errors.items())))
+def _tried(error: _HeldOut) -> tuple[tuple[float, float], ...]:
+    """Errors of the grid from its middle down to no smoothing, then up while there is hope; s rising."""
+    grid: list[float] = _GRID.tolist()
+    for s in reversed([s for s in (0.0, *grid[: _MIDDLE + 1]) if not error.signed or s >= LEAST_SIGNED]):
+        error(s)
+    for s in grid[_MIDDLE + 1 :]:
+        if error(s) > _HOPELESS * min(error.errors.values()):
+            break
+    return tuple(sorted(error.errors.items()))
+
+
+def _mean_length(tried: Sequence[tuple[float, float]], samples: float) -> float:
+    """Mean of the lengths tried, by what their errors on so many independent samples say; see ``choose``."""
+    length, error = np.asarray(tried).T
+    least = float(error.min())
+    if least <= 0:
+        return float(length[np.argmin(error)])
+    weight = np.exp(-0.5 * samples * ((error / least) ** 2 - 1.0))
+    logarithm = np.log(np.maximum(length, _GRID[0] / np.sqrt(2.0)))
+    return float(np.exp(weight @ logarithm / weight.sum()))

@@ -20,6 +20,7 @@ import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.core import nnls
+from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.equations import NodeSums, parted_sums
 from pulsetrainer.core.identification import Identified, fits_dense, penalised
 from pulsetrainer.core.memory import State
@@ -89,22 +90,13 @@ def _interval(draws: FloatArray, level: float) -> Interval:
 def block_length(residuals: Sequence[FloatArray]) -> int:
     """Samples after which residuals have forgotten themselves: n^(1/3) tau^(2/3).
 
-    tau = 1 + 2 sum of the autocorrelation up to its first value below 2 / sqrt(n). The power of n balances
-    the bias of short blocks against the scatter of few (Hall, Horowitz, Jing, Biometrika 82 (1995) 561-574).
+    tau is ``correlation_time``. The power of n balances the bias of short blocks against the scatter of few
+    (Hall, Horowitz, Jing, Biometrika 82 (1995) 561-574).
     """
     n = sum(r.size for r in residuals)
-    lags = max(1, n // 10)
-    power = np.zeros(lags)
-    for residual in residuals:
-        e = residual - residual.mean()
-        spectrum = np.fft.rfft(e, 2 * e.size)
-        own = np.fft.irfft(np.abs(spectrum) ** 2)[: min(lags, e.size)]
-        power[: own.size] += own
-    if power[0] <= 0:  # a fit without any residual: nothing to be unsure about
-        return max(1, n // _MOST_BLOCKS)
-    correlation = power / power[0]
-    end = int(np.argmax(np.append(correlation, 0.0) < 2.0 / np.sqrt(n)))
-    tau = 1.0 + 2.0 * float(correlation[1:end].sum())
+    if not any(np.any(r != r[0]) for r in residuals if r.size):
+        return max(1, n // _MOST_BLOCKS)  # a fit without any residual: nothing to be unsure about
+    tau = correlation_time(residuals)
     length = int(np.ceil(n ** (1 / 3) * tau ** (2 / 3)))
     return int(np.clip(length, -(-n // _MOST_BLOCKS), max(1, n // _FEWEST_BLOCKS)))
 

@@ -29,6 +29,7 @@ _FITS = 0.05  # of the span, median: a fit that leaves more tells nothing of sin
 _WINDOW = 7  # samples of a median: three wild ones do not move it
 _AROUND = 31  # samples whose steps tell how fast the signal moves
 _STEPS = 4.0  # such steps a turn may be away from the median of its neighbours
+_TURN = 2.0  # such steps a turn may be away from the line between its neighbours
 _FAST = 80.0  # percentile of the steps near by
 _QUICK_LEVELS = 16
 _QUICK_SMOOTHING = 0.05
@@ -40,7 +41,7 @@ def isolated(values: FloatArray) -> BoolArray:
     if values.size < FEWEST:
         return np.zeros(values.size, dtype=bool)
     step = np.abs(np.diff(values, prepend=values[0]))
-    moving = scipy.ndimage.percentile_filter(step, _FAST, size=_AROUND, mode="nearest")
+    moving = scipy.ndimage.percentile_filter(step, _FAST, size=_AROUND, mode="mirror")
     usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
     return _far(values, _STEPS * moving + _QUANTA * usual)
 
@@ -64,7 +65,8 @@ def off(residuals: Sequence[FloatArray], span: float) -> list[BoolArray]:
 
 def _far(values: FloatArray, motion: FloatArray) -> BoolArray:
     """Where values (n,) are further from their neighbours' median than noise and ``motion`` (n,) make."""
-    apart = np.abs(values - scipy.ndimage.median_filter(values, size=_WINDOW, mode="nearest"))
+    # mirrored, so that the first and the last sample are alone among their neighbours too
+    apart = np.abs(values - scipy.ndimage.median_filter(values, size=_WINDOW, mode="mirror"))
     body = np.quantile(values, [0.01, 0.99])
     floor = _NEAR * float(body[1] - body[0])
     found = apart > np.maximum(_TAIL * float(np.quantile(apart, 0.95)) + motion, floor)
@@ -79,6 +81,18 @@ def repaired(values: FloatArray, wild: BoolArray) -> FloatArray:
         return values
     place = np.arange(values.size)
     return np.interp(place, place[~wild], values[~wild])
+
+
+def repaired_where_off(values: FloatArray, suspect: BoolArray) -> FloatArray:
+    """Return a signal (n,) with those suspect samples between their neighbours that are off their path.
+
+    A residual does not tell whether input or output was wild. The one that was not is kept: between its
+    neighbours a turn would lose its extreme, which is remembered.
+    """
+    between = repaired(values, suspect)
+    step = np.abs(np.diff(between, prepend=between[0]))
+    moving = scipy.ndimage.percentile_filter(step, _FAST, size=_AROUND, mode="mirror")
+    return repaired(values, suspect & (np.abs(values - between) > _TURN * moving))
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,7 +111,7 @@ def identify(
     measured = [
         replace(part, input=t.input, output=t.output) for part, t in zip(measured, tamed, strict=True)
     ]
-    low, high = _reach(titles, measured)
+    reach = _reach(titles, measured)
     cleaned = [input_noise.clean(part.input) for part in measured]
     notes += _of_noise(cleaned, measured[0].input_unit)
     measured = [replace(part, input=clean.input) for part, clean in zip(measured, cleaned, strict=True)]
@@ -119,9 +119,8 @@ def identify(
     if smoothing is None:
         smoothing = 0.0 if reading == "relay" else "auto"
     n_h = _levels(measured, notes) if levels is None else levels
-    on = partial(fit, low=low, high=high, n_h=n_h, reading=reading, method=method, smoothing=smoothing)
-    signals = [(part.input, part.output) for part in measured]
-    fitted, masks = _without_wild(on, signals, form, [t.wild for t in tamed])
+    on = partial(fit, n_h=n_h, reading=reading, method=method, smoothing=smoothing, form=form)
+    fitted, measured, masks = _without_wild(on, reach, measured, [t.wild for t in tamed])
     notes += fit_notes.of_wild(masks)
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += fit_notes.of_form(fitted, measured[0])
@@ -148,28 +147,37 @@ def identify(
 
 
 def _without_wild(
-    on: Callable[..., Fitted],
-    signals: list[tuple[FloatArray, FloatArray]],
-    form: Form | Literal["auto"],
-    masks: list[BoolArray],
-) -> tuple[Fitted, list[BoolArray]]:
+    on: Callable[..., Fitted], reach: tuple[float, float], runs: list[Run], masks: list[BoolArray]
+) -> tuple[Fitted, list[Run], list[BoolArray]]:
     """Fit without the samples that are known to be wild, then without those that its residual shows.
 
-    Whether input or output is wild there a residual does not tell: both are taken between their neighbours.
+    Whether input or output is wild there a residual does not tell: what is off its own path is mended.
+    The range of the levels and the form are decided anew, as wild samples move both.
     """
-    fitted = on(signals, form=form, kept=[~mask for mask in masks] if any(map(np.any, masks)) else None)
-    span = float(np.ptp(np.concatenate([y for _, y in signals])))
+    fitted = on(_signals(runs), *reach, kept=[~m for m in masks] if any(map(np.any, masks)) else None)
+    span = float(np.ptp(np.concatenate([run.output for run in runs])))
     for _ in range(_ROUNDS):
         more = wild.off(fitted.residuals, span)
         if not any(np.any(new & ~mask) for new, mask in zip(more, masks, strict=True)):
             break
         masks = [mask | new for mask, new in zip(masks, more, strict=True)]
-        signals = [
-            (wild.repaired(u, mask), wild.repaired(y, mask))
-            for (u, y), mask in zip(signals, masks, strict=True)
+        runs = [
+            replace(
+                run,
+                input=wild.repaired_where_off(run.input, mask),
+                output=wild.repaired_where_off(run.output, mask),
+            )
+            for run, mask in zip(runs, masks, strict=True)
         ]
-        fitted = on(signals, form=fitted.form, kept=[~mask for mask in masks])
-    return fitted, masks
+        ranges = np.asarray([input_range(run) for run in runs])
+        reach = max(reach[0], float(ranges[:, 0].min())), min(reach[1], float(ranges[:, 1].max()))
+        fitted = on(_signals(runs), *reach, kept=[~mask for mask in masks])
+    return fitted, runs, masks
+
+
+def _signals(runs: Sequence[Run]) -> list[tuple[FloatArray, FloatArray]]:
+    """Inputs and outputs of runs."""
+    return [(run.input, run.output) for run in runs]
 
 
 def _with_wild(model: Model, run: Run, masks: Sequence[BoolArray]) -> Model:

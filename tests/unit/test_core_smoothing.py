@@ -30,7 +30,8 @@ def test_chosen_smoothing_beats_the_peers_on_their_job():
     assert chosen < 0.074
     assert chosen < 0.7 * plain
     assert heavy > 4 * chosen
-    assert dict(fit.tried)[fit.smoothing] == min(error for _, error in fit.tried)
+    nearest = min(fit.tried, key=lambda one: abs(np.log(max(one[0], 1e-3) / fit.smoothing)))
+    assert nearest[1] <= 1.01 * min(error for _, error in fit.tried)
 
 
 @pytest.mark.parametrize(("gain", "shift", "volt"), [(1e-6, 0.0, 1.0), (40.0, 1e3, 1e5)])
@@ -128,6 +129,33 @@ def test_a_clean_record_is_left_sharp():
     fit = identify([Record(u, device(u))], plane, smoothing="auto")
     print(f"seed 6: s = {fit.smoothing:g}")
     assert np.sqrt(np.mean((fit.operator(u) - device(u)) ** 2)) < 1e-3 * np.ptp(device(u))
+
+
+def test_a_flat_error_has_its_smoothing_in_the_middle():
+    """Errors that differ by no more than chance count alike; a clear minimum is taken, as is no error."""
+    grid = [0.0125, 0.025, 0.05, 0.1]
+    flat = [(s, 1.0) for s in grid]
+    assert smoothing._mean_length(flat, 1000.0) == pytest.approx(0.025 * np.sqrt(2.0))
+    clear = [(s, 1.2 if s != 0.05 else 1.0) for s in grid]
+    assert smoothing._mean_length(clear, 1000.0) == pytest.approx(0.05)
+    assert smoothing._mean_length(clear, 1.0) != pytest.approx(0.05, rel=0.1)
+    assert smoothing._mean_length([(0.0, 0.0), (0.1, 1.0)], 10.0) == 0.0
+
+
+@pytest.mark.parametrize("away", [1e4, 1e6])
+def test_zero_of_the_sensors_does_not_move_the_choice(away):
+    """Output and input that are many spans away from zero: the same smoothing, the same error unseen."""
+    world = job(7, n=2000, levels=120)
+    plane, far = (Plane.uniform(low, low + 2.0, 16) for low in (-1.0, 2.0 * away - 1.0))
+    moved = Record(world.input + 2.0 * away, world.output + away * world.span)
+    here, there = (
+        identify([record], levels, smoothing="auto")
+        for record, levels in ((Record(world.input, world.output), plane), (moved, far))
+    )
+    assert there.smoothing == pytest.approx(here.smoothing, rel=1e-3)
+    expected = here.operator(world.unseen_input) + away * world.span
+    found = there.operator(world.unseen_input + 2.0 * away)
+    assert np.abs(found - expected).max() <= 1e-6 * world.span
 
 
 def test_blocks_are_cut_where_the_memory_is_wiped_out():

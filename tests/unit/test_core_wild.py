@@ -129,6 +129,23 @@ def test_a_median_of_neighbours_is_what_it_says():
     assert not wild.isolated(u[:40]).any()
 
 
+@pytest.mark.parametrize("at", [0, 1, 199, 198])
+def test_the_ends_of_a_record_have_neighbours_too(at):
+    """A wild sample that is the first or the last one is as far from the others as any."""
+    u = np.linspace(0.0, 1.0, 200)
+    u[at] -= 0.7
+    assert np.flatnonzero(wild.isolated(u)).tolist() == [at]
+    (found,) = wild.off([u - np.linspace(0.0, 1.0, 200)], 1.0)
+    assert np.flatnonzero(found).tolist() == [at]
+
+
+def test_a_wild_output_does_not_change_the_form():
+    """A loop that leads remains dual: the form is decided anew without the wild samples."""
+    for seed in (201, 203):
+        _, u, y, rng = clean(seed)
+        assert fitted(u, spoilt(y, 0.03, rng)[0]).form == "dual"
+
+
 def test_a_fit_that_describes_nothing_calls_nothing_wild():
     """The same spike beside a small residual and beside a large one."""
     rng = np.random.default_rng(1)
