@@ -128,7 +128,7 @@ def test_an_output_far_from_zero_is_fitted_as_well(far):
     here = identify([Record(near.input, near.output)], plane, smoothing="auto")
     for sign in (1, -1):
         there = identify([Record(near.input, sign * near.output + far)], plane, smoothing="auto")
-        assert there.smoothing == here.smoothing
+        assert there.smoothing == pytest.approx(here.smoothing, rel=1e-4)
         assert there.operator.weights == pytest.approx(here.operator.weights, abs=100 * slack)
         assert there.operator.offset == pytest.approx(sign * here.operator.offset + far, abs=slack)
     records = [Record(near.input, near.output + far + shift) for shift in (0.0, 0.5)]
