@@ -68,6 +68,19 @@ class Bins:
             ]
         return np.stack(columns, axis=1)
 
+    @cached_property
+    def places(self) -> list[tuple[IntArray, IntArray]]:
+        """For each record its bins (k,), and their places (k,) among even steps."""
+        found = []
+        for k in range(len(self.number)):
+            own = np.flatnonzero(self.record == k)
+            if own.size == 0:
+                continue
+            time = self.time_s[own] - self.time_s[own[0]]
+            step = float(np.diff(time).min()) if own.size > 1 else 1.0
+            found.append((own, np.round(time / step).astype(np.int64)))
+        return found
+
     def even(self, values: FloatArray, k: int) -> FloatArray:
         """Values (count,) of record ``k`` at even steps of its bins, zero where there is no bin."""
         number = self.number[k]

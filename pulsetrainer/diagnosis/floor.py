@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.fitting import Fitted, weights_for
+from pulsetrainer.diagnosis.noise import quiet_square
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.raw import Firing, coarse_step, noise_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY, UNIFORM
@@ -27,6 +29,8 @@ class Floor:
     noise: float  # rms of single samples
     white: float
     discretisation: float = 0.0
+    held: float = 0.0  # mean square of what does not average out: steps and jumps of the output
+    sampled: float = 0.0  # mean square of what single samples' noise leaves in an average
 
     @property
     def squares(self) -> float:
@@ -61,6 +65,15 @@ class Floor:
             self, discretisation=float(np.sqrt(fall / ((LIMITS.levels / LIMITS.coarse_levels) ** 2 - 1.0)))
         )
 
+    def heard(self, fitted: Fitted) -> Floor:
+        """Return the floor with the noise that is heard in what a fit leaves, coloured as it is."""
+        problem = fitted.problem
+        quiet = quiet_square(fitted.residual, problem.bins, problem.measured, np.abs(residual.rates(problem)))
+        square = max(quiet, self.sampled)
+        return replace(
+            self, white=float(np.sqrt(square + self.held)), noise=max(self.noise, float(np.sqrt(square)))
+        )
+
 
 def floor_of(
     measured: Sequence[Record], firings: Sequence[Firing], problem: Problem, span: float = 1.0
@@ -79,5 +92,7 @@ def floor_of(
     step = max(coarse_step(r.output) for r in measured) / span
     jump = max((f.value for f in firings if f.cause == "stick-slip"), default=0.0) / span
     held = (step**2 + jump**2) / UNIFORM  # does not average out
-    white = float(np.sqrt(noise**2 * np.mean(1.0 / problem.bins.sizes) + held))
-    return Floor(problem.bins.count, float(np.ptp(problem.measured)), noise, white)
+    sampled = noise**2 * float(np.mean(1.0 / problem.bins.sizes))
+    white = float(np.sqrt(sampled + held))
+    span = float(np.ptp(problem.measured))
+    return Floor(problem.bins.count, span, noise, white, held=held, sampled=sampled)

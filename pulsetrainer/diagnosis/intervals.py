@@ -29,8 +29,9 @@ def estimates_of(
     if columns.shape[1] == 0:
         return {}
     size = np.maximum(np.linalg.norm(columns, axis=0), TINY)
-    drawn = np.linalg.lstsq(columns / size, noise.draws, rcond=None)[0] / size[:, None]
-    variance = np.var(drawn, axis=1)
+    turned = np.linalg.pinv(columns / size) / size[:, None]
+    assert noise.noise is not None
+    variance = np.diagonal(noise.noise.covariance(fitted.projector(turned.T)))
     left_out = held_out.jackknife(fitted)
     if left_out is not None:
         variance = np.maximum(variance, left_out)

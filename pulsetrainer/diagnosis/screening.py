@@ -1,31 +1,36 @@
 """The fast screen: how much of a residual each cause could explain, and how much it would by chance.
 
-For every start value of every cause not yet in the model: the change of the output that it makes, less
-what the weights can do, is a column; the score is the fall of the sum of squares when the column (or the
-few columns of one block) is fitted to the residual. That is a linearisation around the fitted model: it
-ranks in a second, but shrinks strong causes; ``fitting.refit`` gives the figures.
+For every start value of every cause not yet in the model: the change of the output that it makes, less what
+the weights can do, is a column; the score is the fall of the sum of squares when the column (or the few
+columns of one block) is fitted to the residual. That is a linearisation around the fitted model: it ranks
+in a second, but shrinks strong causes; ``fitting.refit`` gives the figures.
 
-The null distribution is that of the largest score over the whole library on noise that looks like the
-residual: an autoregressive process fitted to what no cause can explain, drawn again and again and
-projected the same way. Exact in it: the projection, the maximum over the library, the refit of the
-offset and of all weights that are positive. Not exact: weights at zero stay there, and parameters
-that enter nonlinearly are taken on the grid of start values instead of being refitted.
+The null distribution is that of the most unlikely score over the whole library on noise like that of the
+record (``noise``): its spectrum and its dependence on the level, read off what no cause can explain. Noise
+has a normal distribution along the columns, whose covariance that spectrum gives, so that each block's
+score has a known one: chi-square. The smallest such p over the library is drawn again and again. Exact in
+it: the projection, the minimum over the library, the refit of the offset and of all weights that are
+positive. What is chosen from the data is chosen anew in each draw: a line's smallest p over all frequencies
+is known (Baluev, MNRAS 385, 2008, equation 6), and a step is tried at all its moments. Not exact: weights
+at zero stay there, and other parameters that enter nonlinearly are taken on the grid of start values.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg, signal
+from scipy import linalg, stats
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Fitted
+from pulsetrainer.diagnosis.noise import Noise, noise_in
 from pulsetrainer.diagnosis.problem import Problem
-from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
 
 @dataclass(frozen=True)
@@ -44,9 +49,7 @@ class Screen:
     """Scores of all causes, best first, and the noise they were judged against."""
 
     scores: tuple[Score, ...] = ()
-    draws: FloatArray = field(
-        default_factory=lambda: np.empty((0, 0))
-    )  # (count, draws), weights projected off
+    noise: Noise | None = None  # None: no null was drawn
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,7 @@ class _Block:
     back: FloatArray  # (k, k) from coordinates along the basis to coefficients of the columns
     one_sided: bool  # the strength must not be negative
     as_it_is: bool  # no strength to be fitted: the column is inserted whole
+    choices: float = 0.0  # so many values its parameters were chosen from by the data; 0: they were not
 
     def gains(self, signals: FloatArray) -> FloatArray:
         """Falls of the sum of squares (m,) for signals (count, m)."""
@@ -71,33 +75,106 @@ class _Block:
             gain = np.where((self.back @ along)[0] > 0, gain, 0.0)
         return np.asarray(gain)
 
+    def surprises(self, along: FloatArray, covariance: FloatArray) -> FloatArray:
+        """Logarithms of p (m,) for parts along the basis (k, m), of which noise has a covariance."""
+        if self.as_it_is:
+            return np.asarray(stats.norm.logsf(along[0] / np.sqrt(covariance[0, 0])))
+        size = np.sum(along * np.linalg.solve(covariance, along), axis=0)
+        surprise = stats.chi2.logsf(size, self.basis.shape[1])
+        if self.choices:
+            half = 0.5 * np.maximum(size, TINY)
+            return np.asarray(np.minimum(np.log(self.choices) + 0.5 * np.log(half) - half, 0.0))
+        if self.one_sided:
+            return np.where((self.back @ along)[0] > 0, surprise - np.log(2.0), 0.0)
+        return np.asarray(surprise)
+
 
 def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: int = LIMITS.draws) -> Screen:
-    """Score every cause that is not in the model yet."""
+    """Score every cause that is not in the model yet; without ``draws`` no p-values are found."""
     project = fitted.projector
     residual = project(fitted.residual[:, None])[:, 0]
-    blocks = _blocks(problem, fitted, residual)
-    everything = np.hstack([b.basis for b in blocks]) if blocks else np.empty((residual.size, 0))
-    noise = coloured(_unexplained(residual, everything), draws, rng)
-    noise = project(noise)
-    best: dict[str, tuple[float, _Block]] = {}
-    largest = np.zeros(draws)
-    for block in blocks:
-        gain = float(block.gains(residual[:, None])[0])
-        if block.cause.id not in best or gain > best[block.cause.id][0]:
-            best[block.cause.id] = gain, block
-        largest = np.maximum(largest, block.gains(noise))
+    blocks = _blocks(problem, fitted)
+    gains = [float(block.gains(residual[:, None])[0]) for block in blocks]
+    noise, known = None, np.ones(len(blocks))
+    if draws and blocks:
+        noise = noise_in(residual, _less(project, blocks), problem.bins, problem.measured, rng)
+        known = _p_values(blocks, residual, noise.covariance(project(_side_by_side(blocks))), draws, rng)
+    best: dict[str, int] = {}
+    p_values: dict[str, float] = {}
+    for k, block in enumerate(blocks):
+        name = block.cause.id
+        p_values[name] = min(p_values.get(name, 1.0), float(known[k]))
+        if name not in best or gains[k] > gains[best[name]]:
+            best[name] = k
+    left = _at_full_rate(problem, fitted)
     scores = [
         Score(
             block.cause,
-            gain,
-            _start(block, residual, problem.frames[0]),
-            p_value(gain, largest),
+            gains[k],
+            block.cause.sharpened(_start(block, residual, problem.frames[0]), problem.frames, left),
+            p_values[name],
             block.basis,
         )
-        for gain, block in best.values()
+        for name, k in best.items()
+        for block in [blocks[k]]
     ]
     return Screen(tuple(sorted(scores, key=lambda s: -s.gain)), noise)
+
+
+def _side_by_side(blocks: Sequence[_Block]) -> FloatArray:
+    return np.hstack([block.basis for block in blocks])
+
+
+def _p_values(
+    blocks: Sequence[_Block],
+    residual: FloatArray,
+    covariance: FloatArray,
+    draws: int,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Family-wise p (blocks,) of every block on a residual, from draws of noise with a covariance."""
+    ends = np.cumsum([block.basis.shape[1] for block in blocks])
+    size, axes = np.linalg.eigh(covariance)
+    white = rng.standard_normal((ends[-1], draws))
+    drawn = axes @ (np.sqrt(np.maximum(size, 0.0))[:, None] * white)
+    least, seen = np.zeros(draws), np.zeros(len(blocks))
+    for k, (block, end) in enumerate(zip(blocks, ends, strict=True)):
+        part = slice(end - block.basis.shape[1], end)
+        own = covariance[part, part] + TINY * np.eye(block.basis.shape[1])
+        seen[k] = block.surprises(block.basis.T @ residual[:, None], own)[0]
+        # what was chosen from the data has its own p, which under the null is any number alike
+        alike = np.log(rng.uniform(size=draws)) if block.choices else block.surprises(drawn[part], own)
+        least = np.minimum(least, alike)
+    return np.asarray([p_value(-one, -least) for one in seen])
+
+
+def _less(
+    project: Callable[[FloatArray], FloatArray], blocks: Sequence[_Block]
+) -> Callable[[FloatArray], FloatArray]:
+    """Take from columns what weights and all causes could explain: what is left is taken for noise."""
+    everything = _side_by_side(blocks)
+    size, axes = np.linalg.eigh(everything.T @ everything)
+    kept = size > LIMITS.rank**2 * size[-1]
+    axes = everything @ (axes[:, kept] / np.sqrt(size[kept]))
+
+    def free(columns: FloatArray) -> FloatArray:
+        left = project(columns)
+        return np.asarray(left - axes @ (axes.T @ left))
+
+    return free
+
+
+def _at_full_rate(problem: Problem, fitted: Fitted) -> list[FloatArray]:
+    """Residual (n,) of every record at its own rate, zero where samples have no weight."""
+    wrong = problem.measured - fitted.simulated
+    start = problem.bins.free @ (problem.bins.free.T @ wrong)
+    found = []
+    for record, number, said in zip(
+        problem.records, problem.bins.number, fitted.simulator.full(fitted.terms), strict=True
+    ):
+        left = record.output - said - start[np.maximum(number, 0)]
+        found.append(np.where(number >= 0, left, 0.0))
+    return found
 
 
 def p_value(observed: float, drawn: FloatArray) -> float:
@@ -108,12 +185,12 @@ def p_value(observed: float, drawn: FloatArray) -> float:
     return (1.0 + float(np.count_nonzero(drawn >= observed))) / (1.0 + drawn.size)
 
 
-def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Block]:
+def _blocks(problem: Problem, fitted: Fitted) -> list[_Block]:
     """All blocks of columns, weights and the causes already in the model projected off."""
     project = fitted.projector
     own = project(fitted.slopes)
     known = linalg.orth(own) if own.shape[1] else own
-    parts = [problem.bins.even(residual, k) for k in range(len(problem.records))]
+    parts = _at_full_rate(problem, fitted)
     timed = all(record.timed for record in problem.records)
     tried: list[tuple[Cause, list[Values]]] = [
         (cause, values)
@@ -145,7 +222,8 @@ def _blocks(problem: Problem, fitted: Fitted, residual: FloatArray) -> list[_Blo
             basis, upper = np.linalg.qr(free[:, part])
             whole = cause.strengths == 0
             one_sided = not whole and len(values) == 1 and cause.parameters[0].low >= 0
-            found.append(_Block(cause, tuple(values), basis, np.linalg.inv(upper), one_sided, whole))
+            back, choices = np.linalg.inv(upper), cause.choices(problem.frames)
+            found.append(_Block(cause, tuple(values), basis, back, one_sided, whole, choices))
     return found
 
 
@@ -160,25 +238,3 @@ def _start(block: _Block, residual: FloatArray, frame: Frame) -> Values:
             one = min(max(one, LIMITS.start_falls * tried), LIMITS.start_rises * tried)
         values[j] = min(max(one, quantity.low), quantity.high)
     return tuple(float(v) for v in values)
-
-
-def _unexplained(residual: FloatArray, columns: FloatArray) -> FloatArray:
-    """The residual less all that any cause could explain: what is left is taken for noise."""
-    if columns.shape[1] == 0:
-        return residual
-    left, size, _ = linalg.svd(columns, full_matrices=False, check_finite=False)
-    left = left[:, size > LIMITS.rank * size[0]]
-    return residual - left @ (left.T @ residual)
-
-
-def coloured(like: FloatArray, draws: int, rng: np.random.Generator) -> FloatArray:
-    """Noise (count, draws) with the spectrum of ``like`` (count,): an autoregression (Yule-Walker)."""
-    lags = np.asarray([like[: like.size - k] @ like[k:] for k in range(LIMITS.ar_order + 1)]) / like.size
-    if lags[0] <= 0:
-        return np.zeros((like.size, draws))
-    lags[0] *= 1.0 + LIMITS.ar_ridge
-    phi = linalg.solve_toeplitz(lags[:-1], lags[1:])
-    power = max(float(lags[0] - phi @ lags[1:]), 0.0)
-    warm = LIMITS.ar_warm_up * LIMITS.ar_order
-    white = rng.standard_normal((like.size + warm, draws)) * np.sqrt(power)
-    return np.asarray(signal.lfilter([1.0], np.concatenate(([1.0], -phi)), white, axis=0)[warm:])

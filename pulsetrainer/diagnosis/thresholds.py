@@ -72,13 +72,26 @@ class Thresholds:
     relevant_span: float = 0.0003  # of the span: smaller effects are irrelevant on any device (decision 044)
     least_reducible: float = 1e-12  # of the baseline's squares: keeps shares finite
 
+    # How large the noise is
+    octaves: int = 6  # in which it is looked at: 1.6 Hz and faster
+    least_quiet: int = 800  # averages at rest: with fewer the slowest ones are looked at
+    slowest: float = 0.3  # of the averages: those
+    slope_octaves: int = 3  # the slowest of the octaves, from which what is slower still is continued
+    steepest: float = 1.2  # power of the period with which a spectrum may rise: pink noise has 1
+    trimmed: float = 0.05  # of the averages of a band: the largest are no noise
+    impulse: float = 3.5  # standard deviations: an average farther out ...
+    alone: float = 2.0  # ... and so many times larger than its neighbours is of a heavy tail
+    slow_doubt: float = 4.0  # times what the continuation gives: slow errors no larger than that are noise
+
     # Screening and its null
     p_max: float = 0.01  # over the whole library: the false alarms that a search may make in a hundred
-    draws: int = 199  # of the noise: the smallest that can show p = 0.005
-    draws_few: int = 20  # where only start values are wanted
-    ar_order: int = 10  # of the noise's autoregression: 50 ms of memory
-    ar_warm_up: int = 20  # orders thrown away before a draw begins
-    ar_ridge: float = 1e-9  # relative, of the variance: keeps its equations regular
+    draws: int = 1999  # of the noise: the smallest p is a twentieth of the limit
+    probes: int = 12  # white signals that tell how much of a spectrum the weights and the library take away
+    band: float = 1.15  # of its frequency: width of a band of the noise's spectrum ...
+    least_lines: int = 4  # ... which has at least so many lines
+    median_lines: int = 12  # a band of so many is a median: a line of a hum is no noise
+    least_seen: float = 0.2  # of a probe: a band that keeps less of it says nothing
+    least_left: float = 0.05  # of a probe, or of the largest noise: keeps ratios finite
     visible: float = 1e-6  # of a column: less than that left by the weights is rounding
     rank: float = 1e-3  # of the largest singular value: smaller ones of the library's columns are noise
     start_falls: float = 0.2  # a linearised strength starts a refit within this ...
@@ -171,6 +184,7 @@ LIMITS = Thresholds()
 # Not thresholds but mathematics.
 TINY = 1e-300  # keeps a division by nothing finite
 PERCENT = 100.0
+CHI_SQUARE_MEDIAN = 0.4549  # median of the square of a standard normal variable
 NORMAL_MAD = 0.6745  # median of |x| of a standard normal variable
 DIFFERENCES = 3  # third ones: a smooth output hardly has any
 THIRD_DIFFERENCE = 20.0  # 1 + 9 + 9 + 1: their variance for white noise

@@ -23,7 +23,7 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.procedure import diagnose
-from pulsetrainer.diagnosis.screening import coloured, screen
+from pulsetrainer.diagnosis.screening import screen
 from pulsetrainer.diagnosis.state import Question
 
 pytestmark = pytest.mark.timeout(600)
@@ -103,7 +103,6 @@ def test_autocorrelated_noise_does_not_alarm():
     best = scores.scores[0]
     assert best.gain / independent > 6.6  # the one per cent point of F(1, many)
     assert best.p_value > 0.01
-    assert coloured(base.residual, 2, rng).shape == (again.bins.count, 2)
 
 
 @pytest.mark.slow

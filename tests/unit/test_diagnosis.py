@@ -12,7 +12,7 @@ from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import experiment, gates, raw, screening
+from pulsetrainer.diagnosis import experiment, gates, raw
 from pulsetrainer.diagnosis.causes import cause_named, library
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass
 from pulsetrainer.diagnosis.extended import Extended, Term
@@ -296,16 +296,6 @@ def test_noise_is_measured_without_a_model():
     rng = np.random.default_rng(2)
     y = 5 * np.sin(np.arange(20_000) / 300) + 0.04 * rng.standard_normal(20_000)
     assert raw.noise_of(y) == pytest.approx(0.04, rel=0.03)
-
-
-def test_simulated_noise_has_the_spectrum_of_its_model():
-    """Variance and first correlations of an autoregression come back."""
-    rng = np.random.default_rng(3)
-    like = screening.signal.lfilter([1.0], [1.0, -0.8], rng.standard_normal(20_000))
-    drawn = screening.coloured(like, 5, rng)
-    assert np.std(drawn) == pytest.approx(np.std(like), rel=0.08)
-    for lag in (1, 3):
-        assert np.corrcoef(drawn[:-lag, 0], drawn[lag:, 0])[0, 1] == pytest.approx(0.8**lag, abs=0.06)
 
 
 @pytest.mark.parametrize("constant", ["input", "output"])

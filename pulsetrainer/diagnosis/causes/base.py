@@ -130,9 +130,17 @@ class Cause:
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try; the columns of a block are fitted together.
 
-        ``residual`` holds the averages of each record at even steps, zero where there are none.
+        ``residual`` holds that of each record (n,) at its own rate, zero where samples have no weight.
         """
         raise NotImplementedError
+
+    def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:
+        """Return start values for a refit, nearer to what the residual shows than the grid of ``starts``."""
+        return values
+
+    def choices(self, frames: Sequence[Frame]) -> float:
+        """Return from how many independent values ``starts`` chooses by the residual; 0 where it does not."""
+        return 0.0
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Input (n,) that the hysteresis sees, for the applied ``u`` (n,) and the output ``y`` (n,)."""

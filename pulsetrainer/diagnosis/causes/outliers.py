@@ -19,6 +19,8 @@ _FAST = 0.95  # quantile of the steps from sample to sample: the fast branches
 _TIP = 4.0  # of those steps: a tip at full speed stands out from its median by up to three
 _STEPS = 2.0  # converter steps: nearer is its rounding
 _LINE = 5  # samples on one side of a suspect that may explain it
+_TAIL = 0.5  # of them between half the limit and the limit: more are the tail of the noise
+_HIGHER = 1.25  # factor from one limit to the next that is tried
 _LEAST = 3  # wild samples: fewer are no fault of a device
 
 
@@ -46,14 +48,29 @@ class Outliers(Cause):
         apart = np.abs(y - ndimage.median_filter(y, _AROUND, mode="nearest"))
         usual = _TIP * float(np.quantile(np.abs(np.diff(y)), _FAST))
         limit = max(_SIGMAS * _DIFFERENCE * noise_of(y), usual, _STEPS * spacing_of(y))
-        wild = (apart > limit) & ~raw.beside_breaks(_AROUND)
-        for at in np.flatnonzero(wild):  # where a stroke ends with a jump, its last sample still lies on it
-            wild[at] = min(_off_line(y, int(at), -1), _off_line(y, int(at), 1)) > limit
-        count = np.count_nonzero(wild)
-        if count < _LEAST:
+        off = np.where((apart > 0.5 * limit) & ~raw.beside_breaks(_AROUND), apart, 0.0)
+        for at in np.flatnonzero(off):  # where a stroke ends with a jump, its last sample still lies on it
+            off[at] = min(off[at], _off_line(y, int(at), -1), _off_line(y, int(at), 1))
+        found = _beyond_the_tail(np.sort(off[off > 0.5 * limit]), limit)
+        if found is None:
             return None
+        limit, wild = found, off > found
+        count = np.count_nonzero(wild)
         figures = {"count": float(count), "limit": float(limit)}
         return Firing(self.id, "gate", float(apart[wild].max()), "{y}", figures, wild)
+
+
+def _beyond_the_tail(off: FloatArray, limit: float) -> float | None:
+    """Return the smallest limit beyond which samples stand apart; None where there is none.
+
+    ``off`` (k,) rises from half of ``limit``. Heavy tails go on: at half a limit they hold many times more.
+    """
+    while np.count_nonzero(off > limit) >= _LEAST:
+        beyond, below = np.count_nonzero(off > limit), np.count_nonzero((off > 0.5 * limit) & (off <= limit))
+        if below <= _TAIL * beyond:
+            return limit
+        limit *= _HIGHER
+    return None
 
 
 def _off_line(y: FloatArray, at: int, side: int) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage
+from scipy import fft, ndimage
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
@@ -18,6 +18,7 @@ _FLOOR = 1e-12  # of the highest line: keeps the ratio finite where the spectrum
 _LEAST = 0.02  # of the highest line: lower ones are noise, however far above their surroundings
 _FINER = 41  # frequencies tried between the two neighbours of a line
 _TRIED = 0.003  # of the span
+_INDEPENDENT = 0.51  # of the samples: so many frequencies are independent (sqrt(pi/3) / 2)
 
 
 class Periodic(Cause):
@@ -43,18 +44,21 @@ class Periodic(Cause):
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
         frame, one = frames[0], residual[0]
-        power = np.abs(np.fft.rfft(one * np.hanning(one.size))) ** 2
-        dt_s = frame.dt_s * round(frame.input.size / one.size)
-        frequency = np.fft.rfftfreq(one.size, dt_s)
-        power[frequency < max(_SLOWEST_Hz, _PERIODS / (one.size * dt_s))] = 0.0
+        power = np.abs(fft.rfft(one * np.hanning(one.size))) ** 2
+        frequency = fft.rfftfreq(one.size, frame.dt_s)
+        power[frequency < max(_SLOWEST_Hz, _PERIODS / (one.size * frame.dt_s))] = 0.0
         if not power.any():
             return []
         # against its surroundings: a line, not the slope of a spectrum
         around = ndimage.median_filter(power, size=_LINES) + _FLOOR * power.max(initial=0.0) + TINY
         k = int(np.argmax(power / around * (power > _LEAST * power.max(initial=0.0))))
-        best = _refined(one, float(frequency[k]), float(frequency[1]), dt_s)
+        best = _refined(one, float(frequency[k]), float(frequency[1]), frame.dt_s)
         size = _TRIED * frame.span
         return [[(size, 0.0, best), (0.0, size, best)]]
+
+    def choices(self, frames: Sequence[Frame]) -> float:
+        """Return from how many independent frequencies ``starts`` chooses: Baluev's W."""
+        return _INDEPENDENT * frames[0].input.size
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -10,7 +10,8 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 
 _TRIED = 0.003  # of the span, and of the gain
-_WINDOWS = (0.02, 0.98, 13)  # of the record, from, to, edges: each window overlaps half of the next
+_MOMENTS = (0.02, 0.98, 25)  # of the record, from, to, how many
+_BESIDE = 1.5  # distances of two moments on either side: a refit cannot move far, so it must begin near
 _SHARED = 20.0  # samples over which the change is shared out, so that the error falls smoothly with the time
 _EDGE = 20  # of a window: splits within one such part of its ends are left out
 _LEAST = 4  # such parts: a shorter window is split at its begin
@@ -38,15 +39,19 @@ class Step(Cause):
     lasting = False
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
-        frame, one = frames[0], residual[0]
-        dt_s = frame.dt_s * round(frame.input.size / one.size)
+        """Blocks of parameter values to try: the same moments, whatever the residual."""
+        frame = frames[0]
         size = _TRIED * frame.span
-        edges = np.linspace(*_WINDOWS) * one.size
-        times = [
-            _split(one, int(begin), int(end)) * dt_s for begin, end in zip(edges[:-2], edges[2:], strict=True)
-        ]
-        return [[(size, 0.0, t), (0.0, _TRIED, t)] for t in dict.fromkeys(times)]
+        times = (np.linspace(*_MOMENTS) * frame.input.size * frame.dt_s).tolist()
+        return [[(size, 0.0, t), (0.0, _TRIED, t)] for t in times]
+
+    def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:
+        """Return the moment around that of ``values`` where the residual on both sides differs most."""
+        size = residual[0].size
+        near = (_MOMENTS[1] - _MOMENTS[0]) / (_MOMENTS[2] - 1) * size
+        at = values[2] / frames[0].dt_s
+        begin, end = max(at - _BESIDE * near, 0.0), min(at + _BESIDE * near, size)
+        return (*values[:2], _split(residual[0], int(begin), int(end)) * frames[0].dt_s)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

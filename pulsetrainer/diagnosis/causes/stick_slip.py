@@ -20,12 +20,14 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, stats
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.raw import Firing, Raw, coarse_step, evenly, noise_of
+from pulsetrainer.diagnosis.thresholds import TINY
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.fitting import Fitted
@@ -42,9 +44,14 @@ _SIGMAS = 7.0  # of the difference of two means
 _AROUND = 15  # such differences in the median: a smooth branch has equal ones, a stuck one none between jumps
 _SHARPER = 4.0  # times that median
 _JUMPS = 15  # fewer are chance
+_LEVELS = 8  # of the output, each with a noise of its own
+_REST = 0.02  # ranges a second: slower is rest
+_ENOUGH = 40  # times that width: samples that tell the noise of a level
+_QUIET = 0.25  # quantile of slow samples: jumps spoil the larger ones
 # Sawtooth of what is left
 _PERIODS = (0.008, 0.08)  # sought, shares of the span: smaller is quantisation, larger is seen one by one
 _FINENESS = 0.004  # from one period to the next, relative
+_BINS = 16.0  # of the shortest period: the residual is put in
 _TURN = 0.02  # of the range: smaller turns of the input are noise
 _STROKE_PERIODS = 3.0  # a stroke must hold
 _SAMPLES = 4.0  # a period must hold
@@ -87,9 +94,11 @@ class StickSlip(Cause):
         wide = max(_WIDE_LEAST, round(_WIDE_S / dt_s))
         if record.output.size < _SHORTEST * wide or coarse_step(raw.calm.output) > 0:
             return None
-        size = _jumps(record.output, wide)
+        moved = _jumps(record.output, wide)
+        size = np.abs(moved)
         around = ndimage.median_filter(size[::wide], _AROUND, mode="nearest").repeat(wide)[: size.size]
-        least = _SIGMAS * np.sqrt(2.0 / wide) * noise_of(record.output)
+        noise = np.sqrt(2.0 / wide) * noise_of(record.output)
+        least = _SIGMAS * np.maximum(_spread(moved, record, dt_s, wide, raw.reach), noise)
         peak = (size == ndimage.maximum_filter1d(size, 2 * wide + 1)) & (size > least)
         broken = replace(raw, record=record, stamps=None).beside_breaks(_APART * wide)
         found = _slow(record.input, dt_s, wide, raw.reach) & peak & (size > _SHARPER * around) & ~broken
@@ -110,11 +119,20 @@ class StickSlip(Cause):
             return None
         count = round(np.log(_PERIODS[1] / _PERIODS[0]) / _FINENESS)
         period = np.geomspace(*_PERIODS, count) * float(np.ptp(problem.measured))
-        sure, amplitude = np.asarray([_line(strokes, one, white) for one in period]).T
+        power, squares, used = _lines(strokes, period)
+        enough = used >= _STROKES
+        if not enough.any():
+            return None
+        used = np.maximum(used, 1.0)
+        sure = np.where(enough, (power / white - used) / np.sqrt(used), 0.0)
+        amplitude = np.where(enough, np.sqrt(squares), 0.0)
         best = int(np.argmax(sure))
         ratio = period / period[best]
         beside = np.any([(low < ratio) & (ratio < high) for low, high in _BESIDE], axis=0)
         sharp = sure[best] > max(_SURE, _SHARP * float(np.median(sure[beside])) if beside.any() else 0.0)
+        # coloured noise lifts all periods alike
+        level = float(np.median((power / used)[beside])) if beside.any() else white
+        sharp = sharp and power[best] / max(level, white) - used[best] > _SURE * np.sqrt(used[best])
         if not sharp or not _LIKE[0] < amplitude[best] * np.pi / period[best] < _LIKE[1]:
             return None
         size = float(period[best])
@@ -127,7 +145,28 @@ def _jumps(y: FloatArray, wide: int) -> FloatArray:
     at = np.arange(wide, y.size - wide)  # the first sample after a jump
     jump = np.zeros(y.size)
     jump[at] = (total[at + wide] - 2.0 * total[at] + total[at - wide]) / wide
-    return np.abs(jump)
+    return jump
+
+
+def _spread(moved: FloatArray, record: Record, dt_s: float, wide: int, reach: float) -> FloatArray:
+    """Standard deviation (n,) of the differences of two means by noise alone, whatever its colour and level.
+
+    At rest the output does not stick; where no rest is at a level, it is the slow samples that change least.
+    """
+    rate = np.abs(ndimage.uniform_filter1d(np.gradient(record.input, dt_s), _RATE * wide)) / reach
+    usual = ndimage.median_filter(moved[::wide], _AROUND, mode="nearest").repeat(wide)[: moved.size]
+    apart = np.abs(moved - usual)
+    level = ndimage.uniform_filter1d(record.output, wide)
+    edges = np.quantile(level, np.linspace(0.0, 1.0, _LEVELS + 1))
+    group = np.clip(np.searchsorted(edges, level) - 1, 0, _LEVELS - 1)
+    spread = np.zeros(_LEVELS)
+    for k in range(_LEVELS):
+        own = group == k
+        for part, share in ((own & (rate < _REST), 0.5), (own & (rate < _RATES[1]), _QUIET), (own, _QUIET)):
+            if np.count_nonzero(part) >= _ENOUGH * wide:
+                spread[k] = float(np.quantile(apart[part], share)) / stats.norm.ppf(0.5 + 0.5 * share)
+                break
+    return spread[group]
 
 
 def _slow(u: FloatArray, dt_s: float, wide: int, reach: float) -> FloatArray:
@@ -152,18 +191,23 @@ def _strokes(fitted: Fitted) -> Strokes:
     return found
 
 
-def _line(strokes: Strokes, period: float, white: float) -> tuple[float, float]:
-    """How far the power at one period is above noise, in its standard deviations, and the amplitude."""
-    power, squares, total, used = 0.0, 0.0, 0, 0
-    for said, left in strokes:
-        moved = abs(float(said[-1] - said[0]))
-        if moved < _STROKE_PERIODS * period or moved * _SAMPLES > period * said.size:
-            continue
-        along = abs(complex(left @ np.exp(-2j * np.pi / period * said))) ** 2
-        power += along / said.size
-        squares += _BOTH * along
-        total += said.size**2
-        used += 1
-    if used < _STROKES:
-        return 0.0, 0.0
-    return (power / white - used) / float(np.sqrt(used)), float(np.sqrt(squares / total))
+def _lines(strokes: Strokes, period: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """For each period (k,) the power added over the strokes, the squared amplitude, and the strokes used.
+
+    The residual of a stroke is put in narrow bins of the model's output: one product of matrices then gives
+    all periods.
+    """
+    step = float(period[0]) / _BINS
+    at = [np.round((said - said.min()) / step).astype(np.int64) for said, _ in strokes]
+    rows = np.zeros((len(strokes), max(int(one.max()) for one in at) + 1))
+    for row, one, (_, left) in zip(rows, at, strokes, strict=True):
+        row[: one.max() + 1] = np.bincount(one, weights=left)
+    turn = 2.0 * np.pi * step * np.arange(rows.shape[1])[:, None] / period
+    along = (rows @ np.cos(turn)) ** 2 + (rows @ np.sin(turn)) ** 2
+    size = np.asarray([float(said.size) for said, _ in strokes])[:, None]
+    moved = np.asarray([abs(float(said[-1] - said[0])) for said, _ in strokes])[:, None]
+    taken = (moved >= _STROKE_PERIODS * period) & (moved * _SAMPLES <= period * size)
+    power = np.sum(np.where(taken, along / size, 0.0), axis=0)
+    total = np.maximum(np.sum(np.where(taken, size**2, 0.0), axis=0), TINY)
+    squares = _BOTH * np.sum(np.where(taken, along, 0.0), axis=0) / total
+    return power, squares, np.count_nonzero(taken, axis=0).astype(np.float64)

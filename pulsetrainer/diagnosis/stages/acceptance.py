@@ -36,7 +36,7 @@ def stage(state: State) -> State:
             state,
             current=accepted,
             p_values={**state.p_values, score.cause.id: score.p_value},
-            floor=state.floor.at(state.coarse, accepted),
+            floor=state.floor.heard(accepted).at(state.coarse, accepted),
             trials=(),
         )
     return replace(state, trials=())

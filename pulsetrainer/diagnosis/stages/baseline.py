@@ -33,7 +33,8 @@ def stage(masked: Masked) -> State:
     coarse = problem_for(records, 0.0, 1.0, LIMITS.coarse_levels)
     fitted = weights_for(problem, (), None)
     fired = [firing for _, firing in firings]
-    floor = floor_of(masked.question.records, fired, problem, masked.scale.span).at(coarse, fitted)
+    floor = floor_of(masked.question.records, fired, problem, masked.scale.span)
+    floor = floor.heard(fitted).at(coarse, fitted)
     lacks = tuple(excitation_limits(problem))
     held_out = HeldOut(problem)
     return State(

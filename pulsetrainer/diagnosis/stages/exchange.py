@@ -34,7 +34,7 @@ def _exchanged(state: State, cause: Cause) -> State:
     # by its cause: an exchange before this one has moved all terms
     others = [term for term in current.terms if term.cause is not cause]
     without = refit(problem, others, current, rounds=LIMITS.without_rounds)
-    known = screen(problem, without, state.question.rng, draws=LIMITS.draws_few)
+    known = screen(problem, without, state.question.rng, draws=0)
     trials = [
         refit(problem, (*without.terms, Term(score.cause, score.start)), without)
         for score in known.scores

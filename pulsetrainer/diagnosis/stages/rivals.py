@@ -69,7 +69,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     """Causes that repair the data as well as ``term``, within the noise of the comparison."""
     fitted, without, floor = state.current, state.without[term.cause.id], state.floor
     gain = without.squares - fitted.squares
-    scores = screen(state.problem, without, state.question.rng, draws=LIMITS.draws_few)
+    scores = screen(state.problem, without, state.question.rng, draws=0)
     margin = max(
         LIMITS.rival_gain * gain,
         LIMITS.rival_relevant * floor.relevant,

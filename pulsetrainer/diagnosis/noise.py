@@ -1,0 +1,218 @@
+"""The noise of a record as it is: its spectrum, and how it grows with the output's level.
+
+Noise n_t = s_t x_t, where s follows the level of the output and x is stationary with the density S(f). Both
+are read off a residual from which all that weights and causes could explain has been taken: what is missing
+there at some frequencies is told by white probes that go the same way, and put back. Bands of the spectrum
+are medians, so that a line in it is no noise. A sum c'n then has the variance
+
+    sum over f of S(f) |FFT(s c)(f)|^2 / N
+
+of the record padded with as many zeros, so that its ends do not meet. How large the noise is, whatever is
+still missing in a model, is told by ``quiet_square``: where the input rests, or is slow, octave by octave,
+the largest averages left out. What is slower than its octaves is continued from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, signal, stats
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.design import Bins
+from pulsetrainer.diagnosis.thresholds import CHI_SQUARE_MEDIAN, LIMITS, TINY
+
+_EXPONENTIAL_MEDIAN = float(np.log(2.0))  # of a line of a periodogram, of its mean
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise of the averages of some records."""
+
+    bins: Bins
+    scale: FloatArray  # (count,) local size, mean square one
+    frequency: FloatArray  # (m,) cycles an average, rising
+    density: FloatArray  # (m,) variance of an average if all frequencies were like this one
+
+    def at(self, frequency: FloatArray) -> FloatArray:
+        """Density at some frequencies (k,), cycles an average."""
+        known = np.log(np.maximum(self.density, TINY))
+        return np.exp(np.interp(np.log(np.maximum(frequency, TINY)), np.log(self.frequency), known))
+
+    def covariance(self, columns: FloatArray) -> FloatArray:
+        """Covariance (k, k) of what noise has along columns (count, k)."""
+        total = np.zeros((columns.shape[1], columns.shape[1]))
+        for own, at in self.bins.places:
+            size = fft.next_fast_len(2 * (int(at[-1]) + 1), real=True)
+            spread = np.zeros((columns.shape[1], size))
+            spread[:, at] = (columns[own] * self.scale[own, None]).T
+            lines = fft.rfft(spread, axis=1)
+            twice = np.full(lines.shape[1], 2.0)
+            twice[0] = 1.0
+            if size % 2 == 0:
+                twice[-1] = 1.0
+            lines *= np.sqrt(twice * self.at(fft.rfftfreq(size)) / size)
+            real = lines.view(np.float64)
+            total += real @ real.T
+        return total
+
+
+def noise_in(
+    residual: FloatArray,
+    free: Callable[[FloatArray], FloatArray],
+    bins: Bins,
+    level: FloatArray,
+    rng: np.random.Generator,
+) -> Noise:
+    """Return the noise of a residual.
+
+    Parameters
+    ----------
+    residual
+        (count,) what is left.
+    free
+        Takes from columns (count, k) all that was taken from the residual.
+    level
+        (count,) averaged output.
+    """
+    left = free(residual[:, None])
+    scale = _scale(left[:, 0], bins, level)
+    probes = free(rng.standard_normal((bins.count, LIMITS.probes)) * scale[:, None])
+    frequency, lines, white = _lines(np.hstack((left, probes)) / scale[:, None], bins)
+    edges = _edges(frequency)
+    values, middles = [], []
+    for begin, end in pairwise(edges):
+        band, known = lines[begin:end], float(white[begin:end].mean())
+        if known < LIMITS.least_seen and end < frequency.size:
+            continue  # taken away almost whole: the bands beside it tell more
+        mean = (
+            float(np.median(band)) / _EXPONENTIAL_MEDIAN
+            if end - begin >= LIMITS.median_lines
+            else float(band.mean())
+        )
+        values.append(mean / max(known, LIMITS.least_left))
+        middles.append(float(np.exp(np.mean(np.log(frequency[begin:end])))))
+    return Noise(bins, scale, np.asarray(middles), np.asarray(values))
+
+
+def _scale(left: FloatArray, bins: Bins, level: FloatArray) -> FloatArray:
+    """Local size (count,) of noise by the level of the output, from differences of neighbours."""
+    apart = np.append(np.diff(left), 0.0) ** 2
+    apart[np.append(np.diff(bins.record), 1) != 0] = np.nan
+    low, high = float(level.min()), float(level.max())
+    group = np.clip((level - low) / max(high - low, TINY) * LIMITS.groups, 0, LIMITS.groups - 1).astype(int)
+    middles, sizes = [], []
+    for k in range(LIMITS.groups):
+        own = apart[(group == k) & np.isfinite(apart)]
+        if own.size >= LIMITS.least_rows:
+            middles.append(low + (k + 0.5) / LIMITS.groups * (high - low))
+            sizes.append(float(np.median(own)) / CHI_SQUARE_MEDIAN)
+    if not sizes or max(sizes) <= 0.0:
+        return np.ones(left.size)
+    square = np.interp(level, middles, np.maximum(sizes, LIMITS.least_left * max(sizes)))
+    return np.asarray(np.sqrt(square / square.mean()))
+
+
+def _lines(columns: FloatArray, bins: Bins) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Frequencies (m,), and there the periodograms of the first column and of the mean of the others."""
+    found: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    for own, at in bins.places:
+        size = int(at[-1]) + 1
+        spread = np.zeros((columns.shape[1], size))
+        window = signal.windows.hann(size, sym=False)
+        spread[:, at] = columns[own].T * window[at]
+        power = np.abs(fft.rfft(spread, axis=1)) ** 2 / max(float(window @ window), TINY)
+        found.append((fft.rfftfreq(size)[1:], power[0, 1:], power[1:, 1:].mean(axis=0)))
+    frequency, lines, white = (np.concatenate(one) for one in zip(*found, strict=True))
+    order = np.argsort(frequency, kind="stable")
+    return frequency[order], lines[order], white[order]
+
+
+def _edges(frequency: FloatArray) -> list[int]:
+    """Edges of bands of so many lines and so wide, as numbers of lines."""
+    edges = [0]
+    while edges[-1] < frequency.size:
+        begin = edges[-1]
+        wide = int(np.searchsorted(frequency, LIMITS.band * frequency[begin]))
+        edges.append(max(wide, begin + LIMITS.least_lines))
+    edges[-1] = frequency.size
+    if len(edges) > 2 and edges[-1] - edges[-2] < LIMITS.least_lines:
+        del edges[-2]
+    return edges
+
+
+def quiet_square(residual: FloatArray, bins: Bins, level: FloatArray, speed: FloatArray) -> float:
+    """Mean square of the noise in a residual (count,), whatever else is in it.
+
+    Parameters
+    ----------
+    level
+        (count,) averaged output.
+    speed
+        (count,) absolute rate of the input.
+    """
+    quiet = speed <= LIMITS.rate_edges[0]
+    if np.count_nonzero(quiet) < LIMITS.least_quiet:
+        quiet = speed <= np.quantile(speed, LIMITS.slowest)
+    bands, slow = _octaves(residual, bins)
+    power = np.asarray([_square(band, quiet, level) for band in bands])
+    # from octave to octave the power changes by 2^(a - 1) if the density goes with f^-a
+    last = np.log2(np.maximum(power[-LIMITS.slope_octaves :], TINY))
+    step = min(max(float(np.polyfit(np.arange(last.size), last, 1)[0]), -1.0), LIMITS.steepest - 1.0)
+    longest = max(int(at[-1]) + 1 for _, at in bins.places)
+    more = max(round(np.log2(longest)) - LIMITS.octaves, 1)
+    slower = float(power[-1]) * float(np.sum(2.0 ** (step * np.arange(1, more + 1))))
+    usual = float(power.sum()) + min(float(np.mean(slow**2)), LIMITS.slow_doubt * slower)
+    return usual + _impulses(residual, usual)
+
+
+def _impulses(residual: FloatArray, usual: float) -> float:
+    """Mean square of averages that stand alone, far out of noise of the ``usual`` size: heavy tails."""
+    size = np.abs(residual)
+    beside = np.maximum(np.append(size[1:], 0.0), np.append(0.0, size[:-1]))
+    alone = (size > LIMITS.impulse * np.sqrt(usual)) & (size > LIMITS.alone * beside)
+    return float(np.sum(residual[alone] ** 2)) / residual.size
+
+
+def _octaves(residual: FloatArray, bins: Bins) -> tuple[list[FloatArray], FloatArray]:
+    """Octaves (count,) of a signal from its highest frequency down, and what is slower (count,)."""
+    bands = [np.zeros(bins.count) for _ in range(LIMITS.octaves + 1)]
+    for own, at in bins.places:
+        spread = np.zeros(int(at[-1]) + 1)
+        spread[at] = residual[own]
+        lines, frequency = fft.rfft(spread), fft.rfftfreq(spread.size)
+        upper = 1.0
+        for k, band in enumerate(bands):
+            lower = 0.5 ** (k + 2) if k < LIMITS.octaves else -1.0
+            inside = (frequency > lower) & (frequency <= upper)
+            band[own] = fft.irfft(np.where(inside, lines, 0.0), spread.size)[at]
+            upper = lower
+    return bands[:-1], bands[-1]
+
+
+def _square(band: FloatArray, quiet: NDArray[np.bool_], level: FloatArray) -> float:
+    """Mean square of a band by its medians where it is quiet, at each level of the output."""
+    low, high = float(level.min()), float(level.max())
+    group = np.clip((level - low) / max(high - low, TINY) * LIMITS.groups, 0, LIMITS.groups - 1).astype(int)
+    middles, squares = [], []
+    for k in range(LIMITS.groups):
+        own = quiet & (group == k)
+        if np.count_nonzero(own) >= LIMITS.least_rows:
+            middles.append(low + (k + 0.5) / LIMITS.groups * (high - low))
+            squares.append(_trimmed(band[own]))
+    if not squares:
+        return _trimmed(band)
+    return float(np.interp(level, middles, squares).mean())
+
+
+def _trimmed(values: FloatArray) -> float:
+    """Mean square of normal values without the largest ones."""
+    squares = np.sort(values**2)
+    kept = max(round((1.0 - LIMITS.trimmed) * values.size), 1)
+    edge = float(stats.norm.isf(0.5 * LIMITS.trimmed))
+    expected = 1.0 - 2.0 * edge * float(stats.norm.pdf(edge)) / (1.0 - LIMITS.trimmed)
+    return float(squares[:kept].mean()) / expected

@@ -1,0 +1,137 @@
+"""The noise as it is: its spectrum, its dependence on the level, and its size whatever else is there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.outliers import _beyond_the_tail
+from pulsetrainer.diagnosis.design import bins_of
+from pulsetrainer.diagnosis.noise import Noise, noise_in, quiet_square
+
+COUNT = 8000
+LEVEL = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(COUNT) / 500)
+
+
+def _bins(count: int = COUNT, records: int = 1):
+    one = np.arange(float(count))
+    return bins_of([Record(one, one, dt_s=5e-3) for _ in range(records)])
+
+
+def _coloured(rng, how: float) -> np.ndarray:
+    return signal.lfilter([1.0], [1.0, -how], rng.standard_normal(COUNT + 500))[500:]
+
+
+def _told(x: np.ndarray, free=lambda columns: columns) -> Noise:
+    return noise_in(x, free, _bins(), LEVEL, np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("how", [0.0, 0.5, 0.95])
+def test_the_variance_of_a_sum_is_that_of_many_draws(how):
+    """Of a slow column and a fast one, in white and in coloured noise: within what one record tells."""
+    rng = np.random.default_rng(2)
+    t = np.arange(COUNT) / COUNT
+    columns = np.stack((np.cos(2 * np.pi * 5 * t), np.cos(2 * np.pi * 1500 * t)), axis=1)
+    drawn = np.stack([columns.T @ _coloured(rng, how) for _ in range(400)], axis=1)
+    told = np.mean([np.diagonal(_told(_coloured(rng, how)).covariance(columns)) for _ in range(8)], axis=0)
+    assert told == pytest.approx(np.var(drawn, axis=1), rel=0.3)
+
+
+def test_noise_that_grows_with_the_level_is_larger_there():
+    """Ten times as large at the top: so it is along a column that lives there."""
+    rng = np.random.default_rng(3)
+    noise = _told((0.1 + 0.9 * LEVEL) * rng.standard_normal(COUNT))
+    high, low = (LEVEL > 0.9).astype(float), (LEVEL < 0.1).astype(float)
+    spread = np.sqrt(
+        np.diagonal(noise.covariance(np.stack((high, low), axis=1) * np.sign(rng.normal(size=(COUNT, 1)))))
+    )
+    assert 4.0 < spread[0] / spread[1] < 12.0
+
+
+def test_what_was_taken_away_is_put_back():
+    """The cosine of every slow line taken off, half of the noise there: it is put back."""
+    rng = np.random.default_rng(4)
+    t = np.arange(COUNT) / COUNT
+    waves = np.linalg.qr(np.stack([np.cos(2 * np.pi * k * t) for k in range(1, 61)], axis=1))[0]
+    told = [
+        _told(rng.standard_normal(COUNT), lambda columns: columns - waves @ (waves.T @ columns))
+        .at(np.asarray([0.002, 0.003, 0.005]))
+        .mean()
+        for _ in range(8)
+    ]
+    assert np.mean(told) == pytest.approx(1.0, rel=0.25)
+
+
+def test_a_line_is_no_noise():
+    """A hum ten times as strong as the noise leaves the density as it is."""
+    rng = np.random.default_rng(5)
+    x = rng.standard_normal(COUNT) + 10.0 * np.sin(2 * np.pi * 0.1234 * np.arange(COUNT))
+    assert _told(x).at(np.asarray([0.1234]))[0] == pytest.approx(1.0, rel=0.3)
+
+
+@pytest.mark.parametrize("records", [1, 2])
+@pytest.mark.parametrize("kind", ["white", "coloured", "tails", "level"])
+def test_the_size_of_the_noise_is_heard_beside_an_error_of_the_model(kind, records):
+    """Whatever its kind, within a tenth; errors of the moving input do not count, where there is rest."""
+    rng = np.random.default_rng(6)
+    bins, count = _bins(COUNT, records), COUNT * records
+    level = np.tile(LEVEL, records)
+    noise = {
+        "white": rng.standard_normal(count),
+        "coloured": np.concatenate([_coloured(rng, 0.9) for _ in range(records)]),
+        "tails": rng.standard_t(4.0, count),
+        "level": (0.2 + level) * rng.standard_normal(count),
+    }[kind]
+    moving = np.tile(np.arange(COUNT) % 1000 < 500, records)
+    error = noise.std() * np.sin(np.arange(count) / 9.0) * moving
+    speed = np.where(moving, 2.0, 0.0)
+    heard = quiet_square(noise + error, bins, level, speed)
+    assert np.sqrt(heard) == pytest.approx(noise.std(), rel=0.13)
+
+
+def test_a_slow_error_is_noise_only_where_the_spectrum_goes_on_to_it():
+    """Pink noise is all noise; a slow wave on white noise is none of it."""
+    rng = np.random.default_rng(7)
+    frequency = np.fft.rfftfreq(COUNT)
+    frequency[0] = np.inf
+    pink = np.fft.irfft(np.fft.rfft(rng.standard_normal(COUNT)) / np.sqrt(frequency), COUNT)
+    still = np.zeros(COUNT)
+    assert quiet_square(pink, _bins(), LEVEL, still) == pytest.approx(np.mean(pink**2), rel=0.15)
+    wave = 2.0 * np.sin(2 * np.pi * 4 * np.arange(COUNT) / COUNT)
+    white = rng.standard_normal(COUNT)
+    assert quiet_square(white + wave, _bins(), LEVEL, still) == pytest.approx(1.0, rel=0.25)  # of 3 in all
+
+
+def test_wild_samples_stand_apart_from_the_tail():
+    """Heavy tails go on and have no limit; a dozen far samples beyond a tail have one."""
+    rng = np.random.default_rng(8)
+    tail = np.abs(rng.standard_t(3.0, 60_000))
+    far = np.sort(tail[tail > 4.0])
+    assert _beyond_the_tail(far, 8.0) is None
+    limit = _beyond_the_tail(np.sort(np.append(far, 300.0 + np.arange(12.0))), 8.0)
+    assert limit is not None
+    assert np.count_nonzero(np.append(far, 300.0 + np.arange(12.0)) > limit) <= 20
+    assert _beyond_the_tail(np.asarray([9.0, 9.5]), 8.0) is None
+
+
+def test_a_frequency_chosen_by_the_data_is_no_surprise():
+    """Of sixty records of white noise a line is significant at five per cent in about three."""
+    rng = np.random.default_rng(9)
+    cause, frame = library()["periodic"], _frame(4000)
+    small = 0
+    for _ in range(60):
+        x = rng.standard_normal(4000)
+        ((block, _),) = cause.starts([frame], [x])
+        turn = 2 * np.pi * block[2] * frame.time_s
+        half = abs(np.sum(x * np.exp(1j * turn))) ** 2 / x.size
+        surprise = np.log(cause.choices([frame])) + 0.5 * np.log(half) - half
+        small += surprise < np.log(0.05)
+    assert small <= 8
+
+
+def _frame(count: int) -> Frame:
+    return Frame(1e-2, np.zeros(count), 1.0, 1.0)
