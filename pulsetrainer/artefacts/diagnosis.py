@@ -23,6 +23,7 @@ class Cause:
     confounded_with: tuple[str, ...] = ()
     text: str = ""  # in words
     doubts: tuple[str, ...] = ()  # what speaks against a cause that was found, in words
+    detectable_from_percent: float = float("nan")  # smallest effect that would have shown, rms, of the span
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,7 @@ class Left(NamedTuple):
 
     percent: float
     floor_percent: float
+    whole: bool = True  # False while what is left is more than noise: something else is missing
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -50,7 +52,7 @@ class Diagnosis(Shown):
 
     kind: ClassVar[str] = "diagnosis"
 
-    verdict: str  # a cause's id, "none" or "unknown"
+    verdict: str  # a cause's id, "none", "inconclusive", "unknown" or "unlisted"
     quick: bool  # screened only: figures are those of linearised scores
     rms: Annotated[float, Data("@output_unit", "rms error of the model as it was given")]
     rms_percent: Annotated[float, Data("percent", "rms error of the model as it was given, of the span")]
@@ -78,6 +80,7 @@ class Diagnosis(Shown):
     held_out_gain_percent: float = float("nan")  # of all causes together; NaN where it was not measured
     lacks: tuple[str, ...] = ()  # what the records do not have: rates, holds, length
     notes: tuple[str, ...] = ()  # what a person should know about the records
+    whole: bool = True  # False while what is left is more than noise
 
     @property
     def found(self) -> tuple[Cause, ...]:
@@ -87,4 +90,4 @@ class Diagnosis(Shown):
     @property
     def left(self) -> Left:
         """What is left with the causes found."""
-        return Left(self.extended_percent, self.floor_percent)
+        return Left(self.extended_percent, self.floor_percent, self.whole)

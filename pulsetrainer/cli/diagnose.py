@@ -73,6 +73,7 @@ def _payload(found: Diagnosis) -> dict[str, Any]:
         "explains_percent",
         "confounded_with",
         "held_out_gain_percent",
+        "detectable_from_percent",
         "text",
         "doubts",
     )

@@ -42,7 +42,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         static_percent=state.baseline.rms * percent,
         extended_percent=extended.rms * percent,
         floor_percent=state.floor.rms * percent,
-        causes=tuple(_cause(finding, words) for finding in state.findings),
+        causes=tuple(_cause(state, finding, words) for finding in state.findings),
         evidence=tuple(wording.sentence(one, words) for one in state.evidence),
         next_experiment=wording.advice(
             state.advice, wording.Bench(scale, model.input_unit, state.question.timed, given.ours)
@@ -58,6 +58,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         output_unit=model.output_unit,
         held_out_gain_percent=_held_out_gain(state),
         lacks=state.lacks,
+        whole=state.is_whole(extended),
         notes=state.question.notes,
     )
 
@@ -97,7 +98,7 @@ def _parameters(estimates: Sequence[Estimate], words: Words) -> tuple[Parameter,
     return tuple(Parameter(e.name, e.value, _unit(e.unit, words), e.lower, e.upper) for e in estimates)
 
 
-def _cause(finding: Finding, words: Words) -> Cause:
+def _cause(state: State, finding: Finding, words: Words) -> Cause:
     return Cause(
         cause=finding.cause.id,
         found=finding.found,
@@ -108,6 +109,7 @@ def _cause(finding: Finding, words: Words) -> Cause:
         confounded_with=finding.confounded_with,
         text=wording.cause_text(finding, words),
         doubts=tuple(wording.DOUBTS[one] for one in finding.doubts),
+        detectable_from_percent=PERCENT * state.limits.get(finding.cause.id, float("nan")),
     )
 
 

@@ -42,6 +42,23 @@ class Score:
     start: Values  # where a joint refit should start
     p_value: float
     basis: FloatArray  # (count, k) orthonormal columns of the best block, weights projected off
+    sight: Sight | None = None  # None: no null was drawn
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How small an effect of one cause a record would show."""
+
+    share: float  # of the effect's norm that the weights leave
+    noise: float  # standard deviation along what is left
+    critical: float  # of these, that the test asks for
+
+    def least(self, relevant: float) -> float:
+        """Norm of the smallest effect that nine records of ten show, given the relevant fall of squares."""
+        sure = LIMITS.nine_of_ten * self.noise
+        tested = self.critical * self.noise + sure
+        matters = sure + float(np.sqrt(sure**2 + relevant))
+        return max(tested, matters) / self.share
 
 
 @dataclass(frozen=True)
@@ -63,6 +80,7 @@ class _Block:
     one_sided: bool  # the strength must not be negative
     as_it_is: bool  # no strength to be fitted: the column is inserted whole
     choices: float = 0.0  # so many values its parameters were chosen from by the data; 0: they were not
+    share: float = 1.0  # of the columns' norm that the weights leave
 
     def gains(self, signals: FloatArray) -> FloatArray:
         """Falls of the sum of squares (m,) for signals (count, m)."""
@@ -74,6 +92,17 @@ class _Block:
         if self.one_sided:
             gain = np.where((self.back @ along)[0] > 0, gain, 0.0)
         return np.asarray(gain)
+
+    def critical(self, surprise: float) -> float:
+        """Standard deviations along the basis that have p of ``exp(surprise)``."""
+        if self.choices:
+            half = np.linspace(*LIMITS.halves)
+            own = np.log(self.choices) + 0.5 * np.log(half) - half
+            return float(np.sqrt(2.0 * half[np.argmax(own <= surprise)]))
+        if self.as_it_is:
+            return float(stats.norm.isf(np.exp(surprise)))
+        chance = np.exp(surprise) * (2.0 if self.one_sided else 1.0)
+        return float(np.sqrt(stats.chi2.isf(chance, self.basis.shape[1])))
 
     def surprises(self, along: FloatArray, covariance: FloatArray) -> FloatArray:
         """Logarithms of p (m,) for parts along the basis (k, m), of which noise has a covariance."""
@@ -96,9 +125,12 @@ def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: in
     blocks = _blocks(problem, fitted)
     gains = [float(block.gains(residual[:, None])[0]) for block in blocks]
     noise, known = None, np.ones(len(blocks))
+    sights: dict[str, Sight] = {}
     if draws and blocks:
         noise = noise_in(residual, _less(project, blocks), problem.bins, problem.measured, rng)
-        known = _p_values(blocks, residual, noise.covariance(project(_side_by_side(blocks))), draws, rng)
+        covariance = noise.covariance(project(_side_by_side(blocks)))
+        known, critical = _p_values(blocks, residual, covariance, draws, rng)
+        sights = _sights(blocks, covariance, critical)
     best: dict[str, int] = {}
     p_values: dict[str, float] = {}
     for k, block in enumerate(blocks):
@@ -114,6 +146,7 @@ def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: in
             block.cause.sharpened(_start(block, residual, problem.frames[0]), problem.frames, left),
             p_values[name],
             block.basis,
+            sights.get(name),
         )
         for name, k in best.items()
         for block in [blocks[k]]
@@ -131,8 +164,11 @@ def _p_values(
     covariance: FloatArray,
     draws: int,
     rng: np.random.Generator,
-) -> FloatArray:
-    """Family-wise p (blocks,) of every block on a residual, from draws of noise with a covariance."""
+) -> tuple[FloatArray, float]:
+    """Family-wise p (blocks,) of every block on a residual, and the logarithm of its own p that is asked for.
+
+    From draws of noise with a covariance.
+    """
     ends = np.cumsum([block.basis.shape[1] for block in blocks])
     size, axes = np.linalg.eigh(covariance)
     white = rng.standard_normal((ends[-1], draws))
@@ -145,7 +181,22 @@ def _p_values(
         # what was chosen from the data has its own p, which under the null is any number alike
         alike = np.log(rng.uniform(size=draws)) if block.choices else block.surprises(drawn[part], own)
         least = np.minimum(least, alike)
-    return np.asarray([p_value(-one, -least) for one in seen])
+    return np.asarray([p_value(-one, -least) for one in seen]), float(np.quantile(least, LIMITS.p_max))
+
+
+def _sights(blocks: Sequence[_Block], covariance: FloatArray, critical: float) -> dict[str, Sight]:
+    """For each cause how small an effect would show: that of the block in the middle of its own."""
+    found: dict[str, list[Sight]] = {}
+    end = 0
+    for block in blocks:
+        part = slice(end, end + block.basis.shape[1])
+        end = part.stop
+        noise = float(np.sqrt(np.trace(covariance[part, part]) / block.basis.shape[1]))
+        found.setdefault(block.cause.id, []).append(Sight(block.share, noise, block.critical(critical)))
+    return {
+        name: sorted(some, key=lambda one: one.critical * one.noise / one.share)[len(some) // 2]
+        for name, some in found.items()
+    }
 
 
 def _less(
@@ -223,7 +274,8 @@ def _blocks(problem: Problem, fitted: Fitted) -> list[_Block]:
             whole = cause.strengths == 0
             one_sided = not whole and len(values) == 1 and cause.parameters[0].low >= 0
             back, choices = np.linalg.inv(upper), cause.choices(problem.frames)
-            found.append(_Block(cause, tuple(values), basis, back, one_sided, whole, choices))
+            share = float(np.linalg.norm(size[part]) / np.linalg.norm(whole_size[part]))
+            found.append(_Block(cause, tuple(values), basis, back, one_sided, whole, choices, share))
     return found
 
 

@@ -79,6 +79,7 @@ class State:
     by_contrast: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)  # what equal loops show
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # of every cause, strongest first
+    limits: Mapping[str, float] = field(default_factory=dict)  # smallest effects that would show, of the span
     verdict: str = "none"
     evidence: tuple[Evidence, ...] = ()
     advice: Evidence = field(default_factory=lambda: Evidence("none"))
@@ -100,6 +101,32 @@ class State:
         left = self.current.squares - self.floor.squares
         half = LIMITS.unexplained * self.floor.reducible(self.baseline)
         return left > max(half, LIMITS.unexplained_relevant * self.floor.relevant)
+
+    @property
+    def blind(self) -> tuple[str, ...]:
+        """Ids of the common causes of which these records would not have shown what matters."""
+        if not self.question.timed or not self.limits:
+            return ()
+        common = [one.id for one in library().values() if one.common and one.id not in self.current.names]
+        return tuple(one for one in common if not self.limits.get(one, np.inf) <= LIMITS.matters)
+
+    def is_whole(self, fitted: Fitted) -> bool:
+        """Whether what a fit leaves is noise, as far as it matters."""
+        left = fitted.squares - self.floor.squares
+        return left <= LIMITS.unexplained_relevant * self.floor.relevant
+
+    @property
+    def background(self) -> set[str]:
+        """Ids of the causes found that are no larger than the noise, which they are taken for part of."""
+        return {
+            one.cause.id
+            for one in self.findings
+            if one.found and one.cause.is_background(self._sizes(one), self.floor.noise)
+        }
+
+    def _sizes(self, finding: Finding) -> list[float]:
+        """Parameters of a finding in the units of the problem."""
+        return [one.value / self.scale.of_unit(one.unit) for one in finding.parameters]
 
     @property
     def extensions(self) -> list[Term]:

@@ -27,6 +27,13 @@ TEXTS: Mapping[str, str] = {
         "explained. What gives it away: {signature}."
     ),
     "extended": "With these causes in the model, {left:.3f} % of the span remains.",
+    "would have shown": (
+        "The smallest effects that these recordings would have shown, rms, % of the span: {limits}"
+    ),
+    "not whole": (
+        "{names} explain only a part of it: {rest:.2g} % of the span is something else, which noise and "
+        "levels do not account for"
+    ),
     "not accepted": (
         "{names} would explain {explains:.0f} % of the error that can be explained, more than noise does "
         "(p = {p:.3f}), but refitted with all weights it is too small to matter, or does not predict blocks "
@@ -65,6 +72,14 @@ ADVICE: Mapping[str, str] = {
         "vary one thing at a time: temperature, load, amplitude."
     ),
     "none": "Nothing is left to explain on this recording.",
+    "too noisy": (
+        "These recordings could not have shown {names} of {matters:.2g} % of the span. Record the same for "
+        "{times:.2g} times as long, or with less noise, and diagnose that."
+    ),
+    "inconclusive": (
+        "These recordings could not have shown {names} of {matters:.2g} % of the span. Record {missing}, and "
+        "diagnose that.{command}"
+    ),
     "extend": "Extend the model, then test it on a recording that was not fitted: pulsetrainer evaluate.",
     "other model": (
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
@@ -162,6 +177,7 @@ def text(one: Evidence, words: Mapping[str, str] | None = None) -> str:
         **(words or {}),
         **one.figures,
         "names": _listed(one.names),
+        "limits": _joined([f"{name} {size:.2g}" for name, size in sorted(one.figures.items())]),
         "signature": cause.signature if cause else "",
     }
     where = f"record {one.record + 1}: " if one.record is not None else ""
@@ -181,7 +197,7 @@ def advice(one: Evidence, bench: Bench) -> str:
     tied = one.kind == "tied"  # its first name is that of the experiment
     names = one.names[1:] if tied else one.names
     return ADVICE[one.kind].format(
-        names=_listed(names),
+        names=_listed([name for name in names if name not in LACKS] or names),
         experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
         missing=_joined([MISSING[name].format(**numbers) for name in names if name in MISSING]),
         command=OURS if bench.ours else "",

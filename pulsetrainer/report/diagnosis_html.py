@@ -60,13 +60,16 @@ def headline(found: Diagnosis) -> str:
     if found.verdict == "none":
         limits = ", but they could not have shown everything: see what they lack" if found.lacks else ""
         return f"These runs show nothing wrong with the model{limits}."
+    if found.verdict == "inconclusive":
+        return "Nothing was found, but these runs could not have shown everything that is common."
     if found.verdict == "unknown":
         return "Something is wrong that no known cause explains."
     cause = next(one for one in found.causes if one.cause == found.verdict)
     also = [one.text for one in found.found if one.cause != found.verdict]
     words = f"{cause.text[:1].upper()}{cause.text[1:]}"
     tied = f" (could equally be {' or '.join(cause.confounded_with)})" if cause.confounded_with else ""
-    return f"{words}{tied}{'; in addition, ' + '; '.join(also) if also else ''}."
+    rest = "" if found.left.whole else ". That explains only a part: something else is left"
+    return f"{words}{tied}{'; in addition, ' + '; '.join(also) if also else ''}{rest}."
 
 
 def _words(one: Cause) -> dict[str, str]:

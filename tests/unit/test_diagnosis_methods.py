@@ -68,6 +68,32 @@ def test_a_signed_strength_stays_within_its_bounds_only():
     assert screening._start(creep, np.asarray([99.0]), FRAME) == (0.6, 1.0)
 
 
+@pytest.mark.parametrize(
+    ("relevant", "least"),
+    [(0.0, 2 * 4.0 + 2 * 1.2816), (1e4, 2 * 1.2816 + np.sqrt((2 * 1.2816) ** 2 + 1e4))],
+)
+def test_the_smallest_effect_that_shows_is_tested_and_matters(relevant, least):
+    """Four standard deviations of 2 and nine in ten more, or a fall of squares; half of it is left."""
+    sight = screening.Sight(share=0.5, noise=2.0, critical=4.0)
+    assert sight.least(relevant) == pytest.approx(least / 0.5)
+
+
+@pytest.mark.parametrize("surprise", [-3.0, -9.0])
+def test_the_critical_size_has_the_surprise_that_is_asked_for(surprise):
+    """For one column, a one-sided one, two, a whole one and a line that was sought."""
+    column = [[1.0], [0.0]]
+    for block in (
+        _block("viscous", ((1.0,),), column, [[1.0]]),
+        _block("output-lag", ((1.0,),), column, [[1.0]], one_sided=True),
+        _block("step", ((0,), (0,)), np.eye(2), np.eye(2)),
+        _block("resonance", ((9.0, 0.1),), column, [[1.0]], as_it_is=True),
+        screening._Block(CAUSE["periodic"], ((0,), (0,)), np.eye(2), np.eye(2), False, False, 5000.0),
+    ):
+        along = np.zeros((block.basis.shape[1], 1))
+        along[0] = block.critical(surprise)
+        assert block.surprises(along, np.eye(along.size))[0] == pytest.approx(surprise, abs=0.05)
+
+
 # --- the floor
 @pytest.mark.parametrize(
     ("white", "error", "span", "size"), [(1.0, 0.2, 1.0, 0.3), (1.0, 0.4, 1.0, 0.4), (0.1, 0.01, 1000.0, 0.3)]
@@ -431,6 +457,9 @@ def test_every_kind_of_evidence_and_advice_has_words():
             "gain",
             "there",
             "here",
+            "rest",
+            "matters",
+            "times",
         ],
         1.25,
     )
@@ -445,9 +474,11 @@ def test_every_kind_of_evidence_and_advice_has_words():
         for bench in (wording.Bench(Scale(), "A", ours=True), wording.Bench(Scale(), timed=False)):
             said = wording.advice(Evidence(kind, figures=figures, names=names), bench)
             assert "{" not in said
-            assert ("delay, creep and step" in said) is (kind in ("tied", "tied, quick", "lacks"))
+            assert ("delay, creep and step" in said) is (
+                kind in ("tied", "tied, quick", "lacks", "inconclusive", "too noisy")
+            )
             # only our own device plays our signals
-            assert ("capture" in said) is (bench.ours and kind in ("tied", "lacks"))
+            assert ("capture" in said) is (bench.ours and kind in ("tied", "lacks", "inconclusive"))
 
 
 @pytest.mark.parametrize("name", wording.EXPERIMENTS)

@@ -646,6 +646,49 @@ def test_the_verdict_is_the_strongest_or_unknown(left, findings, firings, quick,
     assert verdict.stage(state).verdict == expected
 
 
+SEEN = dict.fromkeys([cause.id for cause in CAUSE.values() if cause.common], 0.0049)
+
+
+@pytest.mark.parametrize(
+    ("more", "expected", "blind"),
+    [
+        ({"limits": SEEN}, "none", ()),
+        ({"limits": SEEN | {"creep": 0.0051}}, "inconclusive", ("creep",)),
+        ({"limits": {k: v for k, v in SEEN.items() if k != "delay"}}, "inconclusive", ("delay",)),
+        ({"limits": SEEN | {"step": 9.0}}, "none", ()),
+        ({"limits": {}}, "none", ()),
+        ({"limits": SEEN | {"creep": 0.1}, "findings": (_finding("delay", 9.0),)}, "delay", ("creep",)),
+    ],
+)
+def test_nothing_found_is_none_only_where_it_could_have_been_seen(more, expected, blind):
+    """Half a per cent of the span of every common cause; what was not asked is not missed."""
+    after = verdict.stage(_state(_fit(200.0), **more))
+    assert (after.verdict, after.blind) == (expected, blind)
+    quick = replace(after, question=replace(after.question, quick=True))
+    assert verdict.stage(quick).verdict == expected.replace("inconclusive", "none")
+
+
+@pytest.mark.parametrize(("sine", "expected"), [(0.006, "none"), (0.0072, "periodic")])
+def test_a_hum_no_larger_than_the_noise_takes_no_verdict(sine, expected):
+    """It stays found. A half per cent of the span is its largest rms, however large the noise."""
+    hum = tuple(
+        Estimate(name, value, unit, value, value)
+        for name, value, unit in (("sine", sine, "{y}"), ("cosine", 0.0, "{y}"), ("frequency", 50.0, "Hz"))
+    )
+    after = verdict.stage(_state(_fit(200.0), findings=(_finding("periodic", 90.0, parameters=hum),)))
+    assert after.verdict == expected
+    assert after.findings[0].found
+    loud = replace(FLOOR, noise=0.003)
+    louder = verdict.stage(_state(_fit(200.0), floor=loud, findings=after.findings[:1]))
+    assert louder.verdict == ("none" if sine / np.sqrt(2) < 1.5 * 0.003 else "periodic")
+
+
+@pytest.mark.parametrize(("squares", "whole"), [(135.9, True), (136.1, False)])
+def test_a_name_is_whole_where_what_is_left_is_noise(squares, whole):
+    """Four times the relevant fall of 9 above the squares of 100 that stay."""
+    assert _state(_fit(squares)).is_whole(_fit(squares)) is whole
+
+
 def test_findings_come_in_order_and_gates_once_a_cause():
     """Found, gates, not found, gates that did not fire: strongest first, and no p-value for a gate."""
     firings = ((1, QUANTISED), (2, replace(QUANTISED, value=9.0)))
@@ -682,7 +725,9 @@ def _accounted(monkeypatch, **more):
     groups = [residual.Group("rate", "1/s", np.asarray([0.0, 4.0]), np.asarray([0, 1]))]
     monkeypatch.setattr(residual, "groups", lambda problem: groups)
     monkeypatch.setattr(residual, "rms_by", lambda group, left: np.asarray(left))
-    current = SimpleNamespace(residual=more.pop("left", (1.0, 1.6)), rms=0.02)
+    current = SimpleNamespace(
+        residual=more.pop("left", (1.0, 1.6)), rms=0.02, squares=more.pop("squares", 100.0), names=("creep",)
+    )
     baseline = SimpleNamespace(rms=0.05, residual=(1.0, 1.6), squares=1100.0)
     state = replace(
         _state(_fit(1.0)), baseline=baseline, current=current if more.pop("extended", False) else baseline

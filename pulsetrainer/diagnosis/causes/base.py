@@ -113,6 +113,7 @@ class Cause:
     # what it means
     lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model
     jagged: ClassVar[bool] = False  # leaves what no refit can take away: then what is left is its own
+    common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
 
     def gate(self, raw: Raw) -> Firing | None:
@@ -137,6 +138,10 @@ class Cause:
     def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:
         """Return start values for a refit, nearer to what the residual shows than the grid of ``starts``."""
         return values
+
+    def is_background(self, sizes: Sequence[float], noise: float) -> bool:
+        """Return whether its parameters make it a part of the noise: told, but no verdict."""
+        return False
 
     def choices(self, frames: Sequence[Frame]) -> float:
         """Return from how many independent values ``starts`` chooses by the residual; 0 where it does not."""

@@ -33,6 +33,7 @@ class Creep(Cause):
     stage = "output"
     order = 80
     family = "slow memory"
+    common = True
     parameters = (
         Quantity("amplitude", "1", -0.3, 0.6, 0.002),
         Quantity("tau", "s", 0.04, 20.0, 0.02),

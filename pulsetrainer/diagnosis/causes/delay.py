@@ -40,6 +40,7 @@ class Delay(Cause):
     order = 45
     family = "lag"
     widens = True
+    common = True
     parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005),)
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:

@@ -23,6 +23,7 @@ class FieldLag(Cause):
     order = 20
     family = "lag"
     widens = True
+    common = True
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005),)
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:

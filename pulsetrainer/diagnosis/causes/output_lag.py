@@ -25,6 +25,7 @@ class OutputLag(Cause):
     order = 100
     family = "lag"
     widens = True
+    common = True
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005),)
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 from scipy import fft, ndimage
@@ -18,6 +19,8 @@ _FLOOR = 1e-12  # of the highest line: keeps the ratio finite where the spectrum
 _LEAST = 0.02  # of the highest line: lower ones are noise, however far above their surroundings
 _FINER = 41  # frequencies tried between the two neighbours of a line
 _TRIED = 0.003  # of the span
+_FAINT_NOISE = 1.5  # times the noise of single samples, rms: a smaller hum is part of the noise ...
+_FAINT = 0.005  # ... if it is no larger than this share of the span
 _INDEPENDENT = 0.51  # of the samples: so many frequencies are independent (sqrt(pi/3) / 2)
 
 
@@ -40,6 +43,9 @@ class Periodic(Cause):
         Quantity("frequency", "Hz", 0.0, 1e6, 1e-4),
     )
     lasting = False
+    texts: ClassVar[Mapping[str, str]] = {
+        "background": ("a hum at {frequency:.4g} Hz, no larger than the noise: it is told, but is no verdict")
+    }
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
@@ -55,6 +61,11 @@ class Periodic(Cause):
         best = _refined(one, float(frequency[k]), float(frequency[1]), frame.dt_s)
         size = _TRIED * frame.span
         return [[(size, 0.0, best), (0.0, size, best)]]
+
+    def is_background(self, sizes: Sequence[float], noise: float) -> bool:
+        """Return whether it is a hum of the noise's size."""
+        rms = float(np.hypot(sizes[0], sizes[1])) / np.sqrt(2.0)
+        return bool(rms <= min(_FAINT_NOISE * noise, _FAINT))
 
     def choices(self, frames: Sequence[Frame]) -> float:
         """Return from how many independent frequencies ``starts`` chooses: Baluev's W."""

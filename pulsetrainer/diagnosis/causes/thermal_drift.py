@@ -37,6 +37,7 @@ class ThermalDrift(Cause):
     stage = "output"
     order = 50
     family = "slow gain"
+    common = True
     parameters = (
         Quantity("coefficient", "1/({u})^2", -1.1, 1.1, 0.002),
         Quantity("tau", "s", 1.0, 300.0, 0.5),

@@ -26,6 +26,7 @@ class Viscous(Cause):
     order = 90
     family = "viscous"
     widens = True
+    common = True
     parameters = (Quantity("coefficient", "{y} s/{u}", -1e6, 1e6, 1e-5),)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:

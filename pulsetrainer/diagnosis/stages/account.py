@@ -25,11 +25,21 @@ def stage(state: State) -> State:
     levels = {"left": percent * state.baseline.rms, "floor": percent * state.floor.rms}
     said = [Evidence("static", figures=levels)]
     said += [_of(finding) for finding in state.findings if finding.found]
+    said += [
+        Evidence("background", finding.cause.id, {one.name: one.value for one in finding.parameters})
+        for finding in state.findings
+        if finding.cause.id in state.background
+    ]
     if state.current is not state.baseline:
         said.append(Evidence("extended", figures={"left": percent * state.current.rms}))
-    if state.verdict in ("none", "unknown"):
+        if not state.is_whole(state.current):
+            rest = float(np.sqrt(state.current.squares - state.floor.squares) / np.sqrt(state.floor.count))
+            said.append(Evidence("not whole", figures={"rest": percent * rest}, names=state.current.names))
+    if state.verdict in ("none", "inconclusive") and state.limits:
+        said.append(Evidence("would have shown", figures={k: PERCENT * v for k, v in state.limits.items()}))
+    if state.verdict in ("none", "inconclusive", "unknown"):
         said += _largest(state)
-    if state.verdict == "none" and not state.question.quick:
+    if state.verdict in ("none", "inconclusive") and not state.question.quick:
         said += _not_accepted(state)
     if state.question.quick:
         said.append(Evidence("quick"))

@@ -14,7 +14,7 @@ import numpy as np
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import best_experiment
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import PERCENT
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 # What the evidence says of the model as given, and the advice
 _ANOTHER_MODEL = {"wrong kind": "other model", "shifted": "identify anew", "changed": "identify anew"}
@@ -42,6 +42,16 @@ def _advice(state: State) -> Evidence:
             "faster": best.faster,
         }
         return Evidence("tied", figures=figures, names=(best.name, *names))
+    if state.verdict == "inconclusive":
+        return _to_see_more(state)
     if state.lacks:
         return Evidence("lacks", names=state.lacks)
     return Evidence(state.verdict if state.verdict in ("unknown", "none") else "extend")
+
+
+def _to_see_more(state: State) -> Evidence:
+    """Ask for what the records lack to show the causes that they could not have shown."""
+    worst = max(state.limits.get(name, np.inf) for name in state.blind)
+    figures = {"matters": PERCENT * LIMITS.matters, "times": (worst / LIMITS.matters) ** 2}
+    kind = "inconclusive" if state.lacks else "too noisy"
+    return Evidence(kind, figures=figures, names=(*state.blind, *state.lacks))

@@ -2,8 +2,9 @@
 
 Where more than half of what can be explained is left, and enough to matter, the verdict is the jagged cause
 that a gate saw, since no refit takes away what it leaves; else it is `unknown`, whatever was found besides.
-Otherwise it is the cause that explains most, then what a gate on the raw data saw, and `none` where nothing
-was found.
+Otherwise it is the cause that explains most, then what a gate on the raw data saw. Where nothing was found it
+is `none`, or `inconclusive` if the record could not have shown half a per cent of the span of a common cause.
+A hum no larger than the noise is found and told, and takes no verdict.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ def stage(state: State) -> State:
     gated = _gated(state)
     fired = {one.cause.id for one in gated}
     silent = [Finding(c, False) for c in library().values() if c.stage == "record" and c.id not in fired]
-    verdict = next((one.cause.id for one in (*found, *gated)), "none")
+    faint = state.background
+    verdict = next((one.cause.id for one in (*found, *gated) if one.cause.id not in faint), "none")
+    if verdict == "none" and state.blind and not state.question.quick:
+        verdict = "inconclusive"
     if state.unexplained and not state.question.quick:
         verdict = next((one.cause.id for one in gated if one.cause.jagged), "unknown")
     return replace(state, findings=(*found, *gated, *rest, *silent), verdict=verdict)
