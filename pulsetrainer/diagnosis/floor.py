@@ -30,7 +30,9 @@ class Floor:
     white: float
     discretisation: float = 0.0
     held: float = 0.0  # mean square of what does not average out: steps and jumps of the output
-    sampled: float = 0.0  # mean square of what single samples' noise leaves in an average
+    single: float = 0.0  # rms of single samples, by their differences
+    doubtful: float = 0.0  # mean square of what may be slow noise, or slow errors of the model
+    sampled: float = 0.0  # mean square of what that leaves in an average
 
     @property
     def squares(self) -> float:
@@ -45,7 +47,8 @@ class Floor:
     @property
     def relevant(self) -> float:
         """Fall of the sum of squares below which an effect is irrelevant."""
-        size = max(LIMITS.relevant_noise * self.white, self.discretisation, LIMITS.relevant_span * self.span)
+        sure = float(np.sqrt(max(self.white**2 - self.doubtful, 0.0)))
+        size = max(LIMITS.relevant_noise * sure, self.discretisation, LIMITS.relevant_span * self.span)
         return float(self.count * size**2)
 
     def reducible(self, baseline: Fitted) -> float:
@@ -69,9 +72,12 @@ class Floor:
         """Return the floor with the noise that is heard in what a fit leaves, coloured as it is."""
         problem = fitted.problem
         quiet = quiet_square(fitted.residual, problem.bins, problem.measured, np.abs(residual.rates(problem)))
-        square = max(quiet, self.sampled)
+        square = max(quiet.square, self.sampled)
         return replace(
-            self, white=float(np.sqrt(square + self.held)), noise=max(self.noise, float(np.sqrt(square)))
+            self,
+            white=float(np.sqrt(square + self.held)),
+            noise=max(self.single, float(np.sqrt(square))),
+            doubtful=min(quiet.doubtful, square - self.sampled),
         )
 
 
@@ -95,4 +101,4 @@ def floor_of(
     sampled = noise**2 * float(np.mean(1.0 / problem.bins.sizes))
     white = float(np.sqrt(sampled + held))
     span = float(np.ptp(problem.measured))
-    return Floor(problem.bins.count, span, noise, white, held=held, sampled=sampled)
+    return Floor(problem.bins.count, span, noise, white, held=held, single=noise, sampled=sampled)

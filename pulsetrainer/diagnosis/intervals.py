@@ -1,10 +1,11 @@
 """How sure the parameters of the causes found are: 95 % intervals.
 
 The spread is the larger of two: of the joint refit, linearised, on redrawn noise (a parametric bootstrap);
-and of the jackknife over blocks, which also sees what the fitted model misses. To it comes the
-discretisation error, as if a fifth of it were aligned; the moment of sampling, since input and output belong
-together to a fifth of a sample step only (each has its filter, and converters are read in turn); and what the
-estimates would be under formulas as plausible as those of the library (``Cause.variants``).
+and of the jackknife over blocks, which also sees what the fitted model misses. To it come, as independent
+errors, the discretisation error, as if a fifth of it were aligned; the moment of sampling, since input and
+output belong together to a fifth of a sample step only (each has its filter, and converters are read in
+turn); and what the estimates would be under formulas as plausible as those of the library
+(``Cause.variants``).
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ def estimates_of(
     if left_out is not None:
         variance = np.maximum(variance, left_out)
     others = np.stack([_late(fitted), *_otherwise(fitted)], axis=1)
-    systematic = np.abs(np.linalg.lstsq(columns / size, others, rcond=None)[0]).sum(axis=1) / size
+    systematic = np.linalg.norm(np.linalg.lstsq(columns / size, others, rcond=None)[0], axis=1) / size
     aligned = LIMITS.aligned * floor.discretisation * np.sqrt(floor.count) / size
-    half = LIMITS.student * np.sqrt(variance) + aligned + systematic
+    half = np.sqrt(LIMITS.student**2 * variance + aligned**2 + systematic**2)
     found: dict[str, tuple[Estimate, ...]] = {}
     frame, at = fitted.problem.frames[0], 0
     for term in fitted.terms:

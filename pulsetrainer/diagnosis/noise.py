@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +146,14 @@ def _edges(frequency: FloatArray) -> list[int]:
     return edges
 
 
-def quiet_square(residual: FloatArray, bins: Bins, level: FloatArray, speed: FloatArray) -> float:
+class Heard(NamedTuple):
+    """Mean square of noise, and the part of it that may as well be a slow error of the model."""
+
+    square: float
+    doubtful: float
+
+
+def quiet_square(residual: FloatArray, bins: Bins, level: FloatArray, speed: FloatArray) -> Heard:
     """Mean square of the noise in a residual (count,), whatever else is in it.
 
     Parameters
@@ -155,19 +163,20 @@ def quiet_square(residual: FloatArray, bins: Bins, level: FloatArray, speed: Flo
     speed
         (count,) absolute rate of the input.
     """
-    quiet = speed <= LIMITS.rate_edges[0]
+    quiet, trimmed = speed <= LIMITS.rate_edges[0], LIMITS.trimmed
     if np.count_nonzero(quiet) < LIMITS.least_quiet:
-        quiet = speed <= np.quantile(speed, LIMITS.slowest)
+        quiet, trimmed = speed <= np.quantile(speed, LIMITS.slowest), LIMITS.trimmed_moving
     bands, slow = _octaves(residual, bins)
-    power = np.asarray([_square(band, quiet, level) for band in bands])
+    power = np.asarray([_square(band, quiet, level, trimmed) for band in bands])
     # from octave to octave the power changes by 2^(a - 1) if the density goes with f^-a
     last = np.log2(np.maximum(power[-LIMITS.slope_octaves :], TINY))
     step = min(max(float(np.polyfit(np.arange(last.size), last, 1)[0]), -1.0), LIMITS.steepest - 1.0)
     longest = max(int(at[-1]) + 1 for _, at in bins.places)
     more = max(round(np.log2(longest)) - LIMITS.octaves, 1)
     slower = float(power[-1]) * float(np.sum(2.0 ** (step * np.arange(1, more + 1))))
-    usual = float(power.sum()) + min(float(np.mean(slow**2)), LIMITS.slow_doubt * slower)
-    return usual + _impulses(residual, usual)
+    left = float(np.mean(slow**2))
+    sure, usual = (float(power.sum()) + min(left, doubt * slower) for doubt in (1.0, LIMITS.slow_doubt))
+    return Heard(usual + _impulses(residual, usual), usual - sure)
 
 
 def _impulses(residual: FloatArray, usual: float) -> float:
@@ -194,7 +203,7 @@ def _octaves(residual: FloatArray, bins: Bins) -> tuple[list[FloatArray], FloatA
     return bands[:-1], bands[-1]
 
 
-def _square(band: FloatArray, quiet: NDArray[np.bool_], level: FloatArray) -> float:
+def _square(band: FloatArray, quiet: NDArray[np.bool_], level: FloatArray, trimmed: float) -> float:
     """Mean square of a band by its medians where it is quiet, at each level of the output."""
     low, high = float(level.min()), float(level.max())
     group = np.clip((level - low) / max(high - low, TINY) * LIMITS.groups, 0, LIMITS.groups - 1).astype(int)
@@ -203,16 +212,16 @@ def _square(band: FloatArray, quiet: NDArray[np.bool_], level: FloatArray) -> fl
         own = quiet & (group == k)
         if np.count_nonzero(own) >= LIMITS.least_rows:
             middles.append(low + (k + 0.5) / LIMITS.groups * (high - low))
-            squares.append(_trimmed(band[own]))
+            squares.append(_trimmed(band[own], trimmed))
     if not squares:
-        return _trimmed(band)
+        return _trimmed(band, trimmed)
     return float(np.interp(level, middles, squares).mean())
 
 
-def _trimmed(values: FloatArray) -> float:
-    """Mean square of normal values without the largest ones."""
+def _trimmed(values: FloatArray, share: float) -> float:
+    """Mean square of normal values, told without the largest ones."""
     squares = np.sort(values**2)
-    kept = max(round((1.0 - LIMITS.trimmed) * values.size), 1)
-    edge = float(stats.norm.isf(0.5 * LIMITS.trimmed))
-    expected = 1.0 - 2.0 * edge * float(stats.norm.pdf(edge)) / (1.0 - LIMITS.trimmed)
+    kept = max(round((1.0 - share) * values.size), 1)
+    edge = float(stats.norm.isf(0.5 * share))
+    expected = 1.0 - 2.0 * edge * float(stats.norm.pdf(edge)) / (1.0 - share)
     return float(squares[:kept].mean()) / expected

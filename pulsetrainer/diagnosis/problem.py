@@ -62,8 +62,9 @@ def problem_for(records: Sequence[Record], low: float, high: float, levels: int 
     span, reach = float(np.ptp(measured)), high - low
     ends = _ends(records, low, high)
     longest = max(r.input.size * r.step for r in records)
+    begins = np.cumsum([0.0] + [r.input.size * r.step for r in records]).tolist()
     frames = tuple(
-        Frame(r.step, r.input, span, reach, k, len(records), low, ends, longest_s=longest)
+        Frame(r.step, r.input, span, reach, k, len(records), low, ends, begin_s=begins[k], longest_s=longest)
         for k, r in enumerate(records)
     )
     return Problem(tuple(records), frames, Plane.uniform(low, high, levels), bins, measured, LIMITS.smoothing)

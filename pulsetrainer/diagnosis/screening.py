@@ -283,7 +283,8 @@ def _start(block: _Block, residual: FloatArray, frame: Frame) -> Values:
     """Parameter values scaled by the fitted strengths, within a factor of those tried."""
     strength = block.back @ (block.basis.T @ residual)
     values = list(block.values[0])
-    for j, quantity in enumerate(block.cause.quantities(frame)[: block.cause.strengths]):
+    strengths = len(block.values) if block.cause.strengths else 0
+    for j, quantity in enumerate(block.cause.quantities(frame)[:strengths]):
         tried = block.values[j][j]
         one = tried * float(strength[j])
         if quantity.low >= 0:

@@ -79,6 +79,7 @@ class Thresholds:
     slope_octaves: int = 3  # the slowest of the octaves, from which what is slower still is continued
     steepest: float = 1.2  # power of the period with which a spectrum may rise: pink noise has 1
     trimmed: float = 0.05  # of the averages of a band: the largest are no noise
+    trimmed_moving: float = 0.5  # the same where nothing rests: there the model errs more
     impulse: float = 3.5  # standard deviations: an average farther out ...
     alone: float = 2.0  # ... and so many times larger than its neighbours is of a heavy tail
     slow_doubt: float = 4.0  # times what the continuation gives: slow errors no larger than that are noise
@@ -132,6 +133,7 @@ class Thresholds:
     rival_screened: float = 0.5  # of the found cause's gain: rivals that score less are not refitted
     rival_gain: float = 0.005  # of that gain: as good, if no farther behind than the largest of this,
     rival_relevant: float = 0.3  # ... of the relevant fall of squares,
+    once_in_twenty: float = 1.645  # standard deviations of their difference under noise as it is
     rival_noise: float = 12.0  # ... and mean squares: the noise of comparing two fits
     alike: float = 0.9  # cosine of screened columns: above, a quick screen names both
 

@@ -19,7 +19,7 @@ from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.procedure import diagnose
-from pulsetrainer.diagnosis.state import Question
+from pulsetrainer.diagnosis.state import Question, State
 from pulsetrainer.errors import DataError
 
 DT = 1e-3
@@ -160,6 +160,11 @@ def test_gates_fire_on_what_they_are_for_and_not_otherwise():
     clean = np.round(6 * u + 0.03 * rng.standard_normal(t.size), 3)
     assert _fired(_record(clean, u)) == {}
     assert set(_fired(_record(np.minimum(clean, 8.0), u))) == {"saturation"}
+    low = _fired(_record(np.maximum(clean, 1.0), u))
+    assert (set(low), low["saturation"].value, low["saturation"].kind) == ({"saturation"}, 1.0, "gate")
+    both = _fired(_record(np.clip(clean, 1.0, 8.0), u))["saturation"]
+    assert (both.kind, both.figures["rail"], both.figures["other"]) == ("both", 8.0, 1.0)
+    assert both.mask[(clean <= 1.0) | (clean >= 8.0)].all()
     wild = clean.copy()
     wild[rng.choice(t.size, 20, replace=False)] += 3.0
     fired = _fired(_record(wild, u))
@@ -289,6 +294,36 @@ def test_a_step_is_found_where_it_is():
     values = {e.name: e for e in answer.findings[0].parameters}
     assert values["time"].value == pytest.approx(17.3, abs=0.02)
     assert values["offset"].value + values["gain"].value * 6 == pytest.approx(0.15, rel=0.2)
+
+
+def _two(first: np.ndarray, second: np.ndarray) -> State:
+    """Diagnose two records of one device, with something added to the output of each."""
+    record = _lagging()
+    half = record.input.size // 2
+    parts = [
+        replace(record, input=record.input[k], output=record.output[k] + more, sample_weight=np.ones(half))
+        for k, more in ((slice(half), first), (slice(half, 2 * half), second))
+    ]
+    return diagnose(Question(parts, 0.0, 1.5, np.random.default_rng(0)))
+
+
+def test_a_hum_has_a_phase_of_its_own_in_every_record():
+    """No clock runs through both: one frequency, two phases."""
+    t = np.arange(4000) / 200
+    answer = _two(0.1 * np.sin(2 * np.pi * 17.3 * t), 0.1 * np.sin(2 * np.pi * 17.3 * t + 2.0))
+    assert (answer.verdict, [f.cause.id for f in answer.findings if f.found]) == ("periodic", ["periodic"])
+    values = {e.name: e.value for e in answer.findings[0].parameters}
+    assert values["frequency"] == pytest.approx(17.3, abs=0.01)
+    assert np.hypot(values["sine 2"], values["cosine 2"]) == pytest.approx(0.1, rel=0.1)
+
+
+def test_a_step_in_the_second_record_is_found_there():
+    """Its moment is told on one clock, as if the records had been made one after another."""
+    t = np.arange(4000) / 200
+    answer = _two(np.zeros(4000), 0.15 * (t > 6.4))
+    assert (answer.verdict, [f.cause.id for f in answer.findings if f.found]) == ("step", ["step"])
+    values = {e.name: e.value for e in answer.findings[0].parameters}
+    assert values["time"] == pytest.approx(20.0 + 6.4, abs=0.05)
 
 
 def test_noise_is_measured_without_a_model():

@@ -195,7 +195,7 @@ def test_intervals_hold_noise_levels_moment_and_formula(monkeypatch, jackknife, 
     noise = SimpleNamespace(noise=told)
     told = SimpleNamespace(jackknife=lambda fitted: None if jackknife is None else np.asarray([jackknife]))
     (one,) = intervals.estimates_of(fitted, noise, told, Floor(4, 1.0, 1.0, 1.0, 0.05))["output-lag"]
-    half = 2.26 * np.sqrt(variance) + 0.2 * 0.05 * 2.0 / 2.0 + (0.01 + 0.02)
+    half = np.sqrt(2.26**2 * variance + (0.2 * 0.05 * 2.0 / 2.0) ** 2 + 0.01**2 + 0.02**2)
     assert (one.value, one.lower, one.upper) == pytest.approx(
         (0.3, max(0.3 - half, 0.0), min(0.3 + half, 0.5))
     )

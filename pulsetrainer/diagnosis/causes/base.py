@@ -59,6 +59,7 @@ class Frame:
     low: float = 0.0  # end of the input's range
     ends: tuple[float, float] = (0.0, 1.0)  # output at both ends of the input's range
     zero: float = 0.0  # output of the hysteresis where its memory is empty: gains are about it
+    begin_s: float = 0.0  # since the begin of the first record, as if they had been made one after another
     longest_s: float = 0.0  # of the records, the longest; 0: this one
     past: Past | None = None  # what the causes remember of the piece before; None: there was none
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -47,9 +48,16 @@ class Periodic(Cause):
         "background": ("a hum at {frequency:.4g} Hz, no larger than the noise: it is told, but is no verdict")
     }
 
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """Return a phase for each record, since no clock runs through all of them, and one frequency."""
+        *own, frequency = self.parameters
+        more = [replace(one, name=f"{one.name} {k + 1}") for k in range(1, frame.records) for one in own]
+        return (*own, *more, frequency)
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        frame, one = frames[0], residual[0]
+        k = int(np.argmax([one.size for one in residual]))  # a long record has the sharpest lines
+        frame, one = frames[k], residual[k]
         power = np.abs(fft.rfft(one * np.hanning(one.size))) ** 2
         frequency = fft.rfftfreq(one.size, frame.dt_s)
         power[frequency < max(_SLOWEST_Hz, _PERIODS / (one.size * frame.dt_s))] = 0.0
@@ -60,7 +68,8 @@ class Periodic(Cause):
         k = int(np.argmax(power / around * (power > _LEAST * power.max(initial=0.0))))
         best = _refined(one, float(frequency[k]), float(frequency[1]), frame.dt_s)
         size = _TRIED * frame.span
-        return [[(size, 0.0, best), (0.0, size, best)]]
+        strengths = size * np.eye(2 * frame.records)
+        return [[(*row.tolist(), best) for row in strengths]]
 
     def is_background(self, sizes: Sequence[float], noise: float) -> bool:
         """Return whether it is a hum of the noise's size."""
@@ -69,12 +78,13 @@ class Periodic(Cause):
 
     def choices(self, frames: Sequence[Frame]) -> float:
         """Return from how many independent frequencies ``starts`` chooses: Baluev's W."""
-        return _INDEPENDENT * frames[0].input.size
+        return _INDEPENDENT * max(frame.input.size for frame in frames)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        phase = 2.0 * np.pi * values[2] * frame.time_s
-        return y + values[0] * np.sin(phase) + values[1] * np.cos(phase)
+        sine, cosine = values[2 * frame.record : 2 * frame.record + 2]
+        phase = 2.0 * np.pi * values[-1] * frame.time_s
+        return y + sine * np.sin(phase) + cosine * np.cos(phase)
 
 
 def _refined(residual: FloatArray, frequency: float, width: float, dt_s: float) -> float:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from scipy import ndimage
 
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 
@@ -28,7 +29,7 @@ class Saturation(Cause):
     id = "saturation"
     title = "the {output} is clipped at the end of its range"
     formula = "min(y, y_max)"
-    signature = "exactly repeated maxima, on one side"
+    signature = "exactly repeated maxima or minima"
     excitation = "the whole range"
     source = "Isermann, Fault-Diagnosis Systems, 2006, chapter 7: limit and plausibility checks"
     stage = "record"
@@ -36,20 +37,35 @@ class Saturation(Cause):
     family = "saturation"
     lasting = False
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": "{count:.0f} samples sit at exactly {rail:.4g}: the output is clipped there"
+        "gate": "{count:.0f} samples sit at exactly {rail:.4g}: the output is clipped there",
+        "both": "{count:.0f} samples sit at exactly {rail:.4g} or {other:.4g}: the output is clipped there",
     }
 
     def gate(self, raw: Raw) -> Firing | None:
-        """Maxima that repeat exactly far more often than the values just inside them."""
+        """Extremes that repeat exactly far more often than the values just inside them, at either end."""
         y = raw.calm.output
-        step, rail = spacing_of(y), float(y.max())
-        at = np.abs(y - rail) <= _AT * step
-        inside = (np.abs(y - rail) <= _INSIDE * step) & ~at & (np.abs(y - rail) < _INSIDE_SPAN * np.ptp(y))
-        count = np.count_nonzero(at)
-        if count <= _LEAST or count <= _PILE * np.count_nonzero(inside) or noise_of(y) <= _NOISY * step:
+        step = spacing_of(y)
+        if noise_of(y) <= _NOISY * step:
             return None
+        rails = [sign for sign in (1.0, -1.0) if _clipped(sign * y, step)]
+        if not rails:
+            return None
+        ends = [float((sign * y).max()) * sign for sign in rails]
+        at = np.any([np.abs(y - rail) <= _AT * step for rail in ends], axis=0)
         noise = noise_of(y, np.where(at, 0.0, 1.0))
         mask = ndimage.binary_dilation(at, iterations=_BESIDE)
-        mask |= ndimage.uniform_filter1d(y, _AROUND) > rail - _NEAR * noise
-        figures = {"count": float(count), "rail": rail}
-        return Firing(self.id, "gate", rail, "{y}", figures, mask, spread=step)
+        mean = ndimage.uniform_filter1d(y, _AROUND)
+        for sign, rail in zip(rails, ends, strict=True):
+            mask |= sign * mean > sign * rail - _NEAR * noise
+        figures = {"count": float(np.count_nonzero(at)), "rail": ends[0], "other": ends[-1]}
+        kind = "gate" if len(ends) == 1 else "both"
+        return Firing(self.id, kind, ends[0], "{y}", figures, mask, spread=step)
+
+
+def _clipped(y: FloatArray, step: float) -> bool:
+    """Whether the largest values of ``y`` (n,) are a rail."""
+    below = float(y.max()) - y
+    at = below <= _AT * step
+    inside = (below <= _INSIDE * step) & ~at & (below < _INSIDE_SPAN * np.ptp(y))
+    count = np.count_nonzero(at)
+    return bool(count > _LEAST and count > _PILE * np.count_nonzero(inside))

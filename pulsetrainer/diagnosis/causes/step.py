@@ -40,22 +40,24 @@ class Step(Cause):
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try: the same moments, whatever the residual."""
-        frame = frames[0]
-        size = _TRIED * frame.span
-        times = (np.linspace(*_MOMENTS) * frame.input.size * frame.dt_s).tolist()
+        size = _TRIED * frames[0].span
+        end = frames[-1].begin_s + frames[-1].input.size * frames[-1].dt_s
+        times = (np.linspace(*_MOMENTS) * end).tolist()
         return [[(size, 0.0, t), (0.0, _TRIED, t)] for t in times]
 
     def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:
         """Return the moment around that of ``values`` where the residual on both sides differs most."""
-        size = residual[0].size
-        near = (_MOMENTS[1] - _MOMENTS[0]) / (_MOMENTS[2] - 1) * size
-        at = values[2] / frames[0].dt_s
-        begin, end = max(at - _BESIDE * near, 0.0), min(at + _BESIDE * near, size)
-        return (*values[:2], _split(residual[0], int(begin), int(end)) * frames[0].dt_s)
+        one = max((f for f in frames if f.begin_s <= values[2]), key=lambda f: f.begin_s, default=frames[0])
+        left = residual[one.record]
+        total = frames[-1].begin_s + frames[-1].input.size * frames[-1].dt_s
+        near = _BESIDE * total * (_MOMENTS[1] - _MOMENTS[0]) / (_MOMENTS[2] - 1) / one.dt_s
+        at = (values[2] - one.begin_s) / one.dt_s
+        split = _split(left, int(max(at - near, 0.0)), int(min(at + near, left.size)))
+        return (*values[:2], one.begin_s + split * one.dt_s)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        after = np.clip((frame.time_s - values[2]) / (_SHARED * frame.dt_s) + 0.5, 0.0, 1.0)
+        after = np.clip((frame.begin_s + frame.time_s - values[2]) / (_SHARED * frame.dt_s) + 0.5, 0.0, 1.0)
         return y + after * (values[0] + values[1] * (y - frame.zero))
 
 

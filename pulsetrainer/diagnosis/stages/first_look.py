@@ -23,7 +23,7 @@ def stage(state: State) -> State:
 
 def _finding(state: State, score: Score) -> Finding:
     best = score is state.scores.scores[0]
-    pairs = zip(score.cause.parameters, score.start, strict=True)
+    pairs = zip(score.cause.quantities(state.problem.frames[0]), score.start, strict=True)
     unsure = float("nan")
     return Finding(
         score.cause,

@@ -15,11 +15,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
-from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.screening import screen
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -82,9 +84,21 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
             continue
         terms = (*without.terms, Term(score.cause, score.start))
         trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds)
-        if trial.squares - fitted.squares < margin:
+        if trial.squares - fitted.squares < max(margin, _by_chance(state, trial)):
             found.append(score.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
         alike = [c.id for c in library().values() if c.widens and c is not term.cause]
         found += [name for name in alike if name not in (*found, *fitted.names)]
     return tuple(found)
+
+
+def _by_chance(state: State, trial: Fitted) -> float:
+    """Difference of squares of two models that noise exceeds once in twenty, if neither is better.
+
+    Of squares |e + d|^2 - |e|^2 with e noise and d the difference of the models, 2 d'e is chance.
+    """
+    if state.scores.noise is None:
+        return 0.0
+    apart = state.current.projector((trial.simulated - state.current.simulated)[:, None])
+    variance = float(state.scores.noise.covariance(apart)[0, 0])
+    return 2.0 * LIMITS.once_in_twenty * float(np.sqrt(variance))
