@@ -42,7 +42,7 @@ KEPT = "kept in run.h5 (complete=false)"
 MESSAGES = {
     # --- files -------------------------------------------------------------------------------------------
     "wrong kind": Message("", "pulsetrainer {verb}", "{file}", "expected {expected}", "got {got}"),
-    "absent": Message("does not exist", "there is: {near}", "{file}"),
+    "absent": Message("does not exist", "holds: {near}", "{file}"),
     "a folder": Message("is a folder", "", "{file}", "expected a file"),
     "exists": Message("already exists", "--overwrite", "{file}"),
     "truncated": Message("truncated", "restore it", "{file}", got="{bytes} bytes"),
@@ -82,7 +82,7 @@ MESSAGES = {
     "not a smoothing": Message("--smoothing", "identify --help", expected="a number in 0..1", got="'{got}'"),
     "no such beat": Message("beat", "--beat", "fingerbp_AAC3_3", "6 ", "9"),
     # --- words -------------------------------------------------------------------------------------------
-    "option missing": Message("Missing option", "identify --help", expected="--out"),
+    "option missing": Message("is missing", "identify --help", expected="--out"),
     "no such command": Message("No such command", "--help", got="frobnicate"),
     "no such signal": Message("signal", "pulsetrainer capture", expected="diagnostic", got="noise"),
     "no such bench parameter": Message("parameter", "creep", "bench", got="'crep'"),

@@ -17,6 +17,7 @@ from types import FrameType
 from typing import Any
 
 from pulsetrainer.cli.next_step import as_options, next_step
+from pulsetrainer.cli.usage import usage_of
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
 from pulsetrainer.report.tables import folded
 
@@ -51,7 +52,7 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
         ):  # nothing is wrong with a bare command: this is its help
             sys.stdout.write(f"{error}\n")
             return UsageError.exit_code
-        problem = _usage_of(error) or _outside_of(error) or _bug_of(error)
+        problem = usage_of(error) or _outside_of(error) or _bug_of(error)
         _trace(debug)
     else:
         return int(code or 0)
@@ -114,16 +115,6 @@ def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
         sys.stderr.write(folded("note: ", str(note), width, indent=2) + "\n")
     if hint:  # not folded: a command in it is copied in one piece
         sys.stderr.write(f"  try: {hint}\n")
-
-
-def _usage_of(error: Exception) -> UsageError | None:
-    """Return what the command-line parser objects to, or None when the error is not the parser's."""
-    explain = getattr(error, "format_message", None)
-    if explain is None:
-        return None
-    context = getattr(error, "ctx", None)
-    name = getattr(context, "command_path", "pulsetrainer")
-    return UsageError(str(explain()).rstrip("."), hint=f"{name} --help")
 
 
 def _outside_of(error: Exception) -> PulsetrainerError | None:

@@ -14,7 +14,7 @@ from pulsetrainer.cli.settings import variable
 def positive(value: float | None) -> float | None:
     """Refuse a number that is not above 0 and finite; None is no choice."""
     if value is not None and not 0 < value < math.inf:
-        raise typer.BadParameter(f"{value:g} is not positive and finite.")
+        raise typer.BadParameter(f"must be a finite number above 0, got {value:g}")
     return value
 
 

@@ -88,6 +88,12 @@ def mean_over_repeats(measured: FloatArray) -> FloatArray:
     return np.interp(np.arange(count.size), known, total[known] / count[known])
 
 
+def beats(target: FloatArray) -> int:
+    """Number of times a target (n,) that starts a period at its first sample comes round."""
+    middle = 0.5 * (target.max() + target.min())
+    return max(int(np.sum((target[1:] >= middle) & (target[:-1] < middle))), 1)
+
+
 class Prediction(NamedTuple):
     """Errors of a predicted output."""
 

@@ -45,7 +45,7 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
         raise UsageError(f"the output {path} is not an ordinary file", hint="name a file on disk")
     if not folder.exists():
         raise UsageError(
-            f"the folder {folder} of the output {path.name} does not exist",
+            f"the folder {folder} for the output {path} does not exist",
             hint=f"make it: mkdir -p {shlex.quote(str(folder))}",
         )
     if not folder.is_dir():
@@ -54,7 +54,7 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
         raise ExistsError(path)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(
-            f"the folder {folder} of the output {path.name} is not writable",
+            f"the folder {folder} for the output {path} is not writable",
             hint="write to another folder, or change its permissions",
         )
 

@@ -81,7 +81,7 @@ def _names_in(folder: Path, path: Path) -> str:
     near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
     near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
     near = near or [name for name in names if name.endswith(path.suffix or ".h5")][:5]
-    return f"in that folder there is: {', '.join(near)}" if near else f"there is no similar name in {folder}"
+    return f"the folder holds: {', '.join(near)}" if near else f"there is no similar name in {folder}"
 
 
 def check_resumable(path: Path) -> None:

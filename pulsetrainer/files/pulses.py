@@ -32,7 +32,7 @@ def pulse_file(name: str) -> Path:
     known = library()
     path = known.get(name, Path(name))
     if name not in known and path.suffix.lower() != ".csv" and not path.exists():
-        near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+        near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
         raise UsageError(
             f"there is no pulse {name!r}; the library has {', '.join(known)}",
             hint=(f"did you mean {' or '.join(near)}? Or " if near else "name one of them, or ")

@@ -9,6 +9,8 @@ import numpy as np
 from pulsetrainer.artefacts.units import shown
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from pulsetrainer.artefacts import Fit, Model, ModelEvaluation, WaveformEvaluation
@@ -50,6 +52,17 @@ def identification(fit: Fit) -> str:
         f"Above: loops of the measured output, {_range(fit.output, fit.output_unit)}, over the input, "
         f"{_range(fit.input, fit.input_unit)}, with the output of the model laid on them. "
         f"Below: the residual over time, rms {fit.rms:.3g} {unit}, at most {fit.max_abs:.3g} {unit}."
+    )
+
+
+def methods(played: Sequence[WaveformEvaluation]) -> str:
+    """Say how large the mean error is without compensation, and by each method."""
+    first = played[0]
+    by = ", ".join(f"{one.inversion} {one.compensated.mean_abs_error_percent:.3g} %" for one in played)
+    return (
+        f"Above: one beat of the target force, {_range(first.target, first.output_unit)}, with the measured "
+        f"force of the scaled drive, mean error {first.scaled.mean_abs_error_percent:.3g} %, and of the "
+        f"compensated drive by each method: {by} of full force. Below: the error of each over the beat."
     )
 
 

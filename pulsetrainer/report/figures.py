@@ -27,7 +27,7 @@ from pulsetrainer.report.style import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from pulsetrainer.artefacts import Fit, ModelEvaluation, WaveformEvaluation
 
@@ -59,6 +59,14 @@ def tracking(played: WaveformEvaluation) -> Figure:
     """Return target and output with and without compensation, the errors below (fig. 9)."""
     figure = _sheet()
     panels.tracking(figure, played)
+    return figure
+
+
+@styled
+def methods(played: Sequence[WaveformEvaluation]) -> Figure:
+    """Return one beat of a pulse by all its methods, overlaid, and the error of each."""
+    figure = _sheet(height_in=5.4)
+    panels.methods(figure, played)
     return figure
 
 

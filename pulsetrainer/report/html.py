@@ -40,6 +40,8 @@ def render_evaluation(
 
     """
     played = [(one, f"waveform-{k}") for k, one in enumerate(evaluation.waveforms, start=1)]
+    several = len({(one.name, one.inversion) for one in evaluation.waveforms}) > 1
+    last = views.titled(evaluation.waveforms[-1]) if several else ""  # whose model the evaluation holds
     return (
         environment()
         .get_template("evaluation.html.j2")
@@ -52,7 +54,8 @@ def render_evaluation(
             overview=views.overview(played, published),
             compared=any(one.name in published for one, _ in played),
             warning=evaluation.model.fit.warning if evaluation.model and evaluation.model.fit else "",
-            model=None if evaluation.model is None else views.model_section(evaluation.model),
+            beats=views.beats(evaluation.waveforms),
+            model=None if evaluation.model is None else views.model_section(evaluation.model, last),
             waveforms=[views.waveform_section(one, identifier) for one, identifier in played],
             prediction=views.prediction_section(evaluation.models) if evaluation.models else None,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -12,12 +13,14 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pulsetrainer.artefacts.units import shown
+from pulsetrainer.core.metrics import beats
 from pulsetrainer.report.style import (
     COMPENSATED,
     ERROR,
     GRID,
     GROUND,
     GUIDE,
+    METHODS,
     MODEL,
     MUTED,
     SCALED,
@@ -222,6 +225,28 @@ def tracking(panel: FigureBase, played: WaveformEvaluation) -> None:
         trace(below, played.time_s, 100.0 * (drive.output - played.target) / played.full_force, **style)
     below.set_xlabel(label("time", "s"))
     below.set_ylabel("error [% of full force]")
+
+
+def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
+    """Draw one beat by every method that played a pulse: before and after above, what is left below."""
+    above, below = panel.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
+    first = played[0]
+    beat = slice(0, first.target.size // beats(first.target))
+    time = first.time_s[beat] - first.time_s[0]
+    trace(above, time, first.target[beat], **TARGET, label="target")
+    trace(above, time, first.scaled.output[beat], **SCALED, label="scaled")
+    below.axhline(0.0, **GUIDE)
+    for one, style in zip(played, cycle(METHODS)):
+        size = min(time.size, one.target.size)
+        x, measured, target = time[:size], one.compensated.output[:size], one.target[:size]
+        shown = f"{one.inversion}, mean error {one.compensated.mean_abs_error_percent:.2g} %"
+        trace(above, x, measured, **style, label=shown)
+        trace(below, x, 100.0 * (measured - target) / one.full_force, **style)
+    above.set_ylabel(label("force", first.output_unit))
+    above.set_title(f"{first.name}, one beat")
+    below.set_xlabel(label("time", "s"))
+    below.set_ylabel("error [% of full force]")
+    panel.legend(loc="outside lower center", ncols=2)
 
 
 def _played_title(played: WaveformEvaluation) -> str:

@@ -48,6 +48,13 @@ MODEL: Final[dict[str, Any]] = {"color": BLUE, "linewidth": 0.7}
 FINE: Final[dict[str, Any]] = {"color": INK, "linewidth": 0.6}
 COMPENSATED: Final[dict[str, Any]] = {"color": BLUE, "linewidth": 1.3}
 SCALED: Final[dict[str, Any]] = {"color": VERMILION, "linewidth": 1.3, "linestyle": (0, (4, 1.5))}
+# several methods in one figure, each by line and colour
+METHODS: Final[tuple[dict[str, Any], ...]] = (
+    {"color": BLUE, "linewidth": 1.3},
+    {"color": GREEN, "linewidth": 1.3, "linestyle": (0, (6, 1.2, 1.2, 1.2))},
+    {"color": INK, "linewidth": 1.1, "linestyle": (0, (1.2, 1.0))},
+    {"color": MUTED, "linewidth": 1.3, "linestyle": (0, (7, 2))},
+)
 ERROR: Final[dict[str, Any]] = {"color": VERMILION, "linewidth": 0.9}
 GUIDE: Final[dict[str, Any]] = {"color": MUTED, "linewidth": 0.9, "linestyle": (0, (1, 2))}
 

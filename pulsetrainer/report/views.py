@@ -119,7 +119,8 @@ def _stem(played: WaveformEvaluation) -> str:
     return f"{played.name}.{played.inversion}"
 
 
-def _title(played: WaveformEvaluation) -> str:
+def titled(played: WaveformEvaluation) -> str:
+    """Return a pulse and the method that played it, in words."""
     return f"{played.name}, {played.inversion} inverse"
 
 
@@ -133,7 +134,7 @@ def _metric(played: WaveformEvaluation, dotted: str) -> Number:
 def readout(played: WaveformEvaluation, link: str) -> Readout:
     """Return what stands at the top of the page for one played waveform."""
     return Readout(
-        _title(played),
+        titled(played),
         link,
         number(
             played.mean_error_reduction_percent, f"{_stem(played)}.mean_error_reduction_percent", digits=".1f"
@@ -167,9 +168,27 @@ def overview(played: Sequence[tuple[WaveformEvaluation, str]], published: Publis
     return tuple(rows)
 
 
+def beats(played: Sequence[WaveformEvaluation]) -> tuple[Picture, ...]:
+    """Return for each pulse one beat before and after, by all methods that played it."""
+    found = []
+    for k, name in enumerate(dict.fromkeys(one.name for one in played), start=1):
+        several = [one for one in played if one.name == name]
+        found.append(
+            _picture(
+                figures.methods(several),
+                f"beat-{k}",
+                f"One beat of {name} before and after",
+                alternatives.methods(several),
+                f"One beat of {name}, mean of the repeats: merely scaled, and compensated by each method; "
+                "below, what each method leaves.",
+            )
+        )
+    return tuple(found)
+
+
 def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
     """Return the part of the page about one played waveform."""
-    stem, title = _stem(played), _title(played)
+    stem, title = _stem(played), titled(played)
     return Section(
         identifier,
         title,
@@ -207,8 +226,8 @@ def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
     )
 
 
-def model_section(model: Model) -> Section:
-    """Return the part of the page about the model behind the waveforms."""
+def model_section(model: Model, of: str = "") -> Section:
+    """Return the part of the page about the model of the waveforms, or of the one that is named."""
     facts = [
         ("levels", _count(model.edges.size - 1, "model.levels")),
         ("cells", _count(model.weights.size, "model.cells")),
@@ -258,7 +277,7 @@ def model_section(model: Model) -> Section:
         for extension in model.extensions
         for parameter in extension.parameters
     )
-    return Section("model", "Model", tuple(facts), rows, tuple(pictures))
+    return Section("model", f"Model of {of}" if of else "Model", tuple(facts), rows, tuple(pictures))
 
 
 def prediction_section(models: Sequence[ModelEvaluation]) -> Section:

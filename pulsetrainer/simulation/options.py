@@ -177,8 +177,8 @@ def parse_qemu(port: str) -> QemuOptions:
             seed = wire_seed("qemu", value)
         else:
             raise UsageError(
-                f"the emulated device has no parameter {name!r}: its image is built once",
-                hint=f"it takes break, wire, wire-seed, {', '.join(QEMU_SETTINGS)}; for others the bench: "
+                f"the emulated device has no parameter {name!r}",
+                hint=f"it takes break, wire, wire-seed, {', '.join(QEMU_SETTINGS)}; the bench takes more: "
                 '"bench:?seed=3&creep=0.05"',
             )
     return QemuOptions(tuple(breaks), Wire(rate, seed), tuple(settings))

@@ -127,17 +127,11 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
         mean_abs_error_percent=errors.mean_abs_percent,
         max_abs_error_percent=errors.max_abs_percent,
         rms_error_percent=errors.rms_percent,
-        hysteresis_percent=100.0 * metrics.loop_area(target, mean_output) / (full**2 * _beats(target)),
+        hysteresis_percent=100.0 * metrics.loop_area(target, mean_output) / (full**2 * metrics.beats(target)),
         current_tracking_max_percent=100.0 * float(np.nanmax(tracking)) / playback.input_range,
         output=mean_output,
         output_unit=waveform.output_unit,
     )
-
-
-def _beats(target: FloatArray) -> int:
-    """Number of times a target that starts a period at its first sample comes round."""
-    middle = 0.5 * (target.max() + target.min())
-    return max(int(np.sum((target[1:] >= middle) & (target[:-1] < middle))), 1)
 
 
 # --- models on a run --------------------------------------------------------------------------------------

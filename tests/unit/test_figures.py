@@ -65,6 +65,7 @@ def test_draw_gives_every_kind_a_figure_with_units(make):
         lambda: figures.identification(examples.fit(300)),
         lambda: figures.identification(examples.fit(300, time=False)),
         lambda: figures.tracking(examples.waveform_evaluation()),
+        lambda: figures.methods([examples.waveform_evaluation()] * 5),
         lambda: figures.loops(examples.waveform_evaluation()),
         lambda: figures.prediction(examples.model_evaluation(time=False)),
     ],

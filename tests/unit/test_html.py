@@ -166,8 +166,9 @@ def test_model_numbers(page):
 
 
 def test_every_figure_is_there(page, comparison):
-    """Two per waveform, two of the model; one per compared model."""
-    assert len(page.of("figure")) == len(page.of("svg")) == 2 * 4 + 2
+    """One beat per pulse, two per waveform, two of the model; one per compared model."""
+    pulses = len({one.name for one in EVALUATION.waveforms})
+    assert len(page.of("figure")) == len(page.of("svg")) == pulses + 2 * 4 + 2
     assert len(comparison.of("figure")) == 2 + 1
     assert all(text.strip() for _, text in page.of("figcaption"))
 

@@ -1,0 +1,71 @@
+"""What the command-line parser objects to, in the words of this program."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from pulsetrainer.errors import UsageError
+
+_GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
+
+
+def usage_of(error: Exception) -> UsageError | None:
+    """Return what the parser objects to, or None when the error is not the parser's."""
+    explain = getattr(error, "format_message", None)
+    if explain is None:
+        return None
+    context = getattr(error, "ctx", None)
+    command = getattr(context, "command_path", "pulsetrainer")
+    parameter: Any = getattr(error, "param", None)
+    kind, help_ = type(error).__name__, f"{command} --help"
+    if kind == "NoSuchOption":
+        near = getattr(error, "possibilities", None)
+        said = f"{command} has no option {getattr(error, 'option_name', '')}"
+        return UsageError(said, hint=f"did you mean {' or '.join(near)}?" if near else help_)
+    if kind == "MissingParameter" and parameter is not None:
+        return UsageError(
+            f"{_named(parameter)} is missing", hint=f"add it: {_meaning(parameter)}, see {help_}"
+        )
+    if kind == "BadParameter" and parameter is not None:
+        return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
+    return UsageError(str(explain()).rstrip("."), hint=help_)
+
+
+def _named(parameter: Any) -> str:
+    """Name of an option as it is typed, or of an argument as the help names it."""
+    names = sorted((name for name in parameter.opts if name.startswith("-")), key=len)
+    if not names:
+        return str(parameter.human_readable_name)
+    return names[0] if len(names) == 1 else f"{names[0]} ({names[-1]})"
+
+
+def _meaning(parameter: Any) -> str:
+    text = (getattr(parameter, "help", None) or "what the command works on").rstrip(".")
+    return text[:1].lower() + text[1:]
+
+
+def _must(parameter: Any, error: Exception) -> str:
+    """What a value must be, and what it was."""
+    said = str(getattr(error, "message", error)).rstrip(".")
+    got = _GOT.match(said)
+    if got is None or not hasattr(parameter.type, "name"):
+        return said
+    kind = "a whole number" if "int" in parameter.type.name else "a number"
+    low, high = (getattr(parameter.type, end, None) for end in ("min", "max"))
+    within = (
+        f" from {low} to {high}" if None not in (low, high) else f", {low} or more" if low is not None else ""
+    )
+    return (
+        f"must be {kind}{within}, got {got[1]!r}"
+        if "valid" in got[0]
+        else f"must be {kind}{within}, got {got[1]}"
+    )
+
+
+def _without(parameter: Any, help_: str) -> str:
+    """What happens when an option is left out."""
+    default = getattr(parameter, "default", None)
+    if isinstance(default, int | float) and not isinstance(default, bool):
+        return f"leave it out for the usual {default:g}, or see {help_}"
+    return help_
