@@ -47,7 +47,7 @@ class Thresholds:
     coarse_levels: int = 22  # of the plane that shows how the discretisation error falls with the cell
     smoothing: float = 0.035  # of the density, share of the range: holds the fit at the levels above
     near_end: float = 0.01  # of the range: the outputs at its two ends are averaged over so much
-    followed_kept: int = 6  # inputs kept as they were followed through the plane: some 10 MB each
+    followed_kept: int = 10  # inputs kept as they were followed through the plane: some 10 MB each
     ridge: float = 1e-10  # of the largest diagonal entry: keeps the factor of the positive cells regular
     ridge_held_out: float = 1e-9  # relative: the same where blocks are left out
     ridge_steps: float = 1e-9  # relative: the same for the step of the parameters

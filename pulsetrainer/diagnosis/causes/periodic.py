@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from scipy import fft, ndimage
+from scipy import fft, ndimage, signal
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
@@ -89,7 +89,6 @@ class Periodic(Cause):
 
 def _refined(residual: FloatArray, frequency: float, width: float, dt_s: float) -> float:
     """Frequency of the largest line within a ``width`` of ``frequency``: a spectrum's bins are too coarse."""
-    near = frequency + width * np.linspace(-1.0, 1.0, _FINER)
-    turn = -2j * np.pi * dt_s * (np.arange(residual.size) + 0.5)
-    power = [abs(np.sum(residual * np.exp(turn * one))) for one in near.tolist()]
-    return float(near[int(np.argmax(power))])
+    low, high = max(frequency - width, 0.0), min(frequency + width, 0.5 / dt_s)
+    lines = signal.zoom_fft(residual, [low, high], _FINER, fs=1.0 / dt_s, endpoint=True)
+    return float(np.linspace(low, high, _FINER)[int(np.argmax(np.abs(lines)))])
