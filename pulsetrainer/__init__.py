@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
     from pulsetrainer.steps.capture import capture
     from pulsetrainer.steps.compare import compare
+    from pulsetrainer.steps.correct import correct
     from pulsetrainer.steps.diagnose import diagnose
     from pulsetrainer.steps.evaluate import evaluate
     from pulsetrainer.steps.extend import extend
@@ -39,6 +40,7 @@ __all__ = [
     "__version__",
     "capture",
     "compare",
+    "correct",
     "diagnose",
     "evaluate",
     "extend",
@@ -60,7 +62,10 @@ _HOME = {
     **dict.fromkeys(("invert", "load", "open_device", "read_table", "save", "session", "tune"), "api"),
     **{
         verb: f"steps.{verb}"
-        for verb in ("capture", "compare", "diagnose", "evaluate", "extend", "identify", "play", "refine")
+        for verb in (
+            *("capture", "compare", "correct", "diagnose", "evaluate"),
+            *("extend", "identify", "play", "refine"),
+        )
     },
 }
 

@@ -51,6 +51,9 @@ WRITERS = (
         ("run.h5", "model.h5"),
     ),
     Writer("extend", ("extend", "diagnosis.h5", "--model", "model.h5"), _h5(), ("diagnosis.h5", "model.h5")),
+    Writer(
+        "correct", ("correct", "run.h5", "--diagnosis", "diagnosis.h5"), _h5(), ("run.h5", "diagnosis.h5")
+    ),
     Writer("export", ("export", "run.h5"), _h5("out.csv"), ("run.h5",)),
     Writer("plot", ("plot", "model.h5"), _h5("out.png"), ("model.h5",)),
     Writer(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pulsetrainer.artefacts.data import LARGEST, Attribute, BoolArray, Data, FloatArray, beyond_all_quantities
-from pulsetrainer.artefacts.diagnosis import Cause, Diagnosis, Profile
+from pulsetrainer.artefacts.diagnosis import Cause, Dependence, Diagnosis, Profile, Recorded
 from pulsetrainer.artefacts.evaluation import DriveError, Evaluation, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.artefacts.model import Extension, Fit, Model, Parameter
 from pulsetrainer.artefacts.playback import DrivePlayback, Playback
@@ -19,6 +19,7 @@ __all__ = [
     "BoolArray",
     "Cause",
     "Data",
+    "Dependence",
     "Diagnosis",
     "DriveError",
     "DrivePlayback",
@@ -32,6 +33,7 @@ __all__ = [
     "Playback",
     "Profile",
     "Quiz",
+    "Recorded",
     "RefinePass",
     "Run",
     "Score",

@@ -38,12 +38,35 @@ class Profile:
     output_unit: str = "N"
 
 
+@dataclass(frozen=True, slots=True)
+class Dependence:
+    """A learned dependence of the output on a state of the device that is in no list (k places)."""
+
+    text: str  # in words
+    state: str  # in words
+    unit: str
+    tau_s: float  # time constant of the state
+    at: Annotated[FloatArray, Data("@unit", "state", "place")]  # (k,)
+    value: Annotated[FloatArray, Data("@output_unit", "change of the output", "place")]  # (k,)
+    half: Annotated[FloatArray, Data("@output_unit", "half width of its 95 % band", "place")]  # (k,)
+    output_unit: str = "N"
+
+
 class Left(NamedTuple):
     """The rms residual of averages, per cent of the span, and what it would be if nothing were wrong."""
 
     percent: float
     floor_percent: float
     whole: bool = True  # False while what is left is more than noise: something else is missing
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """One uninterrupted part of a run that was diagnosed."""
+
+    fingerprint: str  # of its samples
+    step_s: float  # of the averages that causes were sought in; NaN where the run has no time
+    begin_s: float = 0.0  # since the begin of the first, as if they had been made one after another
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -81,11 +104,27 @@ class Diagnosis(Shown):
     lacks: tuple[str, ...] = ()  # what the records do not have: rates, holds, length
     notes: tuple[str, ...] = ()  # what a person should know about the records
     whole: bool = True  # False while what is left is more than noise
+    dependences: tuple[Dependence, ...] = ()  # of the cause `unlisted`, one for each that was found
+    # what `correct` and `extend` need; empty in files of 0.1
+    model: str = ""  # fingerprint of the model
+    records: tuple[Recorded, ...] = ()
+    correctable: tuple[str, ...] = ()  # faults of the measurement that were found, and can be taken out
+    polarity: int = 1  # of the model: parameters are of the output times it
+    empty: Annotated[float, Data("@output_unit", "output of the empty memory, times the polarity")] = float(
+        "nan"
+    )
 
     @property
     def found(self) -> tuple[Cause, ...]:
         """The causes that were found, the verdict first."""
         return tuple(one for one in self.causes if one.found)
+
+    @property
+    def next_command(self) -> str:
+        """What to do about it: "correct" the run, "extend" the model, or empty where neither helps."""
+        if self.correctable and (self.verdict in self.correctable or self.extended is None):
+            return "correct"
+        return "extend" if self.extended is not None else ""
 
     @property
     def left(self) -> Left:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Annotated, ClassVar
@@ -146,6 +147,13 @@ class Model(Shown):
                 f"but weights holds {np.size(self.weights)}",
                 hint="identify the model again: pulsetrainer identify RUN.h5 -o model.h5",
             )
+
+    @property
+    def fingerprint(self) -> str:
+        """Digest of what it predicts: equal for equal models."""
+        said = (self.form, self.reading, self.polarity, self.extensions, self.input_unit, self.output_unit)
+        parts = [np.append(one, self.offset).tobytes() for one in (self.edges, self.weights)]
+        return hashlib.sha256(b"".join((*parts, repr(said).encode()))).hexdigest()
 
     @property
     def edges_quantity(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, ClassVar
@@ -35,9 +36,12 @@ class Run(Shown):
     complete: bool = True
     dropped_samples: int = 0  # lost on the wire; the samples that are here are right
     captured: bool = False  # on our own device; files of 0.1 do not say
+    # (n,) true where the output is no measurement: left out of every fit and every error. None: all count
+    masked: Annotated[BoolArray | None, Data("1", "sample is left out", "time")] = None
+    corrected: tuple[str, ...] = ()  # causes that were taken out of it
 
     def __post_init__(self) -> None:
-        check_equal_length(self, ("time_s", "input", "output", "reference", "seam"))
+        check_equal_length(self, ("time_s", "input", "output", "reference", "seam", "masked"))
         check_time(self)
 
     @property
@@ -47,22 +51,35 @@ class Run(Shown):
             return None
         return float(np.median(np.diff(self.time_s)))
 
+    @property
+    def fingerprint(self) -> str:
+        """Digest of what was measured: equal for runs of equal samples."""
+        measured = [self.input, self.output, *([] if self.time_s is None else [self.time_s])]
+        return hashlib.sha256(b"".join(np.asarray(one, "<f8").tobytes() for one in measured)).hexdigest()
+
+    @property
+    def slices(self) -> tuple[slice, ...]:
+        """The uninterrupted parts, as slices of the samples."""
+        if self.seam is None or not np.any(self.seam):
+            return (slice(None),)
+        edges = [0, *np.flatnonzero(self.seam[1:]) + 1, self.seam.size]
+        return tuple(slice(start, stop) for start, stop in pairwise(edges))
+
+    def cut(self, part: slice) -> Run:
+        """Return one uninterrupted part as a run."""
+        arrays = [name for name in _RUN_ARRAYS if getattr(self, name) is not None]
+        return replace(self, seam=None, **{name: getattr(self, name)[part] for name in arrays})
+
     def parts(self, at_least: int = 1) -> tuple[Run, ...]:
         """Return the uninterrupted parts of ``at_least`` so many samples; the run itself where there is none.
 
         After a seam the device had been off: what is slow in it (heat, creep) does not go on where it was.
         Each part begins at the low end of the input, so that its memory is known.
         """
-        if self.seam is None or not np.any(self.seam):
+        if len(self.slices) == 1:
             return (self,)
-        edges = [0, *np.flatnonzero(self.seam[1:]) + 1, self.seam.size]
-        arrays = [name for name in _RUN_ARRAYS if getattr(self, name) is not None]
-        parts = (
-            replace(self, seam=None, **{name: getattr(self, name)[start:stop] for name in arrays})
-            for start, stop in pairwise(edges)
-            if stop - start >= at_least
-        )
-        return tuple(parts) or (self,)
+        parts = map(self.cut, self.slices)
+        return tuple(one for one in parts if one.input.size >= at_least) or (self,)
 
 
-_RUN_ARRAYS = ("time_s", "input", "output", "reference")
+_RUN_ARRAYS = ("time_s", "input", "output", "reference", "masked")

@@ -11,6 +11,7 @@ import typer
 from pulsetrainer.cli import (
     capture,
     compare,
+    correct,
     diagnose,
     doctor,
     evaluate,
@@ -50,6 +51,7 @@ app.command("evaluate")(evaluate.evaluate)
 app.command("compare")(compare.compare)
 app.command("diagnose")(diagnose.diagnose)
 app.command("extend")(extend.extend)
+app.command("correct")(correct.correct)
 app.command("export")(export.export)
 app.command("session")(session.session)
 app.command("refine")(refine.refine)

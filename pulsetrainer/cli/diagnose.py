@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -49,9 +50,25 @@ def diagnose(
 
             job.page(html, render_diagnosis, found, header)
     job.notes(found.notes)
-    job.screen.result(_payload(found) | {"output": out, "html": html, "seconds": job.seconds})
+    commands = _commands(found, runs, model, out)
+    job.screen.result(
+        _payload(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
+    )
     _show(job, found)
+    for line in commands:
+        job.screen.whole(line)
     job.wrote(out, html)
+
+
+def _commands(found: Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:
+    """Return the commands that do what the verdict asks for."""
+    if found.next_command == "extend":
+        words = [["extend", out, "--model", model, "-o", "extended.h5"]]
+    elif found.next_command == "correct":
+        words = [["correct", run, "--diagnosis", out, "-o", f"{run.stem}-corrected.h5"] for run in runs]
+    else:
+        words = []
+    return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
 
 
 def _show(job: Job, found: Diagnosis) -> None:

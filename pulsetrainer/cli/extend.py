@@ -16,6 +16,10 @@ def extend(
     diagnosis: Annotated[Path, typer.Argument(help="Diagnosis of the model.", metavar="DIAGNOSIS.h5")],
     model: Annotated[Path, typer.Option(help="Model that was diagnosed.")],
     out: Out,
+    verify: Annotated[
+        Path | None,
+        typer.Option(help="Run, not diagnosed, that each cause must predict better.", show_default=False),
+    ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
@@ -23,14 +27,20 @@ def extend(
 
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
-    job = Job(context, inputs=(diagnosis, model), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Diagnosis, Model
+    inputs = (diagnosis, model, *([] if verify is None else [verify]))
+    job = Job(context, inputs=inputs, outputs=(out,), overwrite=overwrite, as_json=json)
+    from pulsetrainer.artefacts import Diagnosis, Model, Run
     from pulsetrainer.report.diagnosis_text import parameter
     from pulsetrainer.steps.extend import extend as extended_by
 
     with job.working("extending"):
         found = job.load(diagnosis, Diagnosis)
-        extended = extended_by(job.load(model, Model), found, names=(str(model), str(diagnosis)))
+        extended = extended_by(
+            job.load(model, Model),
+            found,
+            verify=None if verify is None else job.load(verify, Run),
+            names=(str(model), str(diagnosis)),
+        )
         added = [one.cause for one in extended.extensions]
         job.save(out, extended, f"Model extended by {', '.join(added)}")
     figures = ("static_percent", "extended_percent", "held_out_gain_percent")

@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.artefacts import Cause, Diagnosis, Extension, Model, Parameter, Profile
+from pulsetrainer.artefacts import (
+    Cause,
+    Dependence,
+    Diagnosis,
+    Extension,
+    Model,
+    Parameter,
+    Profile,
+    Recorded,
+)
 from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.diagnosis import residual, wording
-from pulsetrainer.diagnosis.extended import seen_input
+from pulsetrainer.diagnosis.causes.unlisted import Unlisted
+from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.fitting import weights_for
+from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import predict
 from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.state import Given, State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -33,6 +46,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
     sign, words = model.polarity, _words(given)
+    dependences = learned(state, words)
     return Diagnosis(
         verdict=state.verdict,
         quick=state.question.quick,
@@ -42,7 +56,9 @@ def diagnosis_of(state: State) -> Diagnosis:
         static_percent=state.baseline.rms * percent,
         extended_percent=extended.rms * percent,
         floor_percent=state.floor.rms * percent,
-        causes=tuple(_cause(state, finding, words) for finding in state.findings),
+        causes=tuple(
+            one for finding in state.findings for one in _causes(state, finding, words, dependences)
+        ),
         evidence=tuple(wording.sentence(one, words) for one in state.evidence),
         next_experiment=wording.advice(
             state.advice, wording.Bench(scale, model.input_unit, state.question.timed, given.ours)
@@ -59,7 +75,18 @@ def diagnosis_of(state: State) -> Diagnosis:
         held_out_gain_percent=_held_out_gain(state),
         lacks=state.lacks,
         whole=state.is_whole(extended),
+        dependences=dependences,
         notes=state.question.notes,
+        model=model.fingerprint,
+        records=tuple(
+            Recorded(
+                name, float("nan") if r.dt_s is None else r.dt_s * scale.second, f.begin_s * scale.second
+            )
+            for name, r, f in zip(given.fingerprints, problem.records, problem.frames, strict=True)
+        ),
+        correctable=tuple(state.correctable),
+        polarity=sign,
+        empty=float(scale.outputs(np.asarray(extended.simulator.frames[0].zero))),
     )
 
 
@@ -96,6 +123,18 @@ def _unit(text: str, words: Words) -> str:
 
 def _parameters(estimates: Sequence[Estimate], words: Words) -> tuple[Parameter, ...]:
     return tuple(Parameter(e.name, e.value, _unit(e.unit, words), e.lower, e.upper) for e in estimates)
+
+
+def _causes(state: State, finding: Finding, words: Words, dependences: Sequence[Dependence]) -> list[Cause]:
+    """Return a finding as causes: one for each learned dependence."""
+    one = _cause(state, finding, words)
+    if not finding.found or finding.cause.id != Unlisted.id or not dependences:
+        return [one]
+    size = len(one.parameters) // len(dependences)
+    return [
+        replace(one, text=told.text, parameters=one.parameters[k * size : (k + 1) * size])
+        for k, told in enumerate(dependences)
+    ]
 
 
 def _cause(state: State, finding: Finding, words: Words) -> Cause:
@@ -168,9 +207,17 @@ def extended_model(state: State, model: Model) -> Model | None:
         reading="continuous",
         polarity=model.polarity,
         extensions=tuple(
-            Extension(term.cause.id, _parameters(state.estimates[term.cause.id], words)) for term in lasting
+            Extension(
+                term.cause.id, _parameters((*_constants(term, scale), *state.estimates[term.cause.id]), words)
+            )
+            for term in lasting
         ),
     )
+
+
+def _constants(term: Term, scale: Scale) -> list[Estimate]:
+    rows = [Estimate(name, value, unit, value, value) for name, value, unit in term.cause.constants()]
+    return [scale.estimate(one) for one in rows]
 
 
 def _is_even(plane: Plane) -> bool:

@@ -35,13 +35,14 @@ def question_of(
     """
     low, high = float(model.edges[0]), float(model.edges[-1])
     *called, model_name = names or (*(f"run {k}" for k in range(1, len(runs) + 1)), "the model")
-    records, notes = [], []
+    records, notes, fingerprints = [], [], []
     stamps: list[FloatArray | None] = []
     for name, run in zip(called, runs, strict=True):
         _check_fits(name, run, model_name, model)
         for part in run.parts(LIMITS.least_samples):
             record, times = measured_of(name, part, model.polarity, low, high)
             records.append(record)
+            fingerprints.append(part.fingerprint)
             stamps.append(times)
         if not run.complete:
             notes.append(f"{name} is incomplete; diagnosing the {run.input.size} samples it has")
@@ -49,7 +50,7 @@ def question_of(
         run.reference is not None and (run.input_quantity, run.output_quantity) == ("current", "force")
         for run in runs
     )
-    given = Given(model, runs[0].input_quantity, runs[0].output_quantity, ours)
+    given = Given(model, runs[0].input_quantity, runs[0].output_quantity, ours, tuple(fingerprints))
     return Question(records, low, high, rng, quick, progress, given, tuple(notes), stamps)
 
 
@@ -104,6 +105,8 @@ def measured_of(
     u = run.input[good]
     weight = np.ones(u.size)
     weight[: known_from(u, low, high)] = 0.0
+    if run.masked is not None:
+        weight[run.masked[good]] = 0.0
     reference = None if run.reference is None else run.reference[good]
     step, stamps = _time_of(run, good)
     return Record(u, polarity * run.output[good], weight, dt_s=step, reference=reference), stamps

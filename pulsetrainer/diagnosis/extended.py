@@ -99,7 +99,7 @@ class Extended:
         """
         sign = static.polarity
         upright = Preisach(static.plane, static.weights, sign * static.offset, static.reading)
-        terms = in_order([Term(cause_named(name), values) for name, values in extensions])
+        terms = in_order([Term(*cause_named(name).restored(values)) for name, values in extensions])
         return cls(upright, terms, sign)
 
     def frame(self, u: FloatArray, dt_s: float, past: Past | None = None) -> Frame:

@@ -47,6 +47,17 @@ class HeldOut:
         first, second = self.error(before), self.error(after)
         return (first - second) / max(first - floor.squares, floor.relevant)
 
+    def pieces(self, fitted: Fitted, count: int) -> FloatArray:
+        """Sums of squares (count,) on whole pieces of the time, each predicted from the others; or empty.
+
+        Blocks that alternate interpolate what wanders slowly; whole pieces have to predict it.
+        """
+        return np.asarray([float(error @ error) for error, _ in self._left_out(fitted, count, whole=True)])
+
+    def piece_of(self, count: int) -> IntArray:
+        """Return the number of the piece of the time that each average (count,) is in."""
+        return np.asarray(_fold_of(count, whole=True)[self.block])
+
     def jackknife(self, fitted: Fitted) -> FloatArray | None:
         """Variances (p,) of the parameters from leaving out one tenth of the blocks after another.
 
@@ -57,12 +68,15 @@ class HeldOut:
             return None
         return (1.0 - 1.0 / LIMITS.jackknife) * np.sum((changes - changes.mean(axis=0)) ** 2, axis=0)
 
-    def _left_out(self, fitted: Fitted, folds: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+    def _left_out(
+        self, fitted: Fitted, folds: int, *, whole: bool = False
+    ) -> Iterator[tuple[FloatArray, FloatArray]]:
         """For each fold its errors, and the changes (p,) of the parameters, when it is left out."""
+        fold_of = _fold_of(folds, whole=whole)
         design, free = fitted.design, np.flatnonzero(fitted.passive)
         extra = design.bins.settled(fitted.slopes)
         more = np.hstack((extra, design.bins.free))
-        test = (self.block[:, None] % folds == np.arange(folds)).astype(np.float64)  # (count, folds)
+        test = (fold_of[self.block][:, None] == np.arange(folds)).astype(np.float64)  # (count, folds)
         size = free.size + more.shape[1]
         if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | (test.sum(axis=0) == 0)):
             return
@@ -81,7 +95,7 @@ class HeldOut:
             train = 1.0 - test[:, fold]
             weighted = more * train[:, None]
             normal = share * smooth
-            kept = np.arange(LIMITS.blocks) % folds != fold
+            kept = fold_of != fold
             normal[: free.size, : free.size] += grams[kept].sum(axis=0)[np.ix_(free, free)]
             normal[free.size :, : free.size] += (weighted.T @ design.matrix)[:, free]
             normal[free.size :, free.size :] += weighted.T @ more
@@ -105,6 +119,12 @@ class HeldOut:
                 parts[k] = own.T @ own
             self._grams = design, parts
         return self._grams[1]
+
+
+def _fold_of(folds: int, *, whole: bool) -> IntArray:
+    """Fold of each block: whole pieces of the time, or blocks that alternate."""
+    number = np.arange(LIMITS.blocks)
+    return number * folds // LIMITS.blocks if whole else number % folds
 
 
 def _blocks_of(problem: Problem) -> IntArray:

@@ -32,6 +32,7 @@ class Given:
     input_quantity: str = "input"
     output_quantity: str = "output"
     ours: bool = False  # recorded by this program, which can play the experiments that it proposes
+    fingerprints: tuple[str, ...] = ()  # of the records
 
 
 @dataclass(frozen=True)
@@ -83,6 +84,7 @@ class State:
     verdict: str = "none"
     evidence: tuple[Evidence, ...] = ()
     advice: Evidence = field(default_factory=lambda: Evidence("none"))
+    once: frozenset[str] = frozenset()  # ids of causes that fit, but do not repeat
     extends: bool = True  # False: what was found is no fault of the model as given
 
     @property
@@ -131,7 +133,16 @@ class State:
     @property
     def extensions(self) -> list[Term]:
         """Causes that go into the model: properties of the device, not of the record."""
-        return [term for term in self.current.terms if term.cause.lasting] if self.extends else []
+        if not self.extends or self.unexplained:
+            return []
+        return [term for term in self.current.terms if term.cause.lasting and term.cause.id not in self.once]
+
+    @property
+    def correctable(self) -> list[str]:
+        """Ids of the faults of the measurement that were found and can be taken out of a record."""
+        if self.question.quick:
+            return []
+        return [one.cause.id for one in self.findings if one.found and one.cause.corrects]
 
     def explains(self, gain: float) -> float:
         """Per cent of what can be explained."""

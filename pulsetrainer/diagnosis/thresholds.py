@@ -112,6 +112,24 @@ class Thresholds:
     rows_per_unknown: int = 2  # averages that must stay for each unknown when blocks are left out
     start_kept: float = 0.01  # of a column's squared norm: holds a start whose block is left out
 
+    # Repetition
+    pieces: int = 5  # whole ones, of the time, each predicted from the others
+    repeated: float = 0.5  # of what the fit gains: a smaller gain on the pieces is chance
+    piece_worse: float = 0.1  # of that gain: no piece may be predicted worse by more
+
+    # Unlisted
+    most_states: int = 3  # learned one after another
+    learned_rounds: int = 4  # Gauss-Newton steps of the joint refit with each
+    fastest_state_s: float = 0.02  # time constants of the bank from here ...
+    slowest_state: float = 0.25  # ... to this share of the longest record ...
+    state_ratio: float = 2.0  # ... so far apart; the best is refined within that factor ...
+    state_settled: float = 0.02  # ... to this relative error
+    state_ends: tuple[float, float] = (0.002, 0.998)  # quantiles between which a curve is drawn
+    curve_ridge: float = 1e-3  # of the mean square of a curve's columns: holds its second differences
+    curve_places: int = 41  # of the figure of a curve
+    curve_bulk: tuple[float, float] = (0.02, 0.98)  # quantiles of the state: beyond, a record shows little
+    curve_end: float = 0.15  # of its places: with its extreme nearer to an end a curve rises or falls
+
     # Equal loops (decision 042)
     contrast_p_max: float = 0.005  # the second of two tests: together they alarm in one or two of a hundred
     permutations: int = 1999  # of equal loops: the smallest p is a tenth of the limit

@@ -39,6 +39,10 @@ TEXTS: Mapping[str, str] = {
         "(p = {p:.3f}), but refitted with all weights it is too small to matter, or does not predict blocks "
         "that were left out. It is not named."
     ),
+    "not repeated": (
+        "What is left can be fitted by a learned dependence, but that did not repeat when whole pieces of "
+        "the time were left out: it is no property of the device"
+    ),
     "largest": "The remaining error is largest at {names} {at:.3g}, {times:.1f} times its smallest value.",
     "quick": "Quick screen: nothing was refitted, so strengths are linearised and come out too small.",
     "lacks": "The recording is limited: {names}.",
@@ -81,6 +85,11 @@ ADVICE: Mapping[str, str] = {
         "diagnose that.{command}"
     ),
     "extend": "Extend the model, then test it on a recording that was not fitted: pulsetrainer evaluate.",
+    "correct": (
+        "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
+        "correct), and identify the model from what that gives, or diagnose it again."
+    ),
+    "repair": "No model can hold this: put right what was found, and record again.",
     "other model": (
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
     ),
@@ -91,6 +100,7 @@ ADVICE: Mapping[str, str] = {
 }
 DOUBTS: Mapping[str, str] = {
     "predicts worse": "with it, blocks that were left out are predicted worse than without it",
+    "does not repeat": "it fits, but does not repeat: it is not added to the model",
     "spans zero": "the interval of its strength spans zero",
     "at bound": "a parameter sits at the end of the range in which it was sought",
 }

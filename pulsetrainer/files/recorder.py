@@ -251,6 +251,7 @@ class RunRecorder:
         values: dict[str, Any] = dict.fromkeys(COLUMNS, Later(self._samples)) | self._texts
         values |= {"complete": self._complete, "dropped_samples": self.dropped_samples}
         values["seam"] = seam if starts else None
+        values |= {"masked": None, "corrected": ()}
         store.write_fields(self._final, Run, values, self._header, overwrite=self._overwrite, fill=self._fill)
 
     def _fill(self, file: h5py.File) -> None:

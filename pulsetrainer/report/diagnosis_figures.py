@@ -23,7 +23,7 @@ from pulsetrainer.report.style import (
 )
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Diagnosis, Profile
+    from pulsetrainer.artefacts import Dependence, Diagnosis, Profile
 
 _MOST_BARS = 10
 _SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side
@@ -68,6 +68,19 @@ def profile(one: Profile, *, extended: bool) -> Figure:
     axes.set_ylabel(label("rms residual", one.output_unit))
     axes.set_ylim(bottom=0.0)
     panels.headroom(axes)
+    return figure
+
+
+@styled
+def dependence(one: Dependence) -> Figure:
+    """Return what a learned dependence adds to the output, with its 95 % band."""
+    figure = Figure(figsize=(_SMALL_IN, 2.6), layout="constrained")
+    axes = figure.add_subplot()
+    axes.fill_between(one.at, one.value - one.half, one.value + one.half, color=BLUE, alpha=0.2, linewidth=0)
+    axes.plot(one.at, one.value, color=BLUE)
+    axes.axhline(0.0, **GUIDE)
+    axes.set_xlabel(label(one.state, one.unit), wrap=True)
+    axes.set_ylabel(label("change of the output", one.output_unit))
     return figure
 
 

@@ -49,7 +49,7 @@ def render_diagnosis(
             levels=[(words, number(getattr(found, name), name, ".3f")) for name, words in _levels(found)],
             rows=[_row(one) for one in shown],
             course=_course(found),
-            profiles=_profiles(found),
+            profiles=[*_dependences(found), *_profiles(found)],
             ranking=_ranking(found),
         )
     )
@@ -119,6 +119,13 @@ def _picture(name: str, figure: Figure, title: str, words: str) -> Picture:
 def _course(found: Diagnosis) -> Picture:
     words = "Measured output and static model; below, what the static and the extended model leave."
     return _picture("course", figures.course(found), "Output and residual over time", words)
+
+
+def _dependences(found: Diagnosis) -> list[Picture]:
+    return [
+        _picture(f"dependence-{k}", figures.dependence(one), "Learned dependence", one.text)
+        for k, one in enumerate(found.dependences, start=1)
+    ]
 
 
 def _profiles(found: Diagnosis) -> list[Picture]:

@@ -19,7 +19,7 @@ from pulsetrainer.artefacts import (
 )
 from pulsetrainer.core import metrics
 from pulsetrainer.core.initial_state import estimated_start, known_from
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.one_thread import one_thread
@@ -165,12 +165,12 @@ def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> Mod
     operator = operator_of(model)
     low, high = operator.low, operator.high
     parts = run.parts(SHORTEST_PART)
-    known = [known_from(part.input, low, high) for part in parts]
+    known = [_known(part, low, high) for part in parts]
     start, state = estimated_start(operator, [(part.input, part.output) for part in parts])
     predicted = np.concatenate(
-        [predict(model, part.input, run.dt_s, start)[k:] for part, k in zip(parts, known, strict=True)]
+        [predict(model, part.input, run.dt_s, start)[k] for part, k in zip(parts, known, strict=True)]
     )
-    measured = np.concatenate([part.output[k:] for part, k in zip(parts, known, strict=True)])
+    measured = np.concatenate([part.output[k] for part, k in zip(parts, known, strict=True)])
     errors = metrics.prediction(measured, predicted)
     offset = float(np.mean(measured - predicted))
     outside = (run.input < low - BEYOND * (high - low)) | (run.input > high + BEYOND * (high - low))
@@ -201,9 +201,16 @@ def _second_half(measured: FloatArray, predicted: FloatArray) -> float:
     return 100.0 * metrics.root_mean_square(left) / float(np.ptp(measured)) if half else float("nan")
 
 
-def _times(parts: Sequence[Run], known: Sequence[int], thinned: slice) -> FloatArray | None:
-    """Times of the samples after ``known`` of each part, thinned; None where the run has no time."""
-    times = [part.time_s[k:] for part, k in zip(parts, known, strict=True) if part.time_s is not None]
+def _known(run: Run, low: float, high: float) -> BoolArray:
+    """Tell which samples (n,) count: from where the memory is known, but those that are masked."""
+    kept = np.ones(run.input.size, dtype=bool) if run.masked is None else ~run.masked
+    kept[: known_from(run.input, low, high)] = False
+    return kept
+
+
+def _times(parts: Sequence[Run], known: Sequence[BoolArray], thinned: slice) -> FloatArray | None:
+    """Times of the samples of each part that are ``known``, thinned; None where the run has no time."""
+    times = [part.time_s[k] for part, k in zip(parts, known, strict=True) if part.time_s is not None]
     return np.concatenate(times)[thinned] if times else None
 
 

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.artefacts import Diagnosis, Model
+from pulsetrainer.artefacts import Diagnosis, Model, Run
 from pulsetrainer.errors import DataError
+from pulsetrainer.steps.evaluate import evaluate
+from pulsetrainer.steps.one_thread import one_thread
 
 
-def extend(model: Model, diagnosis: Diagnosis, *, names: Sequence[str] = ()) -> Model:
+@one_thread
+def extend(
+    model: Model, diagnosis: Diagnosis, *, verify: Run | None = None, names: Sequence[str] = ()
+) -> Model:
     """Extend a model by the causes that a diagnosis of it found.
 
     Its weights are those refitted together with the causes, on the runs that were diagnosed. What was added
@@ -19,13 +25,16 @@ def extend(model: Model, diagnosis: Diagnosis, *, names: Sequence[str] = ()) -> 
 
     Parameters
     ----------
+    verify
+        A run that was not diagnosed: a cause is added only if that run is predicted better with it.
     names
         Names of the model and of the diagnosis, for messages.
 
     Raises
     ------
     DataError
-        The diagnosis found nothing that extends a model, or is of another model.
+        The diagnosis found nothing that extends a model, is of another model, or no cause helps to predict
+        the run that is to verify it.
 
     Source: Della Torre, Magnetic Hysteresis, 1999, chapters 3 to 5: the classical model and its extensions.
 
@@ -44,11 +53,20 @@ def extend(model: Model, diagnosis: Diagnosis, *, names: Sequence[str] = ()) -> 
         why = (
             "only screened for causes and fitted none"
             if diagnosis.quick
-            else f"ended with the verdict {diagnosis.verdict!r} and found no property of the device"
+            else f"ended with the verdict {diagnosis.verdict!r} and found no property of the device that "
+            "repeats"
         )
+        if diagnosis.correctable:
+            hint = (
+                "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis diagnosis.h5 -o corrected.h5"
+            )
+        else:
+            hint = "diagnose without `quick`, on a run of `pulsetrainer capture diagnostic`"
+        raise DataError(f"{diagnosis_name} {why}: there is nothing to extend the model by", hint=hint)
+    if diagnosis.model not in ("", model.fingerprint):  # files of 0.1 do not name theirs
         raise DataError(
-            f"{diagnosis_name} {why}: there is nothing to extend the model by",
-            hint="diagnose without `quick`, on a run of `pulsetrainer capture diagnostic`",
+            f"{model_name} is not the model that {diagnosis_name} is of",
+            hint="give the model that was diagnosed, or diagnose this one: pulsetrainer diagnose",
         )
     same_range = np.allclose(extended.edges[[0, -1]], model.edges[[0, -1]])
     if not same_range or (extended.input_unit, extended.output_unit) != (model.input_unit, model.output_unit):
@@ -58,4 +76,33 @@ def extend(model: Model, diagnosis: Diagnosis, *, names: Sequence[str] = ()) -> 
             f"{model.input_unit}",
             hint="give the model that was diagnosed",
         )
-    return extended
+    return extended if verify is None else _verified(model, extended, verify)
+
+
+def _verified(model: Model, extended: Model, run: Run) -> Model:
+    """Return the extended model without the causes that do not help to predict a run."""
+    if run.dt_s is None:
+        raise DataError(
+            "the run to verify with has no time, and causes need it",
+            hint="import it again with --time COLUMN or --rate HZ",
+        )
+
+    def error(one: Model) -> float:
+        return evaluate(run, one).models[0].rms
+
+    best, least = extended, error(extended)
+    for left_out in extended.extensions:
+        kept = tuple(one for one in best.extensions if one is not left_out)
+        trial = replace(best, extensions=kept)
+        without = error(trial)
+        if without <= least:
+            best, least = trial, without
+    plain = error(model)
+    if not best.extensions or least >= plain:
+        named = ", ".join(one.cause for one in extended.extensions)
+        raise DataError(
+            f"{named} fits, but does not repeat: the run to verify with is predicted to {least:.4g} "
+            f"{model.output_unit} (rms) with it, and to {plain:.4g} without",
+            hint="use the model as it is, or diagnose both runs together",
+        )
+    return best

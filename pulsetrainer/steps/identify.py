@@ -107,7 +107,8 @@ def identify(
     titles = [title for title, parts in zip(titles, cut, strict=True) for _ in parts]
     measured = [part for parts in cut for part in parts]
     raw = measured
-    tamed = wild.tame([(part.input, part.output) for part in measured])
+    masked = [np.zeros(p.input.size, dtype=bool) if p.masked is None else p.masked for p in measured]
+    tamed = wild.tame([(p.input, wild.repaired(p.output, m)) for p, m in zip(measured, masked, strict=True)])
     measured = [
         replace(part, input=t.input, output=t.output) for part, t in zip(measured, tamed, strict=True)
     ]
@@ -120,8 +121,10 @@ def identify(
         smoothing = 0.0 if reading == "relay" else "auto"
     n_h = _levels(measured, notes) if levels is None else levels
     on = partial(fit, n_h=n_h, reading=reading, method=method, smoothing=smoothing, form=form)
-    fitted, measured, masks = _without_wild(on, reach, measured, [t.wild for t in tamed])
-    notes += fit_notes.of_wild(masks)
+    left_out = [t.wild | m for t, m in zip(tamed, masked, strict=True)]
+    fitted, measured, masks = _without_wild(on, reach, measured, left_out)
+    wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
+    notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += fit_notes.of_form(fitted, measured[0])
     notes += _of_offsets(titles, fitted, measured)
@@ -143,7 +146,7 @@ def identify(
     warning = fit_notes.warning(fitted, measured, form)
     progress(1.0)
     model = _model(fitted, measured, covered, ensemble, cleaned, tuple(notes), warning)
-    return _with_wild(model, raw[0], masks)
+    return _with_wild(model, raw[0], wild_ones[0], sum(int(mask.sum()) for mask in masks))
 
 
 def _without_wild(
@@ -180,13 +183,12 @@ def _signals(runs: Sequence[Run]) -> list[tuple[FloatArray, FloatArray]]:
     return [(run.input, run.output) for run in runs]
 
 
-def _with_wild(model: Model, run: Run, masks: Sequence[BoolArray]) -> Model:
-    """Return the model with what was left out of its fit, of the first run as it was measured."""
+def _with_wild(model: Model, run: Run, first: BoolArray, count: int) -> Model:
+    """Return the model with what was left out of its fit: how much, and of the first run what was wild."""
     assert model.fit is not None
-    first = masks[0]
     fit = replace(
         model.fit,
-        masked_samples=sum(int(mask.sum()) for mask in masks),
+        masked_samples=count,
         wild_input=run.input[first] if first.any() else None,
         wild_output=run.output[first] if first.any() else None,
     )

@@ -122,6 +122,20 @@ def test_refine(tmp_path):
     same(by_command(tmp_path, *words), stored(refined, tmp_path))
 
 
+@pytest.mark.slow
+def test_correct(tmp_path):
+    """A run whose zero drifts, by 3 % of its span."""
+    run, model = pt.load(KEPT / "run.h5"), KEPT / "model.h5"
+    drift = 0.03 * np.ptp(run.output) * run.time_s / run.time_s[-1]
+    pt.save(replace(run, output=run.output + drift), tmp_path / "drifting.h5")
+    pt.save(pt.diagnose(pt.load(tmp_path / "drifting.h5"), pt.load(model)), tmp_path / "diagnosis.h5")
+    drifting, found = (pt.load(tmp_path / name) for name in ("drifting.h5", "diagnosis.h5"))
+    assert found.correctable == ("offset-drift",)
+    corrected = pt.correct(drifting, found)
+    words = ("correct", "drifting.h5", "--diagnosis", "diagnosis.h5")
+    same(by_command(tmp_path, *words), stored(corrected, tmp_path))
+
+
 def test_compare(tmp_path):
     """The same figures, and the same words for what became better."""
     evaluation = pt.load(KEPT / "evaluation.h5")

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 COMMANDS = (
-    *("capture", "import", "identify", "invert", "play", "evaluate", "diagnose", "extend"),
+    *("capture", "import", "identify", "invert", "play", "evaluate", "diagnose", "extend", "correct"),
     *("session", "refine", "tune", "export", "show", "plot", "ports", "compare", "doctor"),
 )
 HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich")

@@ -9,7 +9,7 @@ import children
 import store_examples as examples
 
 from command_lines import EXCITATION, WRITERS
-from pulsetrainer.artefacts import Model, Run
+from pulsetrainer.artefacts import Cause, Model, Parameter, Recorded, Run
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import store
 from pulsetrainer.files.recorder import RunRecorder
@@ -58,13 +58,16 @@ def _surely(folder: Path, words: tuple[str, ...], log: Path) -> children.Ended:
 
 
 def _diagnosis(folder: Path) -> None:
-    """Write a diagnosis that has a model to extend, of the range of the model that is there."""
+    """Write a diagnosis of the run that has a model to extend, of the right range, and a drift to correct."""
     from dataclasses import replace
 
-    model = store.read(folder / "model.h5", Model)
+    model, run = store.read(folder / "model.h5", Model), store.read(folder / "run.h5", Run)
+    drift = Cause("offset-drift", True, 0.005, 1.0, 1.0, (Parameter("rate", 0.01, "N/s", 0.0, 0.02),))
     diagnosis = examples.diagnosis()
+    records = tuple(Recorded(part.fingerprint, 0.005) for part in run.parts())
     extended = replace(model, fit=None, extensions=diagnosis.extended.extensions)
-    store.write(folder / "diagnosis.h5", replace(diagnosis, extended=extended), examples.header())
+    whole = replace(diagnosis, extended=extended, causes=(*diagnosis.causes, drift), records=records)
+    store.write(folder / "diagnosis.h5", whole, examples.header())
 
 
 def _cut_off(folder: Path) -> None:

@@ -18,6 +18,8 @@ from pulsetrainer.diagnosis.piecewise import Piecewise
 DT_S = 1e-3
 STATIC = Preisach(Plane.uniform(0.0, 1.5, 12), np.linspace(1.0, 4.0, 78))
 LASTING = [cause for cause in library().values() if cause.lasting and cause.stage != "record"]
+ENDS = [(0.0, 1.5), (0.0, 300.0), (0.0, 2.2), (0.0, 9e4), (0.0, 20.0), (0.0, 3e3), (-0.5, 0.5), (-99.0, 99.0)]
+ENDS += [(0.0, 1.0), (0.0, 1.5), (0.0, 1.0), (0.0, 1.0)]  # of the states of ``unlisted``
 VALUES = {
     "accommodation": (0.2, 4.0),
     "creep": (0.1, 0.3),
@@ -29,6 +31,11 @@ VALUES = {
     "resonance": (20.0, 0.2),
     "thermal-drift": (0.05, 3.0),
     "viscous": (0.02,),
+    # every kind of state at once
+    "unlisted": (
+        *(one for k, (low, high) in enumerate(ENDS) for one in (float(k), low, high)),
+        *([0.05, 0.1, -0.3, 0.2, 0.5, 0.4, -0.1, 0.3] * len(ENDS)),
+    ),
 }
 
 

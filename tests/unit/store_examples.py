@@ -114,6 +114,7 @@ def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None, *, full:
         "cell": level * (level - 1) // 2,
         "repeat": draw(st.integers(0, 3)),
         "group": draw(st.integers(0, 6)),
+        "place": draw(st.integers(0, 6)),
         "beat": draw(st.integers(0, 6)),
         "question": draw(st.integers(0, 4)),
         "wild": draw(st.integers(0, 6)),

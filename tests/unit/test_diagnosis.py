@@ -27,7 +27,7 @@ VOCABULARY = (
     *("delay", "output-lag", "field-lag", "rate-widening", "viscous", "creep", "thermal-drift"),
     *("offset-drift", "resonance", "periodic", "step", "saturation", "load-dependence", "stick-slip"),
     *("quantisation", "outliers", "clock-skew", "current-tracking", "condition-change", "out-of-range"),
-    "accommodation",
+    *("accommodation", "unlisted"),
 )
 # values that matter, and the values at which a cause does nothing
 STRENGTHS = {

@@ -39,7 +39,7 @@ def _names(folder):
 def _tree(path):
     """Return names, attributes, dtypes and values of a file; how the arrays are packed does not count."""
     with h5py.File(path) as file:
-        tree = {"/": dict(file.attrs)}
+        tree = {"/": {key: np.asarray(value).tolist() for key, value in file.attrs.items()}}
 
         def take(name, item):
             links = ("DIMENSION_LIST", "REFERENCE_LIST")

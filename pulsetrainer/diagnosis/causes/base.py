@@ -9,7 +9,7 @@ values, gate, thresholds, flags and words.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -62,6 +62,7 @@ class Frame:
     begin_s: float = 0.0  # since the begin of the first record, as if they had been made one after another
     longest_s: float = 0.0  # of the records, the longest; 0: this one
     past: Past | None = None  # what the causes remember of the piece before; None: there was none
+    kept: dict[str, FloatArray] = field(default_factory=dict, repr=False, compare=False)  # of the input alone
 
     @property
     def length_s(self) -> float:
@@ -86,6 +87,18 @@ class Frame:
         one = replace(self, zero=zero)
         one.__dict__["path"] = self.path
         return one
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A record whose faults of measurement are undone, in its own units, of polarity 1."""
+
+    raw: Raw  # as it was measured
+    time_s: FloatArray  # (n,) as causes count it
+    step_s: float  # of the averages that they were sought in
+    empty: float  # output of the empty memory
+    record: int = 0  # which of those that were diagnosed
+    begin_s: float = 0.0  # of it, since the begin of the first one
 
 
 class Cause:
@@ -113,6 +126,7 @@ class Cause:
     doubted: ClassVar[bool] = False  # others also set off its gate: it is asked again without what they add
     # what it means
     lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model
+    corrects: ClassVar[bool] = False  # a fault of the measurement, which can be taken out of the record
     jagged: ClassVar[bool] = False  # leaves what no refit can take away: then what is left is its own
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
@@ -128,6 +142,14 @@ class Cause:
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""
         return self.parameters
+
+    def constants(self) -> tuple[tuple[str, float, str], ...]:
+        """Return what a model must keep of it besides its parameters: name, value and unit."""
+        return ()
+
+    def restored(self, values: Values) -> tuple[Cause, Values]:
+        """Return the cause and its parameters, from the constants and parameters that a model kept."""
+        return self, values
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try; the columns of a block are fitted together.
@@ -155,6 +177,11 @@ class Cause:
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause, for the output ``y`` (n,) before it."""
         raise NotImplementedError
+
+    def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
+        """Output (n,) without a fault of the measurement; NaN where nothing can be restored."""
+        firing = self.gate(taken.raw)
+        return y if firing is None or firing.mask is None else np.where(firing.mask, np.nan, y)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Outputs (n,) of an output cause under formulas that are as plausible as its own: for intervals."""

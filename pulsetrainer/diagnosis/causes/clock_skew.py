@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
 _TRIED = (1e-5, 1e-4)  # a good crystal's, a bad one's
 
@@ -26,6 +26,7 @@ class ClockSkew(Cause):
     family = "skew"
     parameters = (Quantity("skew", "1", -0.01, 0.01, 1e-6),)
     lasting = False
+    corrects = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
@@ -35,3 +36,8 @@ class ClockSkew(Cause):
         """Output (n,) after this cause."""
         t = frame.time_s
         return np.interp(t * (1.0 + values[0]), t, y)
+
+    def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
+        """Output (n,) on the clock of the input; what it did not reach is not known."""
+        t = taken.time_s
+        return np.interp(t / (1.0 + values[0]), t, y, right=np.nan)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
 _TRIED = 0.01  # of the span over the record
 
@@ -24,6 +24,7 @@ class OffsetDrift(Cause):
     family = "drift"
     parameters = (Quantity("rate", "{y}/s", -1e6, 1e6, 1e-5),)
     lasting = False
+    corrects = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
@@ -32,3 +33,7 @@ class OffsetDrift(Cause):
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
         return y + values[0] * frame.time_s
+
+    def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
+        """Output (n,) without the drift since the first sample."""
+        return y - values[0] * taken.time_s

@@ -37,6 +37,7 @@ class Outliers(Cause):
     order = 1
     family = "outliers"
     lasting = False
+    corrects = True
     wild = True
     texts: ClassVar[Mapping[str, str]] = {
         "gate": "{count:.0f} isolated samples differ from those around them by more than {limit:.3g}"

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import fft, ndimage, signal
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 from pulsetrainer.diagnosis.thresholds import TINY
 
 _SLOWEST_Hz = 0.4  # slower lines are drift ...
@@ -44,6 +44,7 @@ class Periodic(Cause):
         Quantity("frequency", "Hz", 0.0, 1e6, 1e-4),
     )
     lasting = False
+    corrects = True
     texts: ClassVar[Mapping[str, str]] = {
         "background": ("a hum at {frequency:.4g} Hz, no larger than the noise: it is told, but is no verdict")
     }
@@ -82,9 +83,18 @@ class Periodic(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        sine, cosine = values[2 * frame.record : 2 * frame.record + 2]
-        phase = 2.0 * np.pi * values[-1] * frame.time_s
-        return y + sine * np.sin(phase) + cosine * np.cos(phase)
+        return y + _sine(values, frame.record, frame.time_s)
+
+    def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
+        """Output (n,) without the sine."""
+        return y - _sine(values, taken.record, taken.time_s)
+
+
+def _sine(values: Values, record: int, time_s: FloatArray) -> FloatArray:
+    """The sine (n,), with the phase of its record."""
+    sine, cosine = values[2 * record : 2 * record + 2]
+    phase = 2.0 * np.pi * values[-1] * time_s
+    return np.asarray(sine * np.sin(phase) + cosine * np.cos(phase))
 
 
 def _refined(residual: FloatArray, frequency: float, width: float, dt_s: float) -> float:

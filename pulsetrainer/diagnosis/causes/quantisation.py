@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
-from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.core import wild
+from pulsetrainer.core.coarse import between_steps
+from pulsetrainer.core.initial_state import known_from
+from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
 from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of
 from pulsetrainer.diagnosis.thresholds import PERCENT
 
 _COARSE = 0.004  # of the span: finer steps hurt no fit
 _USED = 2  # times that each value comes, on average: in a short record all may differ, far apart as they are
+_LEVELS = 48  # of the hysteresis that tells what lies between the steps
 _MOST = (0.05, 0.95)  # quantiles of the steps: twice their spread is that of the step
 
 
@@ -30,6 +36,7 @@ class Quantisation(Cause):
     family = "quantisation"
     lasting = False
     jagged = True
+    corrects = True
     texts: ClassVar[Mapping[str, str]] = {
         "gate": "the output changes in steps of {step:.4g}, {percent:.2g} % of its span"
     }
@@ -44,3 +51,13 @@ class Quantisation(Cause):
         figures = {"step": step, "percent": PERCENT * step / span}
         spread = 0.5 * float(np.ptp(np.quantile(np.diff(values), _MOST)))
         return Firing(self.id, "gate", step, "{y}", figures, spread=spread)
+
+    def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
+        """Output (n,) between the steps, where the hysteresis that fits them best expects it."""
+        known = np.isfinite(y)
+        weight = known * (
+            np.arange(y.size) >= known_from(taken.raw.record.input, taken.raw.low, taken.raw.high)
+        )
+        record = replace(taken.raw.record, output=wild.repaired(y, ~known), sample_weight=weight * 1.0)
+        between = between_steps(record, Plane.uniform(taken.raw.low, taken.raw.high, _LEVELS), values[0])
+        return np.where(known, between, np.nan)

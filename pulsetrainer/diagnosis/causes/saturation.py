@@ -36,6 +36,7 @@ class Saturation(Cause):
     order = 0
     family = "saturation"
     lasting = False
+    corrects = True
     texts: ClassVar[Mapping[str, str]] = {
         "gate": "{count:.0f} samples sit at exactly {rail:.4g}: the output is clipped there",
         "both": "{count:.0f} samples sit at exactly {rail:.4g} or {other:.4g}: the output is clipped there",

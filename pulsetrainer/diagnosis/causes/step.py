@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
 _TRIED = 0.003  # of the span, and of the gain
 _MOMENTS = (0.02, 0.98, 25)  # of the record, from, to, how many
@@ -37,6 +37,7 @@ class Step(Cause):
         Quantity("time", "s", 0.0, 1e6, 0.01),
     )
     lasting = False
+    corrects = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try: the same moments, whatever the residual."""
@@ -59,6 +60,14 @@ class Step(Cause):
         """Output (n,) after this cause."""
         after = np.clip((frame.begin_s + frame.time_s - values[2]) / (_SHARED * frame.dt_s) + 0.5, 0.0, 1.0)
         return y + after * (values[0] + values[1] * (y - frame.zero))
+
+    def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
+        """Output (n,) as before the step; its moment is not known better than it was shared out."""
+        offset, gain, moment = values
+        since = taken.begin_s + taken.time_s - moment
+        before = (y - offset + gain * taken.empty) / (1.0 + gain)
+        unsure = np.abs(since) < 0.5 * _SHARED * taken.step_s
+        return np.where(unsure, np.nan, np.where(since > 0, before, y))
 
 
 def _split(residual: FloatArray, begin: int, end: int) -> int:

@@ -2,7 +2,8 @@
 
 Where the model as given is of the wrong kind, or of another condition, that comes first: another model is
 needed. Where causes are tied, the experiment on which they look least alike, tried on paper with the model
-that was found. Else what the recordings lack; else what the verdict asks for.
+that was found. Else what the recordings lack; else what the verdict asks for: a fault of the measurement is
+taken out of the record (`correct`), a property of the device goes into the model (`extend`).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import best_experiment
 from pulsetrainer.diagnosis.state import State
@@ -44,9 +46,17 @@ def _advice(state: State) -> Evidence:
         return Evidence("tied", figures=figures, names=(best.name, *names))
     if state.verdict == "inconclusive":
         return _to_see_more(state)
+    return _after_verdict(state)
+
+
+def _after_verdict(state: State) -> Evidence:
+    if state.verdict in ("unknown", "none"):
+        return Evidence("lacks", names=state.lacks) if state.lacks else Evidence(state.verdict)
+    if state.verdict in state.correctable:
+        return Evidence("correct", names=tuple(state.correctable))
     if state.lacks:
         return Evidence("lacks", names=state.lacks)
-    return Evidence(state.verdict if state.verdict in ("unknown", "none") else "extend")
+    return Evidence("extend" if library()[state.verdict].lasting else "repair")
 
 
 def _to_see_more(state: State) -> Evidence:

@@ -1,0 +1,42 @@
+"""``pulsetrainer correct``: a run without what the measurement did to it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, Out, Overwrite
+
+
+def correct(
+    context: typer.Context,
+    run: Annotated[Path, typer.Argument(help="Run that was diagnosed.", metavar="RUN.h5")],
+    diagnosis: Annotated[Path, typer.Option(help="Diagnosis of the run.")],
+    out: Out,
+    delay: Annotated[
+        float, typer.Option(min=0.0, help="Delay of the recorder of the output, s, if it has one.")
+    ] = 0.0,
+    overwrite: Overwrite = False,
+    json: AsJson = False,
+) -> None:
+    """Write the run without the faults of the measurement that were found.
+
+    Example: pulsetrainer correct diagnostic.h5 --diagnosis diagnosis.h5 -o corrected.h5
+    """
+    job = Job(context, inputs=(run, diagnosis), outputs=(out,), overwrite=overwrite, as_json=json)
+    from pulsetrainer.artefacts import Diagnosis, Run
+    from pulsetrainer.steps.correct import correct as corrected_by
+
+    with job.working("correcting"):
+        found = job.load(diagnosis, Diagnosis)
+        corrected = corrected_by(job.load(run, Run), found, delay_s=delay, names=(str(run), str(diagnosis)))
+        job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
+    masked = 0 if corrected.masked is None else int(corrected.masked.sum())
+    job.screen.result({"output": out, "corrected": corrected.corrected, "masked_samples": masked})
+    samples = f"{masked} of {corrected.output.size}"
+    job.screen.facts(
+        f"{out}: corrected run", {"taken out": ", ".join(corrected.corrected), "samples left out": samples}
+    )

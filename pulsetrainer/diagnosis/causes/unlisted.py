@@ -1,0 +1,232 @@
+"""the output depends on something that is in no list: y + sum_j f_j(z_j), each z_j a state of the device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy import interpolate
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.base import (
+    Cause,
+    Frame,
+    Quantity,
+    Values,
+    low_pass,
+    remember,
+    remembered,
+)
+
+KNOTS = 8  # of each curve: even between the ends of the state; its first value is 0
+_STILL = 0.004  # of the range: an input that stays within it rests
+_BACK = 0.02  # of the range: a turn of the input is known when it has come back so far
+_STEEPEST = 1e6  # of a curve
+_SMALL_CHANGE = 1e-4  # of the span: steps of the derivatives, of the curve ...
+_SMALL_TIME_S = 1e-3  # ... and of a time constant
+_CONSTANTS = 3  # of a part: its state, and the ends of its curve
+
+
+@dataclass(frozen=True)
+class State:
+    """One kind of state: its unit, its words, and how it follows from the input and the output."""
+
+    name: str
+    unit: str
+    words: str  # {tau}, {input} and {output} are put in
+    at: Callable[[FloatArray, float, Frame, str], FloatArray]  # y, tau, frame, name of what it remembers
+    saturates: bool = False  # 1 - exp(-time / tau) of the time that its words name
+
+
+def _speed(x: FloatArray, frame: Frame, name: str) -> FloatArray:
+    """Absolute rate (n,) of a signal."""
+    before = remembered(frame.past, f"{name} last", x[:1])
+    remember(frame.past, f"{name} last", x[-1:])
+    return np.asarray(np.abs(np.diff(x, prepend=before)) / frame.dt_s)
+
+
+def _lagged(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
+    return low_pass(x, tau, frame.dt_s, frame.past, name)
+
+
+def _above(frame: Frame) -> FloatArray:
+    return frame.input - frame.low
+
+
+def _since(event: FloatArray, frame: Frame, name: str) -> FloatArray:
+    """Time (n,) since the last sample with an event (n,)."""
+    start = float(remembered(frame.past, f"{name} since", np.zeros(1))[0])
+    place = np.arange(event.size)
+    last = np.maximum.accumulate(np.where(event, place, -1))
+    since = np.where(last >= 0, (place - last) * frame.dt_s, start + (place + 1) * frame.dt_s)
+    remember(frame.past, f"{name} since", since[-1:])
+    return np.asarray(since)
+
+
+def _moves(frame: Frame) -> FloatArray:
+    """Whether the input has left the band that it rested in, at each sample (n,)."""
+    if "moves" in frame.kept:
+        return frame.kept["moves"]
+    at, width = float(remembered(frame.past, "unlisted band", frame.input[:1])[0]), _STILL * frame.reach
+    moved = []
+    for value in frame.input.tolist():
+        moves = abs(value - at) > width
+        at = value if moves else at
+        moved.append(moves)
+    remember(frame.past, "unlisted band", np.asarray([at]))
+    return frame.kept.setdefault("moves", np.asarray(moved))
+
+
+def _turns(frame: Frame) -> tuple[FloatArray, FloatArray]:
+    """The last turn of the input (n,) above the low end, and whether there is a new one."""
+    if "turns" in frame.kept:
+        return frame.kept["turns"], frame.kept["turned"]
+    width = _BACK * frame.reach
+    first = frame.input[0]
+    turn, extreme, way = remembered(frame.past, "unlisted turn", np.asarray([first, first, 1.0])).tolist()
+    turns, new = [], []
+    for value in frame.input.tolist():
+        back = (extreme - value) * way
+        if back > width:
+            turn, extreme, way = extreme, value, -way
+        elif back < 0:
+            extreme = value
+        turns.append(turn)
+        new.append(back > width)
+    remember(frame.past, "unlisted turn", np.asarray([turn, extreme, way]))
+    frame.kept.update(turns=np.asarray(turns) - frame.low, turned=np.asarray(new))
+    return frame.kept["turns"], frame.kept["turned"]
+
+
+def _squared(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
+    return _lagged(x**2, tau, frame, name)
+
+
+def _rate(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
+    return _lagged(_speed(x, frame, name), tau, frame, name)
+
+
+def _change(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
+    return x - _lagged(x, tau, frame, name)
+
+
+def _share(x: FloatArray, tau: float) -> FloatArray:
+    return 1.0 - np.exp(-x / tau)
+
+
+STATES: tuple[State, ...] = (
+    State("input", "{u}", "the average {input} of the last {tau}",
+          lambda _, s, f, n: _lagged(_above(f), s, f, n)),
+    State("output", "{y}", "the average {output} of the last {tau}",
+          lambda y, s, f, n: _lagged(y - f.zero, s, f, n)),
+    State("input squared", "({u})^2",
+          "the average square of the {input}, from its low end, of the last {tau}",
+          lambda _, s, f, n: _squared(_above(f), s, f, n)),
+    State("output squared", "({y})^2",
+          "the average square of the {output}, from its lowest, of the last {tau}",
+          lambda y, s, f, n: _squared(y - f.zero, s, f, n)),
+    State("input rate", "{u}/s", "the average speed of the {input} in the last {tau}",
+          lambda _, s, f, n: _rate(f.input, s, f, n)),
+    State("output rate", "{y}/s", "the average speed of the {output} in the last {tau}",
+          _rate),
+    State("input change", "{u}", "the {input} less its average of the last {tau}",
+          lambda _, s, f, n: _change(_above(f), s, f, n)),
+    State("output change", "{y}", "the {output} less its average of the last {tau}",
+          lambda y, s, f, n: _change(y - f.zero, s, f, n)),
+    State("way", "{u}", "the way of the {input} since its last turn (followed within {tau})",
+          lambda _, s, f, n: _lagged(np.abs(_above(f) - _turns(f)[0]), s, f, n)),
+    State("turn", "{u}", "the {input} at its last turn (followed within {tau})",
+          lambda _, s, f, n: _lagged(_turns(f)[0], s, f, n)),
+    State("since turn", "1", "the time since the last turn of the {input}",
+          lambda _, s, f, n: _share(_since(_turns(f)[1], f, n), s), saturates=True),
+    State("rest", "1", "the time that the {input} has rested",
+          lambda _, s, f, n: _share(_since(_moves(f), f, n), s), saturates=True),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Part:
+    """One dependence: on which state, and between which values the curve is drawn."""
+
+    state: int
+    low: float
+    high: float
+
+    @property
+    def kind(self) -> State:
+        """The kind of its state."""
+        return STATES[self.state]
+
+    def at(self, y: FloatArray, tau: float, frame: Frame, number: int = 0) -> FloatArray:
+        """The state (n,) for the output ``y`` (n,) before this cause."""
+        return self.kind.at(y, tau, frame, f"unlisted {number}")
+
+    def columns(self, z: FloatArray) -> FloatArray:
+        """Curves (n, KNOTS - 1) that are 1 at one knot and 0 at the others; constant beyond the ends."""
+        share = np.clip((z - self.low) / (self.high - self.low), 0.0, 1.0)
+        return np.asarray(_curves()(share))[:, 1:]
+
+
+@cache
+def _curves() -> interpolate.CubicSpline:
+    return interpolate.CubicSpline(np.linspace(0.0, 1.0, KNOTS), np.eye(KNOTS), bc_type="natural")
+
+
+class Unlisted(Cause):
+    """Learned curves over states of the device."""
+
+    id = "unlisted"
+    title = "the {output} also depends on something that is in no list"
+    formula = "y + f(z), z a state (filtered input or output, their squares and rates, path, last turn, rest)"
+    signature = "a curve over one state that predicts blocks of time that were left out"
+    excitation = "the state through its whole range, several times"
+    source = "Hastie and Tibshirani, Generalized Additive Models, 1990, chapter 6"
+    stage = "output"
+    order = 110
+    family = "unlisted"
+    strengths = 0
+
+    def __init__(self, parts: Sequence[Part] = ()) -> None:
+        self.parts = tuple(parts)
+
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """A constant and the values of the curve, of each part."""
+        curve = tuple(
+            Quantity(f"f{k}", "{y}", -_STEEPEST, _STEEPEST, _SMALL_CHANGE * frame.span)
+            for k in range(2, KNOTS + 1)
+        )
+        tau = Quantity("tau", "s", frame.dt_s, max(frame.length_s, 2.0 * frame.dt_s), _SMALL_TIME_S)
+        return (tau, *curve) * len(self.parts)
+
+    def constants(self) -> tuple[tuple[str, float, str], ...]:
+        """Return what is kept besides the parameters: name, value and unit."""
+        return tuple(
+            one
+            for part in self.parts
+            for one in (
+                ("state", float(part.state), "1"),
+                ("low", part.low, part.kind.unit),
+                ("high", part.high, part.kind.unit),
+            )
+        )
+
+    def restored(self, values: Values) -> tuple[Cause, Values]:
+        """Return the cause with its states, and its parameters, for the constants and parameters kept."""
+        count = len(values) // (_CONSTANTS + KNOTS)
+        kept = np.reshape(values[: _CONSTANTS * count], (count, _CONSTANTS))
+        parts = [Part(int(state), float(low), float(high)) for state, low, high in kept]
+        return Unlisted(parts), values[_CONSTANTS * count :]
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """None: it is learned only when no listed cause explains what is left."""
+        return []
+
+    def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
+        """Output (n,) after this cause."""
+        found = y
+        for k, part in enumerate(self.parts):
+            tau, *curve = values[k * KNOTS : (k + 1) * KNOTS]
+            found = found + part.columns(part.at(y, tau, frame, k)) @ np.asarray(curve)
+        return found

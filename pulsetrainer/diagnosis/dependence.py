@@ -1,0 +1,168 @@
+"""Which state of the device explains what is left: every one of a bank, scored on time that was left out.
+
+For each kind of state and each time constant of a grid the columns are curves over the state, less what the
+weights and the causes in the model can do. A ridge fit on the rest of the time predicts each of a few whole
+pieces of the record; the score is the fall of the squares there. The same is done with noise that looks like
+what the best state leaves, again and again: the p-value is the share of draws of which any state of the bank
+scores as much (Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 4.2).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, linalg, optimize
+
+from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.diagnosis.causes.base import Values, spread
+from pulsetrainer.diagnosis.causes.unlisted import KNOTS, STATES, Part
+from pulsetrainer.diagnosis.extended import shown_output
+from pulsetrainer.diagnosis.fitting import Fitted
+from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.noise import Noise, noise_in
+from pulsetrainer.diagnosis.screening import p_value
+from pulsetrainer.diagnosis.thresholds import LIMITS
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """The best state, with the start of a joint refit."""
+
+    part: Part
+    values: Values  # time constant, then the curve
+    gain: float  # fall of the squares on pieces that were left out
+    p_value: float  # over the whole bank
+
+
+class Bank:
+    """The states that go with one fitted model, and how they are projected."""
+
+    def __init__(self, fitted: Fitted, held_out: HeldOut, order: int) -> None:
+        self.fitted = fitted
+        self.piece = held_out.piece_of(LIMITS.pieces)
+        simulator = fitted.simulator
+        before = [term for term in fitted.terms if term.cause.order < order]
+        self.outputs = [
+            shown_output(before, y, frame)
+            for y, frame in zip(simulator.inner(fitted.terms), simulator.frames, strict=True)
+        ]
+        own = fitted.projector(fitted.slopes)
+        self.known = linalg.orth(own) if own.shape[1] else own
+        self.residual = self.project(fitted.residual[:, None])[:, 0]
+
+    def project(self, columns: FloatArray) -> FloatArray:
+        """Columns (count, k) less what weights and causes in the model can do."""
+        free = self.fitted.projector(columns)
+        free -= self.known @ (self.known.T @ free)
+        return free
+
+    def state(self, kind: int, tau: float) -> FloatArray:
+        """Averages (count,) of one state."""
+        frames = self.fitted.simulator.frames
+        signals = [STATES[kind].at(y, tau, f, "") for y, f in zip(self.outputs, frames, strict=True)]
+        return self.fitted.problem.bins.average(signals)
+
+    def columns(self, kind: int, tau: float) -> tuple[Part, FloatArray] | None:
+        """Curves (count, KNOTS - 1) over one state; None where it does not vary."""
+        z = self.state(kind, tau)
+        low, high = (float(one) for one in np.quantile(z, LIMITS.state_ends))
+        if not high > low:
+            return None
+        part = Part(kind, low, high)
+        return part, part.columns(z)
+
+    def curve(self, free: FloatArray) -> FloatArray:
+        """Ridge fit (KNOTS - 1,) of projected columns to the residual."""
+        gram = free.T @ free
+        return np.asarray(np.linalg.solve(gram + _penalty(gram), free.T @ self.residual))
+
+
+def best_dependence(
+    fitted: Fitted, held_out: HeldOut, order: int, rng: np.random.Generator
+) -> Dependence | None:
+    """Return the state that predicts best what is left, its time constant refined; None where none varies."""
+    bank = Bank(fitted, held_out, order)
+    frame = fitted.problem.frames[0]
+    slowest = LIMITS.slowest_state * frame.length_s
+    taus = spread(min(max(LIMITS.fastest_state_s, 2.0 * frame.dt_s), slowest), slowest, LIMITS.state_ratio)
+    found = []
+    for kind in range(len(STATES)):
+        made = [(tau, one) for tau in taus if (one := bank.columns(kind, tau)) is not None]
+        if made:
+            free = bank.project(np.hstack([columns for _, (_, columns) in made]))
+            parts = np.split(free.astype(np.float32), len(made), axis=1)
+            found += [(tau, part, own) for (tau, (part, _)), own in zip(made, parts, strict=True)]
+    if not found:
+        return None
+    scores = [_score(own, bank.residual[:, None], bank.piece)[0] for _, _, own in found]
+    tau, part, own = found[int(np.argmax(scores))]
+    axes = linalg.orth(own.astype(np.float64))
+
+    def free_of_both(columns: FloatArray) -> FloatArray:
+        left = bank.project(columns)
+        return np.asarray(left - axes @ (axes.T @ left))
+
+    problem = fitted.problem
+    like = noise_in(bank.residual, free_of_both, problem.bins, problem.measured, rng)
+    noise = bank.project(_drawn(like, LIMITS.draws, rng))
+    largest = np.max([_score(one, noise, bank.piece) for _, _, one in found], axis=0)
+    part, values = _refined(bank, part.state, tau)
+    return Dependence(part, values, max(scores), p_value(max(scores), largest))
+
+
+def _drawn(noise: Noise, draws: int, rng: np.random.Generator) -> FloatArray:
+    """Noise (count, draws) with a spectrum and a local size."""
+    drawn = np.empty((noise.bins.count, draws))
+    for own, at in noise.bins.places:
+        size = fft.next_fast_len(int(at[-1]) + 1, real=True)
+        lines = fft.rfft(rng.standard_normal((draws, size)), axis=1)
+        lines *= np.sqrt(noise.at(fft.rfftfreq(size)))
+        drawn[own] = fft.irfft(lines, size, axis=1)[:, at].T
+    return drawn * noise.scale[:, None]
+
+
+def _refined(bank: Bank, kind: int, tau: float) -> tuple[Part, Values]:
+    """Return the time constant near ``tau`` that fits best, and its curve."""
+
+    def left(log_tau: float) -> float:
+        made = bank.columns(kind, float(np.exp(log_tau)))
+        if made is None:
+            return float("inf")
+        free = bank.project(made[1])
+        return float(np.sum((bank.residual - free @ bank.curve(free)) ** 2))
+
+    near = (np.log(tau / LIMITS.state_ratio), np.log(tau * LIMITS.state_ratio))
+    best = optimize.minimize_scalar(
+        left, bounds=near, method="bounded", options={"xatol": LIMITS.state_settled}
+    )
+    tau = float(np.exp(best.x))
+    made = bank.columns(kind, tau)
+    assert made is not None
+    part, columns = made
+    return part, (tau, *bank.curve(bank.project(columns)).tolist())
+
+
+def _penalty(gram: FloatArray) -> FloatArray:
+    """Second differences of a curve whose first value is 0, weighted."""
+    bend = np.diff(np.eye(KNOTS), 2, axis=0)[:, 1:]
+    size = float(np.trace(gram)) / gram.shape[0]
+    return np.asarray(
+        LIMITS.curve_ridge * size * (bend.T @ bend + LIMITS.curve_ridge * np.eye(gram.shape[0]))
+    )
+
+
+def _score(free: NDArray[np.float32], signals: FloatArray, piece: IntArray) -> FloatArray:
+    """Falls (m,) of the squares of signals (count, m) on pieces left out of the fit of columns (count, k)."""
+    inside = [piece == k for k in range(LIMITS.pieces)]
+    own = [free[one].astype(np.float64) for one in inside]
+    grams = [one.T @ one for one in own]
+    along = [one.T @ signals[where] for one, where in zip(own, inside, strict=True)]
+    gram, whole = sum(grams), sum(along)
+    fall = np.zeros(signals.shape[1])
+    for one, here in zip(grams, along, strict=True):
+        rest = gram - one
+        curve = np.linalg.solve(rest + _penalty(gram), whole - here)
+        fall += 2.0 * np.sum(curve * here, axis=0) - np.sum(curve * (one @ curve), axis=0)
+    return fall

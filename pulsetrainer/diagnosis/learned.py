@@ -1,0 +1,112 @@
+"""What a learned dependence says: in words, with a figure of its curve, and as causes of the diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from pulsetrainer.artefacts import Dependence
+from pulsetrainer.artefacts.units import with_seconds, with_unit
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
+from pulsetrainer.diagnosis.dependence import Bank
+from pulsetrainer.diagnosis.finding import Estimate
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
+
+_OFFSETS = {"input": "u", "turn": "u", "output": "y"}  # states told from the zero of the quantity
+_TEXT = (
+    "the {output} also depends on something that is in no list: it is {way} by {size} when {state} {where}"
+)
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """One learned dependence, in the units of the record, its mean over the record taken off."""
+
+    part: Part
+    tau: float
+    at: FloatArray  # (k,)
+    value: FloatArray  # (k,)
+    half: FloatArray  # (k,) half width of the band
+
+
+def learned(state: State, words: Mapping[str, str]) -> tuple[Dependence, ...]:
+    """Return the dependences in the model of a diagnosis, each with its text, curve and parameters."""
+    term = next((one for one in state.extensions if isinstance(one.cause, Unlisted)), None)
+    if term is None or term.cause.id not in state.estimates:
+        return ()
+    assert isinstance(term.cause, Unlisted)
+    bank, rows, found = (
+        Bank(state.current, state.held_out, Unlisted.order),
+        state.estimates[term.cause.id],
+        [],
+    )
+    for k, part in enumerate(term.cause.parts):
+        own = slice(k * KNOTS, (k + 1) * KNOTS)
+        curve = _curve(state, bank, part, term.values[own], rows[own])
+        found.append(
+            Dependence(
+                text=_text(curve, state, words),
+                state=_said(curve, words),
+                unit="s" if part.kind.saturates else _unit(part.kind.unit, words),
+                tau_s=curve.tau,
+                at=curve.at,
+                value=state.question.given.model.polarity * curve.value
+                if state.question.given
+                else curve.value,
+                half=curve.half,
+                output_unit=words["y"],
+            )
+        )
+    return tuple(found)
+
+
+def _curve(
+    state: State, bank: Bank, part: Part, values: tuple[float, ...], rows: tuple[Estimate, ...]
+) -> _Curve:
+    scale, (tau, *knots) = state.scale, values
+    z = bank.state(part.state, tau)
+    low, high = (float(one) for one in np.quantile(z, LIMITS.curve_bulk))
+    places = np.linspace(max(low, part.low), min(high, part.high), LIMITS.curve_places)
+    value = part.columns(places) @ np.asarray(knots) - float(np.mean(part.columns(z) @ np.asarray(knots)))
+    half = np.abs(part.columns(places)) @ np.asarray([0.5 * (one.upper - one.lower) for one in rows[1:]])
+    at = places * scale.of_unit(part.kind.unit)
+    if part.kind.saturates:
+        at = -tau * scale.second * np.log1p(-np.minimum(places, 1.0 - LIMITS.same_value))
+    shift = {"u": scale.low, "y": scale.zero + scale.span * bank.fitted.simulator.frames[0].zero}
+    at = at + (shift[_OFFSETS[part.kind.name]] if part.kind.name in _OFFSETS else 0.0)
+    return _Curve(part, tau * scale.second, at, scale.span * value, half)
+
+
+def _text(curve: _Curve, state: State, words: Mapping[str, str]) -> str:
+    """Return the dependence in words: where the output is farthest from its mean, and by how much."""
+    sign = state.question.given.model.polarity if state.question.given else 1
+    value, unit = sign * curve.value, _unit(curve.part.kind.unit, words)
+    k = int(np.argmax(np.abs(value - np.median(value))))
+    first, last = LIMITS.curve_end * LIMITS.curve_places, (1.0 - LIMITS.curve_end) * LIMITS.curve_places
+    if first <= k <= last:
+        change, where = float(value[k] - np.median(value)), f"is near {_place(curve, k, unit)}"
+    else:
+        change = float(value[-1] - value[0])
+        where = f"goes from {_place(curve, 0, unit)} to {_place(curve, -1, unit)}"
+    size = with_unit(f"{abs(change):.2g}", words["y"])
+    way = "lower" if change < 0 else "higher"
+    return _TEXT.format(output=words["output"], way=way, size=size, state=_said(curve, words), where=where)
+
+
+def _said(curve: _Curve, words: Mapping[str, str]) -> str:
+    return curve.part.kind.words.format(
+        input=words["input"], output=words["output"], tau=with_seconds(float(f"{curve.tau:.2g}"))
+    )
+
+
+def _place(curve: _Curve, k: int, unit: str) -> str:
+    value = float(curve.at[k])
+    return with_seconds(value) if curve.part.kind.saturates else with_unit(f"{value:.2g}", unit)
+
+
+def _unit(unit: str, words: Mapping[str, str]) -> str:
+    return unit.replace("{u}", words["u"]).replace("{y}", words["y"])

@@ -1,0 +1,85 @@
+"""Unlisted: what no listed cause explains is sought in a bank of states.
+
+Where more is left than noise, the device may depend on something that is in no list. Its output is then
+fitted by a curve over one state after another: averages of input and output over many times, of their squares
+and speeds, how far each is from its average, the last turn, the way and the time since, and how long the
+input has rested. The state is taken that best predicts whole pieces of the time that were left out, if noise
+alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if it matters, and if,
+refitted with all weights, it repeats (`repetition`). The next one is sought in what is left, up to three.
+
+Where the listed causes found leave more than half unexplained, the search begins without them: they may have
+been taken for what they are not. They are then asked for again, beside the curve; and every cause, listed or
+not, must be missed when it is taken out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pulsetrainer.diagnosis.causes.unlisted import Part, Unlisted
+from pulsetrainer.diagnosis.dependence import best_dependence
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.repeats import repeats
+from pulsetrainer.diagnosis.stages import elimination, search
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
+
+_ID = Unlisted.id
+
+
+def stage(state: State) -> State:
+    """Return the state with learned dependences in the model, where they repeat."""
+    if not _more_is_left(state) or not state.question.timed or state.jagged:
+        return state
+    begun = state
+    if state.unexplained:
+        state = replace(state, current=state.baseline, p_values={}, without={})
+    found, p_value, doubtful = _learned(state)
+    if found is None:
+        said = (Evidence("not repeated", _ID),) if doubtful else ()
+        return replace(begun, evidence=(*begun.evidence, *said))
+    state = replace(state, current=found, p_values={**state.p_values, _ID: p_value})
+    if begun.current.squares <= found.squares:  # listed causes explain as much
+        return begun
+    if begun.unexplained:
+        state = search.stage(state)
+    return elimination.stage(state)
+
+
+def _more_is_left(state: State) -> bool:
+    return state.current.squares - state.floor.squares > state.floor.relevant
+
+
+def _learned(state: State) -> tuple[Fitted | None, float, bool]:
+    """Return the model with the dependences that repeat, its p-value, and whether one did not."""
+    current, largest = state.current, 0.0
+    parts: list[Part] = []
+    values: list[float] = []
+    while len(parts) < LIMITS.most_states:
+        best = best_dependence(current, state.held_out, Unlisted.order, state.question.rng)
+        if (
+            best is None
+            or best.p_value > LIMITS.p_max
+            or best.gain < LIMITS.linearised * state.floor.relevant
+        ):
+            return (current if parts else None), largest, False
+        trial = _refitted(state, current, [*parts, best.part], [*values, *best.values])
+        falls = current.squares - trial.squares > state.floor.relevant
+        if not falls or not repeats(state.held_out, current, trial):
+            return (current if parts else None), largest, falls and not parts
+        parts.append(best.part)
+        values = list(next(term.values for term in trial.terms if term.cause.id == _ID))
+        current, largest = trial, max(largest, best.p_value)
+        if current.squares - state.floor.squares <= state.floor.relevant:
+            break
+    return current, largest, False
+
+
+def _refitted(state: State, current: Fitted, parts: list[Part], values: list[float]) -> Fitted:
+    """Refit all weights and parameters together with the dependences."""
+    others = [term for term in current.terms if term.cause.id != _ID]
+    return refit(
+        state.problem, (*others, Term(Unlisted(parts), tuple(values))), current, rounds=LIMITS.learned_rounds
+    )

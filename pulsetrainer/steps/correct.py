@@ -1,0 +1,138 @@
+"""Correct: from a run and its diagnosis to the run without the faults of the measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pulsetrainer.artefacts import Diagnosis, Run
+from pulsetrainer.core import wild
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.asked import measured_of
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
+from pulsetrainer.diagnosis.raw import Raw
+from pulsetrainer.errors import DataError
+
+_DELAY = "delay"  # told by the caller: no record tells a recorder's from the device's
+
+
+def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequence[str] = ()) -> Run:
+    """Take out of a run what the measurement did to its output, as far as a diagnosis of it found that.
+
+        y <- (y - b - g (y - y0)), y - b t, y - A sin(2 pi f t + phi), y(t / (1 + e)), y(t + d)
+
+    Samples that cannot be restored (wild, clipped, beside a step) are taken between their neighbours and
+    named in ``masked``: no fit counts them. Coarse steps become what lies between them. What was taken out
+    is in ``corrected`` of the new run.
+
+    Parameters
+    ----------
+    delay_s
+        Constant delay of the output's recorder, s, if there is one: a diagnosis cannot tell it from a delay
+        of the device.
+    names
+        Names of the run and of the diagnosis, for messages.
+
+    Raises
+    ------
+    DataError
+        The diagnosis is of another run, found nothing that can be corrected, or the run has no time and a
+        delay.
+
+    Source: Ljung, System Identification, 1999, section 14.1: what is done to data before a fit.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> run, found = pt.load("tests/data/files-0.1/run.h5"), pt.load("tests/data/files-0.1/diagnosis.h5")
+    >>> pt.correct(run, found)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    pulsetrainer.errors.DataError: ...
+    """
+    run_name, diagnosis_name = names or ("the run", "the diagnosis")
+    known = {one.fingerprint: k for k, one in enumerate(diagnosis.records)}
+    parts = [(where, run.cut(where)) for where in run.slices]
+    if not any(part.fingerprint in known for _, part in parts):
+        raise DataError(
+            f"{diagnosis_name} is not a diagnosis of {run_name}: none of the records in it has these samples",
+            hint="give the run that was diagnosed, or diagnose this one: pulsetrainer diagnose",
+        )
+    if delay_s and run.dt_s is None:
+        raise DataError(
+            f"{run_name} has no time, so no delay can be taken out of it",
+            hint="import it again with --time COLUMN or --rate HZ",
+        )
+    faults = _faults(diagnosis)
+    if not faults and not delay_s:
+        raise DataError(_nothing(diagnosis, diagnosis_name), hint=_instead(diagnosis))
+    output = run.output.copy()
+    masked = np.zeros(output.size, dtype=bool) if run.masked is None else run.masked.copy()
+    for where, part in parts:
+        if part.fingerprint in known:
+            restored = _restored(part, diagnosis, faults, known[part.fingerprint], delay_s)
+            lost = np.isnan(restored) & np.isfinite(part.output)
+            output[where] = wild.repaired(restored, lost)
+            masked[where] |= lost
+    ids = [*([_DELAY] if delay_s else []), *(cause.id for cause, _ in faults)]
+    return replace(run, output=output, masked=masked if masked.any() else None, corrected=tuple(ids))
+
+
+def _faults(diagnosis: Diagnosis) -> list[tuple[Cause, Values]]:
+    """Faults of the measurement that were found, in the order in which they are undone."""
+    if diagnosis.quick:
+        return []
+    known = library()
+    found = [
+        (known[one.cause], tuple(p.value for p in one.parameters))
+        for one in diagnosis.found
+        if one.cause in known and known[one.cause].corrects
+    ]
+    # wild and clipped samples must not reach the others; what lies between steps is told from what is left
+    rank = {"record": 0, "output": 1}
+    return sorted(found, key=lambda pair: (2 if pair[0].jagged else rank[pair[0].stage], -pair[0].order))
+
+
+def _restored(
+    part: Run, diagnosis: Diagnosis, faults: Sequence[tuple[Cause, Values]], number: int, delay_s: float
+) -> FloatArray:
+    """Return the output (n,) of one part; NaN where nothing can be restored, or was measured."""
+    step_s, begin_s = diagnosis.records[number].step_s, diagnosis.records[number].begin_s
+    low, high = float(np.nanmin(part.input)), float(np.nanmax(part.input))
+    record, stamps = measured_of("the run", part, diagnosis.polarity, low, high)
+    good = np.isfinite(part.input) & np.isfinite(part.output)
+    if part.reference is not None:
+        good &= np.isfinite(part.reference)
+    even = np.asarray(np.arange(record.input.size) * record.step, dtype=np.float64)
+    begun = even if stamps is None else stamps
+    # the first average lies in the middle of its samples
+    late = 0.5 * (step_s - record.step) if record.timed else 0.0
+    taken = Taken(
+        Raw(record, low, high, stamps=stamps), begun - late, step_s, diagnosis.empty, number, begin_s
+    )
+    y = record.output
+    if delay_s:
+        y = np.interp(begun + delay_s, begun, y, right=np.nan)
+    for cause, values in faults:
+        y = cause.undo(y, values, taken)
+    restored = np.full(part.output.size, np.nan)
+    restored[good] = diagnosis.polarity * y
+    return np.where(good, restored, part.output)
+
+
+def _nothing(diagnosis: Diagnosis, name: str) -> str:
+    if diagnosis.quick:
+        return f"{name} only screened for causes and fitted none: there is nothing to correct"
+    return (
+        f"{name} ended with the verdict {diagnosis.verdict!r} and found no fault of the measurement that can "
+        "be taken out: there is nothing to correct"
+    )
+
+
+def _instead(diagnosis: Diagnosis) -> str:
+    if diagnosis.extended is not None:
+        return "extend the model: pulsetrainer extend DIAGNOSIS.h5 --model model.h5 -o extended.h5"
+    return "diagnose in full" if diagnosis.quick else "use the run as it is"

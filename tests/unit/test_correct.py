@@ -1,0 +1,171 @@
+"""Correct: each fault of a measurement, put into a record by its equation, is taken out again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from pulsetrainer.artefacts import Cause, Diagnosis, Parameter, Recorded
+from pulsetrainer.core.coarse import between_steps
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
+from pulsetrainer.errors import DataError
+
+RATE_HZ = 200.0
+SPAN = 10.0
+
+
+def _plant(n_h: int = 40) -> Preisach:
+    plane = Plane.uniform(0.0, 1.0, n_h)
+    i, j = plane.cell_indices
+    mass = (0.2 + np.exp(-(((i - j) / n_h - 0.2) ** 2) / 0.02)) * plane.areas
+    return Preisach(plane, 0.5 * SPAN * mass / mass.sum() / plane.areas, 0.5 * SPAN)
+
+
+@pytest.fixture(scope="module")
+def clean() -> pt.Run:
+    """Shrinking and growing loops, with a little noise."""
+    tips = np.concatenate([np.linspace(1, 0.2, 12), np.linspace(0.3, 1, 12)])
+    u = np.interp(
+        np.arange(6000), np.linspace(0, 5999, 2 * tips.size + 1), np.append(np.stack([0 * tips, tips], 1), 0)
+    )
+    y = _plant()(u) + 0.002 * SPAN * np.random.default_rng(1).standard_normal(u.size)
+    return pt.Run(time_s=np.arange(u.size) / RATE_HZ, input=u, output=y, input_unit="A", output_unit="N")
+
+
+def _diagnosis(
+    run: pt.Run, name: str, *, polarity: int = 1, step_s: float | None = None, **values: float
+) -> Diagnosis:
+    """Return a diagnosis of a run that found one cause."""
+    found = Cause(name, True, 0.005, 90.0, 90.0, tuple(Parameter(n, v, "1", v, v) for n, v in values.items()))
+    empty = np.empty(0)
+    return Diagnosis(
+        name, False, *[0.0] * 6, (found,), (), "", (), *[empty] * 5,
+        records=(Recorded(run.fingerprint, step_s or run.dt_s),), polarity=polarity, empty=0.0,
+    )  # fmt: skip
+
+
+def _added(name, y, t):
+    """Output with a fault, and the parameters that say it."""
+    if name == "offset-drift":
+        return y + 0.02 * t, {"rate": 0.02}
+    if name == "step":
+        return np.where(t > 12, 0.4 + 1.03 * y, y), {"offset": 0.4, "gain": 0.03, "time": 12.0}
+    if name == "periodic":
+        phase = 2 * np.pi * 7.3 * t
+        return y + 0.2 * np.sin(phase) - 0.1 * np.cos(phase), {"sine": 0.2, "cosine": -0.1, "frequency": 7.3}
+    return np.interp(t * 0.999, t, y), {"skew": -0.001}
+
+
+@pytest.mark.parametrize("name", ["offset-drift", "step", "periodic", "clock-skew"])
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_what_was_added_is_taken_out(clean, name, polarity):
+    """To the last digits where it was added, to what noise interpolates where time was stretched."""
+    spoilt, values = _added(name, polarity * clean.output, clean.time_s)
+    run = replace(clean, output=polarity * spoilt)
+    done = pt.correct(run, _diagnosis(run, name, polarity=polarity, **values))
+    kept = slice(None) if done.masked is None else ~done.masked
+    assert done.corrected == (name,)
+    error = np.abs(done.output - clean.output)[kept]
+    assert np.median(error) < (0.02 if name == "clock-skew" else 1e-9)
+    assert np.abs(run.output - clean.output).max() > 0.1
+    lost = 0 if done.masked is None else int(done.masked.sum())
+    assert {"step": 20, "clock-skew": 7}.get(name, 0) >= lost >= {"step": 18, "clock-skew": 4}.get(name, 0)
+
+
+def test_a_hum_sought_in_averages_keeps_its_phase(clean):
+    """The first average of eight samples lies three and a half samples after the first sample."""
+    wide = 8 / RATE_HZ
+    since = clean.time_s - 3.5 / RATE_HZ
+    run = replace(clean, output=clean.output + 0.3 * np.sin(2 * np.pi * 9.0 * since))
+    done = pt.correct(run, _diagnosis(run, "periodic", step_s=wide, sine=0.3, cosine=0.0, frequency=9.0))
+    np.testing.assert_allclose(done.output, clean.output, atol=1e-9)
+
+
+def test_wild_and_clipped_samples_are_masked_and_no_fit_counts_them(clean):
+    """Every one of them, and the model of the corrected run does not depend on what they were."""
+    bad = np.arange(50, 6000, 97)
+    wild = clean.output.copy()
+    wild[bad] += 4.0
+    run = replace(clean, output=wild)
+    done = pt.correct(run, _diagnosis(run, "outliers", size=4.0))
+    assert done.masked is not None
+    assert np.array_equal(np.flatnonzero(done.masked), bad)
+    assert np.abs(done.output - clean.output).max() < 0.5
+    other = replace(done, output=np.where(done.masked, done.output + 1.0, done.output))
+    np.testing.assert_array_equal(pt.identify(done, levels=12).weights, pt.identify(other, levels=12).weights)
+
+    rail = 0.75 * SPAN
+    cut = replace(clean, output=np.minimum(clean.output, rail))
+    done = pt.correct(cut, _diagnosis(cut, "saturation", size=rail))
+    assert done.masked is not None
+    assert np.all(done.masked[clean.output >= rail])
+    assert done.masked.mean() < 0.25
+    seen = replace(clean, output=_plant()(clean.input), masked=clean.output >= rail)
+    models = [pt.identify(one, levels=24, form="direct") for one in (cut, done)]
+    assert pt.evaluate(seen, models).models[1].gain_percent > 50
+
+
+def test_a_masked_sample_is_no_error(clean):
+    """Evaluate counts what was measured only."""
+    model = pt.identify(clean, levels=12)
+    spoilt = replace(clean, output=np.where(np.arange(6000) % 50 == 3, 99.0, clean.output))
+    told = replace(spoilt, masked=np.arange(6000) % 50 == 3)
+    whole, masked = (pt.evaluate(one, [model]).models[0].rms for one in (clean, told))
+    assert masked == pytest.approx(whole, rel=0.02)
+    assert pt.evaluate(spoilt, [model]).models[0].rms > 5 * whole
+
+
+def test_between_coarse_steps_lies_what_the_hysteresis_says(clean):
+    """The error of the steps falls to a third, within each step; noise beyond the step is left alone."""
+    true, q = _plant()(clean.input), 0.04 * SPAN
+    coarse = q * np.round(true / q)
+    plane = Plane.uniform(0.0, 1.0, 24)
+    done = between_steps(Record(clean.input, coarse), plane, q)
+    assert np.abs(done - coarse).max() <= 0.5 * q * (1 + 1e-9)
+    assert np.std(done - true) < 0.33 * np.std(coarse - true)
+    noisy = q * np.round((true + q * np.random.default_rng(0).standard_normal(true.size)) / q)
+    assert between_steps(Record(clean.input, noisy), plane, q) is noisy
+
+
+def test_a_recorders_delay_is_taken_out_only_when_told(clean):
+    """The output on the clock of the input; its last samples are not known."""
+    late = replace(clean, output=np.interp(clean.time_s - 0.1, clean.time_s, clean.output))
+    nothing = _diagnosis(late, "creep", amplitude=0.1, tau=1.0)
+    done = pt.correct(late, nothing, delay_s=0.1)
+    assert done.corrected == ("delay",)
+    assert done.masked is not None
+    assert done.masked.sum() in (20, 21)
+    np.testing.assert_allclose(done.output[~done.masked], clean.output[~done.masked], atol=1e-9)
+    with pytest.raises(DataError):
+        pt.correct(late, nothing)
+
+
+def test_a_diagnosis_of_another_run_is_refused(clean):
+    """One sample that differs is another run; a corrected run is another one too."""
+    found = _diagnosis(clean, "offset-drift", rate=0.1)
+    other = replace(clean, output=np.append(clean.output[:-1], 0.0))
+    with pytest.raises(DataError, match="not a diagnosis"):
+        pt.correct(other, found)
+    with pytest.raises(DataError):
+        pt.correct(pt.correct(clean, found), found)
+
+
+def test_a_part_that_was_not_diagnosed_stays_as_it_is(clean):
+    """Parts too short to be diagnosed are kept; each of the others is corrected from its own first sample."""
+    seam = np.zeros(6000, dtype=bool)
+    seam[[3000, 5950]] = True
+    run = replace(clean, seam=seam)
+    first, second, short = (run.cut(part) for part in run.slices)
+    found = _diagnosis(first, "offset-drift", rate=0.1)
+    found = replace(found, records=(*found.records, Recorded(second.fingerprint, 1 / RATE_HZ)))
+    done = pt.correct(run, found)
+    added = clean.output - done.output
+    np.testing.assert_allclose(added[:3000], 0.1 * np.arange(3000) / RATE_HZ, atol=1e-9)
+    np.testing.assert_allclose(added[3000:5950], 0.1 * np.arange(2950) / RATE_HZ, atol=1e-9)
+    assert not added[5950:].any()
+    assert short.input.size == 50

@@ -1,0 +1,202 @@
+"""Dependences that are in no list: found, put into words, extended; and what does not repeat is not added."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from pulsetrainer.artefacts import Extension, Parameter
+from pulsetrainer.core import excitations
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.unlisted import KNOTS, STATES, Part, Unlisted
+from pulsetrainer.diagnosis.repeats import repeats
+from pulsetrainer.errors import DataError
+
+RATE_HZ = 100.0
+DT_S = 1.0 / RATE_HZ
+SPAN = 10.0
+NAMES = {state.name: k for k, state in enumerate(STATES)}
+
+
+def _static(u):
+    plane = Plane.uniform(0.0, 1.5, 40)
+    i, j = plane.cell_indices
+    mass = (0.3 + np.exp(-(((i - j) / 40 - 0.2) ** 2) / 0.02)) * plane.areas
+    return Preisach(plane, 0.5 * SPAN * mass / mass.sum() / plane.areas, 0.5 * SPAN)(u)
+
+
+def _average(u, tau_s, dt_s):
+    """A first-order average, by Euler's rule in tenths of a sample."""
+    fine = np.interp(np.arange(10 * u.size) / 10, np.arange(u.size), u)
+    for k in range(1, fine.size):
+        fine[k] = fine[k - 1] + (fine[k] - fine[k - 1]) * 0.1 * dt_s / tau_s
+    return fine[::10]
+
+
+def _run(u, y):
+    y = y + 0.001 * SPAN * np.random.default_rng(u.size).standard_normal(u.size)
+    return pt.Run(time_s=np.arange(u.size) * DT_S, input=u, output=y)
+
+
+def _dip(u, dt_s=DT_S, tau_s=0.4):
+    """A force that is lower by 0.5 N while the average current is near 0.7 A."""
+    return _static(u) - 0.5 * np.exp(-0.5 * ((_average(u, tau_s, dt_s) - 0.7) / 0.15) ** 2)
+
+
+# --- states -----------------------------------------------------------------------------------------------
+U = np.concatenate(
+    [np.linspace(0, 1, 50), np.full(100, 1.0), np.linspace(1, 0.4, 30), np.linspace(0.4, 0.9, 20)]
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "expected"),
+    [
+        ("turn", [40, 170, 199], [0.0, 1.0, 0.4]),
+        ("way", [149, 179, 199], [1.0, 0.54, 0.45]),
+        ("input change", [49, 149], [None, 0.0]),
+        ("input rate", [149, 178], [0.0, 0.6 / 29 / DT_S]),
+        ("output squared", [149], [4.0]),
+    ],
+)
+def test_what_a_state_is(name, at, expected):
+    """Told by a ramp, a rest and a turn, with a time constant far below them."""
+    frame = Frame(DT_S, U, 1.0, 1.0, ends=(3.0, 5.0), zero=3.0)
+    z = STATES[NAMES[name]].at(3.0 + 2.0 * U, 0.02, frame, "x")
+    for k, value in zip(at, expected, strict=True):
+        if value is not None:
+            assert z[k] == pytest.approx(value, abs=0.02), k
+
+
+def test_rest_and_time_since_a_turn_are_times():
+    """Both as the share 1 - exp(-time / tau)."""
+    frame = Frame(DT_S, U, 1.0, 1.0)
+    for name, begun, end in (("rest", 49, 149), ("since turn", 151, 175)):
+        z = STATES[NAMES[name]].at(U, 0.5, frame, "x")
+        assert -0.5 * np.log1p(-z[end]) == pytest.approx((end - begun) * DT_S, abs=3 * DT_S)
+
+
+def test_a_curve_goes_through_its_knots_and_stays_level_beyond_them():
+    """The first value is 0."""
+    part, values = Part(0, 1.0, 2.0), np.arange(1.0, KNOTS)
+    z = np.linspace(1.0, 2.0, KNOTS)
+    np.testing.assert_allclose(part.columns(z) @ values, [0.0, *values], atol=1e-12)
+    np.testing.assert_allclose(part.columns(np.asarray([-5.0, 9.0])) @ values, [0.0, values[-1]], atol=1e-12)
+
+
+def test_what_a_model_keeps_of_it_brings_it_back():
+    """States, ends, constants and curves of several."""
+    cause = Unlisted([Part(0, 0.0, 1.5), Part(4, 0.2, 3.0)])
+    values = tuple(float(k) for k in range(2 * KNOTS))
+    kept = (*(value for _, value, _ in cause.constants()), *values)
+    again, same = Unlisted().restored(kept)
+    assert isinstance(again, Unlisted)
+    assert (again.parts, same) == (cause.parts, values)
+
+
+# --- the whole --------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def dipping():
+    """A device with a dip, its model and its diagnosis."""
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    run = _run(u, _dip(u))
+    model = pt.identify(run, levels=32, form="direct")
+    return model, pt.diagnose(run, model)
+
+
+def test_a_dip_over_the_average_current_is_found_and_said(dipping):
+    """Its state, its time constant within 20 %, its depth, its place and its way, in words and as a curve."""
+    _, found = dipping
+    assert found.verdict == "unlisted"
+    (cause,) = found.found
+    tau = next(one for one in cause.parameters if one.name == "tau")
+    assert tau.value == pytest.approx(0.4, rel=0.2)
+    for words in ("in no list", "lower by 0.", " N ", "average current of the last", "near 0."):
+        assert words in cause.text
+    (curve,) = found.dependences
+    assert curve.at[np.argmin(curve.value)] == pytest.approx(0.7, abs=0.1)
+    assert np.ptp(curve.value) == pytest.approx(0.5, rel=0.25)
+    assert np.all(curve.half > 0)
+    assert (curve.unit, curve.output_unit) == ("A", "N")
+
+
+def test_it_is_a_term_of_the_model_like_any_other(dipping, tmp_path):
+    """Stored and read back, it predicts a run never fitted, and the inverse undoes it."""
+    model, found = dipping
+    pt.save(pt.extend(model, found), tmp_path / "extended.h5")
+    extended = pt.load(tmp_path / "extended.h5")
+    u = excitations.identification(0.0, 1.5, n_h=10, speed=4.0, rate_Hz=RATE_HZ).value
+    fresh = _run(u, _dip(u))
+    assert pt.evaluate(fresh, [model, extended]).models[1].gain_percent > 60
+    t = np.arange(1200) * DT_S
+    target = 4.0 + 2.0 * np.sin(2 * np.pi * 0.5 * t)
+    errors = []
+    for one in (model, extended):
+        drive = pt.invert((t, target), one, periods=1)
+        errors.append(np.std((_dip(drive.compensated, drive.time_s[1]) - drive.target)[drive.scored]))
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_a_run_of_its_own_decides(dipping):
+    """With the same dip the cause is added; a device without it says that it does not repeat."""
+    model, found = dipping
+    u = excitations.identification(0.0, 1.5, n_h=10, speed=4.0, rate_Hz=RATE_HZ).value
+    assert pt.extend(model, found, verify=_run(u, _dip(u))).extensions[0].cause == "unlisted"
+    with pytest.raises(DataError, match="does not repeat"):
+        pt.extend(model, found, verify=_run(u, _static(u)))
+    with pytest.raises(DataError, match="no time"):
+        pt.extend(model, found, verify=replace(_run(u, _dip(u)), time_s=None))
+
+
+def test_of_two_causes_the_one_that_harms_is_left_out(dipping):
+    """The other stays."""
+    model, found = dipping
+    assert found.extended is not None
+    lag = Extension("output-lag", (Parameter("tau", 0.2, "s", 0.1, 0.3),))
+    both = replace(found.extended, extensions=(lag, *found.extended.extensions))
+    u = excitations.identification(0.0, 1.5, n_h=10, speed=4.0, rate_Hz=RATE_HZ).value
+    kept = pt.extend(model, replace(found, extended=both), verify=_run(u, _dip(u)))
+    assert [one.cause for one in kept.extensions] == ["unlisted"]
+
+
+def test_another_model_is_refused(dipping):
+    """Of the same range and the same units, but not the one that was diagnosed."""
+    model, found = dipping
+    with pytest.raises(DataError, match="not the model"):
+        pt.extend(replace(model, offset=model.offset + 1.0), found)
+
+
+class _Pieces:
+    """Errors on pieces of a fit that is known by its squares alone."""
+
+    def __init__(self, **errors):
+        self.errors = errors
+
+    def pieces(self, fitted, count):
+        return np.asarray(self.errors[fitted.name], dtype=float)
+
+
+class _Fit:
+    def __init__(self, name, squares):
+        self.name, self.squares = name, squares
+
+
+@pytest.mark.parametrize(
+    ("after", "expected"),
+    [
+        ([1.0, 1.0, 1.0, 1.0, 1.0], True),
+        ([1.0, 1.0, 1.0, 1.0, 2.2], True),  # a little worse on one piece
+        ([0.0, 0.0, 0.0, 0.0, 4.0], False),  # much worse on one
+        ([1.8, 1.8, 1.8, 1.8, 1.8], False),  # hardly better on any
+        ([], False),  # too short a record to leave pieces out
+    ],
+)
+def test_what_repeats(after, expected):
+    """Half of what the fit gains, and no piece worse by a tenth of it."""
+    held_out = _Pieces(before=[2.0] * 5, after=after)
+    assert repeats(held_out, _Fit("before", 10.0), _Fit("after", 5.0)) is expected
