@@ -1,0 +1,78 @@
+"""The command `correct`: what it says and writes, and what it refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from program import pulsetrainer
+from pulsetrainer.artefacts import Cause, Diagnosis, Parameter, Recorded
+
+
+def _diagnosis(run: pt.Run, verdict: str, causes: tuple[Cause, ...]) -> Diagnosis:
+    lists = (causes, (), "", ())
+    told = Diagnosis(verdict, False, *[0.0] * 6, *lists, *[np.empty(0)] * 5)
+    return replace(
+        told, records=(Recorded(run.fingerprint, 0.01),), correctable=tuple(c.cause for c in causes)
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A run with a drift and five wild samples, its diagnosis; another run; one that found nothing."""
+    path = tmp_path_factory.mktemp("correct")
+    t = np.arange(2000) / 100
+    u = 0.5 - 0.5 * np.cos(t)
+    y = u**2 + 0.001 * np.random.default_rng(1).standard_normal(t.size)
+    spoilt = y + 0.01 * t
+    spoilt[100:600:100] += 3.0
+    run = pt.Run(time_s=t, input=u, output=spoilt)
+    drift = Cause("offset-drift", True, 0.005, 90.0, 90.0, (Parameter("rate", 0.01, "N/s", 0.009, 0.011),))
+    wild = Cause("outliers", True, None, 0.0, 0.0, (Parameter("size", 3.0, "N", 3.0, 3.0),))
+    pt.save(run, path / "run.h5")
+    pt.save(replace(run, output=y), path / "other.h5")
+    pt.save(_diagnosis(run, "offset-drift", (drift, wild)), path / "diagnosis.h5")
+    pt.save(_diagnosis(run, "none", ()), path / "none.h5")
+    return path
+
+
+def test_it_says_what_was_corrected_and_masks_the_rest(folder):
+    """The ids, the number of samples left out, and the run itself."""
+    words = ("correct", "run.h5", "--diagnosis", "diagnosis.h5", "-o", "corrected.h5", "--json")
+    done = pulsetrainer(folder, *words)
+    assert done.code == 0, done
+    assert done.json["corrected"] == ["outliers", "offset-drift"]
+    assert done.json["masked_samples"] == 5
+    corrected, clean = pt.load(folder / "corrected.h5"), pt.load(folder / "other.h5")
+    assert np.flatnonzero(corrected.masked).tolist() == [100, 200, 300, 400, 500]
+    np.testing.assert_allclose(corrected.output, clean.output, atol=0.01)
+    fitted = pulsetrainer(folder, "identify", "corrected.h5", "--levels", "12", "-o", "m.h5", "--json")
+    assert fitted.json["masked_samples"] >= 5
+
+
+@pytest.mark.parametrize(
+    ("run", "diagnosis", "words"),
+    [
+        ("other.h5", "diagnosis.h5", "diagnosis.h5 is not a diagnosis of other.h5"),
+        ("run.h5", "none.h5", "there is nothing to correct"),
+    ],
+)
+def test_what_cannot_be_corrected_is_refused_and_nothing_is_written(folder, run, diagnosis, words):
+    """A diagnosis of another run; a verdict with nothing to take out."""
+    done = pulsetrainer(folder, "correct", run, "--diagnosis", diagnosis, "-o", "no.h5", "--json")
+    assert done.code == 3
+    assert words in done.json["error"]["message"]
+    assert done.json["error"]["hint"]
+    assert not list(folder.glob("no.h5*"))
+
+
+def test_extend_points_at_correct(folder):
+    """Where only the measurement is at fault."""
+    model = pt.identify(pt.load(folder / "other.h5"), levels=12)
+    pt.save(model, folder / "model.h5", overwrite=True)
+    done = pulsetrainer(folder, "extend", "diagnosis.h5", "--model", "model.h5", "-o", "no.h5", "--json")
+    assert done.code == 3
+    assert "pulsetrainer correct" in done.json["error"]["hint"]
