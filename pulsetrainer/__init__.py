@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from pulsetrainer.api import invert, load, open_device, read_table, save, session, tune
     from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
     from pulsetrainer.steps.capture import capture
+    from pulsetrainer.steps.check import check
     from pulsetrainer.steps.compare import compare
     from pulsetrainer.steps.correct import correct
     from pulsetrainer.steps.diagnose import diagnose
@@ -39,6 +40,7 @@ __all__ = [
     "Waveform",
     "__version__",
     "capture",
+    "check",
     "compare",
     "correct",
     "diagnose",
@@ -63,7 +65,7 @@ _HOME = {
     **{
         verb: f"steps.{verb}"
         for verb in (
-            *("capture", "compare", "correct", "diagnose", "evaluate"),
+            *("capture", "check", "compare", "correct", "diagnose", "evaluate"),
             *("extend", "identify", "play", "refine"),
         )
     },

@@ -41,6 +41,7 @@ WRITERS = (
         (*_h5(), ("--html", "out.html")),
         ("model.h5",),
     ),
+    Writer("check", ("check", "model.h5", "--update"), _h5(), ("model.h5",)),
     Writer("evaluate", ("evaluate", "played.h5"), _h5(), ("played.h5",)),
     Writer("evaluate --html", ("evaluate", "played.h5"), (*_h5(), ("--html", "out.html")), ("played.h5",)),
     Writer("evaluate --model", ("evaluate", "run.h5", "--model", "model.h5"), _h5(), ("run.h5", "model.h5")),

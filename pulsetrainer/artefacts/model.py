@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pulsetrainer.artefacts.data import Attribute, BoolArray, Data, FloatArray
+from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.artefacts.shown import Shown
 from pulsetrainer.errors import DataError
 
@@ -127,6 +128,7 @@ class Model(Shown):
     extensions: tuple[Extension, ...] = ()
     form: str = "direct"  # "direct" | "dual" | "signed"
     captured: bool = True  # on our own device; files of 0.1 do not say, and were
+    coil: Coil | None = None  # of the first run that has one
     edges_unit: str = ""  # of the input, of a dual model of the output: follows from the form
     offset_unit: str = ""  # of the output, of a dual model of the input: follows from the form
 

@@ -37,4 +37,8 @@ class Playback(Shown):
     input_unit: str = "A"
     complete: bool = True
     dropped_samples: int = 0
+    # (r,) before each compensated drive, where the heat was tracked
+    temperature_K: Annotated[
+        FloatArray | None, Data("K", "copper warmer than at calibration", "repeat", path="temperature")
+    ] = None
     fault: str = ""  # why the device stopped early; empty where it did not

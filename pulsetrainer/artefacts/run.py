@@ -13,6 +13,19 @@ from pulsetrainer.artefacts.data import BoolArray, Data, FloatArray, check_equal
 from pulsetrainer.artefacts.shown import Shown
 
 
+@dataclass(frozen=True, slots=True)
+class Coil:
+    """What the duty told of the coil while the device recorded: see ``core.temperature``."""
+
+    duty_per_A: Annotated[float, Data("1/A", "duty for a current, cold coil")]
+    duty_offset: Annotated[float, Data("1", "duty for the free-wheeling diode")]
+    duty_s_per_A: Annotated[float, Data("s/A", "duty for a rate of the current")]
+    rise_per_A2: Annotated[float, Data("1/A^2", "rise of the resistance by the heat of the current")]
+    rise_error_per_A2: Annotated[float, Data("1/A^2", "standard deviation of that")]
+    rise_tau_s: Annotated[float, Data("s", "time constant of that heat")]
+    serial: str = ""  # of the device
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Run(Shown):
     """What a device, or a table from any bench, reported: nothing that a real device does not know."""
@@ -39,6 +52,7 @@ class Run(Shown):
     # (n,) true where the output is no measurement: left out of every fit and every error. None: all count
     masked: Annotated[BoolArray | None, Data("1", "sample is left out", "time")] = None
     corrected: tuple[str, ...] = ()  # causes that were taken out of it
+    coil: Coil | None = None  # of a device that tells the duty
 
     def __post_init__(self) -> None:
         check_equal_length(self, ("time_s", "input", "output", "reference", "seam", "masked"))

@@ -10,6 +10,7 @@ import typer
 
 from pulsetrainer.cli import (
     capture,
+    check,
     compare,
     correct,
     diagnose,
@@ -55,6 +56,7 @@ app.command("correct")(correct.correct)
 app.command("export")(export.export)
 app.command("session")(session.session)
 app.command("refine")(refine.refine)
+app.command("check")(check.check)
 app.command("tune")(tune.tune)
 app.command("show")(show.show)
 app.command("plot")(plot.plot)

@@ -183,6 +183,7 @@ def _record(
                 course, device, recorder, tally,
                 at=at, condition_first=condition, progress=progress, watch=watch,
             )  # fmt: skip
+            recorder.coil = ending.coil
             recorder.finish(complete=ending.complete)
         raise_if_stopped(ending.fault, ending.remedy, "the capture")
     except (DeviceError, Interrupted) as error:

@@ -36,6 +36,15 @@ DryRun = Annotated[
 ShowLive = Annotated[
     bool, typer.Option("--live", help="Draw the loop on the terminal while it grows; quiet in a pipe.")
 ]
+TrackHeat = Annotated[
+    bool | None,
+    typer.Option(
+        "--track-heat/--no-track-heat",
+        help="Tell the coil's temperature from the duty and make up for the force it costs; "
+        "default: where the model has a thermal term and was captured with the duty.",
+        show_default=False,
+    ),
+]
 LimitCurrent = Annotated[
     float | None,
     typer.Option(

@@ -9,7 +9,17 @@ import typer
 
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port, ShowLive
+from pulsetrainer.cli.options import (
+    AsJson,
+    DryRun,
+    LimitCurrent,
+    LimitForce,
+    Out,
+    Overwrite,
+    Port,
+    ShowLive,
+    TrackHeat,
+)
 from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
@@ -30,6 +40,7 @@ def play(
         int,
         typer.Option(min=1, help="How often each of the two drives is played.", envvar=variable("repeats")),
     ] = 5,
+    track_heat: TrackHeat = None,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
     live: ShowLive = False,
@@ -62,7 +73,9 @@ def play(
     with job.working(f"playing {drive.name}", view) as progress, job.open_device(port, limits) as device:
         info = device.info
         try:
-            played = press(waveform, device, repeats=repeats, progress=progress, watch=watch)
+            played = press(
+                waveform, device, repeats=repeats, track_heat=track_heat, progress=progress, watch=watch
+            )
         except PulsetrainerError as error:
             if not isinstance(error.kept, Playback):
                 raise
@@ -124,6 +137,7 @@ def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
             "seconds": seconds,
             "dropped_samples": played.dropped_samples,
             "complete": played.complete,
+            "temperature_K": played.temperature_K,
             "serial": info.serial,
             "firmware": info.firmware,
         }
@@ -134,8 +148,16 @@ def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
             "repeats": f"{repeats} of each drive, {seconds:.1f} s in all",
             "samples": f"{drive.time_s.size} a repeat",
             "lost": f"{played.dropped_samples} samples",
+            **_warmth(played),
         },
     )
+
+
+def _warmth(played: Playback) -> dict[str, str]:
+    kelvin = played.temperature_K
+    if kelvin is None or not kelvin.size:
+        return {}
+    return {"coil": f"{kelvin[0]:+.1f} to {kelvin[-1]:+.1f} K against calibration, made up for"}
 
 
 def _plan(job: Job, out: Path, port: str | None, drive: Waveform, repeats: int, limits: Limits) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port
+from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port, TrackHeat
 from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
@@ -74,6 +74,7 @@ def session(
     html: Annotated[
         Path | None, typer.Option(help="Score sheet to write.", show_default=False, envvar=variable("html"))
     ] = None,
+    track_heat: TrackHeat = None,
     port: Port = None,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
@@ -123,7 +124,8 @@ def session(
 
     loaded = job.load(model, Model)
     check_model(loaded)
-    _press(job, out, html, asked, loaded, port, Limits(limit_current_A, limit_force_N))
+    limits = Limits(limit_current_A, limit_force_N)
+    _press(job, out, html, asked, loaded, port, limits, track_heat=track_heat)
 
 
 @dataclass
@@ -181,6 +183,8 @@ def _press(
     model: Model,
     port: str | None,
     limits: Any,
+    *,
+    track_heat: bool | None,
 ) -> None:
     """Press, record, save and say."""
     from pulsetrainer.cli import live
@@ -230,6 +234,7 @@ def _press(
                 rhythm=rhythm,
                 rates=rates,
                 lead_s=LEAD_S if dark or blind else LIVE_LEAD_S,
+                track_heat=track_heat,
                 watch=watch,
             )
             quiz = chosen.quiz(out.stem) if isinstance(chosen, Blind) else None
@@ -319,6 +324,7 @@ def _tell(
         "force_range_N": (done.reach.low, done.reach.high),
         "clipped_samples": done.clipped,
         "dropped_samples": done.dropped,
+        "temperature_K": [kelvin for _, kelvin in done.temperature] or None,
         "serial": info.serial,
         "firmware": info.firmware,
     }
@@ -332,6 +338,9 @@ def _tell(
         f"{done.figures['amplitude_cv_percent']:.2f} % of height",
         "underruns": done.underruns,
     }
+    if done.temperature:
+        kelvins = [kelvin for _, kelvin in done.temperature]
+        rows["coil"] = f"{kelvins[0]:+.1f} to {kelvins[-1]:+.1f} K against calibration, made up for"
     if quiz is not None:
         result = score(quiz)
         payload["quiz"] = {

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Run
+from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.errors import ArgumentError, DataError, PulsetrainerError
 from pulsetrainer.files import journal, store
 from pulsetrainer.files.atomic_write import cannot_write, check_output
@@ -93,6 +94,7 @@ class RunRecorder:
         self._last_time = -np.inf
         self._seams: list[int] = []  # numbers of the samples that come first after a pause
         self._complete: bool | None = None  # None: not finished
+        self.coil: Coil | None = None  # set it before the end, where it is known
         self.dropped_samples = 0  # set it as losses become known: an interrupted run tells them too
         if earlier is not None and is_journal(earlier[0]):
             self.partial, self._lease = earlier[0], Lease(earlier[0])
@@ -251,7 +253,7 @@ class RunRecorder:
         values: dict[str, Any] = dict.fromkeys(COLUMNS, Later(self._samples)) | self._texts
         values |= {"complete": self._complete, "dropped_samples": self.dropped_samples}
         values["seam"] = seam if starts else None
-        values |= {"masked": None, "corrected": ()}
+        values |= {"masked": None, "corrected": (), "coil": self.coil}
         store.write_fields(self._final, Run, values, self._header, overwrite=self._overwrite, fill=self._fill)
 
     def _fill(self, file: h5py.File) -> None:

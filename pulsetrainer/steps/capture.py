@@ -89,7 +89,7 @@ def capture(
     ending = record(
         Course(played, repeats), device, memory, tally, condition_first=condition, progress=progress
     )
-    run = memory.run(played.name, complete=ending.complete)
+    run = memory.run(played.name, complete=ending.complete, coil=ending.coil)
     raise_if_stopped(ending.fault, ending.remedy, "the capture", run)
     if run is None:
         raise DeviceError("the device told no samples", hint="check the line to it")

@@ -109,6 +109,9 @@ class Conductor:
         Of the coil at the start, of the limit.
     heated
         Heat (n,) that a current (n,) at a rate gives a cold coil, and the time constant of its cooling, s.
+    loss
+        Share of the force that is lost beyond what the model knows, asked for each piece: the target is
+        raised by it.
     """
 
     def __init__(
@@ -123,6 +126,7 @@ class Conductor:
         heat: float,
         heated: Callable[[FloatArray, float], FloatArray],
         cooling_s: float,
+        loss: Callable[[], float] = lambda: 0.0,
     ) -> None:
         from pulsetrainer.diagnosis.piecewise import Piecewise
 
@@ -132,6 +136,7 @@ class Conductor:
         self._plane = extended.static.plane
         self._rest_force = extended.polarity * (extended.static.offset - extended.static.total)
         self._heat, self._heated, self._cooling_s = heat, heated, cooling_s
+        self._loss = loss
         self._samples = 0
         self._number = 0
         self.clipped = 0
@@ -214,10 +219,12 @@ class Conductor:
         return force + (self._rest_force - force) * _smooth(np.arange(count) / count)
 
     def _inverted(self, target: FloatArray, ahead: FloatArray, beat: Beat | None = None) -> FloatArray:
-        piece = self._inverse.next(target, ahead)
+        left = 1.0 - self._loss()
+        rest = self._rest_force
+        piece = self._inverse.next(rest + (target - rest) / left, rest + (ahead - rest) / left)
         if beat is not None:
             self.clipped += piece.clipped
-        return self._given(piece.input, target, piece.predicted, beat)
+        return self._given(piece.input, target, rest + (piece.predicted - rest) * left, beat)
 
     def _beat(self, play: Play, place: _Place) -> tuple[FloatArray, _Place]:
         target, beat, then = self._target(play, place, self._samples)

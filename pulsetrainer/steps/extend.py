@@ -76,6 +76,7 @@ def extend(
             f"{model.input_unit}",
             hint="give the model that was diagnosed",
         )
+    extended = replace(extended, coil=model.coil)
     return extended if verify is None else _verified(model, extended, verify)
 
 

@@ -308,6 +308,7 @@ def _model(
         polarity=inner.polarity,
         form=fitted.form,
         # files of 0.1 do not say where a run is from; these names only captures had
+        coil=next((run.coil for run in runs if run.coil is not None), None),
         captured=all(run.captured or run.signal in EXCITATIONS for run in runs),
         weights_lower=None if weights is None else weights.lower,
         weights_upper=None if weights is None else weights.upper,

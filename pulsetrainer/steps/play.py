@@ -19,12 +19,14 @@ from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.steps.heat import Correction, take_temperature, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from pulsetrainer.core.temperature import Thermometer
     from pulsetrainer.device.device import Device
     from pulsetrainer.device.trace import Block, Trace
 
@@ -73,13 +75,16 @@ def play(
     device: Device,
     *,
     repeats: int = 5,
+    track_heat: bool | None = None,
     progress: Progress = silent,
     watch: Watch | None = None,
 ) -> Playback:
     """Play both drives of a waveform alternately, ``repeats`` times each, and return what was measured.
 
     ``watch`` is shown what comes back as it comes: name of the drive, number of the repeat, places (m,) on
-    the samples of the drive, current and force (m,).
+    the samples of the drive, current and force (m,). ``track_heat`` takes the coil's temperature from the
+    duty, before and between the drives, and makes the compensated one up for it; None: where the model has a
+    thermal term and knows the coil.
 
     Arrays of the playback are (repeats, n), in A and N; NaN where the wire lost a block.
 
@@ -108,20 +113,26 @@ def play(
     currents = {"compensated": drive.compensated, "scaled": drive.scaled}
     kept: dict[str, list[FloatArray]] = {name: [] for name in DRIVES}
     dropped, fault, remedy = 0, "", ""
+    tracked = _Tracked.of(drive, device, track_heat)
     for number in range(repeats * len(DRIVES)):
         name = DRIVES[number % len(DRIVES)]
         repeat = number // len(DRIVES) + 1
         _LOG.info("repeat %d of %d, %s drive", repeat, repeats, name)
+        current = currents[name]
+        if tracked is not None and name == "compensated":
+            current = tracked.current()
         once = play_once(
             drive,
             device,
-            currents[name],
+            current,
             expected=drive.predicted if name == "compensated" else None,
             earlier=[rows[2] for rows in kept[name]],
             watch=None if watch is None else partial(watch, name, repeat),
         )
         dropped += once.dropped_samples
         fault, remedy = once.fault, once.remedy
+        if tracked is not None:
+            tracked.take(drive.time_s, once)
         if fault:
             break
         kept[name].append(once.rows)
@@ -137,9 +148,51 @@ def play(
         complete=not fault,
         dropped_samples=dropped,
         fault=fault,
+        temperature_K=np.asarray(tracked.temperatures[:whole]) if tracked is not None else None,
     )
     raise_if_stopped(fault, remedy, "the playback", playback if whole else None)
     return playback
+
+
+class _Tracked:
+    """A play whose heat is tracked."""
+
+    def __init__(self, drive: Waveform, model: Model, thermometer: Thermometer) -> None:
+        self._correction, self._thermometer = Correction(drive, model), thermometer
+        self.temperatures: list[float] = []  # at each compensated drive, K
+
+    @classmethod
+    def of(cls, drive: Waveform, device: Device, asked: bool | None) -> _Tracked | None:
+        model = drive.model
+        if drive.inversion == "closest-match":
+            if asked:
+                raise DataError(
+                    f"the drive {drive.name} is a closest match; for another heat it cannot be made again",
+                    hint="invert with `method` continuous or extended",
+                )
+            return None
+        thermometer = thermometer_of(model, device, asked=asked)
+        if thermometer is None or model is None:
+            return None
+        take_temperature(device, thermometer, _top(model))
+        return cls(drive, model, thermometer)
+
+    def current(self) -> FloatArray:
+        """The compensated drive for the heat of now."""
+        self._thermometer.restart()
+        self.temperatures.append(self._thermometer.temperature_K)
+        return self._correction.current(self._thermometer.extra)
+
+    def take(self, time_s: FloatArray, once: Once) -> None:
+        """Take in what a play brought back."""
+        self._thermometer.restart()
+        there = np.isfinite(once.duty)
+        reference, current, _ = once.rows
+        self._thermometer.add(time_s[there], reference[there], current[there], once.duty[there])
+
+
+def _top(model: Model) -> float:
+    return float(model.edges[-1])
 
 
 def _input_range(model: Model) -> float:
@@ -184,6 +237,7 @@ class Once:
     dropped_samples: int
     fault: str  # why it did not end, or why its force is not to be trusted; empty where neither
     remedy: str
+    duty: FloatArray  # (n,) of the coil's voltage; NaN where a block was lost or the device does not tell
 
 
 def play_once(
@@ -206,24 +260,24 @@ def play_once(
             watch(block.tick // decimation, block.current_A, block.force_N)
 
     recording = device.play(current, drive.rate_Hz, decimation=decimation, on_block=show)
-    rows = _on_grid(recording, drive.time_s.size, decimation)
+    *measured, duty = _on_grid(recording, drive.time_s.size, decimation)
+    rows = np.stack(measured)
     if recording.fault:
-        return Once(rows, recording.dropped_samples, recording.fault, recording.remedy)
+        return Once(rows, recording.dropped_samples, recording.fault, recording.remedy, duty)
     fault = "" if expected is None else judge_against(drive.time_s, expected, rows[2])
     if not fault and earlier:
         begun = slice(int(np.argmax(drive.scored)), None)  # the first beat shows what was before
         fault = judge_repeat(drive.time_s[begun], earlier[-1][begun], rows[2][begun])
-    return Once(rows, recording.dropped_samples, fault, FORCE_REMEDY)
+    return Once(rows, recording.dropped_samples, fault, FORCE_REMEDY, duty)
 
 
 def _on_grid(recording: Trace, samples: int, decimation: int) -> FloatArray:
-    """Lay a recording (3, n) on the waveform's samples by its ticks; NaN where a block was lost."""
-    grid = np.full((3, samples), np.nan)
+    """Lay a recording (4, n) on the waveform's samples by its ticks; NaN where a block was lost."""
+    grid = np.full((4, samples), np.nan)
     place = recording.tick // decimation
     inside = place < samples
-    grid[:, place[inside]] = np.stack((recording.reference_A, recording.current_A, recording.force_N))[
-        :, inside
-    ]
+    told = (recording.reference_A, recording.current_A, recording.force_N, recording.duty)
+    grid[:, place[inside]] = np.stack(told)[:, inside]
     return grid
 
 

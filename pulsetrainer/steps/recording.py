@@ -10,17 +10,19 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from pulsetrainer.artefacts import Run
+from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.core import excitations
 from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.temperature import Windows, record_of
 from pulsetrainer.device.codes import MAX_DECIMATION
 from pulsetrainer.device.limits import check_peak
 from pulsetrainer.errors import ArgumentError, DataError
@@ -98,7 +100,7 @@ class Memory:
         """Say that the device was off since the last sample."""
         self._seams.append(self.samples)
 
-    def run(self, signal: str, *, complete: bool) -> Run | None:
+    def run(self, signal: str, *, complete: bool, coil: Coil | None = None) -> Run | None:
         """Return what was recorded; None where that is nothing."""
         if not self._blocks:
             return None
@@ -115,6 +117,7 @@ class Memory:
             complete=complete,
             dropped_samples=self.dropped_samples,
             captured=True,
+            coil=coil,
         )
 
 
@@ -170,6 +173,7 @@ class Ending:
     fault: str
     remedy: str
     parts: int
+    coil: Coil | None = None  # of a capture that was made in one go
 
 
 def record(
@@ -199,6 +203,7 @@ def record(
     info, rate_Hz = device.info, course.signal.rate_Hz
     check_top(course.signal, info.current_limit_A)
     decimation = decimation_for(info.tick_rate_Hz, rate_Hz)
+    windows, begun_cold = Windows(), at == 0
     high, parts, step = float(course.signal.value.max()), 0, info.tick_rate_Hz
     for part in parts_of(course, at, device.longest_play_s):
         if condition_first:
@@ -211,6 +216,7 @@ def record(
         def keep(block: Block, begun_s: float = begun_s, part: Part = part) -> None:
             sink.append(begun_s + block.tick / step, block.reference_A, block.current_A, block.force_N)
             tally.add(block.reference_A, block.current_A, block.force_N)
+            windows.add(begun_s + block.tick / step, block.reference_A, block.current_A, block.duty)
             if watch is not None:
                 watch(block.current_A, block.force_N)
             played = int(block.tick[-1]) // decimation + 1 - part.lead.size
@@ -231,7 +237,9 @@ def record(
         sink.dropped_samples += played.dropped_samples + played.samples - (sink.samples - before)
         if played.fault or not played.complete:
             return Ending(complete=False, fault=played.fault, remedy=played.remedy, parts=parts)
-    return Ending(complete=True, fault="", remedy="", parts=parts)
+    told = record_of(windows) if begun_cold and parts == 1 else None
+    coil = Coil(**asdict(told), serial=info.serial) if told is not None else None
+    return Ending(complete=True, fault="", remedy="", parts=parts, coil=coil)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
 from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach, major_loop
+from pulsetrainer.steps.heat import rest_force, take_temperature, thermometer_of
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.progress import Progress, silent
@@ -31,11 +32,13 @@ from pulsetrainer.steps.recording import PAUSE_S
 from pulsetrainer.steps.stopped import raise_if_stopped
 
 if TYPE_CHECKING:
+    from pulsetrainer.core.temperature import Thermometer
     from pulsetrainer.device.device import Device
     from pulsetrainer.device.trace import Block
 
 LEAD_S = 3.0  # of current that is ready before its time: how long this computer may be busy with other things
 LIVE_LEAD_S = 0.5  # the same where a person changes what comes next
+_FOLLOW = 0.3  # of a new reading of the loss: a window of a second is noisier than the room
 _SETTLED = 4.0  # of the slowest time constant of a model
 _LONGEST_SETTLING_S = 300.0
 
@@ -96,6 +99,7 @@ class Performed:
     fault: str
     remedy: str
     notes: tuple[str, ...]
+    temperature: tuple[tuple[float, float], ...] = ()  # s, K against calibration, where heat was tracked
 
     @property
     def fields(self) -> dict[str, object]:
@@ -180,8 +184,12 @@ class _Performance:
         sink: Sink,
         reach: Reach,
         watch: Callable[[Now], None],
+        thermometer: Thermometer | None = None,
     ) -> None:
         self._device, self._sink, self._watch = device, sink, watch
+        self._thermometer = thermometer
+        self._loss = 0.0 if thermometer is None else thermometer.extra
+        self._warmth: list[tuple[float, float]] = []  # s and K, of each window
         self._ledger = Ledger(tuple(pulse.name for pulse in pulses))
         self._reach = reach
         self._conductor = Conductor(
@@ -194,6 +202,7 @@ class _Performance:
             heat=device.heat,
             heated=added,
             cooling_s=HEAT_TAU_S,
+            loss=lambda: self._loss,
         )
         self._begun = 0  # sample at which the part began
         self._gap_s = 0.0
@@ -241,12 +250,17 @@ class _Performance:
             fault=fault,
             remedy=remedy,
             notes=tuple(conductor.notes),
+            temperature=tuple(self._warmth),
         )
 
     def _take(self, block: Block, decimation: int) -> None:
         sample = self._begun + block.tick // decimation
         target, done, measured = self._ledger.measure(sample, block.force_N)
         self.measured_s = float(sample[-1]) / RATE_HZ
+        meter = self._thermometer
+        if meter is not None and meter.add(sample / RATE_HZ, block.reference_A, block.current_A, block.duty):
+            self._loss += _FOLLOW * (meter.extra - self._loss)
+            self._warmth.append((self.measured_s, meter.temperature_K))
         self._sink.append(
             sample / RATE_HZ + self._gap_s, target, block.reference_A, block.current_A, block.force_N
         )
@@ -280,6 +294,7 @@ def perform(
     rhythm: Rhythm,
     rates: Sequence[float | None] = (None,),
     lead_s: float = LEAD_S,
+    track_heat: bool | None = None,
     watch: Callable[[Now], None] = lambda _now: None,
 ) -> Performed:
     """Press what ``decide`` decides until it decides the end, and judge every beat.
@@ -291,6 +306,9 @@ def perform(
         None: its own.
     lead_s
         How long before its time a beat is decided and made.
+    track_heat
+        Tell the coil's temperature from the duty, before and all the time, and make up for the force that it
+        costs; None: where the model has a thermal term and knows the coil.
     watch
         Called with each piece of telemetry.
 
@@ -304,7 +322,14 @@ def perform(
     check_model(model)
     beating = [Pulse(shape) for shape in pulses]
     reach = reach_of(model, beating, rates)
-    return _Performance(model, device, beating, rhythm, decide, sink, reach, watch).run(lead_s)
+    meter = thermometer_of(model, device, asked=track_heat)
+    if meter is not None:
+        take_temperature(device, meter, float(model.edges[-1]))
+        meter.restart()
+        rest, left = rest_force(model), 1.0 - max(meter.extra, 0.0)  # a warm coil does not reach as high
+        reach = Reach(reach.low, rest + (reach.high - rest) * left)
+    performance = _Performance(model, device, beating, rhythm, decide, sink, reach, watch, meter)
+    return performance.run(lead_s)
 
 
 def session(
@@ -324,6 +349,7 @@ def session(
     quiz: int = 0,
     answers: Sequence[str] | Answer = (),
     decide: Decide | None = None,
+    track_heat: bool | None = None,
     progress: Progress = silent,
 ) -> Session:
     """Press pulses for as long as wanted and return everything, every beat judged.
@@ -346,6 +372,8 @@ def session(
         Number of questions, and the answers to them: a list, or a callable that is asked for each.
     decide
         In the place of all that: asked for each beat what is played; see ``steps.conductor``.
+    track_heat
+        As in ``perform``.
 
     Raises
     ------
@@ -373,7 +401,17 @@ def session(
         if isinstance(chosen, Programme):
             progress(chosen.share(0, now.time_s))
 
-    done = perform(model, device, pulses, decide or chosen, sink, rhythm=rhythm, rates=rates, watch=watch)
+    done = perform(
+        model,
+        device,
+        pulses,
+        decide or chosen,
+        sink,
+        rhythm=rhythm,
+        rates=rates,
+        track_heat=track_heat,
+        watch=watch,
+    )
     asked = chosen.quiz() if isinstance(chosen, Blind) else None
     kept = _session(sink, done, tuple(shape.name for shape in pulses), asked)
     raise_if_stopped(done.fault, done.remedy, "the session", kept)

@@ -9,7 +9,7 @@ import pytest
 
 COMMANDS = (
     *("capture", "import", "identify", "invert", "play", "evaluate", "diagnose", "extend", "correct"),
-    *("session", "refine", "tune", "export", "show", "plot", "ports", "compare", "doctor"),
+    *("session", "refine", "tune", "check", "export", "show", "plot", "ports", "compare", "doctor"),
 )
 HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich")
 

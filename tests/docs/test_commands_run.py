@@ -73,6 +73,8 @@ RUN = {
     HOW_TO / "ci.md": ("played.h5", "last-week.h5"),
     HOW_TO / "teach.md": ("model.h5",),
     HOW_TO / "tune.md": (),
+    HOW_TO / "track-heat.md": ("drive.h5", "model.h5"),
+    HOW_TO / "check.md": ("model.h5",),
     HOW_TO / "batches.md": ("workflow",),
 }  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
 SLOW = ("README", "measured", "tutorial")

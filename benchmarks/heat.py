@@ -1,0 +1,98 @@
+"""Heat without a force sensor: minutes of pulses in a room that nobody told of, with and without tracking.
+
+    python benchmarks/heat.py [--first 1] [--devices 10] [--minutes 15]
+
+Each device is calibrated and diagnosed at 0 K; then it plays at 0 K as it was calibrated, and at a room
+drawn from -20 to 20 K, without and with tracking. The true temperature is that of the simulated copper.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+import scipy.signal
+
+import pulsetrainer as pt
+from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.files.pulses import read_pulse
+from pulsetrainer.steps.programme import Programme
+from pulsetrainer.steps.session import Memory, perform
+
+DRIFT_PER_A2, TAU_S = 0.006, 20.0  # of the as-built bench
+COPPER_PER_K = 0.0039
+NAMES = ("normal", "bifid")
+
+
+def calibrated(port: str):
+    """Return the extended model of a device, as it is at calibration."""
+    with pt.open_device(port) as device:
+        run = pt.capture("identification", device)
+    model = pt.identify(run)
+    with pt.open_device(port) as device:  # cold again
+        diagnostic = pt.capture("diagnostic", device)
+    found = pt.diagnose([diagnostic], model)
+    return pt.extend(model, found)
+
+
+def played(model, port: str, minutes: float, *, track: bool, ambient: float):
+    """Mean error in %, and the largest error of the temperature in K."""
+    sink = Memory()
+    programme = Programme(NAMES, rate=None, amplitude=100.0, seconds=60.0 * minutes)
+    with pt.open_device(port) as device:
+        done = perform(
+            model,
+            device,
+            [read_pulse(name) for name in NAMES],
+            programme,
+            sink,
+            rhythm=Rhythm(0.0, 0.0, 0.0, 0),
+            rates=programme.rates,
+            track_heat=track,
+        )
+    if done.fault:
+        raise RuntimeError(done.fault)
+    off = float("nan")
+    if track:
+        time_s, _, _, current, _ = np.concatenate(sink.blocks, axis=1)
+        share = -np.expm1(-1e-3 / TAU_S)
+        heat = scipy.signal.lfilter([share], [1.0, share - 1.0], current**2)
+        told_s, told = np.array(done.temperature).T
+        own = 2 * DRIFT_PER_A2 * np.interp(told_s - 0.5, time_s, heat) / COPPER_PER_K
+        off = float(np.abs(told - own - ambient).max())
+    return done.figures["mean_abs_error_percent"], off
+
+
+def main() -> None:
+    """Print a line for each device, and the worst."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--devices", type=int, default=10)
+    parser.add_argument("--minutes", type=float, default=15.0)
+    asked = parser.parse_args()
+    rows = []
+    for seed in range(asked.first, asked.first + asked.devices):
+        ambient = float(np.random.default_rng(seed).uniform(-20, 20))
+        port = f"bench:?seed={seed}"
+        model = calibrated(port)
+        room = f"{port}&ambient={ambient:.2f}"
+        fresh, _ = played(model, port, asked.minutes, track=False, ambient=0.0)
+        without, _ = played(model, room, asked.minutes, track=False, ambient=ambient)
+        tracked, off = played(model, room, asked.minutes, track=True, ambient=ambient)
+        rows.append((fresh, without, tracked, off))
+        terms = ", ".join(one.cause for one in model.extensions)
+        print(
+            f"{seed:4d} {ambient:+6.1f} K  fresh {fresh:.3f} %  without {without:.3f} %  "
+            f"tracked {tracked:.3f} % ({tracked / fresh:.2f} of fresh)  within {off:.2f} K  ({terms})",
+            flush=True,
+        )
+    table = np.array(rows)
+    ratio = table[:, 2] / table[:, 0]
+    print(
+        f"{len(rows)} devices: tracked at most {ratio.max():.2f} of fresh (mean {ratio.mean():.2f}), without "
+        f"{(table[:, 1] / table[:, 0]).max():.1f}; temperature within {table[:, 3].max():.2f} K"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""``pulsetrainer check``: say whether a model is still true of its device, and what moved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Overwrite, Port
+
+if TYPE_CHECKING:
+    from pulsetrainer.steps.check import Checked, Estimate
+
+
+def check(
+    context: typer.Context,
+    model: Annotated[Path, typer.Argument(help="Model of the device.")],
+    port: Port = None,
+    update: Annotated[
+        bool, typer.Option("--update", help="Write a model with the offset and the gain of now.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="File to write, with --update.", show_default=False)
+    ] = None,
+    limit_current_A: LimitCurrent = None,
+    limit_force_N: LimitForce = None,
+    overwrite: Overwrite = False,
+    json: AsJson = False,
+) -> None:
+    """Measure for ten seconds whether a model is still true of its device.
+
+    The verdict is true, shifted (offset, gain, temperature) or changed (the shape: identify again).
+
+    Example: pulsetrainer check model.h5 --update -o updated.h5
+    """
+    from pulsetrainer.errors import UsageError
+    from pulsetrainer.simulation.options import check_port
+
+    check_port(port)
+    if update != (out is not None):
+        raise UsageError(
+            "--update writes a model and -o names its file: the one needs the other",
+            hint="give both, or neither",
+        )
+    job = Job(context, inputs=(model,), outputs=(out,), overwrite=overwrite, as_json=json)
+    from pulsetrainer.artefacts import Model
+    from pulsetrainer.device.limits import Limits
+    from pulsetrainer.steps.check import check as measure
+    from pulsetrainer.steps.check import check_updatable, updated
+
+    loaded = job.load(model, Model)
+    if update:
+        check_updatable(loaded)
+    limits = Limits(limit_current_A, limit_force_N)
+    with job.working(f"checking {model.name}") as progress, job.open_device(port, limits) as device:
+        found = measure(loaded, device, progress=progress)
+        info = device.info
+    if out is not None:
+        job.save(
+            out, updated(loaded, found), f"{model.name} as {info.serial} is now", device=job.device(info)
+        )
+    _show(job, model, out, found)
+
+
+def _show(job: Job, model: Path, out: Path | None, found: Checked) -> None:
+    job.screen.result(plain(found) | {"output": out})
+    rows = {
+        "offset": _said(found.offset, "N", 3),
+        "gain": _said(found.gain, "", 4),
+        "shape": _said(found.shape_percent, "% of the span", 2),
+    }
+    if found.temperature_K is not None:
+        rows["temperature"] = _said(found.temperature_K, "K against calibration", 1)
+    error = found.error_percent
+    rows["error"] = f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain"
+    for number, reason in enumerate(found.reasons, 1):
+        rows[f"reason {number}"] = reason
+    job.screen.facts(f"{model}: {found.verdict}", rows)
+    job.wrote(out)
+
+
+def _said(estimate: Estimate, unit: str, digits: int) -> str:
+    low, high = estimate.interval
+    return f"{estimate.value:.{digits}f} {unit}".rstrip() + f" ({low:.{digits}f} to {high:.{digits}f})"

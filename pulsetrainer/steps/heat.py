@@ -1,0 +1,149 @@
+"""Heat: the coil's temperature while a device plays, and the drive that makes up for the force it costs."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pulsetrainer.artefacts import Model, Waveform
+from pulsetrainer.artefacts.run import Coil
+from pulsetrainer.core import inversion
+from pulsetrainer.core.learning import BAND_HZ
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.temperature import CoilRecord, Thermal, Thermometer
+from pulsetrainer.diagnosis.prediction import extended_of, operator_of
+from pulsetrainer.errors import DataError
+from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
+from pulsetrainer.steps.invertible import invertible
+from pulsetrainer.steps.recording import conditioning_loop
+from pulsetrainer.steps.stopped import raise_if_stopped
+
+if TYPE_CHECKING:
+    from pulsetrainer.device.device import Device
+
+_RATE_HZ = 1000.0
+_NEW = 3e-4  # of the force: a change of the loss that is worth another inverse
+
+
+def thermal_of(model: Model) -> Thermal | None:
+    """Return the thermal term of a model, None where it has none."""
+    for extension in model.extensions:
+        if extension.cause == "thermal-drift":
+            value = {parameter.name: parameter.value for parameter in extension.parameters}
+            return Thermal(value["coefficient"], value["tau"], float(model.edges[0]))
+    return None
+
+
+def thermometer_of(model: Model | None, device: Device, *, asked: bool | None) -> Thermometer | None:
+    """Return the thermometer for a play; None where heat is not tracked.
+
+    ``asked`` None: it is where the model has a thermal term, was captured with the duty, and the device tells
+    it.
+
+    Raises
+    ------
+    DataError
+        It is asked for and the model does not know the coil.
+    DeviceError
+        It is asked for and the device does not tell the duty.
+    """
+    if asked is False or model is None:
+        return None
+    coil, thermal = model.coil, thermal_of(model)
+    unknown = coil is None or thermal is None or coil.serial not in ("", device.info.serial)
+    if asked is None and (unknown or not device.tells_duty):
+        return None
+    if coil is None:
+        raise DataError(
+            "the model does not know the coil's resistance at calibration, so no heat can be tracked",
+            hint="capture and identify with firmware that tells the duty (protocol 2.2)",
+        )
+    device.needs_duty("tracking heat")
+    check_same_device(model, device)
+    return thermometer(coil, thermal)
+
+
+def thermometer(coil: Coil, thermal: Thermal | None) -> Thermometer:
+    """Return the thermometer of a coil."""
+    known = asdict(coil)
+    del known["serial"]
+    return Thermometer(CoilRecord(**known), thermal)
+
+
+def check_same_device(model: Model, device: Device) -> None:
+    """Refuse a model that was captured on another device, where it knows.
+
+    Raises
+    ------
+    DataError
+        The serial numbers differ.
+    """
+    serial = model.coil.serial if model.coil is not None else ""
+    if serial and serial != device.info.serial:
+        raise DataError(
+            f"the model is of the device {serial}, this is {device.info.serial}",
+            hint="give the model of this device, or connect that one",
+        )
+
+
+def take_temperature(device: Device, thermometer: Thermometer, high_A: float) -> None:
+    """Take the temperature before a play: once around the major loop, which comes first in every play anyway.
+
+    Raises
+    ------
+    DeviceError, Interrupted
+        The loop could not be completed.
+    """
+    for _ in range(2):  # a loop lasts about as long as a window
+        trace = device.play(conditioning_loop(high_A, _RATE_HZ), _RATE_HZ)
+        raise_if_stopped(trace.fault, trace.remedy, "taking the temperature")
+        thermometer.add(trace.time_s, trace.reference_A, trace.current_A, trace.duty)
+        if thermometer.known:
+            return
+
+
+class Correction:
+    """Makes the compensated drive again where the heat has changed.
+
+        u' = u + M^-1[y0 + (target - y0) / (1 - loss)] - M^-1[target],   y0 the force without current
+
+    so that what was learnt beyond the model stays. What is out of reach is clipped, as the inverse does.
+    """
+
+    def __init__(self, drive: Waveform, model: Model) -> None:
+        part = invertible(model, drive.rate_Hz)
+        self._model, self._part, self._drive = model, part, drive
+        self._body = slice(part.lead.size, drive.target.size - part.tail.size)
+        self._kept = (0.0, drive.compensated)
+        self._cold: FloatArray | None = None
+
+    def current(self, loss: float) -> FloatArray:
+        """Current (n,) in A for a share of the force that is lost."""
+        if abs(loss - self._kept[0]) > _NEW:
+            if self._cold is None:
+                self._cold = self._made(0.0)
+            low, high = float(self._model.edges[0]), float(self._model.edges[-1])
+            changed = self._drive.compensated + self._made(loss) - self._cold
+            self._kept = (loss, np.clip(changed, low, high))
+        return self._kept[1]
+
+    def _made(self, loss: float) -> FloatArray:
+        drive, part = self._drive, self._part
+        rest = rest_force(self._model)
+        wanted = rest + (drive.target[self._body] - rest) / (1.0 - loss)
+        if self._model.extensions:
+            dt_s = 1.0 / drive.rate_Hz
+            extended = extended_of(self._model)
+            exact = extended.invert(wanted, dt_s, lead=part.lead, band_Hz=BAND_HZ).input
+        else:
+            exact = part.inverse(np.clip(wanted, *part.reach)).input
+        current = inversion.slew_limited(exact, drive.rate_Hz, DEVICE_SLEW_A_PER_S)
+        return np.concatenate((part.lead, current, part.tail))
+
+
+def rest_force(model: Model) -> float:
+    """Force of a model at the low end of its current, which no heat changes, N."""
+    static = extended_of(model).static if model.extensions else operator_of(model)
+    return float(static(np.asarray([float(model.edges[0])]))[0])

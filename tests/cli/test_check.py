@@ -1,0 +1,59 @@
+"""``check`` from the command line: its figures, its update, and what it refuses."""
+
+from __future__ import annotations
+
+import pytest
+
+import pulsetrainer as pt
+
+KEYS = {"verdict", "offset", "gain", "shape_percent", "temperature_K", "error_percent"}
+
+
+@pytest.fixture(scope="module")
+def calibrated(made_once):
+    """A folder with a model of the as-built bench."""
+
+    def fill(folder):
+        from program import pulsetrainer
+
+        for words in (
+            ("capture", "identification", "--levels", 24, "--speed", 2, "-o", "run.h5"),
+            ("identify", "run.h5", "--levels", 24, "-o", "model.h5"),
+        ):
+            done = pulsetrainer(folder, *words)
+            assert done.code == 0, done.err
+
+    return made_once("calibrated", fill)
+
+
+def test_the_contract_and_the_update(run, calibrated, tmp_path):
+    """Every key, each value with its interval; what is written is true of the device as it is now."""
+    port = "bench:?condition-offset=0.3&noise-seed=4"
+    done = run("check", calibrated / "model.h5", "--port", port, "--update", "-o", "updated.h5", "--json")
+    assert done.code == 0, done.err
+    assert set(done.json) >= KEYS
+    assert done.json["verdict"] == "shifted"
+    for name in ("offset", "gain", "shape_percent", "temperature_K"):
+        assert set(done.json[name]) == {"value", "interval"}
+    assert done.json["error_percent"]["after"] < 0.5 * done.json["error_percent"]["before"]
+    before, after = pt.load(calibrated / "model.h5"), pt.load(tmp_path / "updated.h5")
+    assert after.predict([0.0, 1.0]) == pytest.approx(before.predict([0.0, 1.0]) + 0.3, abs=0.15)
+    again = run("check", "updated.h5", "--port", port, "--json")
+    assert again.json["verdict"] == "true"
+
+
+def test_another_device_is_not_updated(run, calibrated, tmp_path):
+    """A changed density: exit 3, nothing written; the verdict alone is no error."""
+    words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9", "--json")
+    assert run(*words).json["verdict"] == "changed"
+    refused = run(*words, "--update", "-o", "updated.h5")
+    assert (refused.code, refused.json["error"]["kind"]) == (3, "data")
+    assert not (tmp_path / "updated.h5").exists()
+
+
+@pytest.mark.parametrize("words", [("--update",), ("-o", "updated.h5")])
+def test_an_update_has_a_file_and_a_file_an_update(run, calibrated, tmp_path, words):
+    """One without the other is a mistake: exit 2."""
+    done = run("check", calibrated / "model.h5", *words, "--json")
+    assert (done.code, done.json["error"]["kind"]) == (2, "usage")
+    assert not list(tmp_path.iterdir())

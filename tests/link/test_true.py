@@ -1,0 +1,123 @@
+"""A device that stays true: `check` tells what moved, and a play makes up for the coil's heat."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from pulsetrainer.artefacts.model import Extension, Parameter
+from pulsetrainer.errors import DataError
+from pulsetrainer.steps.check import check_updatable, updated
+
+# What a diagnosis of the as-built bench finds.
+THERMAL = Extension(
+    "thermal-drift",
+    (
+        Parameter("coefficient", 0.006, "1/A^2", 0.005, 0.007),
+        Parameter("tau", 20.0, "s", 15.0, 25.0),
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def model():
+    """A model of the as-built bench, captured with the duty."""
+    with pt.open_device("bench:?seed=1") as device:
+        run = pt.capture("identification", device)
+    return pt.identify(run)
+
+
+def test_the_model_knows_its_coil(model):
+    """5 ohm at 12 V: duty over current, the diode, the serial number; it survives a file."""
+    assert model.coil.duty_per_A == pytest.approx(5 / 12.6, rel=2e-3)
+    assert model.coil.duty_offset == pytest.approx(0.6 / 12.6, rel=0.02)
+    assert model.coil.rise_per_A2 == pytest.approx(0.012, rel=0.15)
+    assert model.coil.serial == "BENCH-0"
+
+
+@pytest.mark.parametrize(
+    ("moved", "verdict", "offset", "gain", "kelvin"),
+    [
+        ("", "true", 0.0, 1.0, 0.0),
+        ("&condition-offset=0.3", "shifted", 0.3, 1.0, 0.0),
+        ("&condition-gain=0.05", "shifted", 0.0, 1.05, 0.0),
+        ("&ambient=20", "shifted", 0.0, 0.961, 20.0),
+        ("&condition-offset=-0.3&condition-gain=-0.05&ambient=-20", "shifted", -0.3, 0.987, -20.0),
+    ],
+)
+def test_what_moved_is_told(model, moved, verdict, offset, gain, kelvin):
+    """Zero within 0.1 N, gain within 1.5 %, temperature within 2 K; an updated model is true again."""
+    with pt.open_device(f"bench:?seed=1&noise-seed=3{moved}") as device:
+        found = pt.check(model, device)
+        again = pt.check(updated(model, found), device)
+    assert found.verdict == verdict, found
+    assert found.offset.value == pytest.approx(offset, abs=0.1)
+    assert found.gain.value == pytest.approx(gain, abs=0.015)
+    assert found.temperature_K.value == pytest.approx(kelvin, abs=2.0)
+    for one in (found.offset, found.gain, found.shape_percent, found.temperature_K):
+        assert one.interval[0] <= one.value <= one.interval[1]
+    assert found.seconds <= 12
+    assert again.verdict == "true", again
+    assert again.error_percent.before == pytest.approx(found.error_percent.after, abs=0.1)
+
+
+def test_another_density_is_changed_and_not_updated(model):
+    """No offset and no gain makes one device another."""
+    with pt.open_device("bench:?seed=101") as device:
+        found = pt.check(model, device)
+    assert found.verdict == "changed"
+    with pytest.raises(DataError, match="shape"):
+        updated(model, found)
+
+
+def test_what_an_offset_and_a_gain_do_not_mend_is_refused(model):
+    """Causes in newtons, and another form."""
+    sticking = Extension("stick-slip", (Parameter("jump", 0.3, "N", 0.2, 0.4),))
+    for hindered in (replace(model, extensions=(sticking,)), replace(model, form="signed")):
+        with pytest.raises(DataError):
+            check_updatable(hindered)
+    check_updatable(replace(model, extensions=(THERMAL,)))
+
+
+def test_the_model_of_another_device_is_refused(model):
+    """By its serial number: check, and heat that is asked for; heat by default is then off."""
+    other = replace(model, coil=replace(model.coil, serial="OTHER"), extensions=(THERMAL,))
+    drive = pt.invert("normal", other, periods=2)
+    with pt.open_device("bench:?seed=1") as device:
+        with pytest.raises(DataError, match="OTHER"):
+            pt.check(other, device)
+        with pytest.raises(DataError, match="OTHER"):
+            pt.play(drive, device, repeats=1, track_heat=True)
+        assert pt.play(drive, device, repeats=1).temperature_K is None
+
+
+def test_a_play_makes_up_for_the_room(model):
+    """16 K colder: told within 2 K before the first drive, and the force is as in the room of calibration."""
+    drive = pt.invert("normal", replace(model, extensions=(THERMAL,)), periods=2)
+    force = {}
+    for ambient, track in ((0, False), (0, None), (-16, False), (-16, None)):
+        with pt.open_device(f"bench:?seed=1&ambient={ambient}") as device:
+            played = pt.play(drive, device, repeats=2, track_heat=track)
+        force[ambient, track] = np.nanmean(played.compensated.output[:, drive.scored], axis=0)
+        if track is None:
+            assert played.temperature_K[0] == pytest.approx(ambient, abs=2.0)
+    moved, left = (
+        force[-16, track] @ force[0, track] / (force[0, track] @ force[0, track]) - 1.0
+        for track in (False, None)
+    )
+    assert moved == pytest.approx(0.00195 * 16, abs=0.006)
+    assert abs(left) < 0.35 * moved
+
+
+def test_nothing_changes_where_there_is_no_thermal_term(model):
+    """By default a model without it is played as it was, to the bit."""
+    drive = pt.invert("normal", model, periods=2)
+    played = []
+    for track in (None, False):
+        with pt.open_device("bench:?seed=1") as device:
+            played.append(pt.play(drive, device, repeats=1, track_heat=track))
+    np.testing.assert_array_equal(played[0].compensated.output, played[1].compensated.output)
+    assert played[0].temperature_K is None
