@@ -87,7 +87,7 @@ class Case:
 
 
 def test_chosen_smoothing_is_near_the_best(table):
-    """At most 1.3 times the error of the best of the grid, in 19 of 20 records."""
+    """At most 1.3 times the error of the best of the grid, in every record; one of the 40 misses it."""
     ratios = []
     for seed in SEEDS:
         case = Case(seed)
@@ -106,6 +106,6 @@ def test_chosen_smoothing_is_near_the_best(table):
         ours=f"{mean:.2f} mean, {ninth:.2f} in nine of ten",
         baseline="the best of 22",
         figure=f"worst {most:.2f}",
-        bar="1.3 times in 19 of 20",
+        bar="1.3 times in all",
     )
-    assert np.mean(np.asarray(ratios) <= 1.3) >= 0.95
+    assert max(ratios) <= 1.3
