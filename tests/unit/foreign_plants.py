@@ -73,8 +73,8 @@ class ForeignDevice:
 
     info = SimpleNamespace(tick_rate_Hz=TICK_HZ, serial="foreign", firmware="none")
 
-    def play(self, current: FloatArray, rate_Hz: float, *, decimation: int = 10) -> Trace:
-        """Press a current (n,) from rest."""
+    def play(self, current: FloatArray, rate_Hz: float, *, decimation: int = 10, on_block=None) -> Trace:
+        """Press a current (n,) from rest; nobody watches it."""
         assert abs(rate_Hz - RATE_HZ) < 1e-6
         assert decimation == 10
         self.plays += 1
