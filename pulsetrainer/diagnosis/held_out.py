@@ -90,13 +90,15 @@ class HeldOut:
         smooth[-design.bins.free.shape[1] :, -design.bins.free.shape[1] :] = LIMITS.start_kept * np.eye(
             design.bins.free.shape[1]
         )
-        share = 1.0 - 1.0 / folds
+        told = LIMITS.piece_told if whole else 0.0  # what the rest cannot tell stays as all of it said
+        share = 1.0 - (1.0 - told) / folds
         for fold in range(folds):
-            train = 1.0 - test[:, fold]
+            train = 1.0 - (1.0 - told) * test[:, fold]
             weighted = more * train[:, None]
             normal = share * smooth
             kept = fold_of != fold
-            normal[: free.size, : free.size] += grams[kept].sum(axis=0)[np.ix_(free, free)]
+            gram = grams[kept].sum(axis=0) + told * grams[~kept].sum(axis=0)
+            normal[: free.size, : free.size] += gram[np.ix_(free, free)]
             normal[free.size :, : free.size] += (weighted.T @ design.matrix)[:, free]
             normal[free.size :, free.size :] += weighted.T @ more
             normal[np.diag_indices(size)] *= 1.0 + LIMITS.ridge_held_out

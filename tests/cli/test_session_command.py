@@ -184,7 +184,7 @@ def test_stopped_by_a_signal_nothing_is_lost(tmp_path, number):
     try:
         _until(lambda: _recorded(tmp_path) >= 4000)
         process.send_signal(number)
-        _, err = process.communicate(timeout=20)
+        _, err = process.communicate(timeout=60)
     finally:
         process.kill()
     assert process.returncode == 130, err
