@@ -24,10 +24,10 @@ def _h5(name: str = "out.h5") -> tuple[tuple[str, str], ...]:
     return (("-o", name),)
 
 
-EXCITATION = ("capture", "identification", "--levels", "12", "--speed", "12")
+EXCITATION = ("capture", "identification", "--levels", "12", "--speed", "4")
 WRITERS = (
     Writer("capture", EXCITATION, _h5(), ()),
-    Writer("capture (long)", (*EXCITATION, "--repeats", "40"), _h5(), ()),
+    Writer("capture (long)", (*EXCITATION, "--repeats", "13"), _h5(), ()),
     Writer(
         "import", ("import", "run.csv", "--input", "current_A", "--output", "force_N"), _h5(), ("run.csv",)
     ),

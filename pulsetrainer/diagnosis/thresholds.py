@@ -117,6 +117,7 @@ class Thresholds:
     repeated: float = 0.5  # of what the fit gains: a smaller gain on the pieces is chance
     piece_worse: float = 0.1  # of that gain: no piece may be predicted worse by more
     piece_told: float = 0.02  # weight of a piece that is left out: enough where the others tell nothing
+    slow_share: float = 0.4  # of what is left: so much that may be slow noise is sought in the bank too
 
     # Unlisted
     most_states: int = 3  # learned one after another

@@ -167,7 +167,7 @@ def plan(
     loop = conditioning_loop(top, signal.rate_Hz) if condition else np.zeros(0)
     played = 0
     for part in parts_of(course, at, ON_TIME_S - RAMP_S):
-        for piece in (loop, part.reference):
+        for piece in (loop, part.reference(course)):
             if piece.size:
                 rehearsal.play(piece, signal.rate_Hz)
             played += piece.size

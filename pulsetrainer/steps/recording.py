@@ -225,7 +225,7 @@ def record(
         _LOG.info("playing samples %d to %d of %d at %g Hz", part.start, part.end, course.size, rate_Hz)
         before = sink.samples
         played = device.play(
-            part.reference,
+            part.reference(course),
             rate_Hz,
             decimation=decimation,
             on_block=keep,
@@ -247,9 +247,13 @@ class Part:
     """What is played in one go."""
 
     lead: FloatArray  # (m,) brings the memory back to where the part before ended
-    reference: FloatArray  # (n,) with the lead
     start: int  # of the course
     end: int
+
+    def reference(self, course: Course) -> FloatArray:
+        """Samples (n,) with the lead, A: made when they are played, so that one part at a time is held."""
+        values = course.values(self.start, self.end)
+        return np.concatenate((self.lead, values)) if self.lead.size else values
 
 
 def parts_of(course: Course, at: int, longest_s: float) -> Iterator[Part]:
@@ -271,8 +275,7 @@ def parts_of(course: Course, at: int, longest_s: float) -> Iterator[Part]:
                 hint="raise the device's on-time limit",
             )
         end = course.part_end(at, longest - lead.size)
-        values = course.values(at, end)
-        yield Part(lead, np.concatenate((lead, values)) if lead.size else values, at, end)
+        yield Part(lead, at, end)
         at = end
 
 

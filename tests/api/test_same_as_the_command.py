@@ -124,15 +124,15 @@ def test_refine(tmp_path):
 
 @pytest.mark.slow
 def test_correct(tmp_path):
-    """A run whose zero drifts, by 3 % of its span."""
+    """A run with a hum of 2 % of its span."""
     run, model = pt.load(KEPT / "run.h5"), KEPT / "model.h5"
-    drift = 0.03 * np.ptp(run.output) * run.time_s / run.time_s[-1]
-    pt.save(replace(run, output=run.output + drift), tmp_path / "drifting.h5")
-    pt.save(pt.diagnose(pt.load(tmp_path / "drifting.h5"), pt.load(model)), tmp_path / "diagnosis.h5")
-    drifting, found = (pt.load(tmp_path / name) for name in ("drifting.h5", "diagnosis.h5"))
-    assert found.correctable == ("offset-drift",)
-    corrected = pt.correct(drifting, found)
-    words = ("correct", "drifting.h5", "--diagnosis", "diagnosis.h5")
+    hum = 0.02 * np.ptp(run.output) * np.sin(2 * np.pi * 37.0 * run.time_s)
+    pt.save(replace(run, output=run.output + hum), tmp_path / "humming.h5")
+    pt.save(pt.diagnose(pt.load(tmp_path / "humming.h5"), pt.load(model)), tmp_path / "diagnosis.h5")
+    humming, found = (pt.load(tmp_path / name) for name in ("humming.h5", "diagnosis.h5"))
+    assert found.correctable == ("periodic",)
+    corrected = pt.correct(humming, found)
+    words = ("correct", "humming.h5", "--diagnosis", "diagnosis.h5")
     same(by_command(tmp_path, *words), stored(corrected, tmp_path))
 
 

@@ -49,7 +49,10 @@ def stage(state: State) -> State:
 
 
 def _more_is_left(state: State) -> bool:
-    return state.current.squares - state.floor.squares > state.floor.relevant
+    """Tell whether more is left than noise, or much that is slow: that may be either, and this finds out."""
+    left, floor = state.current.squares, state.floor
+    slow = left - floor.sure_squares > LIMITS.slow_share * left
+    return left - floor.squares > floor.relevant or (slow and left - floor.sure_squares > floor.relevant)
 
 
 def _learned(state: State) -> tuple[Fitted | None, float, bool]:
@@ -72,7 +75,7 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
         parts.append(best.part)
         values = list(next(term.values for term in trial.terms if term.cause.id == _ID))
         current, largest = trial, max(largest, best.p_value)
-        if current.squares - state.floor.squares <= state.floor.relevant:
+        if current.squares - state.floor.sure_squares <= state.floor.relevant:
             break
     return current, largest, False
 
