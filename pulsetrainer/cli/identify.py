@@ -172,5 +172,5 @@ def _smoothing(text: str | None) -> float | Literal["auto"] | None:
     except ValueError:
         value = float("nan")
     if not 0 <= value <= 1:
-        raise typer.BadParameter(f"must be auto or a number in 0..1, got {text!r}")
+        raise typer.BadParameter(f"must be auto or a number in 0..1, got {text!r}", param_hint="--smoothing")
     return value

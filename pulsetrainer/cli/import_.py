@@ -186,5 +186,7 @@ def _rate(text: str | None) -> float | Literal["even"] | None:
     except ValueError:
         value = float("nan")
     if not 0 < value < float("inf"):
-        raise typer.BadParameter(f"must be the word even or a rate above 0 in Hz, got {text!r}")
+        raise typer.BadParameter(
+            f"must be the word even or a rate above 0 in Hz, got {text!r}", param_hint="--resample"
+        )
     return value

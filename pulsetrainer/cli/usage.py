@@ -29,6 +29,9 @@ def usage_of(error: Exception) -> UsageError | None:
         )
     if kind == "BadParameter" and parameter is not None:
         return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
+    named = getattr(error, "param_hint", None)  # of what a command finds out itself
+    if kind == "BadParameter" and isinstance(named, str):
+        return UsageError(f"{named} {str(getattr(error, 'message', error)).rstrip('.')}", hint=help_)
     return UsageError(str(explain()).rstrip("."), hint=help_)
 
 

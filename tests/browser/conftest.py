@@ -70,7 +70,7 @@ def report(request) -> Report:
     """Each report in turn."""
     kind = request.param
     folder = request.getfixturevalue("evaluated" if kind == "evaluation" else "diagnosed")
-    figures = {"evaluation": 2 * 2 + 2, "prediction": 2 + 1, "diagnosis": 1 + 5 + 1}[kind]
+    figures = {"evaluation": 2 + 2 * 2 + 2, "prediction": 2 + 1, "diagnosis": 1 + 5 + 1}[kind]
     return Report(kind, folder / f"{kind}.html", folder / f"{kind}.h5", figures)
 
 
