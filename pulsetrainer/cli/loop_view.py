@@ -60,10 +60,6 @@ class LoopView:
         np.bitwise_or.at(self._cells, (row // 4, column // 2), _DOTS[row % 4, column % 2])
         self._draw()
 
-    def begin(self) -> None:
-        """Clear the loop."""
-        self._cells[:] = 0
-
     @contextmanager
     def on_screen(self, label: str) -> Iterator[Progress]:
         """Draw on the terminal, and give a callable that takes the share of the work done."""
