@@ -18,7 +18,7 @@ from verdict import verdict_page
 
 from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.app import app
-from pulsetrainer.cli.settings import SETTINGS, VARIABLE
+from pulsetrainer.cli.settings import SETTINGS, VARIABLE, takers
 from pulsetrainer.files.schema import FieldPlan, plan_of
 from pulsetrainer.version import __version__
 
@@ -84,7 +84,7 @@ def commands_page() -> str:
             *_arguments(command),
             *_options(command, of=name),
         ]
-    return "\n".join(parts + _settings())
+    return "\n".join(parts + _settings(root))
 
 
 def _description(text: str) -> Iterator[str]:
@@ -125,10 +125,10 @@ def _default(option: Any) -> str:
     return "" if callable(value) or not isinstance(value, str | int | float) else f"{value}"
 
 
-def _settings() -> list[str]:
+def _settings(root: Any) -> list[str]:
     rows = [
         f"| `{one.key}` | {one.unit} | {one.what} | "
-        + ", ".join(sorted({command for command, _ in one.options}))
+        + ", ".join(sorted(takers(one, root.commands)))
         + f" | `{one.variable}` |"
         for one in SETTINGS
     ]
@@ -322,8 +322,8 @@ def manual_page() -> str:
     lines += [".SH SETTINGS", _roff(SETTINGS_WORDS)]
     for one in SETTINGS:
         unit = f", {one.unit}" if one.unit else ""
-        takers = ", ".join(sorted({command for command, _ in one.options}))
-        lines += [".TP", f".B {_roff(one.key)}", _roff(f"{one.what}{unit}; for {takers}.")]
+        commands = ", ".join(sorted(takers(one, root.commands)))
+        lines += [".TP", f".B {_roff(one.key)}", _roff(f"{one.what}{unit}; for {commands}.")]
     lines.append(".SH ENVIRONMENT")
     for one in SETTINGS:
         lines += [".TP", f".B {_roff(one.variable)}", _roff(f"as {one.key} in the settings.")]

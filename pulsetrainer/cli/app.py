@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -81,7 +81,6 @@ def root(
         typer.Option(
             "--settings",
             help="File of settings; default: pulsetrainer.toml here, or in the user's configuration.",
-            show_default=False,
         ),
     ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show the whole traceback of an error.")] = False,
@@ -93,7 +92,8 @@ def root(
     file = settings.find(settings_file, os.environ)
     context.obj = file
     if file is not None:
-        context.default_map = settings.defaults(settings.read(file))
+        program: Any = context.command
+        context.default_map = settings.defaults(settings.read(file), program.commands)
 
 
 def main() -> None:

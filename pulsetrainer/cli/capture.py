@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import (
     AsJson,
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
     from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.files.resume import Earlier
-    from pulsetrainer.steps.capture import Plan
     from pulsetrainer.steps.recording import Watch
 
 
@@ -114,7 +112,15 @@ def capture(
             at = samples_played(earlier.run, course)
         if dry_run:
             planned = plan(played, levels=levels, condition=condition, repeats=repeats, limits=limits, at=at)
-            _show_plan(job, out, port, planned, at / course.size)
+            rows = {
+                "length": f"{planned.seconds:.1f} s, {planned.samples} samples, {planned.rate_Hz:g} a second",
+                "reversals": planned.reversals,
+                "cells switched": f"{planned.coverage_percent:.1f} %",
+            }
+            does = (
+                f"continue {played.name} at {100 * at / course.size:.0f} %" if at else f"play {played.name}"
+            )
+            job.would(does, planned, port, out, rows)
             return
         if not resume:
             _note_leftovers(job, out)
@@ -246,26 +252,5 @@ def _show(job: Job, got: dict[str, Any]) -> None:
             "reversals": got["reversals"],
             **({"parts": got["parts"]} if got["parts"] > 1 else {}),
             "cells switched": f"{got['coverage_percent']:.1f} %",
-        },
-    )
-
-
-def _show_plan(job: Job, out: Path, port: str | None, planned: Plan, done: float) -> None:
-    """Say what would be played."""
-    from pulsetrainer.device.device import DEFAULT_PORT
-    from pulsetrainer.device.schemes import redact
-
-    where = redact(port or DEFAULT_PORT)
-    job.screen.result(plain(planned) | {"port": where, "output": out, "dry_run": True})
-    does = (
-        f"would continue {planned.signal} at {100 * done:.0f} %" if done else f"would play {planned.signal}"
-    )
-    job.screen.facts(
-        f"would {does} on {where} and write {out}; nothing was done",
-        {
-            "length": f"{planned.seconds:.1f} s, {planned.samples} samples, {planned.rate_Hz:g} a second",
-            "current": f"{planned.peak_current_A:.3f} A at most, {planned.rms_current_A:.3f} A rms",
-            "reversals": planned.reversals,
-            "cells switched": f"{planned.coverage_percent:.1f} %",
         },
     )

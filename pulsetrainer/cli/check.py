@@ -22,9 +22,7 @@ def check(
     update: Annotated[
         bool, typer.Option("--update", help="Write a model with the offset and the gain of now.")
     ] = False,
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File to write, with --update.", show_default=False)
-    ] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write, with --update.")] = None,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
     overwrite: Overwrite = False,

@@ -27,8 +27,7 @@ def compare(
         typer.Argument(help="Evaluations or sessions, the oldest first.", metavar="EVALUATION.h5..."),
     ],
     out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="Figure (png, svg, pdf) or table (csv).", show_default=False),
+        Path | None, typer.Option("-o", "--out", help="Figure (png, svg, pdf) or table (csv).")
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="All figures, not only the headlines.")] = False,
     overwrite: Overwrite = False,

@@ -21,7 +21,7 @@ def diagnose(
     runs: Annotated[list[Path], typer.Argument(help="Runs of the device.", metavar="RUN.h5...")],
     model: Annotated[Path, typer.Option(help="Model to be diagnosed.")],
     out: Out,
-    html: Annotated[Path | None, typer.Option(help="Report to write.", show_default=False)] = None,
+    html: Annotated[Path | None, typer.Option(help="Report to write.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Screen only: seconds, but no refit.")] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated null distribution.")] = 0,
     overwrite: Overwrite = False,

@@ -21,13 +21,9 @@ def evaluate(
         list[Path], typer.Argument(help="Playbacks, or one run.", metavar="PLAYED.h5...|RUN.h5")
     ],
     model: Annotated[list[Path], typer.Option(help="Model to test on the run; may be given again.")] = [],  # noqa: B006
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File to write.", show_default=False)
-    ] = None,
-    html: Annotated[Path | None, typer.Option(help="Report to write.", show_default=False)] = None,
-    bounds: Annotated[
-        Path | None, typer.Option(help="TOML file of bounds; outside them exit 1.", show_default=False)
-    ] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Report to write.")] = None,
+    bounds: Annotated[Path | None, typer.Option(help="TOML file of bounds; outside them exit 1.")] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:

@@ -17,8 +17,7 @@ def extend(
     model: Annotated[Path, typer.Option(help="Model that was diagnosed.")],
     out: Out,
     verify: Annotated[
-        Path | None,
-        typer.Option(help="Run, not diagnosed, that each cause must predict better.", show_default=False),
+        Path | None, typer.Option(help="Run, not diagnosed, that each cause must predict better.")
     ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,

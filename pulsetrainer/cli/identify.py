@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -16,29 +15,7 @@ if TYPE_CHECKING:
     from pulsetrainer.artefacts import Model
 
 
-class Reading(StrEnum):
-    """How the weights are read."""
-
-    continuous = "continuous"
-    relay = "relay"
-
-
-class FormChoice(StrEnum):
-    """Which form the model has."""
-
-    auto = "auto"
-    direct = "direct"
-    dual = "dual"
-    signed = "signed"
-
-
-class Method(StrEnum):
-    """How weights and offset are found."""
-
-    joint = "joint"
-    alternating = "alternating"
-
-
+Reading = Literal["continuous", "relay"]
 _MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
 
 
@@ -53,22 +30,23 @@ def identify(
             max=_MOST_LEVELS,
             help="Levels of the Preisach plane; default: 48, fewer for a short record.",
             envvar=variable("levels"),
-            show_default=False,
         ),
     ] = None,
     form: Annotated[
-        FormChoice,
+        Literal["auto", "direct", "dual", "signed"],
         typer.Option(
             help="direct: the output lags; dual: it leads, roles exchanged; signed: weights of either sign; "
             "auto: by held-out blocks."
         ),
-    ] = FormChoice.auto,
+    ] = "auto",
     reading: Annotated[
         Reading,
         typer.Option("--reading", help="How the weights are read: continuous, or relay as in the paper."),
-    ] = Reading.continuous,
+    ] = "continuous",
     operator: Annotated[Reading | None, typer.Option("--operator", hidden=True)] = None,
-    method: Annotated[Method, typer.Option(help="joint, or alternating as in the paper.")] = Method.joint,
+    method: Annotated[
+        Literal["joint", "alternating"], typer.Option(help="joint, or alternating as in the paper.")
+    ] = "joint",
     smoothing: Annotated[
         str | None,
         typer.Option(
@@ -100,9 +78,9 @@ def identify(
         model = fit(
             [job.load(path, Run) for path in runs],
             levels=levels,
-            form=form.value,
-            reading=(operator or reading).value,
-            method=method.value,
+            form=form,
+            reading=operator or reading,
+            method=method,
             smoothing=length,
             bootstrap=bootstrap,
             seed=seed,

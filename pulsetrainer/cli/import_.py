@@ -28,10 +28,7 @@ def import_(
         ),
     ],
     out: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--out", help="File to write; '{name}.h5' makes a run of each file.", show_default=False
-        ),
+        Path, typer.Option("-o", "--out", help="File to write; '{name}.h5' makes a run of each file.")
     ],
     input_column: Annotated[
         str, typer.Option("--input", help="Column of the input, a current for instance.")
@@ -40,21 +37,18 @@ def import_(
         str, typer.Option("--output", help="Column of the output, a force for instance.")
     ],
     time_column: Annotated[
-        str | None,
-        typer.Option("--time", help="Column of the time; default: the first one.", show_default=False),
+        str | None, typer.Option("--time", help="Column of the time; default: the first one.")
     ] = None,
     reference_column: Annotated[
-        str | None, typer.Option("--reference", help="Column of the reference.", show_default=False)
+        str | None, typer.Option("--reference", help="Column of the reference.")
     ] = None,
     input_unit: Annotated[
-        str | None, typer.Option(help="Unit of the input; default: from the header.", show_default=False)
+        str | None, typer.Option(help="Unit of the input; default: from the header.")
     ] = None,
     output_unit: Annotated[
-        str | None, typer.Option(help="Unit of the output; default: from the header.", show_default=False)
+        str | None, typer.Option(help="Unit of the output; default: from the header.")
     ] = None,
-    rate: Annotated[
-        float | None, typer.Option(help="Samples a second, instead of a time column.", show_default=False)
-    ] = None,
+    rate: Annotated[float | None, typer.Option(help="Samples a second, instead of a time column.")] = None,
     no_time: Annotated[
         bool, typer.Option("--no-time", help="Ignore time: only the order of the samples counts.")
     ] = False,
@@ -63,7 +57,6 @@ def import_(
         typer.Option(
             metavar="even|HZ",
             help="Make the time steps even: at the median step, or at a rate. Default: left as they are.",
-            show_default=False,
         ),
     ] = None,
     skip_bad_rows: Annotated[

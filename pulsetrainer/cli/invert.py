@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -16,14 +15,6 @@ if TYPE_CHECKING:
     from pulsetrainer.artefacts import Waveform
 
 
-class Inversion(StrEnum):
-    """How the model is inverted."""
-
-    continuous = "continuous"
-    closest_match = "closest-match"
-    extended = "extended"
-
-
 def invert(
     context: typer.Context,
     waveform: Annotated[
@@ -32,25 +23,22 @@ def invert(
     model: Annotated[Path, typer.Option(help="Model to invert.")],
     out: Out,
     method: Annotated[
-        Inversion | None,
+        Literal["continuous", "closest-match", "extended"] | None,
         typer.Option(
-            help="continuous (default), closest-match as in the paper, or extended (default if it is).",
-            show_default=False,
+            help="continuous (default), closest-match as in the paper, or extended (default if it is)."
         ),
     ] = None,
     force_min: Annotated[
-        float | None,
-        typer.Option(help="Force at the foot of the pulse, N; default: the lowest.", show_default=False),
+        float | None, typer.Option(help="Force at the foot of the pulse, N; default: the lowest.")
     ] = None,
     force_max: Annotated[
-        float | None, typer.Option(help="Force at its top, N; default: the highest.", show_default=False)
+        float | None, typer.Option(help="Force at its top, N; default: the highest.")
     ] = None,
     beat: Annotated[
         str | None,
         typer.Option(
             metavar="N|mean",
             help="Beat of a recorded pulse: its number from 1, or the mean. Default: all is one period.",
-            show_default=False,
         ),
     ] = None,
     periods: Annotated[
@@ -64,12 +52,10 @@ def invert(
             help="Fastest the drive may move, input unit a second; default: 30 A/s for a model of our own "
             "device, none for any other.",
             envvar=variable("slew_A_per_s"),
-            show_default=False,
         ),
     ] = None,
     despite_warning: Annotated[
-        bool,
-        typer.Option("--despite-warning", help="Invert a model that does not describe its own record."),
+        bool, typer.Option("--despite-warning", help="Invert a model that does not describe its own record.")
     ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
@@ -95,7 +81,7 @@ def invert(
         drive = inverse_of(
             read_pulse(waveform),
             source,
-            method=method.value if method else None,
+            method=method,
             force_min=force_min,
             force_max=force_max,
             beat=beat,

@@ -210,6 +210,19 @@ class Job:
         said = {name: getattr(header, name) for name in ("title", "created", "history")}
         self.write(path, render(noun, provenance_json=header.provenance.to_json(), **said))
 
+    def would(
+        self, what: str, plan: Any, port: str | None, out: Path, rows: Mapping[str, Any], **besides: Any
+    ) -> None:
+        """Say what a dry run would have played, and where; ``besides`` is for JSON."""
+        from pulsetrainer.device.device import DEFAULT_PORT
+        from pulsetrainer.device.schemes import redact
+
+        where = redact(port or DEFAULT_PORT)
+        self.screen.result(besides | plain(plan) | {"port": where, "output": out, "dry_run": True})
+        current = f"{plan.peak_current_A:.3f} A at most, {plan.rms_current_A:.3f} A rms"
+        title = f"would {what} on {where} and write {out}; nothing was done"
+        self.screen.facts(title, {**rows, "current": current})
+
     def wrote(self, *paths: Path | None) -> None:
         """Say which files there are now."""
         for path in paths:

@@ -18,7 +18,7 @@ def positive(value: float | None) -> float | None:
     return value
 
 
-Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.", show_default=False)]
+Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing output.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 Port = Annotated[
@@ -27,7 +27,6 @@ Port = Annotated[
         "--port",
         help="bench: (default), bench:?seed=3, qemu:, /dev/ttyUSB0, COM3 or socket://host:port.",
         envvar="PULSETRAINER_PORT",
-        show_default=False,
     ),
 ]
 DryRun = Annotated[
@@ -42,7 +41,6 @@ TrackHeat = Annotated[
         "--track-heat/--no-track-heat",
         help="Tell the coil's temperature from the duty and make up for the force it costs; "
         "default: where the model has a thermal term and was captured with the duty.",
-        show_default=False,
     ),
 ]
 LimitCurrent = Annotated[
@@ -52,7 +50,6 @@ LimitCurrent = Annotated[
         callback=positive,
         help="Highest current the device may drive, A; this can only lower the device's own limit.",
         envvar=variable("limits.current_A"),
-        show_default=False,
     ),
 ]
 LimitForce = Annotated[
@@ -62,6 +59,5 @@ LimitForce = Annotated[
         callback=positive,
         help="Force above which the device switches off, N; this can only lower the device's own limit.",
         envvar=variable("limits.force_N"),
-        show_default=False,
     ),
 ]

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import (
     AsJson,
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from pulsetrainer.cli.loop_view import LoopView
     from pulsetrainer.core.plane import IntArray
     from pulsetrainer.device.identity import DeviceInfo
-    from pulsetrainer.device.limits import Limits
     from pulsetrainer.steps.play import Watch
 
 
@@ -61,11 +59,18 @@ def play(
     from pulsetrainer.artefacts import Playback, Waveform
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.errors import PulsetrainerError
+    from pulsetrainer.steps.play import plan
     from pulsetrainer.steps.play import play as press
 
     waveform, limits = job.load(drive, Waveform), Limits(limit_current_A, limit_force_N)
     if dry_run:
-        _plan(job, out, port, waveform, repeats, limits)
+        planned = plan(waveform, repeats=repeats, limits=limits)
+        rows = {
+            "repeats": f"{repeats} of each drive, {planned.seconds:.1f} s in all",
+            "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
+        }
+        what = {"name": waveform.name, "inversion": waveform.inversion, "repeats": repeats}
+        job.would(f"play {_named(waveform)}", planned, port, out, rows, **what)
         return
     stopped: PulsetrainerError | None = None
     view = job.view(*_ends(waveform), live=live)
@@ -81,16 +86,15 @@ def play(
                 raise
             stopped, played = error, error.kept
     whole = played.compensated.output.shape[0]
-    job.save(
-        out,
-        played,
-        f"{waveform.name} by {waveform.inversion} inversion, played on {info.serial}",
-        device=job.device(info),
-    )
+    job.save(out, played, f"{_named(waveform)}, played on {info.serial}", device=job.device(info))
     if stopped is not None:
         stopped.message += f"; {whole} of {repeats} repeats were kept in {out}"
         raise stopped
     _show(job, out, played, info)
+
+
+def _named(drive: Waveform) -> str:
+    return f"{drive.name} by {drive.inversion} inversion"
 
 
 def _ends(drive: Waveform) -> tuple[float, float]:
@@ -143,7 +147,7 @@ def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
         }
     )
     job.screen.facts(
-        f"{out}: {drive.name} by {drive.inversion} inversion on {info.serial}",
+        f"{out}: {_named(drive)} on {info.serial}",
         {
             "repeats": f"{repeats} of each drive, {seconds:.1f} s in all",
             "samples": f"{drive.time_s.size} a repeat",
@@ -158,26 +162,3 @@ def _warmth(played: Playback) -> dict[str, str]:
     if kelvin is None or not kelvin.size:
         return {}
     return {"coil": f"{kelvin[0]:+.1f} to {kelvin[-1]:+.1f} K against calibration, made up for"}
-
-
-def _plan(job: Job, out: Path, port: str | None, drive: Waveform, repeats: int, limits: Limits) -> None:
-    """Say what would be played."""
-    from pulsetrainer.device.device import DEFAULT_PORT
-    from pulsetrainer.device.schemes import redact
-    from pulsetrainer.steps.play import plan
-
-    planned, where = plan(drive, repeats=repeats, limits=limits), redact(port or DEFAULT_PORT)
-    job.screen.result(
-        {"name": drive.name, "inversion": drive.inversion, "repeats": repeats}
-        | plain(planned)
-        | {"port": where, "output": out, "dry_run": True}
-    )
-    job.screen.facts(
-        f"would play {drive.name} by {drive.inversion} inversion on {where} and write {out}; "
-        "nothing was done",
-        {
-            "repeats": f"{repeats} of each drive, {planned.seconds:.1f} s in all",
-            "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
-            "current": f"{planned.peak_current_A:.3f} A at most, {planned.rms_current_A:.3f} A rms",
-        },
-    )

@@ -16,8 +16,7 @@ def plot(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
     out: Annotated[
-        Path | None,
-        typer.Option("-o", "--out", help="File to write; default: beside it, as PNG.", show_default=False),
+        Path | None, typer.Option("-o", "--out", help="File to write; default: beside it, as PNG.")
     ] = None,
     data: Annotated[
         bool, typer.Option("--data", help="Write what is drawn as a table too, beside the figure, as CSV.")

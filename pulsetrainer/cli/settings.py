@@ -21,13 +21,12 @@ VARIABLE = "PULSETRAINER_SETTINGS"
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One key of the file and the options that take its value."""
+    """One key of the file; the options of its environment variable take its value."""
 
     key: str  # dotted where it is in a table of the file
     kind: type
     unit: str
     what: str
-    options: tuple[tuple[str, str], ...]  # (command, parameter of its function)
 
     @property
     def variable(self) -> str:
@@ -41,35 +40,30 @@ def variable(key: str) -> str:
 
 
 SETTINGS = (
-    Setting(
-        "port",
-        str,
-        "",
-        "the device",
-        (("capture", "port"), ("play", "port"), ("doctor", "port"), ("tune", "port")),
-    ),
-    Setting("levels", int, "", "levels of the plane", (("capture", "levels"), ("identify", "levels"))),
-    Setting("current_max_A", float, "A", "top of the range of a capture", (("capture", "current_max_A"),)),
-    Setting("speed_A_per_s", float, "A/s", "speed of identification", (("capture", "speed_A_per_s"),)),
-    Setting("rate_Hz", float, "Hz", "samples a second", (("capture", "rate_Hz"),)),
-    Setting("slew_A_per_s", float, "A/s", "fastest a drive may move", (("invert", "slew_A_per_s"),)),
-    Setting("periods", int, "", "periods of a pulse", (("invert", "periods"),)),
-    Setting("repeats", int, "", "how often a drive is played", (("play", "repeats"),)),
-    Setting(
-        "limits.current_A",
-        float,
-        "A",
-        "the device refuses more",
-        (("capture", "limit_current_A"), ("play", "limit_current_A"), ("tune", "limit_current_A")),
-    ),
-    Setting(
-        "limits.force_N",
-        float,
-        "N",
-        "the device switches off above",
-        (("capture", "limit_force_N"), ("play", "limit_force_N"), ("tune", "limit_force_N")),
-    ),
+    Setting("port", str, "", "the device"),
+    Setting("levels", int, "", "levels of the plane"),
+    Setting("current_max_A", float, "A", "top of the range of a capture"),
+    Setting("speed_A_per_s", float, "A/s", "speed of identification"),
+    Setting("rate_Hz", float, "Hz", "samples a second"),
+    Setting("slew_A_per_s", float, "A/s", "fastest a drive may move"),
+    Setting("periods", int, "", "periods of a pulse"),
+    Setting("repeats", int, "", "how often a drive is played"),
+    Setting("limits.current_A", float, "A", "the device refuses more"),
+    Setting("limits.force_N", float, "N", "the device switches off above"),
 )
+
+
+def takers(setting: Setting, commands: Mapping[str, Any]) -> dict[str, str]:
+    """Return which of the program's commands take a setting, each with the parameter of its function.
+
+    They are those with an option of the setting's environment variable.
+    """
+    return {
+        name: parameter.name
+        for name, command in commands.items()
+        for parameter in command.params
+        if parameter.envvar == setting.variable
+    }
 
 
 def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
@@ -144,12 +138,12 @@ def _value(path: Path, key: str, value: Any) -> Any:
     return value
 
 
-def defaults(values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def defaults(values: Mapping[str, Any], commands: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return settings as the parser takes them: by command and by parameter of its function."""
     found: dict[str, dict[str, Any]] = {}
     for setting in SETTINGS:
         if setting.key in values:
-            for command, parameter in setting.options:
+            for command, parameter in takers(setting, commands).items():
                 found.setdefault(command, {})[parameter] = values[setting.key]
     return found
 

@@ -21,10 +21,7 @@ def tune(
     out: Annotated[
         Path | None,
         typer.Option(
-            "-o",
-            "--out",
-            help="File of settings to write the gains into, such as pulsetrainer.toml.",
-            show_default=False,
+            "-o", "--out", help="File of settings to write the gains into, such as pulsetrainer.toml."
         ),
     ] = None,
     supply_V: Annotated[
@@ -33,7 +30,6 @@ def tune(
             "--supply",
             callback=positive,
             help="Voltage of the supply, V, where you have measured it; default: told by the diode's 0.6 V.",
-            show_default=False,
         ),
     ] = None,
     limit_current_A: LimitCurrent = None,

@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from pulsetrainer.cli.app import app
-from pulsetrainer.cli.settings import SETTINGS
+from pulsetrainer.cli.settings import SETTINGS, defaults, takers
 from wording import refusal
 
 PLAN = ("capture", "identification", "--dry-run", "--json", "-o", "run.h5")
@@ -109,13 +109,19 @@ def test_dry_run_of_a_play_is_what_the_play_does(run, tmp_path):
     assert plan["peak_current_A"] == pytest.approx(peak, abs=2e-4)
 
 
-def test_every_setting_reaches_its_options():
-    """The parameters that a setting names are there, and their environment variable is the setting's."""
-    command = typer.main.get_command(app)
-    for one in SETTINGS:
-        for name, parameter in one.options:
-            found = {p.name: p for p in command.commands[name].params}[parameter]
-            assert found.envvar == one.variable
+def test_every_setting_reaches_all_commands_that_take_it():
+    """A limit, a port: wherever there is the option; the first command of each setting is named here."""
+    commands = typer.main.get_command(app).commands
+    plays = {name for name, one in commands.items() if {p.name for p in one.params} & {"limit_force_N"}}
+    assert plays == {"capture", "play", "session", "refine", "check", "tune"}
+    reach = {one.key: set(takers(one, commands)) for one in SETTINGS}
+    assert reach["limits.current_A"] == reach["limits.force_N"] == plays
+    assert reach["port"] == plays | {"doctor"}
+    assert reach["levels"] == {"capture", "identify"}
+    assert {key for key, names in reach.items() if not names} == set()
+    given = defaults({"limits.force_N": 5.0, "port": "bench:"}, commands)
+    assert given["session"] == {"limit_force_N": 5.0, "port": "bench:"}
+    assert given["doctor"] == {"port": "bench:"}
 
 
 def test_verbose_says_what_is_done_on_stderr(run):
