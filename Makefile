@@ -17,7 +17,7 @@ PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: demo ideal test test-slow lint faults bench mutate blind docs site bounds firmware-mps2 firmware-cost clean help
+.PHONY: install demo ideal test test-slow lint faults bench mutate blind docs site bounds firmware-mps2 firmware-cost clean help
 
 help:  ## say what there is
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -26,7 +26,7 @@ help:  ## say what there is
 demo: $(D)/report.html $(D)/diagnosis.html $(D)/prediction.h5  ## the whole chain, twice: as identified, and extended by what a diagnosis finds
 	@$(PT) evaluate $(PLAYED)
 	@$(PT) evaluate $(D)/unseen.h5 --model $(D)/model-continuous.h5 --model $(D)/model-extended.h5
-	@echo "reports: $(D)/report.html $(D)/diagnosis.html"
+	@echo "open in a browser: $(D)/report.html $(D)/diagnosis.html"
 
 # --- set-up -----------------------------------------------------------------------------------------
 $(VENV)/installed: pyproject.toml
@@ -37,6 +37,8 @@ $(VENV)/installed: pyproject.toml
 $(VENV)/installed-test: $(VENV)/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test]'
 	@touch $@
+
+install: $(VENV)/installed  ## the program into .venv
 
 # --- the main job: a rule a file; only what is stale is made again ------------------------------------
 $(D):

@@ -58,6 +58,14 @@ class DataError(PulsetrainerError):
     kind = "data"
 
 
+class AbsentError(DataError):
+    """A file that is to be read is not there."""
+
+    def __init__(self, path: Path | str, *, hint: str) -> None:
+        super().__init__(f"{path} does not exist", hint=hint)
+        self.path = Path(path)
+
+
 class WrongKindError(DataError):
     """A file holds another kind of artefact than is wanted here."""
 

@@ -15,10 +15,11 @@ THERE = {"x.h5", "x.html", "x.png", "x.csv"}  # outputs that exist
 
 
 class Mistake(NamedTuple):
-    """A command line and the exit code that it must end with."""
+    """A command line, the exit code that it must end with, and the option or argument to be named."""
 
     words: tuple[str, ...]
     code: int
+    where: str = ""
 
 
 def lay_out(folder: Path) -> None:
@@ -37,10 +38,10 @@ def at_once() -> dict[str, Mistake]:
     for one in (*WRITERS, *READS_ONLY):
         for name in one.reads:
             absent = tuple(f"absent{Path(word).suffix}" if word == name else word for word in _line(one))
-            found[f"{one.name}: {name} is absent"] = Mistake(absent, 3)
+            found[f"{one.name}: {name} is absent"] = Mistake(absent, 3, _given_as(absent))
         for option, name in one.outputs:
             there = _line(one, {option: f"x{Path(name).suffix}"})
-            found[f"{one.name}: {option} exists"] = Mistake(there, 2)
+            found[f"{one.name}: {option} exists"] = Mistake(there, 2, f"({option})")
             nowhere = _line(one, {option: f"no/{name}"})
             found[f"{one.name}: {option} has no folder"] = Mistake(nowhere, 2)
     table = ("import", "run.csv", "--input", "u", "--output", "y", "-o", "out.h5")
@@ -86,10 +87,31 @@ def at_once() -> dict[str, Mistake]:
         "no such file of settings": ("--settings", "absent.toml", "ports"),
         "no such setting": ("--settings", "wrong.toml", "ports"),
     }
-    found |= {name: Mistake(line, 2) for name, line in words.items()}
-    found["no such file of bounds"] = Mistake(("evaluate", "played.h5", "--bounds", "absent.toml"), 3)
-    found["no such CSV signal"] = Mistake(("capture", "absent.csv", "-o", "out.h5"), 3)
+    named = {
+        "--levels",
+        "--repeats",
+        "--speed",
+        "--rate",
+        "--current-max",
+        "--limit-force",
+        "--periods",
+        "--slew",
+    }
+    named |= {"--seed", "--beat", "--smoothing", "--port", "--resample"}
+    found |= {
+        name: Mistake(line, 2, next((word for word in line if word in named), ""))
+        for name, line in words.items()
+    }
+    bounds = ("evaluate", "played.h5", "--bounds", "absent.toml")
+    found["no such file of bounds"] = Mistake(bounds, 3, "(--bounds)")
+    found["no such CSV signal"] = Mistake(("capture", "absent.csv", "-o", "out.h5"), 3, "(argument ")
     return found
+
+
+def _given_as(words: tuple[str, ...]) -> str:
+    """Return the option before the absent file; where there is none, it is an argument."""
+    before = words[next(place for place, word in enumerate(words) if word.startswith("absent.")) - 1]
+    return f"({before})" if before.startswith("--") else "(argument "
 
 
 def _line(one: Writer, outputs: dict[str, str] | None = None) -> tuple[str, ...]:

@@ -42,9 +42,9 @@ KEPT = "kept in run.h5 (complete=false)"
 MESSAGES = {
     # --- files -------------------------------------------------------------------------------------------
     "wrong kind": Message("", "pulsetrainer {verb}", "{file}", "expected {expected}", "got {got}"),
-    "absent": Message("does not exist", "holds: {near}", "{file}"),
+    "absent": Message("does not exist", "files here: {near}", "{file}"),
     "a folder": Message("is a folder", "", "{file}", "expected a file"),
-    "exists": Message("already exists", "--overwrite", "{file}"),
+    "exists": Message("already exists", "another file, such as", "{file}"),
     "truncated": Message("truncated", "restore it", "{file}", got="{bytes} bytes"),
     "not HDF5": Message("not an HDF5 file", "pulsetrainer import", "{file}"),
     "another program's": Message("another program", "pulsetrainer import", "{file}", "kind"),
@@ -79,13 +79,15 @@ MESSAGES = {
     "too many samples": Message(
         "samples", "fewer", expected="more than {most}", got="{times} times {samples}"
     ),
-    "not a smoothing": Message("--smoothing", "identify --help", expected="a number in 0..1", got="'{got}'"),
+    "not a smoothing": Message(
+        "--smoothing", "identify --help", expected="a number from 0 to 1", got="'{got}'"
+    ),
     "no such beat": Message("beat", "--beat", "fingerbp_AAC3_3", "6 ", "9"),
     # --- words -------------------------------------------------------------------------------------------
-    "option missing": Message("is missing", "identify --help", expected="--out"),
-    "no such command": Message("No such command", "--help", got="frobnicate"),
+    "option missing": Message("is missing", "pulsetrainer identify run.h5", expected="--out"),
+    "no such command": Message("there is no command", "--help", got="frobnicate"),
     "no such signal": Message("signal", "pulsetrainer capture", expected="diagnostic", got="noise"),
-    "no such bench parameter": Message("parameter", "creep", "bench", got="'crep'"),
+    "no such bench parameter": Message("parameter", "creep", "--port: the bench", got="'crep'"),
     "one evaluation": Message("at least two", "pulsetrainer compare"),
     "nothing in common": Message("in common", "evaluat"),
     # --- settings ----------------------------------------------------------------------------------------

@@ -31,6 +31,7 @@ from pulsetrainer.cli import (
     show,
     tune,
 )
+from pulsetrainer.cli.naming import Command
 from pulsetrainer.version import __version__
 
 # Plain help: drawing it with rich would cost a third of the time until it shows.
@@ -43,25 +44,25 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-app.command("capture")(capture.capture)
-app.command("import")(import_.import_)
-app.command("identify")(identify.identify)
-app.command("invert")(invert.invert)
-app.command("play")(play.play)
-app.command("evaluate")(evaluate.evaluate)
-app.command("compare")(compare.compare)
-app.command("diagnose")(diagnose.diagnose)
-app.command("extend")(extend.extend)
-app.command("correct")(correct.correct)
-app.command("export")(export.export)
-app.command("session")(session.session)
-app.command("refine")(refine.refine)
-app.command("check")(check.check)
-app.command("tune")(tune.tune)
-app.command("show")(show.show)
-app.command("plot")(plot.plot)
-app.command("ports")(ports.ports)
-app.command("doctor")(doctor.doctor)
+app.command("capture", cls=Command)(capture.capture)
+app.command("import", cls=Command)(import_.import_)
+app.command("identify", cls=Command)(identify.identify)
+app.command("invert", cls=Command)(invert.invert)
+app.command("play", cls=Command)(play.play)
+app.command("evaluate", cls=Command)(evaluate.evaluate)
+app.command("compare", cls=Command)(compare.compare)
+app.command("diagnose", cls=Command)(diagnose.diagnose)
+app.command("extend", cls=Command)(extend.extend)
+app.command("correct", cls=Command)(correct.correct)
+app.command("export", cls=Command)(export.export)
+app.command("session", cls=Command)(session.session)
+app.command("refine", cls=Command)(refine.refine)
+app.command("check", cls=Command)(check.check)
+app.command("tune", cls=Command)(tune.tune)
+app.command("show", cls=Command)(show.show)
+app.command("plot", cls=Command)(plot.plot)
+app.command("ports", cls=Command)(ports.ports)
+app.command("doctor", cls=Command)(doctor.doctor)
 
 
 def _version(wanted: bool) -> None:

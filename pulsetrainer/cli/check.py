@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def check(
     context: typer.Context,
-    model: Annotated[Path, typer.Argument(help="Model of the device.")],
+    model: Annotated[Path, typer.Argument(help="Model of the device.", metavar="MODEL.h5")],
     port: Port = None,
     update: Annotated[
         bool, typer.Option("--update", help="Write a model with the offset and the gain of now.")

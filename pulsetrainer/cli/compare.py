@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def compare(
     context: typer.Context,
-    files: Annotated[
+    evaluations: Annotated[
         list[Path],
         typer.Argument(help="Evaluations or sessions, the oldest first.", metavar="EVALUATION.h5..."),
     ],
@@ -39,20 +39,20 @@ def compare(
 
     Example: pulsetrainer compare before.h5 after.h5 -o change.png
     """
-    check_several(files)
+    check_several(evaluations)
     form = figure_form(out, "a comparison", "csv") if out is not None else ""
-    job = Job(context, inputs=files, outputs=(out,), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=evaluations, outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.artefacts import Evaluation, Session
     from pulsetrainer.files import store
     from pulsetrainer.steps.compare import compare as side_by_side
 
-    labels = labels_of(files)
+    labels = labels_of(evaluations)
     with job.working("comparing"):
-        evaluations = [job.load_any(path, Evaluation, Session) for path in files]
-        headers = [store.read_header(path) for path in files]
-        metrics = side_by_side(evaluations, names=list(map(str, files)), everything=everything)
+        loaded = [job.load_any(path, Evaluation, Session) for path in evaluations]
+        headers = [store.read_header(path) for path in evaluations]
+        metrics = side_by_side(loaded, names=list(map(str, evaluations)), everything=everything)
         if out is not None and form == "csv":
-            job.write(out, _csv(files, metrics))
+            job.write(out, _csv(evaluations, metrics))
         elif out is not None:
             from pulsetrainer.report import comparison_figure, render
 
@@ -61,7 +61,7 @@ def compare(
             )
     sources = [
         {"file": path, "title": header.title, "created": header.created}
-        for path, header in zip(files, headers, strict=True)
+        for path, header in zip(evaluations, headers, strict=True)
     ]
     job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})
     words = {True: "better", False: "worse", None: ""}

@@ -142,7 +142,7 @@ def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
 
 
 def _smoothing(text: str | None) -> float | Literal["auto"] | None:
-    """Read --smoothing: auto, or a number in 0..1."""
+    """Read --smoothing: auto, or a number from 0 to 1."""
     if text is None or text == "auto":
         return None if text is None else "auto"
     try:
@@ -150,5 +150,7 @@ def _smoothing(text: str | None) -> float | Literal["auto"] | None:
     except ValueError:
         value = float("nan")
     if not 0 <= value <= 1:
-        raise typer.BadParameter(f"must be auto or a number in 0..1, got {text!r}", param_hint="--smoothing")
+        raise typer.BadParameter(
+            f"must be auto or a number from 0 to 1, got {text!r}", param_hint="--smoothing"
+        )
     return value

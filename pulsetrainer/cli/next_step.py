@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import shlex
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 _TABLES = (".csv", ".tsv", ".txt", ".dat")
 
-_MAKES = {
+MAKES = {
     "run": "pulsetrainer capture identification -o run.h5",
     "model": "pulsetrainer identify RUN.h5 -o model.h5",
     "waveform": "pulsetrainer invert normal --model model.h5 -o drive.h5",
@@ -55,19 +56,27 @@ _NEXT = {
 def next_step(problem: PulsetrainerError) -> str:
     """Return what to do about an error: a command or an option where there is one, else its own hint."""
     if isinstance(problem, ExistsError):
-        return "give --overwrite to replace it, or name another file"
+        other = shlex.quote(str(_free(problem.path)))
+        return f"name another file, such as {other}, or give --overwrite to replace it"
     if isinstance(problem, WrongKindError):
         return _after_wrong_kind(problem)
     if isinstance(problem, DamagedFileError):
         how = (
-            f"with `{_MAKES[problem.artefact]}`"
-            if problem.artefact in _MAKES
-            else "(see pulsetrainer --help)"
+            f"with `{MAKES[problem.artefact]}`" if problem.artefact in MAKES else "(see pulsetrainer --help)"
         )
         return f"restore it from a copy, or make it again {how}"
     if isinstance(problem, NotAnArtefactError):
         return _after_foreign_file(problem.path)
     return problem.hint
+
+
+def _free(path: Path) -> Path:
+    """Return a name like this one that is not taken."""
+    return next(
+        other
+        for number in itertools.count(2)
+        if not (other := path.with_name(f"{path.stem}-{number}{path.suffix}")).exists()
+    )
 
 
 _PARAMETER = re.compile(r"`([a-z]+(?:_[a-z]+)*)(?:_[A-Z]\w*)?`")  # without the unit at its end
@@ -79,10 +88,13 @@ def as_options(text: str) -> str:
 
 
 def _after_wrong_kind(problem: WrongKindError) -> str:
+    if problem.expected == ("playback", "run") and problem.found == "model":
+        given = shlex.quote(str(problem.path))
+        return f"a model goes with the run: pulsetrainer evaluate run.h5 --model {given}"
     for kind in problem.expected:
         if (kind, problem.found) in _NEXT:
             return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))
-    return f"run `{_MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"
+    return f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"
 
 
 def _after_foreign_file(path: Path) -> str:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 def play(
     context: typer.Context,
-    drive: Annotated[Path, typer.Argument(help="Waveform made by invert.")],
+    drive: Annotated[Path, typer.Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
     out: Out,
     port: Port = None,
     repeats: Annotated[

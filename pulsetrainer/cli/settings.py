@@ -123,7 +123,7 @@ def _value(path: Path, key: str, value: Any) -> Any:
 
         near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
         raise UsageError(
-            f"{path} sets {key!r}, which is no setting",
+            f"{path} sets {key!r}, which is not a setting",
             hint=f"did you mean {near[0]}?" if near else f"there are: {', '.join(known)}",
         )
     setting = known[key]

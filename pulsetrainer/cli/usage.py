@@ -7,6 +7,8 @@ from typing import Any
 
 from pulsetrainer.errors import UsageError
 
+_EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
+_UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 
 
@@ -24,15 +26,24 @@ def usage_of(error: Exception) -> UsageError | None:
         said = f"{command} has no option {getattr(error, 'option_name', '')}"
         return UsageError(said, hint=f"did you mean {' or '.join(near)}?" if near else help_)
     if kind == "MissingParameter" and parameter is not None:
-        return UsageError(
-            f"{_named(parameter)} is missing", hint=f"add it: {_meaning(parameter)}, see {help_}"
-        )
+        example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
+        like = f"; like this: {example[1]}" if example else f", see {help_}"
+        return UsageError(f"{_named(parameter)} is missing", hint=f"add it: {_meaning(parameter)}{like}")
     if kind == "BadParameter" and parameter is not None:
         return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
     named = getattr(error, "param_hint", None)  # of what a command finds out itself
     if kind == "BadParameter" and isinstance(named, str):
         return UsageError(f"{named} {str(getattr(error, 'message', error)).rstrip('.')}", hint=help_)
-    return UsageError(str(explain()).rstrip("."), hint=help_)
+    return _other(str(explain()).rstrip("."), help_)
+
+
+def _other(said: str, help_: str) -> UsageError:
+    """What has no words of its own here, but for a command that does not exist."""
+    unknown = _UNKNOWN.match(said)
+    if unknown is None:
+        return UsageError(said, hint=help_)
+    near = f"did you mean {unknown[2]}? All commands: " if unknown[2] else ""
+    return UsageError(f"there is no command {unknown[1]!r}", hint=f"{near}{help_}")
 
 
 def _named(parameter: Any) -> str:
@@ -71,4 +82,4 @@ def _without(parameter: Any, help_: str) -> str:
     default = getattr(parameter, "default", None)
     if isinstance(default, int | float) and not isinstance(default, bool):
         return f"leave it out for the usual {default:g}, or see {help_}"
-    return help_
+    return help_ if getattr(parameter, "required", False) else f"leave it out, or see {help_}"

@@ -74,7 +74,7 @@ def find_opener(port: str) -> Opener | None:
     scheme, slashes = match.groups()
     if scheme not in _OPENERS and not slashes:
         raise UsageError(
-            f"{port!r} is of no known kind of port",
+            f"`port`: {port!r} is of no known kind",
             hint=f"a port is {''.join(f'{known}:, ' for known in _OPENERS)}/dev/ttyUSB0, COM3 or "
             "socket://host:port",
         )

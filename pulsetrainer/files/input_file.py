@@ -6,12 +6,15 @@ Nothing heavy is loaded here, so that a mistyped name is answered at once.
 from __future__ import annotations
 
 import difflib
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
-from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, UsageError
+from pulsetrainer.errors import AbsentError, DamagedFileError, DataError, NotAnArtefactError, UsageError
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 JOURNAL = b"pulsetrainer journal 1\n"  # what a recording under way begins with
+_FIRST_TEXT = re.compile(rb"GCOL.{28}([a-z]+)", re.DOTALL)  # our first text attribute is the kind
 
 
 def check_file(path: Path | str) -> None:
@@ -57,7 +60,7 @@ def _first_bytes(path: Path) -> bytes:
         if path.is_dir():
             raise DataError(f"{path} is a folder, expected a file", hint=_names_in(path, path))
         if not path.exists():
-            raise DataError(f"{path} does not exist", hint=_names_in(path.parent, path))
+            raise AbsentError(path, hint=_names_in(path.parent, path))
         if not path.is_file():
             raise DataError(f"{path} is not an ordinary file", hint="name a file on disk")
         with path.open("rb") as stream:
@@ -81,7 +84,38 @@ def _names_in(folder: Path, path: Path) -> str:
     near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
     near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
     near = near or [name for name in names if name.endswith(path.suffix or ".h5")][:5]
-    return f"the folder holds: {', '.join(near)}" if near else f"there is no similar name in {folder}"
+    where = "here" if folder == Path() else f"in {folder}"
+    return f"files {where}: {', '.join(near)}" if near else f"no file {where} has a similar name"
+
+
+def near_names(path: Path, kinds: Sequence[str]) -> list[str]:
+    """Return the artefacts of these kinds in the folder of ``path``, those with the nearest names first.
+
+    No kinds: every artefact. The kind is read off the first bytes, without HDF5: it is a hint, no check.
+    """
+    try:
+        names = [
+            entry.name
+            for entry in sorted(path.parent.iterdir())
+            if entry.is_file() and (kind := _likely_kind(entry)) and (not kinds or kind in kinds)
+        ]
+    except OSError:
+        return []
+    near = difflib.get_close_matches(path.name, names, n=5, cutoff=0.5)
+    return [*near, *(name for name in names if name not in near)][:5]
+
+
+def _likely_kind(path: Path) -> str:
+    """Return the kind of an artefact by its first bytes; empty where they tell of none."""
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(512)
+    except OSError:
+        return ""
+    if start.startswith(JOURNAL):
+        return "run"
+    found = _FIRST_TEXT.search(start) if start.startswith(_HDF5) else None
+    return found[1].decode() if found else ""
 
 
 def check_resumable(path: Path) -> None:

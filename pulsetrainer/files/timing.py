@@ -26,7 +26,7 @@ def check_timing(time: str | None, rate_Hz: float | None, *, no_time: bool, resa
             "`no_time` was given together with `time` or `rate_Hz`", hint="give one of the three"
         )
     if rate_Hz is not None and not 0 < rate_Hz < math.inf:
-        raise UsageError(f"the rate must be positive, got {rate_Hz:g} Hz", hint="for instance `rate_Hz` 1000")
+        raise UsageError(f"`rate_Hz` must be above 0, got {rate_Hz:g} Hz", hint="for instance `rate_Hz` 1000")
     if no_time and resampled:
         raise UsageError(
             "a run without time cannot be resampled", hint="leave out either `no_time` or `resample`"

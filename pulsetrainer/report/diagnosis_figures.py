@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from pulsetrainer.report import panels
@@ -36,16 +37,23 @@ def course(found: Diagnosis) -> Figure:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1.0))
     panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
     panels.trace(above, found.time_s, found.before, **MODEL, label="static model, refitted")
-    above.set_ylabel(label("output", found.output_unit))
+    above.set_ylabel(label(panels.quantity_of(found.output_unit), found.output_unit))
+    above.set_title(_verdict(found), wrap=True)
     panels.headroom(above)
-    panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="static")
+    panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="left by the static model")
     if not found.quick:
-        panels.trace(below, found.time_s, found.output - found.after, **MODEL, label="extended")
+        panels.trace(below, found.time_s, found.output - found.after, **MODEL, label="by the extended")
     below.axhline(0.0, **GUIDE)
     below.set_ylabel(label("residual", found.output_unit))
     below.set_xlabel(label("time, runs one after another", "s"))
     panels.headroom(below)
     return figure
+
+
+def _verdict(found: Diagnosis) -> str:
+    """Return the verdict in a line: the causes found, else what was found instead."""
+    causes = [one.cause for one in found.causes if one.found]
+    return f"verdict: {', '.join(causes) or found.verdict}"
 
 
 @styled
@@ -76,11 +84,13 @@ def dependence(one: Dependence) -> Figure:
     """Return what a learned dependence adds to the output, with its 95 % band."""
     figure = Figure(figsize=(_SMALL_IN, 2.6), layout="constrained")
     axes = figure.add_subplot()
-    axes.fill_between(one.at, one.value - one.half, one.value + one.half, color=BLUE, alpha=0.2, linewidth=0)
-    axes.plot(one.at, one.value, color=BLUE)
+    low, high = one.value - one.half, one.value + one.half
+    axes.fill_between(one.at, low, high, color=BLUE, alpha=0.2, linewidth=0, label="95 %")
+    axes.plot(one.at, one.value, color=BLUE, label="learned")
     axes.axhline(0.0, **GUIDE)
     axes.set_xlabel(label(one.state, one.unit), wrap=True)
-    axes.set_ylabel(label("change of the output", one.output_unit))
+    panels.headroom(axes)
+    axes.set_ylabel(label(f"change of the {panels.quantity_of(one.output_unit)}", one.output_unit))
     return figure
 
 
@@ -88,7 +98,7 @@ def dependence(one: Dependence) -> Figure:
 def ranking(found: Diagnosis) -> Figure:
     """Return how much of what can be explained each cause explains, with its p-value."""
     shown = [one for one in found.causes if one.found or one.explains_percent > 0][:_MOST_BARS][::-1]
-    figure = Figure(figsize=(COLUMN_IN, 0.7 + 0.34 * max(len(shown), 1)), layout="constrained")
+    figure = Figure(figsize=(COLUMN_IN, 1.0 + 0.34 * max(len(shown), 1)), layout="constrained")
     axes = figure.add_subplot()
     share = [max(one.explains_percent, 1e-3) for one in shown]
     axes.barh(
@@ -109,4 +119,6 @@ def ranking(found: Diagnosis) -> Figure:
     axes.set_xlim(0.0, 1.25 * max([*share, 1.0]))
     axes.set_xlabel("explains [% of what can be explained]")
     axes.grid(visible=False, axis="y")
+    keys = [Patch(color=BLUE, label="found"), Patch(color=MUTED, label="not found")]
+    figure.legend(handles=keys, loc="outside lower center", ncols=2)
     return figure

@@ -74,7 +74,7 @@ def methods(played: Sequence[WaveformEvaluation]) -> Figure:
 def loops(played: WaveformEvaluation) -> Figure:
     """Return force against target for both drives (fig. 10)."""
     figure = _sheet()
-    panels.loops(figure, played)
+    panels.loops(figure, [played])
     return figure
 
 
@@ -100,7 +100,8 @@ def run(record: Run) -> Figure:
     input_label = label(record.input_quantity, record.input_unit)
     output_label = label(record.output_quantity, record.output_unit)
     above.set_ylabel(input_label)
-    above.set_title((record.signal or "run") + ("" if record.complete else ", incomplete"))
+    title = f"{record.signal} signal over time" if record.signal else "the record over time"
+    above.set_title(title + ("" if record.complete else ", incomplete"))
     if record.reference is not None:
         panels.headroom(above)
     below.set_ylabel(output_label)
@@ -142,10 +143,10 @@ def playback(played: Playback) -> Figure:
         panels.repeats(current, played.time_s, drive.input, name, style)
         panels.current_error(error, played.time_s, drive, played.input_range, style)
     force.set_ylabel(label("force", played.scaled.output_unit))
-    force.set_title(asked.name + ("" if played.complete else ", incomplete"))
-    current.set_ylabel(label("drive", played.scaled.input_unit))
+    force.set_title(f"{asked.name}, {asked.inversion} inverse" + ("" if played.complete else ", incomplete"))
+    current.set_ylabel(label(panels.quantity_of(played.scaled.input_unit), played.scaled.input_unit))
     error.axhline(0.0, **GUIDE)
-    error.set_ylabel("current error [% of range]")
+    error.set_ylabel("current error\n[% of range]")
     error.set_xlabel(label("time", "s"))
     for axes in (force, current, error):
         panels.unscored(axes, asked)
@@ -167,7 +168,7 @@ def model(identified: Model) -> Figure:
 
 @styled
 def evaluation(errors: Evaluation) -> Figure:
-    """Return tracking and loops of every waveform, then the prediction of every model.
+    """Return force and loops of every pulse, methods overlaid, then the prediction of every model.
 
     Raises
     ------
@@ -175,7 +176,10 @@ def evaluation(errors: Evaluation) -> Figure:
         The evaluation holds neither waveforms nor models.
     """
     pairs = -(-len(errors.models) // 2)
-    rows = len(errors.waveforms) + pairs
+    pulses: dict[str, list[WaveformEvaluation]] = {}
+    for one in errors.waveforms:
+        pulses.setdefault(one.name, []).append(one)
+    rows = len(pulses) + pairs
     if rows == 0:
         raise DataError(
             "this evaluation holds neither played waveforms nor models, so there is nothing to draw",
@@ -183,11 +187,14 @@ def evaluation(errors: Evaluation) -> Figure:
         )
     figure = _sheet(2 * COLUMN_IN, _ROW_IN * rows)
     cells = figure.subfigures(rows, 2, squeeze=False)
-    for row, played in zip(cells, errors.waveforms, strict=False):
-        panels.tracking(row[0], played)
+    for row, played in zip(cells, pulses.values(), strict=False):
+        if len(played) > 1:
+            panels.methods(row[0], played)
+        else:
+            panels.tracking(row[0], played[0])
         panels.loops(row[1], played)
     reach = panels.largest_residual(errors.models)
-    for cell, predicted in zip(cells[len(errors.waveforms) :].flat, errors.models, strict=False):
+    for cell, predicted in zip(cells[len(pulses) :].flat, errors.models, strict=False):
         panels.prediction(cell, predicted, reach)
     return figure
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import lru_cache
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -41,7 +42,10 @@ def render_evaluation(
     """
     played = [(one, f"waveform-{k}") for k, one in enumerate(evaluation.waveforms, start=1)]
     several = len({(one.name, one.inversion) for one in evaluation.waveforms}) > 1
-    last = views.titled(evaluation.waveforms[-1]) if several else ""  # whose model the evaluation holds
+    # whose model the evaluation holds: that of the last
+    last = f" of {views.titled(evaluation.waveforms[-1])}" if several else ""
+    if len(evaluation.models) > 1:
+        last = f" {PurePath(evaluation.models[-1].name).stem}"
     return (
         environment()
         .get_template("evaluation.html.j2")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import cycle
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -28,7 +29,7 @@ from pulsetrainer.report.style import (
     VERMILION,
     label,
 )
-from pulsetrainer.report.thin import extremes
+from pulsetrainer.report.thin import extremes, path
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,6 +56,14 @@ if TYPE_CHECKING:
 _DENSITY_GAMMA = 0.5
 _DENSITY_QUANTILE = 0.99
 _DENSITY_REACH = 2.0
+_QUANTITIES = {
+    "N": "force",
+    "A": "current",
+    "T": "flux density",
+    "V": "voltage",
+    "Pa": "pressure",
+    "N*m": "torque",
+}
 
 
 def abscissa(time_s: FloatArray | None, n: int) -> tuple[FloatArray, str]:
@@ -71,8 +80,8 @@ def trace(axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
 
 
 def orbit(axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
-    """Draw ``y`` against ``x`` in the order of time, thinned to the extremes of both."""
-    kept = extremes(x, y)
+    """Draw ``y`` against ``x`` in the order of time, thinned to its shape."""
+    kept = path(x, y)
     axes.plot(x[kept], y[kept], **style)
 
 
@@ -81,6 +90,11 @@ def headroom(axes: Axes, share: float = 0.16) -> None:
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + share * (high - low))
     axes.legend(loc="upper left", ncols=4, columnspacing=1.2, borderaxespad=0.2)
+
+
+def quantity_of(unit: str) -> str:
+    """Return what is measured in a unit, where an artefact tells no more; "output" where nothing is known."""
+    return _QUANTITIES.get(unit, "output")
 
 
 def density(panel: FigureBase, model: Model) -> None:
@@ -117,12 +131,14 @@ def density(panel: FigureBase, model: Model) -> None:
     axes.set_xlabel(label("β, switches down at: " + model.edges_quantity, model.edges_unit))
     axes.set_ylabel(label("α, switches up at: " + model.edges_quantity, model.edges_unit))
     axes.set_title("Preisach density" + ("" if model.form == "direct" else f", {model.form} form"))
-    axes.text(0.97, 0.06, _facts(model), transform=axes.transAxes, ha="right", va="bottom", linespacing=1.5)
     sizes = np.abs(model.weights[model.covered]) if signed else model.weights[model.covered]
     ends: Literal["max", "both", "neither"] = "neither"
     if np.any(sizes > top):
         ends = "both" if signed else "max"
-    bar = panel.colorbar(mesh, ax=axes, label=label("μ", model.weights_unit), extend=ends, shrink=0.9)
+    axes.text(
+        0.97, 0.06, _facts(model, ends), transform=axes.transAxes, ha="right", va="bottom", linespacing=1.5
+    )
+    bar = panel.colorbar(mesh, ax=axes, label=label("density μ", model.weights_unit), extend=ends, shrink=0.9)
     bar.outline.set_visible(False)
 
 
@@ -145,17 +161,20 @@ def _cell(edges: FloatArray, i: int, j: int) -> list[tuple[float, float]]:
     return corners[:3] if i == j else corners
 
 
-def _facts(model: Model) -> str:
+def _facts(model: Model, ends: str) -> str:
     """Return what stands in the empty half of the plane."""
     covered = int(np.count_nonzero(model.covered))
     lines = [
         f"{model.edges.size - 1} levels, {model.weights.size} cells",
-        f"{covered} covered" + (", the rest hatched" if covered < model.weights.size else ""),
+        f"{covered} covered" + (", hatched: not covered" if covered < model.weights.size else ""),
         f"offset {model.offset:.4g} {shown(model.offset_unit)}".rstrip().replace("-", "−"),
     ]
     if model.polarity < 0:
         lines.append("output falls as input rises")
-    lines += [f"with {extension.cause}" for extension in model.extensions]
+    if ends == "max":
+        lines.append("orange: beyond the scale")
+    if model.extensions:
+        lines.append("with " + ",\n".join(extension.cause for extension in model.extensions))
     return "\n".join(lines)
 
 
@@ -175,7 +194,7 @@ def fit(panel: FigureBase, record: Fit, input_quantity: str, output_quantity: st
     residual(below, x, record.output - record.predicted, record.rms)
     below.set_xlabel(name)
     below.set_ylabel(label("residual", record.output_unit))
-    below.set_title(f"Residual: rms {record.rms_percent:.3g} % of span")
+    below.set_title(f"Residual: rms {record.rms_percent:.3g} % of span, dotted")
 
 
 def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> None:
@@ -194,8 +213,8 @@ def prediction(panel: FigureBase, model: ModelEvaluation, reach: float | None = 
     x, name = abscissa(model.time_s, model.output.size)
     trace(above, x, model.output, **GROUND, label="measured")
     trace(above, x, model.predicted, **MODEL, label="predicted")
-    above.set_ylabel(label("output", model.output_unit))
-    above.set_title(f"{model.name}: rms {model.rms_percent:.3g} % of span")
+    above.set_ylabel(label(quantity_of(model.output_unit), model.output_unit))
+    above.set_title(f"{PurePath(model.name).stem}: rms {model.rms_percent:.3g} % of span, dotted below")
     headroom(above)
     residual(below, x, model.output - model.predicted, model.rms)
     if reach is not None and np.isfinite(reach) and reach > 0:
@@ -224,7 +243,7 @@ def tracking(panel: FigureBase, played: WaveformEvaluation) -> None:
     for drive, style in ((played.scaled, SCALED), (played.compensated, COMPENSATED)):
         trace(below, played.time_s, 100.0 * (drive.output - played.target) / played.full_force, **style)
     below.set_xlabel(label("time", "s"))
-    below.set_ylabel("error [% of full force]")
+    below.set_ylabel("error\n[% of full force]")
 
 
 def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
@@ -245,7 +264,7 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
     above.set_ylabel(label("force", first.output_unit))
     above.set_title(f"{first.name}, one beat")
     below.set_xlabel(label("time", "s"))
-    below.set_ylabel("error [% of full force]")
+    below.set_ylabel("error\n[% of full force]")
     panel.legend(loc="outside lower center", ncols=2)
 
 
@@ -253,22 +272,29 @@ def _played_title(played: WaveformEvaluation) -> str:
     return f"{played.name}, {played.inversion} inverse"
 
 
-def loops(panel: FigureBase, played: WaveformEvaluation) -> None:
-    """Draw force against target for both drives: perfect is the diagonal, hysteresis opens a loop."""
+def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
+    """Draw force against target over one beat: hysteresis opens a loop, the perfect drive is a line.
+
+    The scaled drive, and the compensated one by each method that played the pulse.
+    """
     axes = panel.add_subplot()
-    ends = [float(np.nanmin(played.target)), float(np.nanmax(played.target))]
+    first = played[0]
+    ends = [float(np.nanmin(first.target)), float(np.nanmax(first.target))]
     axes.plot(ends, ends, **TARGET, label="target")
-    for name, drive, style in (
-        ("scaled", played.scaled, SCALED),
-        ("compensated", played.compensated, COMPENSATED),
-    ):
+    several = len(played) > 1
+    drawn = [("scaled", first, first.scaled, SCALED)]
+    for one, style in zip(played, cycle(METHODS)):
+        drawn.append((one.inversion if several else "compensated", one, one.compensated, style))
+    for name, one, drive, style in drawn:
+        beat = slice(0, one.target.size // beats(one.target))
         shown = f"{name}, loop {drive.hysteresis_percent:.3g} %"
-        orbit(axes, played.target, drive.output, **style, label=shown)
+        orbit(axes, one.target[beat], drive.output[beat], **style, label=shown)
     axes.set_aspect("equal")
-    axes.set_xlabel(label("target", played.output_unit))
-    axes.set_ylabel(label("force", played.output_unit))
-    axes.set_title(_played_title(played))
-    panel.legend(loc="outside lower center", ncols=3, columnspacing=1.2)  # inside, a loop would run through
+    axes.set_xlabel(label("target", first.output_unit))
+    axes.set_ylabel(label("force", first.output_unit))
+    axes.set_title(f"{first.name if several else _played_title(first)}: one beat")
+    # outside, since inside a loop would run through
+    panel.legend(loc="outside lower center", ncols=2 if several else 3, columnspacing=1.2)
 
 
 def drives(panel: FigureBase, waveform: Waveform) -> None:
@@ -277,15 +303,15 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     trace(above, waveform.time_s, waveform.target, **TARGET, label="target")
     measured = "pressed in the kept pass, mean" if waveform.passes else "predicted by the model"
     trace(above, waveform.time_s, waveform.predicted, **MODEL, label=measured)
-    above.set_ylabel(label("output", waveform.output_unit))
-    above.set_title(f"{waveform.name}: target")
+    above.set_ylabel(label(quantity_of(waveform.output_unit), waveform.output_unit))
+    above.set_title(f"{waveform.name}, {waveform.inversion} inverse: what is asked for, and the drive")
     trace(below, waveform.time_s, waveform.scaled, **SCALED, label="scaled")
     trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label=waveform.inversion)
-    below.set_ylabel(label("drive", waveform.input_unit))
+    below.set_ylabel(label(f"drive: {quantity_of(waveform.input_unit)}", waveform.input_unit))
     below.set_xlabel(label("time", "s"))
     for axes in (above, below):
-        headroom(axes)
         unscored(axes, waveform)
+        headroom(axes)
 
 
 def passes(panel: FigureBase, waveform: Waveform) -> None:
@@ -303,7 +329,7 @@ def passes(panel: FigureBase, waveform: Waveform) -> None:
     axes.axvline(waveform.kept, **GUIDE)
     axes.set_xticks(numbers)
     axes.set_xlabel(f"pass; pass {waveform.kept} is kept")
-    axes.set_ylabel("error [% of full force]")
+    axes.set_ylabel("error\n[% of full force]")
     panel.legend(loc="outside lower center", ncols=3)
 
 
@@ -313,7 +339,12 @@ def unscored(axes: Axes, waveform: Waveform) -> None:
     last = waveform.time_s.size - 1
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         axes.axvspan(
-            waveform.time_s[min(start, last)], waveform.time_s[min(stop, last)], color=GRID, alpha=0.5, lw=0
+            waveform.time_s[min(start, last)],
+            waveform.time_s[min(stop, last)],
+            color=GRID,
+            alpha=0.5,
+            lw=0,
+            label="not scored" if start == 0 else None,
         )
 
 

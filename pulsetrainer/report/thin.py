@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     IntArray = NDArray[np.int64]
 
 MOST_POINTS: Final = 4000
+_FAR = 4.0  # times as far off its bin as the farthest usually is: no noise, and no fast stretch either
 
 
 def extremes(*series: FloatArray, most: int = MOST_POINTS) -> IntArray:
@@ -49,5 +50,56 @@ def extremes(*series: FloatArray, most: int = MOST_POINTS) -> IntArray:
         ]
         gap = starts + np.argmax(hole, axis=1)
         picked.append(gap[hole.any(axis=1) & (gap < n)])
+    kept: IntArray = np.unique(np.concatenate(picked))
+    return kept
+
+
+def path(x: FloatArray, y: FloatArray, most: int = 2 * MOST_POINTS) -> IntArray:
+    """Return at most ``most`` sample numbers that keep the course of a curve in the plane.
+
+    The samples are cut into bins of equal length. Of each stays the sample nearest to the bin's mean, so
+    that noise makes no kinks; where the means of x turn back, the one at the tip; and one that lies far off
+    its bin, such as a wild sample. The least and the greatest of both series stay, and where the curve
+    begins, ends, and breaks off. A curve that is short enough stays whole.
+
+    Parameters
+    ----------
+    x, y
+        Arrays (n,) drawn against each other in the order of time; NaN is a gap.
+    most
+        The most points to keep, at least 30.
+
+    """
+    n = x.size
+    lost = np.isnan(x) | np.isnan(y)
+    if n <= most or lost.all():
+        return np.arange(min(n, most))
+    size = -(-n // max(1, (most - 6) // 4))
+    starts = np.arange(0, n, size)
+    picked = [np.array([0, n - 1])]
+    off = np.zeros((starts.size, size))  # squared distance from the mean of the bin
+    for values in (x, y):
+        table = np.full(starts.size * size, np.nan)
+        table[:n] = np.where(lost, np.nan, values)
+        low, high = np.nanmin(table), np.nanmax(table)
+        picked.append(np.array([np.nanargmin(table), np.nanargmax(table)]))
+        table = (table.reshape(starts.size, size) - low) / ((high - low) or 1.0)
+        hole = np.isnan(table)
+        means = np.where(hole, 0.0, table).sum(axis=1) / np.maximum((~hole).sum(axis=1), 1)
+        if values is x:
+            steps = np.diff(means)
+            turns = 1 + np.flatnonzero(steps[1:] * steps[:-1] < 0.0)
+            up = np.where(steps[turns - 1] > 0.0, 1.0, -1.0)[:, np.newaxis]
+            picked.append(
+                starts[turns] + np.argmax(np.where(hole[turns], -np.inf, up * table[turns]), axis=1)
+            )
+        off += np.where(hole, np.nan, (table - means[:, np.newaxis]) ** 2)
+    some = np.flatnonzero(~np.isnan(off).all(axis=1))
+    picked.append(starts[some] + np.nanargmin(off[some], axis=1))
+    farthest = np.nanmax(off[some], axis=1)
+    wild = some[farthest > _FAR**2 * np.median(farthest)]
+    picked.append(starts[wild] + np.nanargmax(off[wild], axis=1))
+    breaks = np.flatnonzero(lost & ~np.concatenate((np.array([False]), lost[:-1])))
+    picked.append(breaks[: starts.size])
     kept: IntArray = np.unique(np.concatenate(picked))
     return kept

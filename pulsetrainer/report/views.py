@@ -220,14 +220,14 @@ def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
                 f"{identifier}-loops",
                 f"Force against target: {title}",
                 alternatives.loops(played),
-                "Force against target. Hysteresis opens a loop; without it the curve is the diagonal.",
+                "Force against target over one beat. Hysteresis opens a loop; without it there is a line.",
             ),
         ),
     )
 
 
-def model_section(model: Model, of: str = "") -> Section:
-    """Return the part of the page about the model of the waveforms, or of the one that is named."""
+def model_section(model: Model, which: str = "") -> Section:
+    """Return the part of the page about the model; ``which`` says of what, where there are several."""
     facts = [
         ("levels", _count(model.edges.size - 1, "model.levels")),
         ("cells", _count(model.weights.size, "model.cells")),
@@ -277,7 +277,7 @@ def model_section(model: Model, of: str = "") -> Section:
         for extension in model.extensions
         for parameter in extension.parameters
     )
-    return Section("model", f"Model of {of}" if of else "Model", tuple(facts), rows, tuple(pictures))
+    return Section("model", f"Model{which}", tuple(facts), rows, tuple(pictures))
 
 
 def prediction_section(models: Sequence[ModelEvaluation]) -> Section:

@@ -41,7 +41,7 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
         if name not in parameters:
             near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.5)
             return UsageError(
-                f"the bench has no parameter {name!r}",
+                f"`port`: the bench has no parameter {name!r}",
                 hint=f"did you mean {' or '.join(near)}?"
                 if near
                 else f"there are: {', '.join([*_OWN, *parameters])}",
@@ -49,16 +49,20 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
         unit, low, high, meaning = parameters[name]
         if f"{name}={value}" in complaint:
             return UsageError(
-                f"bench parameter {name}={value} is outside its range: {low}..{high} {unit}",
-                hint=f"{name}: {meaning}",
+                f"`port`: the bench parameter {name}={value} is outside {low} to {high} {unit}".removesuffix(
+                    " 1"
+                ),
+                hint=f"give {name} ({meaning}) a value in that range",
             )
     for what in options.breaks:
         if what.partition("@")[0] not in breaks or what in complaint:
             return UsageError(
-                f"the bench cannot break {what!r}",
+                f"`port`: the bench cannot break {what!r}",
                 hint=f"break=WHAT@SECONDS with WHAT one of {', '.join(breaks)}",
             )
-    return UsageError(f"the bench refused its parameters: {complaint}", hint='start with "bench:" alone')
+    return UsageError(
+        f"`port`: the bench refused its parameters: {complaint}", hint='start with `port` "bench:" alone'
+    )
 
 
 class Bench:

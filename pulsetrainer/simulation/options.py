@@ -47,8 +47,8 @@ def wire_rate(kind: str, text: str) -> float:
         rate = -1.0
     if not 0 <= rate <= MAX_RATE:
         raise UsageError(
-            f"{kind} parameter wire={text} is not a rate of damaged bytes between 0 and {MAX_RATE}",
-            hint=f'one byte in ten thousand: "{kind}:?wire=0.0001&wire-seed=3"',
+            f"`port`: the {kind} parameter wire={text} is not a share of damaged bytes, 0 to {MAX_RATE}",
+            hint=f'one byte in ten thousand: `port` "{kind}:?wire=0.0001&wire-seed=3"',
         )
     return rate
 
@@ -57,8 +57,8 @@ def wire_seed(kind: str, text: str) -> int:
     """Return the seed in ``wire-seed=text`` of a ``kind:`` port; raises UsageError if it is none."""
     if not re.fullmatch(r"\d{1,9}", text):
         raise UsageError(
-            f"{kind} parameter wire-seed={text} is not a whole number from 0 on",
-            hint=f'"{kind}:?wire=0.0001&wire-seed=3"',
+            f"`port`: the {kind} parameter wire-seed={text} is not a whole number from 0 on",
+            hint=f'`port` "{kind}:?wire=0.0001&wire-seed=3"',
         )
     return int(text)
 
@@ -78,7 +78,7 @@ def parse_break(text: str) -> tuple[int, float]:
             return BREAKS.index(what), second
     near = difflib.get_close_matches(what, BREAKS, n=1)
     raise UsageError(
-        f"a simulated device cannot break {text!r}" + (f"; did you mean {near[0]}?" if near else ""),
+        f"`port`: a simulated device cannot break {text!r}" + (f"; did you mean {near[0]}?" if near else ""),
         hint=f"break=WHAT@SECONDS with WHAT one of {', '.join(BREAKS)}",
     )
 
@@ -114,8 +114,8 @@ def parse_bench(port: str) -> BenchOptions:
     match = re.fullmatch(r"bench:(?://)?(?:\?(.*))?", port)
     if match is None:
         raise UsageError(
-            f"{port!r} is not a bench port",
-            hint='like this: "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
+            f"`port`: {port!r} is not a bench port",
+            hint='like this: `port` "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
     ideal, speed = False, "max"
     rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
@@ -125,12 +125,16 @@ def parse_bench(port: str) -> BenchOptions:
         if name == "ideal":
             if value not in {"", "1", "0"}:
                 raise UsageError(
-                    f"bench parameter ideal takes no value, got {value!r}", hint='"bench:?ideal"'
+                    f"`port`: the bench parameter ideal takes no value, got {value!r}",
+                    hint='`port` "bench:?ideal"',
                 )
             ideal = value != "0"
         elif name == "speed":
             if value not in _SPEEDS:
-                raise UsageError(f"bench speed is max or real, not {value!r}", hint='"bench:?speed=real"')
+                raise UsageError(
+                    f"`port`: the bench speed is max or real, not {value!r}",
+                    hint='`port` "bench:?speed=real"',
+                )
             speed = value
         elif name == "break":
             breaks.append(value)
@@ -162,7 +166,9 @@ def parse_qemu(port: str) -> QemuOptions:
     """
     match = re.fullmatch(r"qemu:(?://)?(?:\?(.+))?", port)
     if match is None:
-        raise UsageError(f"{port!r} is not a port", hint='"qemu:" alone, or "qemu:?break=reset@1"')
+        raise UsageError(
+            f"`port`: {port!r} is not a port", hint='`port` "qemu:" alone, or "qemu:?break=reset@1"'
+        )
     breaks: list[tuple[int, float]] = []
     rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
     settings: list[tuple[str, float]] = []
@@ -177,9 +183,9 @@ def parse_qemu(port: str) -> QemuOptions:
             seed = wire_seed("qemu", value)
         else:
             raise UsageError(
-                f"the emulated device has no parameter {name!r}",
+                f"`port`: the emulated device (qemu:) has no parameter {name!r}",
                 hint=f"it takes break, wire, wire-seed, {', '.join(QEMU_SETTINGS)}; the bench takes more: "
-                '"bench:?seed=3&creep=0.05"',
+                '`port` "bench:?seed=3&creep=0.05"',
             )
     return QemuOptions(tuple(breaks), Wire(rate, seed), tuple(settings))
 
@@ -193,8 +199,8 @@ def _setting(name: str, text: str) -> float:
         value = math.nan
     if not low <= value <= high:
         raise UsageError(
-            f"qemu parameter {name}={text} is not a number from {low:g} to {high:g}",
-            hint='like this: "qemu:?ambient=20"',
+            f"`port`: the qemu parameter {name}={text} is not a number from {low:g} to {high:g}",
+            hint='like this: `port` "qemu:?ambient=20"',
         )
     return value
 

@@ -158,7 +158,7 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
         raise UsageError("a run without time cannot be resampled", hint="give `time` or `rate_Hz`")
     if rate_Hz is not None and not 0 < rate_Hz < np.inf:
         raise UsageError(
-            f"the rate must be positive, got {rate_Hz:g} Hz", hint="for instance `resample` 1000"
+            f"`resample` must be a rate above 0, got {rate_Hz:g} Hz", hint="for instance `resample` 1000"
         )
     step = steps_of(run.time_s).median if rate_Hz is None else 1.0 / rate_Hz
     count = int(np.floor((run.time_s[-1] - run.time_s[0]) / step + 1e-9)) + 1

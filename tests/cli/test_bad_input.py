@@ -47,7 +47,7 @@ def test_the_wrong_kind_of_file_names_both_kinds_and_the_next_step(ready, words,
 
 def test_an_absent_file_is_named_with_those_that_are_there(ready):
     """A name that was mistyped."""
-    refused(ready, ["identify", "absent.h5", "-o", "x.h5"], 3, "absent", file="absent.h5", near="played.h5")
+    refused(ready, ["identify", "absent.h5", "-o", "x.h5"], 3, "absent", file="absent.h5", near="run.h5")
 
 
 def test_an_existing_output_is_refused_and_kept(ready):

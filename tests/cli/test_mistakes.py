@@ -20,7 +20,7 @@ JOB = """
 import json, os, sys
 from pulsetrainer.cli import app, guard
 ended = {}
-for name, (words, _) in json.load(sys.stdin).items():
+for name, (words, *_) in json.load(sys.stdin).items():
     reading, writing = os.pipe()
     if os.fork() == 0:
         os.dup2(writing, 2)
@@ -54,6 +54,7 @@ def test_a_mistake_in_a_name_loads_nothing_heavy(tmp_path):
     wrong = {}
     for name, (code, said) in json.loads(done.stdout).items():
         told = said.startswith("error: ") and "\n  try: " in said and "Traceback" not in said
+        told = told and cases[name].where in said
         if code != cases[name].code or not told or not said.endswith("\n[]"):
             wrong[name] = (code, said)
     assert not wrong
@@ -71,7 +72,7 @@ def test_a_mistake_that_a_look_inside_tells_is_a_usage_error(small_chain, tmp_pa
     """The artefacts are opened, or the device is asked: exit 2 in words, nothing written."""
     shutil.copytree(small_chain, tmp_path, dirs_exist_ok=True)
     before = sorted(path.name for path in tmp_path.iterdir())
-    for name, (words, code) in INSIDE.items():
+    for name, (words, code, _) in INSIDE.items():
         done = pulsetrainer(tmp_path, *words)
         assert done.code == code, (name, done)
         assert "error: " in done.err, (name, done)

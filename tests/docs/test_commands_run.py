@@ -18,7 +18,7 @@ from program import program_on_path
 
 HOW_TO = ROOT / "docs" / "how-to"
 # Blocks that a test cannot run inside itself: they install into .venv and start this very test.
-NOT_RUN = ("make demo", "make test")
+NOT_RUN = ("make install", ". .venv/bin/activate", "make demo", "make test")
 
 
 @pytest.fixture(scope="session")
@@ -42,7 +42,6 @@ def _give(folder: Path) -> None:
         with h5py.File(folder / source) as file:
             columns = np.column_stack([file[key][::step] for key in ("time", "input", "output")])
         np.savetxt(folder / name, columns, delimiter=",", header="t_s,current_A,force_N", comments="")
-    shutil.copy(folder / "other.h5", folder / "other-run.h5")
     shutil.copytree(ROOT / "workflow", folder / "workflow")
 
 
@@ -65,7 +64,7 @@ def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 # page, what must be there before
 RUN = {
-    ROOT / "README.md": ("scope.csv", "other-run.h5"),
+    ROOT / "README.md": ("scope.csv",),
     ROOT / "docs/tutorial.md": (),
     HOW_TO / "own-bench.md": ("scope.csv", "other.csv"),
     HOW_TO / "settings.md": (),
@@ -120,6 +119,8 @@ def test_what_is_not_run_is_there(given):
     assert len(left_out) == len(NOT_RUN)
     makefile = (ROOT / "Makefile").read_text()
     for command in left_out:
+        if not command.startswith("make"):
+            continue
         assert re.search(rf"^{command.split()[1]}:", makefile, flags=re.MULTILINE)
 
 

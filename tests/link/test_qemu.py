@@ -71,7 +71,7 @@ def gone(session: int, seconds: float = 5.0) -> bool:
         ("qemu:?break=hang@1e9", "cannot break", "break=WHAT@SECONDS"),
         ("qemu:?ambient=warm", "qemu parameter ambient=warm", "ambient=20"),
         ("qemu:?coil=-1", "qemu parameter coil=-1", "ambient=20"),
-        ("qemu:?wire=1", "qemu parameter wire=1 is not a rate", "wire-seed"),
+        ("qemu:?wire=1", "qemu parameter wire=1 is not a share", "wire-seed"),
         ("qemu:?wire-seed=x", "qemu parameter wire-seed=x", "wire-seed"),
     ],
 )

@@ -20,7 +20,7 @@ from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.report import figures
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
-from pulsetrainer.report.thin import MOST_POINTS, extremes
+from pulsetrainer.report.thin import MOST_POINTS, extremes, path
 
 
 @pytest.fixture(autouse=True)
@@ -136,7 +136,7 @@ def test_density_marks_cells_that_were_not_covered():
     ]
     corners = [len(path.vertices) - 1 for path in hatched[0].get_paths()]
     assert corners == [4, 3]
-    assert "8 covered, the rest hatched" in figure.axes[0].texts[0].get_text()
+    assert "8 covered, hatched: not covered" in figure.axes[0].texts[0].get_text()
 
 
 def test_density_scale_is_not_set_by_the_reversible_diagonal():
@@ -211,14 +211,15 @@ def test_all_samples_lost():
 
 
 def test_a_million_samples_are_drawn_by_their_envelope():
-    """At most 4000 points per line, and a single-sample spike survives."""
+    """At most 4000 points per line, 8000 of a loop, and a single-sample spike survives."""
     n = 1_000_000
     x = np.sin(np.linspace(0, 300, n))
     y = x.copy()
     y[777_777] = 9.0
     figure = figures.draw(Run(time_s=np.arange(n) * 0.001, input=x, output=y))
     lines = [line for axes in figure.axes for line in axes.lines]
-    assert all(line.get_xdata().size <= MOST_POINTS for line in lines)
+    assert all(line.get_xdata().size <= 2 * MOST_POINTS for line in lines)
+    assert all(line.get_xdata().size <= MOST_POINTS for axes in figure.axes[:2] for line in axes.lines)
     assert figure.axes[1].lines[0].get_ydata().max() == 9.0
     assert figure.axes[2].lines[0].get_ydata().max() == 9.0
 
@@ -242,15 +243,36 @@ def test_extremes_keep_the_envelope(values, most):
     assert np.isnan(y[kept]).any() == np.isnan(y).any()
 
 
-def test_extremes_of_two_series_keep_both():
-    """An orbit keeps its outermost points in both directions."""
+def test_a_thinned_loop_keeps_its_outermost_points():
+    """In both directions, whatever the curve."""
     rng = np.random.default_rng(0)
     x, y = rng.normal(size=(2, 20_000))
-    kept = extremes(x, y, most=100)
+    kept = path(x, y, most=100)
     assert kept.size <= 100
     for series in (x, y):
         assert series[kept].min() == series.min()
         assert series[kept].max() == series.max()
+
+
+def test_a_thinned_loop_has_no_kinks_of_its_own():
+    """Noise on a slow triangle: what is drawn lies within the noise, tips at their ends."""
+    n, sigma = 100_000, 0.01
+    true = np.abs((np.arange(n) / 5000) % 2 - 1)
+    y = true + np.random.default_rng(1).normal(0.0, sigma, n)
+    kept = path(true, y)
+    assert 500 < kept.size < n // 20
+    assert np.sqrt(np.mean((y[kept] - true[kept]) ** 2)) < sigma
+    tips = np.flatnonzero((true == 0.0) | (true == 1.0))
+    assert np.isin(tips[1:-1], kept).all()
+
+
+def test_a_thinned_loop_keeps_a_wild_sample():
+    """One sample far off the curve, though not its greatest."""
+    x = np.sin(np.linspace(0, 60, 50_000))
+    y = x.copy()
+    wild = int(np.argmin(np.abs(x[20_000:22_000]))) + 20_000
+    y[wild] = 0.6
+    assert wild in path(x, y)
 
 
 def test_playback_draws_every_repeat_and_shades_the_lead_in():

@@ -33,7 +33,7 @@ def test_the_names_of_a_row_are_words():
                 assert name is None or name.isidentifier()
 
 
-SAID = "error: the output m.h5 already exists\n  try: give --overwrite\n"
+SAID = "error: the output m.h5 already exists\n  try: name another file, such as m-2.h5\n"
 
 
 @pytest.mark.parametrize(
