@@ -22,6 +22,7 @@ from pulsetrainer.steps.session import Memory, perform
 DRIFT_PER_A2, TAU_S = 0.006, 20.0  # of the as-built bench
 COPPER_PER_K = 0.0039
 NAMES = ("normal", "bifid")
+_PLAYS = 4
 
 
 def calibrated(port: str):
@@ -36,21 +37,16 @@ def calibrated(port: str):
 
 
 def played(model, port: str, minutes: float, *, track: bool, ambient: float):
-    """Mean error in %, and the largest error of the temperature in K."""
-    sink = Memory()
-    programme = Programme(NAMES, rate=None, amplitude=100.0, seconds=60.0 * minutes)
-    with pt.open_device(port) as device:
-        done = perform(
-            model,
-            device,
-            [read_pulse(name) for name in NAMES],
-            programme,
-            sink,
-            rhythm=Rhythm(0.0, 0.0, 0.0, 0),
-            rates=programme.rates,
-            track_heat=track,
-        )
-    if done.fault:
+    """Mean error in %, and the largest error of the temperature in K.
+
+    A play that ends because this computer was busy with something else for seconds is played again.
+    """
+    for _ in range(_PLAYS):
+        sink = Memory()
+        done = _once(model, port, minutes, sink, track=track)
+        if not done.fault:
+            break
+    else:
         raise RuntimeError(done.fault)
     off = float("nan")
     if track:
@@ -61,6 +57,22 @@ def played(model, port: str, minutes: float, *, track: bool, ambient: float):
         own = 2 * DRIFT_PER_A2 * np.interp(told_s - 0.5, time_s, heat) / COPPER_PER_K
         off = float(np.abs(told - own - ambient).max())
     return done.figures["mean_abs_error_percent"], off
+
+
+def _once(model, port: str, minutes: float, sink: Memory, *, track: bool):
+    """Press the pulses of ``NAMES``, each for half of the time."""
+    programme = Programme(NAMES, rate=None, amplitude=100.0, seconds=60.0 * minutes)
+    with pt.open_device(port) as device:
+        return perform(
+            model,
+            device,
+            [read_pulse(name) for name in NAMES],
+            programme,
+            sink,
+            rhythm=Rhythm(0.0, 0.0, 0.0, 0),
+            rates=programme.rates,
+            track_heat=track,
+        )
 
 
 def main() -> None:

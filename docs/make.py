@@ -163,6 +163,7 @@ Every artefact is one HDF5 file. Any HDF5 reader opens it; axes are dimension sc
 - Files are written under another name and renamed when they are complete: a killed command leaves the old file or none. A
   capture keeps its samples in `NAME.partial` until it ends; stopped by a fault or Ctrl-C, it has `complete` = 0. After a kill
   or a power cut `NAME.partial` is left: every command that reads a run reads it, and `capture --resume` goes on with it.
+  Of a session it is a session, as far as it went.
 
 Cells of the Preisach plane are numbered k = i (i + 1) / 2 + j, i >= j: the relays that switch up between levels i and i + 1,
 down between levels j and j + 1 ([theory](theory.md)).

@@ -109,6 +109,11 @@ class Session(Shown):
     clipped_samples: int = 0
     fault: str = ""
     notes: tuple[str, ...] = ()
+    # where heat was tracked: a reading every second
+    temperature_s: Annotated[FloatArray | None, Data("s", "time of the temperature", "window")] = None
+    temperature_K: Annotated[
+        FloatArray | None, Data("K", "copper warmer than at calibration", "window", path="temperature")
+    ] = None
 
     def __post_init__(self) -> None:
         check_equal_length(self, ("time_s", "target", "reference", "input", "output"))

@@ -12,13 +12,14 @@ from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import DriveError, Evaluation
+    from pulsetrainer.artefacts import DriveError, Evaluation, Session
 
 
 def evaluate(
     context: typer.Context,
     inputs: Annotated[
-        list[Path], typer.Argument(help="Playbacks, or one run.", metavar="PLAYED.h5...|RUN.h5")
+        list[Path],
+        typer.Argument(help="Playbacks, one run, or one session.", metavar="PLAYED.h5...|RUN.h5|SESSION.h5"),
     ],
     model: Annotated[list[Path], typer.Option(help="Model to test on the run; may be given again.")] = [],  # noqa: B006
     out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write.")] = None,
@@ -29,7 +30,8 @@ def evaluate(
 ) -> None:
     """Report how large the errors are.
 
-    Force errors of playbacks, or prediction errors of models on a run that they were not fitted to.
+    Force errors of playbacks, or prediction errors of models on a run that they were not fitted to. Of a
+    session it says what was pressed and answered, and --html writes its score sheet.
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
@@ -41,7 +43,7 @@ def evaluate(
         overwrite=overwrite,
         as_json=json,
     )
-    from pulsetrainer.artefacts import Model, Playback, Run
+    from pulsetrainer.artefacts import Model, Playback, Run, Session
     from pulsetrainer.errors import QualityError
     from pulsetrainer.files.bounds import read_bounds
     from pulsetrainer.steps.evaluate import breaches
@@ -49,7 +51,10 @@ def evaluate(
 
     limits = read_bounds(bounds) if bounds else {}
     with job.working("evaluating") as progress:
-        measured = [job.load_any(path, Playback, Run) for path in inputs]
+        measured = [job.load_any(path, Playback, Run, Session) for path in inputs]
+        if len(measured) == 1 and isinstance(measured[0], Session):
+            _of_session(job, inputs[0], measured[0], html, alone=not (model or out or bounds))
+            return
         models = [job.load(path, Model) for path in model]
         progress(0.2)
         evaluation = errors_of(
@@ -80,6 +85,18 @@ def evaluate(
         raise typer.Exit(QualityError.exit_code)
     if limits:
         job.screen.whole(f"all {len(limits)} bounds of {bounds} hold")
+
+
+def _of_session(job: Job, path: Path, session: Session, html: Path | None, *, alone: bool) -> None:
+    from pulsetrainer.cli.score import say
+    from pulsetrainer.errors import UsageError
+
+    if not alone:
+        raise UsageError(
+            f"{path} is a session, which keeps its own errors: it has no models, no bounds and no evaluation",
+            hint=f"pulsetrainer evaluate {path} --html sheet.html",
+        )
+    say(job, path, html, session)
 
 
 _HINT = "look at what changed; if the new figure is right, change the bound knowingly"

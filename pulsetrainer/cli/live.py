@@ -17,7 +17,7 @@ from pulsetrainer.steps.steering import KEYS
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from pulsetrainer.steps.session import Now
+    from pulsetrainer.steps.performance import Now
 
 SMALLEST = (50, 10)  # columns and lines
 _BARS = " ▁▂▃▄▅▆▇█"

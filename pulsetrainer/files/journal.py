@@ -8,9 +8,10 @@ What ``append`` has returned from survives the death of the program. The file is
 
 A ``HEAD`` is JSON: the header of the artefact and the run's texts. Whoever goes on with a recording adds
 another, and the last one counts. ``DATA`` is little-endian float64 (4, n): time, reference, input, output.
-``PART`` is the same, and its first sample comes after a pause. A ``GOAL`` after one of them has the
-targets (n,) of its samples, where it is the record of a session. The last block may be incomplete, where the
-writer was killed or is writing: it is ignored. Anything else that does not fit is damage.
+``PART`` is the same, and its first sample comes after a pause. In the journal of a session, a ``GOAL`` after
+one of them has the targets (n,) of its samples, and a ``BEAT`` the beats that are over, as in
+``session_journal``. The last block may be incomplete, where the writer was killed or is writing: it is
+ignored. Anything else that does not fit is damage.
 """
 
 from __future__ import annotations
@@ -24,17 +25,18 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
-from pulsetrainer.artefacts import BoolArray, FloatArray, Run
+from pulsetrainer.artefacts import BoolArray, FloatArray, Run, Session
 from pulsetrainer.errors import DamagedFileError, DataError
 from pulsetrainer.files.input_file import JOURNAL
 from pulsetrainer.files.provenance import Header, Provenance
+from pulsetrainer.files.session_journal import session_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
     from pathlib import Path
 
 COLUMNS = ("time_s", "reference", "input", "output")
-GOAL = b"GOAL"
+GOAL, BEAT = b"GOAL", b"BEAT"
 _HEAD = struct.Struct("<4sQQII")
 _LARGEST = 1 << 32  # bytes of a block; a batch of samples has some thousands
 
@@ -50,8 +52,8 @@ class Block:
 
     @property
     def samples(self) -> FloatArray:
-        """Time, reference, input and output, (4, n); none in a HEAD or a GOAL."""
-        if self.tag in (b"HEAD", GOAL):
+        """Time, reference, input and output, (4, n); none but in DATA and PART."""
+        if self.tag in (b"HEAD", GOAL, BEAT):
             return np.zeros((len(COLUMNS), 0))
         return np.frombuffer(self.content, dtype="<f8").reshape(len(COLUMNS), -1)
 
@@ -153,7 +155,7 @@ class Recording:
     """What a journal holds."""
 
     header: Header
-    run: Run  # not complete
+    artefact: Run | Session  # not complete
     end: int  # of the last whole block
 
     @classmethod
@@ -173,6 +175,10 @@ class Recording:
             raise DamagedFileError(f"{path} holds no recording yet", path=path, artefact="run")
         header, texts = _described(path, heads[-1])
         columns = np.concatenate([block.samples for block in found], axis=1)
+        if said := [block.content for block in found if block.tag == BEAT]:
+            goals = [np.frombuffer(block.content, dtype="<f8") for block in found if block.tag == GOAL]
+            session = session_of(path, columns, np.concatenate([np.zeros(0), *goals]), said)
+            return cls(header, session, found[-1].end)
         arrays: dict[str, Any] = dict(zip(COLUMNS, columns, strict=True))
         seam, dropped = _seam(found, columns.shape[1]), found[-1].dropped
         run = Run(**arrays, **texts, seam=seam, complete=False, dropped_samples=dropped)

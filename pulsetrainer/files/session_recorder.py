@@ -1,4 +1,4 @@
-"""A session that is on disk while it is pressed: killed at any moment, it is readable as a run."""
+"""A session that is on disk while it is pressed: killed at any moment, it is readable as far as it went."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pulsetrainer.files.atomic_write import cannot_write
 from pulsetrainer.files.encode import Later
 from pulsetrainer.files.recorder import RunRecorder
 from pulsetrainer.files.schema import plan_of
+from pulsetrainer.files.session_journal import CUT_OFF, SessionWriter
 
 if TYPE_CHECKING:
     import h5py
@@ -26,13 +27,15 @@ _COPIED_SAMPLES = 1 << 16  # at a time
 
 
 class SessionRecorder(RunRecorder):
-    """Writes a session batch by batch into a run's journal, each batch followed by its target.
+    """Writes a session batch by batch into a journal: samples, their targets, and the beats that are over.
 
-    ``keep`` says what the whole was; without it what was recorded becomes a run. Parameters, use and errors
-    are those of ``RunRecorder``.
+    ``judge`` comes before the first samples. Parameters, use and errors are those of ``RunRecorder``.
     """
 
-    _fields: Mapping[str, Any] | None = None
+    def __init__(self, *args: Any, **options: Any) -> None:
+        self._fields: Mapping[str, Any] = {}
+        self._writer = SessionWriter()
+        super().__init__(*args, **options)
 
     def press(
         self,
@@ -51,24 +54,34 @@ class SessionRecorder(RunRecorder):
             As ``append``.
         """
         self.append(time_s, reference, current, force)
+        self._add(journal.GOAL, np.asarray(target, dtype="<f8").tobytes())
+
+    def judge(self, fields: Mapping[str, Any]) -> None:
+        """Take in what the session amounts to so far: its fields that are no samples.
+
+        Raises
+        ------
+        DataError
+            The disk is full or failed.
+        """
+        self._add(journal.BEAT, self._writer.block(fields))
+        self._fields = {**fields, "fault": CUT_OFF}
+
+    def keep(self, fields: Mapping[str, Any], header: Header) -> None:
+        """Take in what the whole session was, and what the artefact says about itself."""
+        self._fields, self._header = fields, header
+
+    def _add(self, tag: bytes, content: bytes) -> None:
         try:
-            self._journal.append(
-                journal.GOAL, np.asarray(target, dtype="<f8").tobytes(), self.dropped_samples
-            )
+            self._journal.append(tag, content, self.dropped_samples)
         except OSError as error:
             raise cannot_write(self.partial, error) from error
 
-    def keep(self, fields: Mapping[str, Any], header: Header) -> None:
-        """Take in the fields that are no samples, and what the artefact says about itself."""
-        self._fields, self._header = fields, header
-
     def _convert(self) -> None:
-        if self._fields is None:
-            super()._convert()
-            return
         samples = dict.fromkeys((*_COLUMNS, "target"), Later(self._samples))
         defaults = {plan.name: plan.default for plan in plan_of(Session)}
-        values = {**defaults, **self._fields, **samples, "complete": self._complete}
+        ending = {"complete": self._complete, "dropped_samples": self.dropped_samples}
+        values = {**defaults, **self._fields, **samples, **ending}
         store.write_fields(
             self._final, Session, values, self._header, overwrite=self._overwrite, fill=self._fill_session
         )
@@ -87,7 +100,7 @@ class SessionRecorder(RunRecorder):
                 continue
             goal = np.concatenate(goals)
             if goal.size != count:
-                raise DataError(f"{self.partial} lacks targets", hint="read it as a run")
+                raise DataError(f"{self.partial} lacks the last targets", hint="it can be read as it is")
             for name, values in zip(_COLUMNS, np.concatenate(kept, axis=1), strict=True):
                 file[paths[name]][start : start + count] = values
             file[paths["target"]][start : start + count] = goal

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import h5py
 import numpy as np
 
-from pulsetrainer.artefacts import KINDS, Run
+from pulsetrainer.artefacts import KINDS
 from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, WrongKindError
 from pulsetrainer.files.atomic_write import check_output, replacing
 from pulsetrainer.files.checksum import append_checksum, check_checksum
@@ -130,10 +130,10 @@ def read_one_of(path: Path | str, *kinds: type) -> Any:
     """
     expected = [kind_of(kind) for kind in kinds]
     recording = _recording(path)
-    if recording is not None and Run in kinds:
-        return recording.run
+    if recording is not None and type(recording.artefact) in kinds:
+        return recording.artefact
     if recording is not None:
-        raise WrongKindError(path, expected, Run.kind)
+        raise WrongKindError(path, expected, recording.artefact.kind)
     with _opened(path) as file:
         got = _kind(file, path)
         if got not in expected:
@@ -150,7 +150,7 @@ def read_any(path: Path | str) -> Any:
         The file is absent, unreadable, damaged, not an artefact, or of a newer format.
     """
     if recording := _recording(path):
-        return recording.run
+        return recording.artefact
     with _opened(path) as file:
         return _decode(file, path, _kind(file, path))
 

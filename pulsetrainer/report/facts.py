@@ -33,6 +33,7 @@ def _playback(played: Playback) -> dict[str, Any]:
         "repeats": played.compensated.output.shape[0],
         "complete": played.complete,
         "dropped_samples": played.dropped_samples,
+        **_temperatures(played.temperature_K),
     }
 
 
@@ -155,11 +156,19 @@ def _session(session: Session) -> dict[str, Any]:
     return {
         "pulses": list(session.pulses),
         "beats": session.beats.start_s.size,
-        "seconds": float(session.time_s[-1] - session.time_s[0]),
+        "seconds": float(np.ptp(session.time_s)) if session.time_s.size else 0.0,
         **session.figures(),
         "error in just noticeable differences": session.error_jnd,
+        **_temperatures(session.temperature_K),
         "underruns": session.underruns,
         "complete": session.complete,
+        **({"ended early": session.fault} if session.fault else {}),
         "dropped_samples": session.dropped_samples,
         "right": None if quiz is None else f"{quiz.right} of {len(quiz.asked)}",
     }
+
+
+def _temperatures(kelvin: FloatArray | None) -> dict[str, str]:
+    if kelvin is None or not kelvin.size:
+        return {}
+    return {"coil": f"{kelvin[0]:+.1f} to {kelvin[-1]:+.1f} K against calibration, made up for"}

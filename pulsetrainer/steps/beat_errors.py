@@ -121,8 +121,8 @@ class Ledger:
         return len(self._rows) // 8
 
     def beats(self, unit: str) -> Beats:
-        """Return every beat."""
-        columns = np.asarray(self._rows).reshape(-1, 8).T
+        """Return every beat that is over."""
+        columns = np.array(self._rows).reshape(-1, 8).T  # a copy: the rows go on growing
         start, interval, pulse, amplitude, gain, late, mean, most = columns
         return Beats(start, interval, pulse.astype(np.int64), amplitude, gain, late, mean, most, unit)
 

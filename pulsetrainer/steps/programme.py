@@ -123,6 +123,10 @@ class Programme:
         """How much of it is over."""
         return number / self._beats if self._beats else time_s / (self._seconds or np.inf)
 
+    def share_at(self, time_s: float) -> float:
+        """How much of it is over at a time; 0 where beats are counted."""
+        return 0.0 if self._beats else self.share(0, time_s)
+
     def __call__(self, number: int, time_s: float) -> Decision:
         """Return what is played next."""
         share = self.share(number, time_s)

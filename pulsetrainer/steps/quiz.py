@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
-from pulsetrainer.artefacts.session import Quiz, Score
+from pulsetrainer.artefacts.session import Beats, Quiz, Score
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.conductor import Decision, Play, Rest
 
@@ -79,6 +81,11 @@ class Blind:
         """Number of the question, from 0; as many as there are when all are answered."""
         return len(self._answers)
 
+    @property
+    def questions(self) -> int:
+        """How many there are."""
+        return len(self._asked)
+
     def __call__(self, number: int, time_s: float) -> Decision:
         """Return what is played next."""
         at = self.question
@@ -96,6 +103,15 @@ class Blind:
         if said is not None:
             self._answers.append(said)
         return Rest()
+
+    def told(self, beats: Beats) -> Beats:
+        """Return the beats of the questions that are answered: one of the others would tell what is asked."""
+        is_open = len(self._answers) < len(self._begun)
+        end_s = self._begun[len(self._answers)] if is_open else np.inf
+        told = beats.start_s < end_s - _ROUNDING_S
+        names = [field.name for field in fields(beats) if field.name != "output_unit"]
+        columns: dict[str, Any] = {name: getattr(beats, name)[told] for name in names}
+        return Beats(**columns, output_unit=beats.output_unit)
 
     def quiz(self, learner: str = "") -> Quiz | None:
         """Return what was asked and answered so far; None where that is nothing."""

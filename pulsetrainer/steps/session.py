@@ -3,60 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pulsetrainer.artefacts import Model
-from pulsetrainer.artefacts.session import Beats, Quiz, Session
+from pulsetrainer.artefacts.session import Quiz, Session
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM, Pulse
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.core.rhythm import Rhythm
-from pulsetrainer.device.codes import HEAT_TAU_S
-from pulsetrainer.device.heat import added
-from pulsetrainer.device.plausibility import judge_against
-from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
-from pulsetrainer.steps.beat_errors import Ledger
-from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach, major_loop
+from pulsetrainer.steps.conductor import RATE_HZ, Decide, Play, Reach, major_loop
 from pulsetrainer.steps.heat import rest_force, take_temperature, thermometer_of
 from pulsetrainer.steps.one_thread import one_thread
+from pulsetrainer.steps.performance import Now, Performance, Performed, Sink
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.quiz import Answer, Blind, from_list, order
-from pulsetrainer.steps.recording import PAUSE_S
 from pulsetrainer.steps.stopped import raise_if_stopped
 
 if TYPE_CHECKING:
-    from pulsetrainer.core.temperature import Thermometer
     from pulsetrainer.device.device import Device
-    from pulsetrainer.device.trace import Block
 
 LEAD_S = 3.0  # of current that is ready before its time: how long this computer may be busy with other things
 LIVE_LEAD_S = 0.5  # the same where a person changes what comes next
-_FOLLOW = 0.3  # of a new reading of the loss: a window of a second is noisier than the room
 _SETTLED = 4.0  # of the slowest time constant of a model
 _LONGEST_SETTLING_S = 300.0
-
-
-class Sink(Protocol):
-    """Where a session goes while it is pressed."""
-
-    def append(
-        self,
-        time_s: FloatArray,
-        target: FloatArray,
-        reference: FloatArray,
-        current: FloatArray,
-        force: FloatArray,
-        /,
-    ) -> None:
-        """Take samples in, arrays (n,) in s, N, A, A and N."""
-        ...
 
 
 class Memory:
@@ -69,52 +43,8 @@ class Memory:
         """Take samples in."""
         self.blocks.append(np.stack(columns))
 
-
-@dataclass(frozen=True, slots=True)
-class Now:
-    """What a screen may show while a session goes on."""
-
-    time_s: float
-    target: FloatArray  # (n,) N, the samples that came last
-    current: FloatArray  # (n,) A
-    force: FloatArray  # (n,) N
-    beat: Play | None  # the one that was pressed last
-    interval_s: float
-    resting: bool  # no beat is under way
-
-
-@dataclass(frozen=True, slots=True)
-class Performed:
-    """How a session went, without its samples."""
-
-    figures: dict[str, float]
-    beats: Beats
-    full_force: float
-    mean_force: float
-    reach: Reach
-    clipped: int
-    dropped: int
-    parts: int
-    underruns: int
-    fault: str
-    remedy: str
-    notes: tuple[str, ...]
-    temperature: tuple[tuple[float, float], ...] = ()  # s, K against calibration, where heat was tracked
-
-    @property
-    def fields(self) -> dict[str, object]:
-        """Fields of the artefact that are no samples."""
-        return self.figures | {
-            "beats": self.beats,
-            "full_force": self.full_force,
-            "mean_force": self.mean_force,
-            "complete": not self.fault,
-            "dropped_samples": self.dropped,
-            "underruns": self.underruns,
-            "clipped_samples": self.clipped,
-            "fault": self.fault,
-            "notes": self.notes,
-        }
+    def judge(self, _fields: object) -> None:
+        """Keep nothing: what it amounts to is known at the end."""
 
 
 def check_model(model: Model) -> None:
@@ -171,118 +101,6 @@ def reach_of(model: Model, pulses: Sequence[Pulse], rates: Sequence[float | None
     return Reach(max(lows), min(highs))
 
 
-class _Performance:
-    """A session under way: what is given out, what comes back."""
-
-    def __init__(
-        self,
-        model: Model,
-        device: Device,
-        pulses: Sequence[Pulse],
-        rhythm: Rhythm,
-        decide: Decide,
-        sink: Sink,
-        reach: Reach,
-        watch: Callable[[Now], None],
-        thermometer: Thermometer | None = None,
-    ) -> None:
-        self._device, self._sink, self._watch = device, sink, watch
-        self._thermometer = thermometer
-        self._loss = 0.0 if thermometer is None else thermometer.extra
-        self._warmth: list[tuple[float, float]] = []  # s and K, of each window
-        self._ledger = Ledger(tuple(pulse.name for pulse in pulses))
-        self._reach = reach
-        self._conductor = Conductor(
-            extended_of(model),
-            pulses,
-            reach,
-            rhythm,
-            decide,
-            self._ledger.give,
-            heat=device.heat,
-            heated=added,
-            cooling_s=HEAT_TAU_S,
-            loss=lambda: self._loss,
-        )
-        self._begun = 0  # sample at which the part began
-        self._gap_s = 0.0
-        self._implausible = ""
-        self._last: Given | None = None
-        self.measured_s = 0.0
-
-    def run(self, lead_s: float) -> Performed:
-        """Press part after part until the end is decided, or the device or the user stops it."""
-        conductor, device = self._conductor, self._device
-        decimation = round(device.info.tick_rate_Hz / RATE_HZ)
-        parts = dropped = 0
-        fault = remedy = ""
-        underrun = False
-        while not conductor.ended and not fault:
-            before = self._ledger.count
-            self._begun = round(conductor.time_s * RATE_HZ)
-            trace = device.stream(
-                partial(next, conductor.part(device.longest_play_s), None),
-                RATE_HZ,
-                lead_s=lead_s,
-                decimation=decimation,
-                on_block=lambda block: self._take(block, decimation),
-                should_stop=lambda: bool(self._implausible),
-            )
-            parts += 1
-            dropped += trace.dropped_samples
-            fault, remedy, underrun = trace.fault, trace.remedy, trace.underrun
-            if self._implausible:
-                fault, remedy = self._implausible, FORCE_REMEDY
-            self._gap_s += PAUSE_S
-            if not fault and not conductor.ended and self._ledger.count == before:
-                fault, remedy = "the device stays on too short for one beat", "raise its on-time limit"
-        ledger = self._ledger
-        return Performed(
-            figures=ledger.figures(),
-            beats=ledger.beats("N"),
-            full_force=ledger.high if ledger.count else float("nan"),
-            mean_force=ledger.mean_force,
-            reach=self._reach,
-            clipped=conductor.clipped,
-            dropped=dropped,
-            parts=parts,
-            underruns=int(underrun),
-            fault=fault,
-            remedy=remedy,
-            notes=tuple(conductor.notes),
-            temperature=tuple(self._warmth),
-        )
-
-    def _take(self, block: Block, decimation: int) -> None:
-        sample = self._begun + block.tick // decimation
-        target, done, measured = self._ledger.measure(sample, block.force_N)
-        self.measured_s = float(sample[-1]) / RATE_HZ
-        meter = self._thermometer
-        if meter is not None and meter.add(sample / RATE_HZ, block.reference_A, block.current_A, block.duty):
-            self._loss += _FOLLOW * (meter.extra - self._loss)
-            self._warmth.append((self.measured_s, meter.temperature_K))
-        self._sink.append(
-            sample / RATE_HZ + self._gap_s, target, block.reference_A, block.current_A, block.force_N
-        )
-        for piece, force in zip(done, measured, strict=True):
-            if piece.beat is not None:
-                self._last = piece
-                time_s = (piece.first + np.arange(force.size)) / RATE_HZ
-                self._implausible = self._implausible or judge_against(time_s, piece.predicted, force)
-        last = self._last.beat if self._last else None
-        self._watch(
-            Now(
-                self.measured_s,
-                target,
-                block.current_A,
-                block.force_N,
-                last.play if last else None,
-                last.interval_s if last else float("nan"),
-                resting=not self._ledger.is_beating,
-            )
-        )
-
-
 @one_thread
 def perform(
     model: Model,
@@ -328,7 +146,7 @@ def perform(
         meter.restart()
         rest, left = rest_force(model), 1.0 - max(meter.extra, 0.0)  # a warm coil does not reach as high
         reach = Reach(reach.low, rest + (reach.high - rest) * left)
-    performance = _Performance(model, device, beating, rhythm, decide, sink, reach, watch, meter)
+    performance = Performance(model, device, beating, rhythm, decide, sink, reach, watch, meter)
     return performance.run(lead_s)
 
 
@@ -413,7 +231,7 @@ def session(
         watch=watch,
     )
     asked = chosen.quiz() if isinstance(chosen, Blind) else None
-    kept = _session(sink, done, tuple(shape.name for shape in pulses), asked)
+    kept = _session(sink, done, asked)
     raise_if_stopped(done.fault, done.remedy, "the session", kept)
     if kept is None:
         raise DeviceError("the session brought back no sample", hint="check the line to the device")
@@ -457,9 +275,9 @@ def programme(
     return Blind(names, asked, answer, Play(0, amplitude / 100.0, rate)), (rate,)
 
 
-def _session(sink: Memory, done: Performed, names: tuple[str, ...], asked: Quiz | None) -> Session | None:
-    if not sink.blocks or not done.beats.start_s.size:
+def _session(sink: Memory, done: Performed, asked: Quiz | None) -> Session | None:
+    if not sink.blocks:
         return None
     time_s, target, reference, current, force = np.concatenate(sink.blocks, axis=1)
-    fields = done.fields | {"pulses": names, "quiz": asked}
-    return Session(time_s=time_s, target=target, reference=reference, input=current, output=force, **fields)  # type: ignore[arg-type]
+    samples = {"time_s": time_s, "target": target, "reference": reference, "input": current, "output": force}
+    return Session(**samples, **done.fields, quiz=asked)

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from program import PROGRAM, pulsetrainer
-from pulsetrainer.artefacts import Run, Session
+from pulsetrainer.artefacts import Session
 from pulsetrainer.files.store import read, read_any
 from pulsetrainer.steps.conductor import SLEW_A_PER_S
 
@@ -49,6 +49,16 @@ def test_the_contract(run, tmp_path):
     assert run("show", "s.h5").code == 0
     assert run("plot", "s.h5", "-o", "s.png").code == 0
     assert "<svg" in page
+
+
+def test_a_session_in_a_file_has_its_sheet_made_again(run, tmp_path):
+    """The same page as when it was pressed; models, bounds and an evaluation do not go with it."""
+    assert run(*SHORT, "--beats", 3, "--html", "s.html").code == 0
+    done = run("evaluate", "s.h5", "--html", "again.html", "--json")
+    assert (done.code, done.json["beats"], done.json["complete"]) == (0, 3, True)
+    assert (tmp_path / "again.html").read_text() == (tmp_path / "s.html").read_text()
+    refused = run("evaluate", "s.h5", "-o", "e.h5")
+    assert (refused.code, (tmp_path / "e.h5").exists()) == (2, False)
 
 
 def test_changes_of_a_script_come_at_the_next_beat(run, tmp_path):
@@ -162,7 +172,7 @@ def _recorded(folder: Path) -> int:
 @pytest.mark.realtime
 @pytest.mark.parametrize("after", [200, 2500])
 def test_killed_at_any_moment_the_file_is_readable(tmp_path, after):
-    """What was pressed until then is a run: time, reference, current and force."""
+    """It is a session that was cut off: its beats, what was asked and measured; and it has a score sheet."""
     process = _started(tmp_path, *SHORT, "--minutes", 5)
     try:
         _until(lambda: _recorded(tmp_path) >= after)
@@ -170,10 +180,19 @@ def test_killed_at_any_moment_the_file_is_readable(tmp_path, after):
         process.kill()
         process.communicate()
     kept = read_any(tmp_path / "s.h5.partial")
-    assert isinstance(kept, Run)
+    assert isinstance(kept, Session)
     assert kept.input.size >= after
     assert not kept.complete
-    assert pulsetrainer(tmp_path, "show", "s.h5.partial").code == 0
+    assert kept.pulses == ("normal",)
+    last_s = kept.time_s[-1]
+    over = kept.beats.start_s + kept.beats.interval_s
+    assert kept.beats.start_s.size == 0 or over[-1] <= last_s + 0.01
+    assert kept.beats.start_s.size >= (last_s - 3.0) // 0.8 - 1  # but for the way up, and the one under way
+    shown = pulsetrainer(tmp_path, "show", "s.h5.partial", "--json")
+    assert (shown.json["kind"], shown.json["facts"]["complete"]) == ("session", False)
+    done = pulsetrainer(tmp_path, "evaluate", "s.h5.partial", "--html", "s.html", "--json")
+    assert done.json["beats"] == kept.beats.start_s.size
+    assert kept.fault in (tmp_path / "s.html").read_text()
 
 
 @pytest.mark.realtime
@@ -287,6 +306,8 @@ def test_nothing_gives_a_question_away(tmp_path):
     assert not any("bifid" in name or "parvus" in name for name in files)
     journal = (tmp_path / "s.h5.partial").read_bytes()
     assert journal.count(b'"asked"') == journal.count(b'"pulse"') == 0
+    under_way = read(tmp_path / "s.h5.partial", Session)
+    assert (under_way.quiz, under_way.beats.start_s.size) == (None, 0)
     # an answer for each question, whenever it is its turn
     terminal.press("a")
     terminal.until(lambda: b"question 2 of 2" in terminal.seen)

@@ -19,6 +19,8 @@ import ready
 from children import DOCUMENTED, Child, Ended
 
 from command_lines import EXCITATION, READS_ONLY, WRITERS, Writer
+from pulsetrainer.errors import DataError
+from pulsetrainer.files import journal, store
 from pulsetrainer.files.checksum import CHECKSUM_LENGTH
 
 _SETTLE_S = 0.004  # the moments around a new file's appearance
@@ -67,6 +69,20 @@ class Tally:
         elif path.read_bytes() != older and not ready.whole(path):
             self.half_written += 1
             self.blame(f"{path.name} is half-written")
+
+    def look_into(self, recording: Path, kind: str) -> None:
+        """Count a recording that cannot be read, or that reads as another kind, though it holds samples."""
+        if not any(block.samples.size for block in journal.blocks(recording)):
+            return
+        try:
+            kept = store.read_any(recording)
+        except DataError as error:
+            self.lost += 1
+            self.blame(f"{recording.name} cannot be read: {error.message}")
+            return
+        if kept.kind != kind or kept.complete:
+            self.half_written += 1
+            self.blame(f"{recording.name} reads as a {kind if kept.complete else kept.kind}")
 
     @property
     def clean(self) -> bool:
@@ -150,6 +166,8 @@ def kill(world: World, tries: int, writer: Writer, *, older: bool) -> Tally:
                 tally.judge(done, (0, -9))
             for path in outputs(writer, folder):
                 tally.look(path, before.get(path))
+            for path in _recordings(folder):
+                tally.look_into(path, "session" if writer.words[0] == "session" else "run")
             _go_on(world, writer, folder, tally)
     return tally
 
@@ -161,10 +179,14 @@ def _until_new_file(child: Child, folder: Path, names: set[str], *, skip: int) -
         time.sleep(0.0001)
 
 
+def _recordings(folder: Path) -> list[Path]:
+    """Recordings that a dead process left."""
+    return [path for path in folder.iterdir() if ".partial" in path.name]
+
+
 def _go_on(world: World, writer: Writer, folder: Path, tally: Tally) -> None:
     """After a kill the same command works; nothing of the dead one stays but a recording, which is named."""
-    dead = leftovers(folder)
-    recordings = [path for path in folder.iterdir() if ".partial" in path.name]
+    dead, recordings = leftovers(folder), _recordings(folder)
     if not dead and not recordings:
         return
     if writer.name == "capture (long)" and recordings:
@@ -337,19 +359,20 @@ def _damaged(world: World, tries: int, fault: str, damage: Callable[[bytes, rand
 
 
 def damaged_recording(world: World, tries: int) -> Tally:
-    """Show, use and resume what a killed capture left, cut at a random byte or with flipped bits."""
+    """Show, use and resume what a killed capture or session left, cut anywhere or with flipped bits."""
     tally = Tally("damaged recording")
     resume = Writer("resume", (*EXCITATION, "--resume"), (("-o", "out.h5"),), (ready.CUT_OFF,))
     identify = ("identify", ready.CUT_OFF, "--levels", "12")
     able = (
         Writer("show", ("show", ready.CUT_OFF), (), (ready.CUT_OFF,)),
+        Writer("sheet", ("evaluate", ready.CUT_SESSION), (("--html", "out.html"),), (ready.CUT_SESSION,)),
         Writer("identify", identify, (("-o", "model.h5"),), (ready.CUT_OFF,)),
         resume,
     )
     for number in range(tries):
         writer = able[number % len(able)]
         with world.folder(writer) as folder:
-            victim, is_cut = folder / ready.CUT_OFF, number // len(able) % 2 == 0
+            victim, is_cut = folder / writer.reads[0], number // len(able) % 2 == 0
             data = victim.read_bytes()
             victim.write_bytes(data[: world.rng.randrange(len(data))] if is_cut else _flip(data, world.rng))
             found = victim.read_bytes()

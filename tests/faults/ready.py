@@ -12,9 +12,11 @@ from command_lines import EXCITATION, WRITERS
 from pulsetrainer.artefacts import Cause, Model, Parameter, Recorded, Run
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import store
+from pulsetrainer.files.encode import values_of
 from pulsetrainer.files.recorder import RunRecorder
+from pulsetrainer.files.session_recorder import SessionRecorder
 
-CUT_OFF = "out.h5.partial"
+CUT_OFF, CUT_SESSION = "out.h5.partial", "session.h5.partial"
 
 
 def prepare(folder: Path) -> dict[str, float]:
@@ -36,6 +38,7 @@ def prepare(folder: Path) -> dict[str, float]:
     (folder / "run.csv").write_text(text)
     _diagnosis(folder)
     _cut_off(folder)
+    _cut_session(folder)
     seconds = {}
     for writer in WRITERS:
         seconds[writer.name] = _surely(folder, writer.line(force=True), log).seconds
@@ -78,6 +81,17 @@ def _cut_off(folder: Path) -> None:
             part = slice(start, start + 50)
             recorder.append(run.time_s[part], run.reference[part], run.input[part], run.output[part])
         shutil.copy(recorder.partial, folder / CUT_OFF)
+    (folder / "whole.h5").unlink()
+
+
+def _cut_session(folder: Path) -> None:
+    """Leave what a session leaves that was killed: the journal of its two beats and their quiz."""
+    fields = values_of(examples.session())
+    samples = [fields.pop(name) for name in ("time_s", "target", "reference", "input", "output")]
+    with SessionRecorder(folder / "whole.h5", examples.header(), signal="session") as recorder:
+        recorder.press(*samples)
+        recorder.judge(fields)
+        shutil.copy(recorder.partial, folder / CUT_SESSION)
     (folder / "whole.h5").unlink()
 
 

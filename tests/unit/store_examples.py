@@ -116,6 +116,7 @@ def artefacts(draw: st.DrawFn, cls: type, inherited: int | None = None, *, full:
         "group": draw(st.integers(0, 6)),
         "place": draw(st.integers(0, 6)),
         "beat": draw(st.integers(0, 6)),
+        "window": draw(st.integers(0, 6)),
         "question": draw(st.integers(0, 4)),
         "wild": draw(st.integers(0, 6)),
     }

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pulsetrainer.artefacts import Quiz
+from pulsetrainer.artefacts import Beats, Quiz
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.conductor import Play, Rest
 from pulsetrainer.steps.quiz import GAP_S, QUESTION_S, Blind, from_list, order, score
@@ -142,3 +142,21 @@ def test_the_next_question_waits_for_the_answer():
 def test_nothing_is_told_before_the_first_answer():
     """An unanswered quiz is no quiz yet."""
     assert Blind(CHOICES, [0, 1], lambda _q: None, Play(0)).quiz() is None
+
+
+def test_a_beat_is_told_when_its_question_is_answered():
+    """Those of an open question stay untold, those of the questions before it are all there."""
+    said: list[tuple[str, float]] = []
+    blind = Blind(CHOICES, [2, 0], lambda _question: said.pop() if said else None, Play(0))
+    start_s = np.arange(0.0, 40.0, 0.8)
+    beats = Beats(start_s, *(np.ones(start_s.size) for _ in range(7)))
+    assert blind(0, 3.0) == Play(2, 1.0, None, 3.0 + QUESTION_S)
+    assert blind.told(beats).start_s.max() < 3.0
+    said.append((CHOICES[1], 9.0))
+    assert blind(20, 3.0 + QUESTION_S + GAP_S) == Rest()
+    assert blind.told(beats).start_s.size == start_s.size  # nothing is open
+    second_s = 3.0 + QUESTION_S + 2 * GAP_S
+    assert isinstance(blind(20, second_s), Play)
+    told = blind.told(beats)
+    assert told.start_s.max() < second_s <= start_s[told.start_s.size]
+    assert told.gain.size == told.start_s.size

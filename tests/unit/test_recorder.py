@@ -337,7 +337,7 @@ def test_a_full_disk_in_the_middle_of_a_block(tmp_path, monkeypatch):
         journal.append(b"DATA", np.zeros((4, 5)).tobytes())
     monkeypatch.setattr(journal, "_stream", stream)
     journal.append(b"DATA", np.arange(8.0).tobytes(), dropped=7)
-    run = Recording.read(path).run
+    run = Recording.read(path).artefact
     assert run.output.tolist() == [6.0, 7.0]
     assert run.dropped_samples == 7
 

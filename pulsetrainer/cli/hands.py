@@ -1,0 +1,88 @@
+"""Hands on a session: keys that change what is played, or that answer, and the screen that goes with them."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from pulsetrainer.cli.live import Live, letters, why_not
+from pulsetrainer.core.heartbeat import Pulse
+from pulsetrainer.errors import UsageError
+from pulsetrainer.steps.quiz import Blind
+from pulsetrainer.steps.steering import Steering
+
+if TYPE_CHECKING:
+    from pulsetrainer.cli.console import Screen
+    from pulsetrainer.core.pulses import Shape
+    from pulsetrainer.steps.conductor import Decide
+    from pulsetrainer.steps.performance import Now
+    from pulsetrainer.steps.programme import Programme
+
+
+@dataclass(frozen=True, slots=True)
+class Steered:
+    """A session with its screen and keys, or without."""
+
+    decide: Decide
+    view: Callable[[Now], None]
+    screen: contextlib.AbstractContextManager[None]
+    share: Callable[[float], float]  # of the work that is done, at a time in s
+    by_key: bool  # what comes next may change at any moment
+
+
+class Hands:
+    """What a person presses; ``names`` are those of the pulses."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.names = tuple(names)
+        self._answers: list[tuple[str, float]] = []  # not yet taken
+
+    def answer(self, _question: int) -> tuple[str, float] | None:
+        """Return the answer to the question that is open, and when it came; None while there is none."""
+        return self._answers.pop(0) if self._answers else None
+
+    def steer(
+        self, screen: Screen, chosen: Programme | Blind, shapes: Sequence[Shape], *, by_key: bool
+    ) -> Steered:
+        """Put screen and keys around who decides, where there is a terminal.
+
+        Raises
+        ------
+        UsageError
+            A quiz is to be answered by key, and there is none.
+        """
+        dark = "a result in JSON has no live view" if screen.as_json else why_not()
+        if isinstance(chosen, Blind):
+            if by_key and dark:
+                raise UsageError(f"a quiz is answered by key, and {dark}", hint="give the answers in a file")
+            if dark:
+                return Steered(chosen, lambda _now: None, contextlib.nullcontext(), lambda _s: 0.0, False)
+            return self._asked(chosen)
+        if dark:
+            if "small" in dark:
+                screen.note(f"{dark}; there are no keys")
+            return Steered(chosen, lambda _now: None, contextlib.nullcontext(), chosen.share_at, False)
+        steering = Steering(chosen, [Pulse(shape).own_bpm for shape in shapes])
+        live = Live(lambda key, _s: steering.press(key), self.names, blind=False)
+        live.status = lambda: "paused" if steering.paused else ""
+        return Steered(steering, live, live.on_screen(), chosen.share_at, True)
+
+    def _asked(self, quiz: Blind) -> Steered:
+        """Return a quiz on the screen: a letter answers, Q stops."""
+        steering = Steering(quiz, [])
+
+        def press(key: str, at_s: float) -> None:
+            choices = letters()[: len(self.names)]
+            if key in choices:
+                self._answers[:] = [(self.names[choices.index(key)], at_s)]
+            elif key == "Q":
+                steering.press("q")
+
+        live = Live(press, self.names, blind=True)
+        live.status = lambda: (
+            f"question {min(quiz.question + 1, quiz.questions)} of {quiz.questions}"
+            + (", answered" if self._answers else "")
+        )
+        return Steered(steering, live, live.on_screen(), lambda _s: 0.0, False)

@@ -1,0 +1,109 @@
+"""What is said of a session: its score sheet, and its figures on the screen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pulsetrainer.cli.job import Job
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts import Quiz, Session
+    from pulsetrainer.device.identity import DeviceInfo
+    from pulsetrainer.files.provenance import Header
+    from pulsetrainer.steps.performance import Performed
+
+
+def sheet(job: Job, html: Path, session: Session, header: Header) -> None:
+    """Write the score sheet of a session."""
+    from functools import partial
+
+    from pulsetrainer.report.score_sheet import render_session
+    from pulsetrainer.steps.quiz import score
+
+    result = None if session.quiz is None else score(session.quiz)
+    job.page(html, partial(render_session, score=result), session, header)
+
+
+def say(job: Job, path: Path, html: Path | None, session: Session) -> None:
+    """Say what a session in a file amounts to, whole or cut off, and write its sheet."""
+    from pulsetrainer.files import store
+    from pulsetrainer.report.facts import facts
+
+    if html is not None:
+        sheet(job, html, session, store.read_header(path))
+    quizzed, right = _quizzed(session.quiz)
+    said = {"beats": int(session.beats.start_s.size), **session.figures(), "underruns": session.underruns}
+    job.screen.result(said | {"complete": session.complete, "fault": session.fault, "html": html, **quizzed})
+    job.screen.facts(f"{path}: session", {k: v for k, v in facts(session).items() if v is not None} | right)
+    job.wrote(html)
+
+
+def tell(
+    job: Job, out: Path, html: Path | None, done: Performed, quiz: Quiz | None, info: DeviceInfo
+) -> None:
+    """Write the sheet and say what came out, also where the session was stopped."""
+    from pulsetrainer.artefacts import Session
+    from pulsetrainer.errors import PulsetrainerError
+    from pulsetrainer.files import store
+    from pulsetrainer.steps.stopped import raise_if_stopped
+
+    job.notes(done.notes)
+    if html is not None:
+        sheet(job, html, store.read(out, Session), store.read_header(out))
+    try:
+        raise_if_stopped(done.fault, done.remedy, "the session")
+    except PulsetrainerError as error:
+        error.message += f"; {done.beats.start_s.size} beats were kept in {out} (complete=false)"
+        raise
+    quizzed, right = _quizzed(quiz)
+    payload: dict[str, Any] = {
+        "output": out,
+        "beats": int(done.beats.start_s.size),
+        **done.figures,
+        "underruns": done.underruns,
+        "parts": done.parts,
+        "force_range_N": (done.reach.low, done.reach.high),
+        "clipped_samples": done.clipped,
+        "dropped_samples": done.dropped,
+        "temperature_K": [kelvin for _, kelvin in done.temperature] or None,
+        "serial": info.serial,
+        "firmware": info.firmware,
+        **quizzed,
+    }
+    rows: dict[str, Any] = {
+        "beats": f"{payload['beats']} in {done.parts} part{'s' if done.parts > 1 else ''}",
+        "force": f"{done.reach.low:.2f} .. {done.reach.high:.2f} N at full amplitude",
+        "error": f"{done.figures['mean_abs_error_percent']:.2f} % mean, "
+        f"{done.figures['max_abs_error_percent']:.2f} % at most, of full force",
+        "timing": f"{done.figures['beat_timing_max_ms']:.2f} ms at most",
+        "variation": f"{done.figures['rate_cv_percent']:.3f} % of rate, "
+        f"{done.figures['amplitude_cv_percent']:.2f} % of height",
+        "underruns": done.underruns,
+    }
+    if done.temperature:
+        kelvins = [kelvin for _, kelvin in done.temperature]
+        rows["coil"] = f"{kelvins[0]:+.1f} to {kelvins[-1]:+.1f} K against calibration, made up for"
+    job.screen.result(payload)
+    job.screen.facts(f"{out}: a session on {info.serial}", rows | right)
+
+
+def _quizzed(quiz: Quiz | None) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return what JSON and the screen say of a quiz."""
+    from pulsetrainer.steps.quiz import score
+
+    if quiz is None:
+        return {}, {}
+    result = score(quiz)
+    low, high = (100 * end for end in result.interval)
+    said = {
+        "asked": result.asked,
+        "right": result.right,
+        "interval": result.interval,
+        "chance": result.chance,
+        "p_value": result.p_value,
+        "response_s": result.response_s,
+        "confusion": quiz.confusion,
+    }
+    share = f"{100 * result.share:.0f} %, 95 % interval {low:.0f} to {high:.0f} %"
+    return {"quiz": said}, {"right": f"{result.right} of {result.asked}: {share}"}

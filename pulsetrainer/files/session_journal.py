@@ -1,0 +1,102 @@
+"""The beats of a session in its journal: written as they are over, so that a killed program leaves a session.
+
+A block is JSON: the beats and the windows of temperature that are new since the block before it, the quiz as
+far as it is answered, and the other fields of the session as they stand now.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pulsetrainer.artefacts import Beats, FloatArray, Quiz, Session
+from pulsetrainer.errors import DamagedFileError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+CUT_OFF = "the record ends before the session does: it was cut off, or is still going on"
+_BEAT = (
+    "start_s", "interval_s", "pulse", "amplitude", "gain", "late", "mean_error", "max_error",
+)  # fmt: skip
+_WINDOW = ("temperature_s", "temperature_K")
+
+
+class SessionWriter:
+    """Turns what a session amounts to so far into blocks, each beat once."""
+
+    def __init__(self) -> None:
+        self._beats = self._windows = 0  # that are written
+
+    def block(self, fields: Mapping[str, Any]) -> bytes:
+        """Return the next block, from the fields of a session that are no samples."""
+        beats, quiz = fields["beats"], fields["quiz"]
+        rows = np.stack([getattr(beats, name) for name in _BEAT], axis=1)[self._beats :]
+        windows = np.stack([_array(fields[name]) for name in _WINDOW], axis=1)[self._windows :]
+        self._beats, self._windows = self._beats + len(rows), self._windows + len(windows)
+        plain = {name: value for name, value in fields.items() if name not in ("beats", "quiz", *_WINDOW)}
+        asked = None if quiz is None else asdict(quiz) | {"response_s": quiz.response_s.tolist()}
+        said = {"beats": rows.tolist(), "windows": windows.tolist(), "fields": plain, "quiz": asked}
+        return json.dumps(said).encode()
+
+
+def _array(values: FloatArray | None) -> FloatArray:
+    return np.zeros(0) if values is None else values
+
+
+def session_of(path: Path, columns: FloatArray, target: FloatArray, blocks: Sequence[bytes]) -> Session:
+    """Return the session in a journal, not complete.
+
+    Parameters
+    ----------
+    path
+        Of the journal.
+    columns, target
+        Time, reference, input and output (4, n), and the targets (m,) of the first m samples: the others were
+        cut off.
+    blocks
+        What ``SessionWriter`` gave, at least one.
+
+    Raises
+    ------
+    DamagedFileError
+        The blocks are not what it gives.
+    """
+    try:
+        said = [json.loads(block) for block in blocks]
+        rows = np.asarray([row for one in said for row in one["beats"]], dtype=np.float64)
+        told = dict(zip(_BEAT, rows.reshape(-1, len(_BEAT)).T, strict=True))
+        beats = Beats(**(told | {"pulse": told["pulse"].astype(np.int64)}))  # type: ignore[arg-type]
+        windows = np.asarray([row for one in said for row in one["windows"]], dtype=np.float64)
+        warm = dict(zip(_WINDOW, windows.reshape(-1, len(_WINDOW)).T, strict=True)) if windows.size else {}
+        plain = {name: _tupled(value) for name, value in said[-1]["fields"].items()}
+        time_s, reference, current, force = columns[:, : target.size]
+        return Session(
+            time_s=time_s,
+            target=target,
+            reference=reference,
+            input=current,
+            output=force,
+            beats=beats,
+            quiz=_quiz(said[-1]["quiz"]),
+            **plain | warm | {"complete": False, "fault": CUT_OFF},
+        )
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise DamagedFileError(
+            f"{path} does not say what was pressed: {error}", path=path, artefact="session"
+        ) from error
+
+
+def _quiz(said: Mapping[str, Any] | None) -> Quiz | None:
+    if said is None:
+        return None
+    times = {"response_s": np.asarray(said["response_s"], dtype=np.float64)}
+    return Quiz(**{name: _tupled(value) for name, value in said.items()} | times)
+
+
+def _tupled(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

@@ -1,0 +1,225 @@
+"""A session under way: what is given out to the device, what comes back, and what it amounts to so far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from pulsetrainer.artefacts import Model
+from pulsetrainer.artefacts.session import Beats
+from pulsetrainer.core.heartbeat import Pulse
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.device.codes import HEAT_TAU_S
+from pulsetrainer.device.heat import added
+from pulsetrainer.device.plausibility import judge_against
+from pulsetrainer.device.wording import FORCE_REMEDY
+from pulsetrainer.diagnosis.prediction import extended_of
+from pulsetrainer.steps.beat_errors import Ledger
+from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach
+from pulsetrainer.steps.recording import PAUSE_S
+
+if TYPE_CHECKING:
+    from pulsetrainer.core.temperature import Thermometer
+    from pulsetrainer.device.device import Device
+    from pulsetrainer.device.trace import Block
+
+_FOLLOW = 0.3  # of a new reading of the loss: a window of a second is noisier than the room
+
+
+class Sink(Protocol):
+    """Where a session goes while it is pressed."""
+
+    def append(
+        self,
+        time_s: FloatArray,
+        target: FloatArray,
+        reference: FloatArray,
+        current: FloatArray,
+        force: FloatArray,
+        /,
+    ) -> None:
+        """Take samples in, arrays (n,) in s, N, A, A and N."""
+        ...
+
+    def judge(self, fields: Mapping[str, Any], /) -> None:
+        """Take in what the session amounts to so far: before the first samples, and after every beat."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Now:
+    """What a screen may show while a session goes on."""
+
+    time_s: float
+    target: FloatArray  # (n,) N, the samples that came last
+    current: FloatArray  # (n,) A
+    force: FloatArray  # (n,) N
+    beat: Play | None  # the one that was pressed last
+    interval_s: float
+    resting: bool  # no beat is under way
+
+
+@dataclass(frozen=True, slots=True)
+class Performed:
+    """How a session went, without its samples."""
+
+    figures: dict[str, float]
+    beats: Beats
+    full_force: float
+    mean_force: float
+    reach: Reach
+    clipped: int
+    dropped: int
+    parts: int
+    underruns: int
+    fault: str
+    remedy: str
+    notes: tuple[str, ...]
+    pulses: tuple[str, ...]
+    temperature: tuple[tuple[float, float], ...] = ()  # s, K against calibration, where heat was tracked
+
+    @property
+    def fields(self) -> dict[str, Any]:
+        """Fields of the artefact that are neither samples nor a quiz."""
+        warm = np.asarray(self.temperature, dtype=np.float64).reshape(-1, 2).T if self.temperature else None
+        return self.figures | {
+            "beats": self.beats,
+            "pulses": self.pulses,
+            "full_force": self.full_force,
+            "mean_force": self.mean_force,
+            "complete": not self.fault,
+            "dropped_samples": self.dropped,
+            "underruns": self.underruns,
+            "clipped_samples": self.clipped,
+            "fault": self.fault,
+            "notes": self.notes,
+            "temperature_s": None if warm is None else warm[0],
+            "temperature_K": None if warm is None else warm[1],
+        }
+
+
+class Performance:
+    """A session under way: what is given out, what comes back."""
+
+    def __init__(
+        self,
+        model: Model,
+        device: Device,
+        pulses: Sequence[Pulse],
+        rhythm: Rhythm,
+        decide: Decide,
+        sink: Sink,
+        reach: Reach,
+        watch: Callable[[Now], None],
+        thermometer: Thermometer | None = None,
+    ) -> None:
+        self._device, self._sink, self._watch = device, sink, watch
+        self._thermometer = thermometer
+        self._loss = 0.0 if thermometer is None else thermometer.extra
+        self._warmth: list[tuple[float, float]] = []  # s and K, of each window
+        self._pulses = tuple(pulse.name for pulse in pulses)
+        self._ledger = Ledger(self._pulses)
+        self._reach = reach
+        self._conductor = Conductor(
+            extended_of(model),
+            pulses,
+            reach,
+            rhythm,
+            decide,
+            self._ledger.give,
+            heat=device.heat,
+            heated=added,
+            cooling_s=HEAT_TAU_S,
+            loss=lambda: self._loss,
+        )
+        self._begun = 0  # sample at which the part began
+        self._gap_s = 0.0
+        self._next = 0  # sample that comes, where none is lost
+        self._parts = self._dropped = self._underruns = 0
+        self._fault = self._remedy = self._implausible = ""
+        self._last: Given | None = None
+        self.measured_s = 0.0
+
+    def run(self, lead_s: float) -> Performed:
+        """Press part after part until the end is decided, or the device or the user stops it."""
+        conductor, device = self._conductor, self._device
+        decimation = round(device.info.tick_rate_Hz / RATE_HZ)
+        self._sink.judge(self._so_far().fields)
+        while not conductor.ended and not self._fault:
+            beats, dropped = self._ledger.count, self._dropped
+            self._begun = self._next = round(conductor.time_s * RATE_HZ)
+            trace = device.stream(
+                partial(next, conductor.part(device.longest_play_s), None),
+                RATE_HZ,
+                lead_s=lead_s,
+                decimation=decimation,
+                on_block=lambda block: self._take(block, decimation),
+                should_stop=lambda: bool(self._implausible),
+            )
+            self._parts += 1
+            self._dropped = dropped + trace.dropped_samples
+            self._fault, self._remedy, self._underruns = trace.fault, trace.remedy, int(trace.underrun)
+            if self._implausible:
+                self._fault, self._remedy = self._implausible, FORCE_REMEDY
+            self._gap_s += PAUSE_S
+            if not self._fault and not conductor.ended and self._ledger.count == beats:
+                self._fault = "the device stays on too short for one beat"
+                self._remedy = "raise its on-time limit"
+        return self._so_far()
+
+    def _so_far(self) -> Performed:
+        ledger = self._ledger
+        return Performed(
+            figures=ledger.figures(),
+            beats=ledger.beats("N"),
+            full_force=ledger.high if ledger.count else float("nan"),
+            mean_force=ledger.mean_force,
+            reach=self._reach,
+            clipped=self._conductor.clipped,
+            dropped=self._dropped,
+            parts=self._parts,
+            underruns=self._underruns,
+            fault=self._fault,
+            remedy=self._remedy,
+            notes=tuple(self._conductor.notes),
+            pulses=self._pulses,
+            temperature=tuple(self._warmth),
+        )
+
+    def _take(self, block: Block, decimation: int) -> None:
+        sample = self._begun + block.tick // decimation
+        self._dropped += int(sample[-1]) + 1 - self._next - sample.size
+        self._next = int(sample[-1]) + 1
+        target, done, measured = self._ledger.measure(sample, block.force_N)
+        self.measured_s = float(sample[-1]) / RATE_HZ
+        meter = self._thermometer
+        if meter is not None and meter.add(sample / RATE_HZ, block.reference_A, block.current_A, block.duty):
+            self._loss += _FOLLOW * (meter.extra - self._loss)
+            self._warmth.append((self.measured_s + self._gap_s, meter.temperature_K))
+        self._sink.append(
+            sample / RATE_HZ + self._gap_s, target, block.reference_A, block.current_A, block.force_N
+        )
+        for piece, force in zip(done, measured, strict=True):
+            if piece.beat is not None:
+                self._last = piece
+                time_s = (piece.first + np.arange(force.size)) / RATE_HZ
+                self._implausible = self._implausible or judge_against(time_s, piece.predicted, force)
+        if any(piece.beat is not None for piece in done):
+            self._sink.judge(self._so_far().fields)
+        last = self._last.beat if self._last else None
+        self._watch(
+            Now(
+                self.measured_s,
+                target,
+                block.current_A,
+                block.force_N,
+                last.play if last else None,
+                last.interval_s if last else float("nan"),
+                resting=not self._ledger.is_beating,
+            )
+        )
