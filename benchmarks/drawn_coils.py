@@ -77,7 +77,8 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--coils", type=int, default=100)
     asked = parser.parse_args()
-    drives = [pt.load(path).compensated for path in asked.drives]
+    loaded = [pt.load(path) for path in asked.drives]
+    drives = [drive.compensated for drive in loaded]
     able = delivered = tuned_ones = named = wrongly_named = excluded = 0
     errors = []
     seed = asked.first - 1
@@ -92,7 +93,7 @@ def main() -> None:
         said = ""
         with pt.open_device(port) as device:
             try:
-                found = pt.tune(device)
+                found = pt.tune(device, pulses=loaded)
             except DeviceError as error:
                 said = error.message
             else:

@@ -126,8 +126,8 @@ def tune(
 ) -> Tuned:
     """Measure the coil, set the gains of the current loop by a rule, and verify them on pulses.
 
-    Everything else is as in ``steps.tune.tune``, which this calls. The gains stay set until the device is
-    closed.
+    ``pulses`` are names, tables, or drives, which are followed as they will be played. Everything else is as
+    in ``steps.tune.tune``, which this calls. The gains stay set until the device is closed.
 
     Raises
     ------
@@ -142,7 +142,9 @@ def tune(
     >>> round(tuned.resistance_ohm, 1), tuned.tracking_percent.after < 1.0
     (5.0, True)
     """
-    return _tune(device, pulses=[_shape(one) for one in pulses], **options)
+    return _tune(
+        device, pulses=[one if isinstance(one, Waveform) else _shape(one) for one in pulses], **options
+    )
 
 
 def invert(

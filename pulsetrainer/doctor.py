@@ -20,6 +20,7 @@ from pulsetrainer.api import open_device
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import DEFAULT_PORT
+from pulsetrainer.device.gains import DELIVERED
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.diagnosis import gates, wording
@@ -70,12 +71,13 @@ def examine(
     *,
     capture: bool = True,
     settings: str = "",
+    tuned: Path | None = None,
     folder: Path = Path(),
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Result:
     """Look at versions, compiler, emulator, folder, ports and device; with ``capture`` its coil is driven.
 
-    ``settings`` says in words which are in force.
+    ``settings`` says in words which are in force, ``tuned`` is the file with the gains that `tune` found.
     """
     looks: list[Callable[[], Iterator[Finding]]] = [
         _versions,
@@ -84,7 +86,7 @@ def examine(
         lambda: _folder(folder),
         lambda: iter([Finding("settings", "ok", settings or "none: defaults")]),
         _ports,
-        lambda: _device(port, capture=capture),
+        lambda: _device(port, tuned, capture=capture),
     ]
     found: list[Finding] = []
     for number, look in enumerate(looks):
@@ -188,10 +190,12 @@ def _ports() -> Iterator[Finding]:
 # --- the device -----------------------------------------------------------------------------------------
 
 
-def _device(port: str | None, *, capture: bool) -> Iterator[Finding]:
+def _device(port: str | None, tuned: Path | None, *, capture: bool) -> Iterator[Finding]:
     try:
-        with open_device(port) as device:
+        with open_device(port, tuned=tuned) as device:
             yield from _identity(device, redact(port or DEFAULT_PORT))
+            known = device.gains != DELIVERED
+            yield Finding("gains", "ok", f"those of `tune`, from {tuned}" if known else "as delivered")
             if capture:
                 yield from _short_capture(device)
     except PulsetrainerError as error:
@@ -283,7 +287,7 @@ def _rails(recording: Trace, top: float) -> Iterator[Finding]:
             "current tracking",
             "warning",
             f"{100 * worst:.2g} % of the range at worst",
-            "check supply voltage and coil resistance; set the gains of the loop anew",
+            "measure the coil and set the gains for it: pulsetrainer tune -o pulsetrainer.toml",
         )
     else:
         yield Finding("current tracking", "ok", f"{100 * worst:.2g} % of the range at worst")

@@ -33,10 +33,11 @@ def doctor(
 
     screen = Screen("doctor", as_json=json)
     named = context.parent.params.get("settings_file") if context.parent else None
-    rows = settings.effective(settings.find(named, os.environ))
+    file = settings.find(named, os.environ)
+    rows = settings.effective(file)
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
     with screen.bar("looking") as progress:
-        result = examine(port, capture=capture, settings=words, progress=progress)
+        result = examine(port, capture=capture, settings=words, tuned=file, progress=progress)
     payload = plain(result) | {"problems": result.problems}
     problem = f"{result.problems} of {len(result.findings)} findings stand in the way"
     hint = "follow the fixes, from the top"

@@ -32,6 +32,13 @@ def tune(
             help="Voltage of the supply, V, where you have measured it; default: told by the diode's 0.6 V.",
         ),
     ] = None,
+    drive: Annotated[
+        list[Path],
+        typer.Option(
+            help="Drive that the coil must follow; may be given again. Default: two pulses of the library.",
+            show_default=False,
+        ),
+    ] = [],  # noqa: B006
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
     overwrite: Overwrite = False,
@@ -51,17 +58,19 @@ def tune(
     check_port(port)
     if out is not None:
         check_output(out, overwrite=True)
-    job = Job(context, as_json=json)
+    job = Job(context, inputs=drive, as_json=json)
     from pulsetrainer.api import open_device
     from pulsetrainer.api import tune as measure
+    from pulsetrainer.artefacts import Waveform
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.tuning import check_tuned, write_tuned
 
+    drives = [job.load(path, Waveform) for path in drive]
     limits = Limits(limit_current_A, limit_force_N)
     with job.working("tuning") as progress, open_device(port, limits=limits) as device:
         if out is not None:
             check_tuned(out, device.info.serial, overwrite=overwrite)
-        found = measure(device, supply_V=supply_V, progress=progress)
+        found = measure(device, pulses=drives or ("normal", "bifid"), supply_V=supply_V, progress=progress)
     if out is not None:
         measured = {"resistance_ohm": found.resistance_ohm, "inductance_H": found.inductance_H}
         write_tuned(out, found.serial, measured | found.gains.values(), overwrite=overwrite)

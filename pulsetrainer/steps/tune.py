@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pulsetrainer.artefacts import Waveform
 from pulsetrainer.core import coil as electrical
 from pulsetrainer.core.coil import Coil, Hold, LoopGains, Margins
 from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, PARAMETERS, Fault
 from pulsetrainer.device.gains import Gains
+from pulsetrainer.device.limits import check_peak
 from pulsetrainer.errors import DeviceError
+from pulsetrainer.steps.play import check_current
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -79,7 +82,11 @@ class Tuned:
 
 
 def tune(
-    device: Device, *, pulses: Sequence[Shape], supply_V: float | None = None, progress: Progress = silent
+    device: Device,
+    *,
+    pulses: Sequence[Shape | Waveform],
+    supply_V: float | None = None,
+    progress: Progress = silent,
 ) -> Tuned:
     """Measure resistance and inductance by steps, set the gains of the current loop by a rule, and verify.
 
@@ -88,13 +95,16 @@ def tune(
     Parameters
     ----------
     pulses
-        Shapes that the current must be able to follow over the whole range.
+        What the current must be able to follow: shapes, over the whole range, and the compensated currents of
+        drives, which rise faster than the pulses that they press.
     supply_V
         Voltage of the supply where it has been measured: ohms and henries are then by it. None: by the
         drop of the free-wheeling diode, 0.6 V. The gains need neither.
 
     Raises
     ------
+    ArgumentError
+        A drive goes beyond the device's range.
     DeviceError
         No coil, a shorted one, one that the supply cannot drive over the pulses (with the reason), a force at
         rest, a fault, or a firmware that does not tell the duty. The output is off and the gains are those
@@ -104,6 +114,11 @@ def tune(
     """
     if supply_V is not None:
         positive(supply_V=supply_V)
+    for pulse in pulses:
+        if isinstance(pulse, Waveform):
+            check_current(pulse)
+            hint = "invert again with a lower `force_max`"
+            check_peak(pulse.compensated, device.info.current_limit_A, hint=hint)
     device.needs_duty("tuning")
     before = device.gains
     try:
@@ -118,7 +133,11 @@ class _Tuning:
     """One device being tuned."""
 
     def __init__(
-        self, device: Device, pulses: Sequence[Shape], supply_V: float | None, progress: Progress
+        self,
+        device: Device,
+        pulses: Sequence[Shape | Waveform],
+        supply_V: float | None,
+        progress: Progress,
     ) -> None:
         self._device, self._pulses, self._supply_V, self._progress = device, pulses, supply_V, progress
         self._dt_s = 1.0 / device.info.tick_rate_Hz
@@ -281,14 +300,18 @@ class _Tuning:
     def _references(self) -> list[FloatArray]:
         """A sine of half the range, then the pulses over all of it."""
         phase = 2.0 * math.pi * np.arange(round(2 * RATE_HZ / _SINE_HZ) + 1) * _SINE_HZ / RATE_HZ
-        pulses = [
-            train(shape, periods=_BEATS, rate_Hz=RATE_HZ, low=0.0, high=self._range_A)
-            for shape in self._pulses
-        ]
+        pulses = [self._current(pulse) for pulse in self._pulses]
         middle, swing = _SINE
         up = np.linspace(0.0, middle - swing, round(_MEAN_S * RATE_HZ))
         sine = np.concatenate((up, middle - swing * np.cos(phase), up[::-1]))
         return [self._range_A * sine, *pulses]
+
+    def _current(self, pulse: Shape | Waveform) -> FloatArray:
+        """Return the current (n,) of a pulse, A."""
+        if isinstance(pulse, Shape):
+            return train(pulse, periods=_BEATS, rate_Hz=RATE_HZ, low=0.0, high=self._range_A)
+        samples = np.arange(round(float(pulse.time_s[-1]) * RATE_HZ) + 1)
+        return np.interp(samples / RATE_HZ, pulse.time_s, pulse.compensated)
 
     def _before(self, gains: Gains, sound: Margins, references: Sequence[FloatArray]) -> float | None:
         """Return the error with the gains from before, where they are fit to be tried on this coil."""

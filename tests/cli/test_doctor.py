@@ -43,6 +43,16 @@ def test_troubles_of_the_device_are_found(run, setting, name, state):
     assert done.code == (1 if state == "problem" else 0)
 
 
+def test_the_gains_of_tune_are_in_force(run):
+    """A coil on which the delivered gains ring is followed, and it is said which gains are in force."""
+    coil = "bench:?resistance=3&inductance=0.008&supply=24"
+    assert run("tune", "--port", coil, "-o", "tuned.toml", "--json").code == 0
+    for words, state in (((), "warning"), (("--settings", "tuned.toml"), "ok")):
+        found = _named(run(*words, "doctor", "--port", coil, "--json"))
+        assert found["current tracking"]["state"] == state
+        assert ("tuned.toml" in found["gains"]["found"]) == bool(words)
+
+
 def test_an_absent_port_is_a_problem_with_a_fix(run):
     """As text, as a person reads it; nothing is captured."""
     done = run("doctor", "--port", "/dev/ttyNOWHERE")

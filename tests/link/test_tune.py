@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,9 +12,10 @@ import pulsetrainer as pt
 from pulsetrainer.device.codes import State
 from pulsetrainer.device.gains import DELIVERED
 from pulsetrainer.device.limits import Limits
-from pulsetrainer.errors import DeviceError
+from pulsetrainer.errors import ArgumentError, DeviceError
 
 RANGE_A = 1.5
+DATA = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 
 
 @pytest.mark.parametrize(
@@ -70,6 +74,27 @@ def test_what_cannot_be_tuned_is_named_and_off(port, names):
         assert device.gains == DELIVERED
         assert device._status().state in {State.IDLE, State.FAULT}
         assert device._status().current < 200
+
+
+def test_a_coil_is_judged_by_the_drives_that_it_is_to_follow():
+    """6 ohm, 0.1 H at 10 V follow the library's pulses; a drive that rises twice as fast they do not."""
+    drive = pt.load(DATA / "drive.h5")
+    rise = 1.4 * np.clip((drive.time_s - 1.0) * 20, 0.0, 1.0) * np.clip((2.0 - drive.time_s) * 20, 0.0, 1.0)
+    fast = replace(drive, compensated=rise)
+    with pt.open_device("bench:?resistance=6&inductance=0.1&supply=10") as device:
+        assert pt.tune(device, pulses=["normal", "bifid"]).tracking_percent.after < 1.0
+        with pytest.raises(DeviceError) as raised:
+            pt.tune(device, pulses=[fast])
+    assert "time constant" in raised.value.message
+
+
+def test_a_drive_beyond_the_range_is_refused():
+    """Before anything is measured."""
+    with (
+        pt.open_device("bench:", limits=Limits(current_A=0.8)) as device,
+        pytest.raises(ArgumentError),
+    ):
+        pt.tune(device, pulses=[pt.load(DATA / "drive.h5")])
 
 
 def test_limits_that_were_lowered_hold_while_it_is_tuned():
