@@ -22,7 +22,7 @@ from pulsetrainer.steps.session import Memory, perform
 DRIFT_PER_A2, TAU_S = 0.006, 20.0  # of the as-built bench
 COPPER_PER_K = 0.0039
 NAMES = ("normal", "bifid")
-_PLAYS = 4
+_PLAYS = 8
 
 
 def calibrated(port: str):

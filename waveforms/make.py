@@ -274,8 +274,8 @@ LIBRARY = (
     ),
     Pulse(
         name="stiff",
-        meaning="the pulse of stiff arteries in old age, a late systolic peak above the early one and a "
-        "steep fall: the reflected wave returns within systole",
+        meaning="the pulse of stiff arteries in old age as at the neck, a late systolic peak above the early "
+        "one and a steep fall: the reflected wave returns within systole",
         source="Murgo JP et al., Aortic input impedance in normal man: relationship to pressure wave forms, "
         "Circulation 1980, 62, 105-116 (type A); Kelly R et al., Noninvasive determination of age-related "
         "changes in the human arterial pulse, Circulation 1989, 80, 1652-1659",

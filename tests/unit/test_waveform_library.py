@@ -5,14 +5,19 @@ from __future__ import annotations
 import importlib.util
 import itertools
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pulsetrainer.core.beats import find_beats
+from pulsetrainer.core.heartbeat import Pulse
+from pulsetrainer.core.pulses import Shape
 from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.resources import waveforms_dir
 
 FOLDER = waveforms_dir()
+DATA = Path(__file__).resolve().parents[1] / "data"
 NAMES = (
     "normal",
     "bifid",
@@ -275,3 +280,51 @@ def test_alternans_of_three_depths():
         strong, weak = _systolic_peaks(_read(name)[2], 2)
         depths.append(1.0 - weak / strong)
     np.testing.assert_allclose(depths, [0.18, 0.38, 0.68], atol=0.08)
+
+
+HEALTHY = (
+    "normal",
+    "tachycardia",
+    "bradycardia",
+    "atrial-fibrillation",
+    "premature-atrial",
+    "alternans-mild",
+)
+SICK = ("bifid", "dicrotic", "water-hammer", "anacrotic", "parvus-et-tardus")
+VOLUNTEERS = ("fingerbp_AAC249_0", "fingerbp_AAC3_3", "fingerbp_AAC409_0")
+
+
+def _beat(shape: Shape) -> np.ndarray:
+    """The first beat of a pulse at 75 beats a minute, in 200 steps, from 0 to 1."""
+    level = Pulse(shape).level(0, 0.8, np.arange(200) / 250)
+    return (level - level.min()) / np.ptp(level)
+
+
+def _recorded_beat(name: str) -> np.ndarray:
+    """The mean beat of a volunteer."""
+    t, p = np.loadtxt(DATA / f"{name}.csv", delimiter=",", skiprows=1).T
+    return _beat(find_beats(Shape(name, t, p)).mean())
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((one - other) ** 2)))
+
+
+def test_single_beats_against_recorded_ones():
+    """Where the beat is a healthy one it is as near to some volunteer as two volunteers are; else to none.
+
+    The volunteers lie 0.08 to 0.15 of the height apart, rms over the beat.
+    """
+    recorded = [_recorded_beat(name) for name in VOLUNTEERS]
+    between = [_apart(a, b) for a, b in itertools.combinations(recorded, 2)]
+    for name in (*HEALTHY, *SICK):
+        nearest = min(_apart(_beat(read_pulse(name)), one) for one in recorded)
+        assert nearest < min(between) if name in HEALTHY else nearest > 0.9 * max(between), name
+
+
+def test_the_stiff_pulse_is_nearest_to_the_volunteer_with_a_late_systolic_peak():
+    """Of the three recorded ones one peaks late in systole and has no dicrotic wave to speak of."""
+    late, *others = (_recorded_beat(name) for name in VOLUNTEERS)
+    assert np.argmax(late) > 1.4 * max(np.argmax(one) for one in others)
+    stiff = _beat(read_pulse("stiff"))
+    assert _apart(stiff, late) < 0.75 * min(_apart(stiff, one) for one in others)
