@@ -19,15 +19,16 @@ from pulsetrainer.artefacts import (
 )
 from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import BoolArray, Plane
 from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.fitting import weights_for
+from pulsetrainer.diagnosis.forms import dual_behind
 from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import predict
-from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.state import Given, State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -182,23 +183,14 @@ def extended_model(state: State, model: Model) -> Model | None:
     lasting = state.extensions
     if not lasting:
         return None
-    plane, scale = Plane(model.edges), state.scale
-    if plane.n_h > LIMITS.extended_levels or not _is_even(plane):
-        low, high = float(model.edges[0]), float(model.edges[-1])
-        plane = Plane.uniform(low, high, min(plane.n_h, LIMITS.extended_levels))
-    problem = problem_for(state.problem.records, 0.0, 1.0, plane.n_h)
-    terms = state.current.terms
-    operator = weights_for(problem, terms, None).simulator.operator
-    seen = [
-        seen_input(terms, record.output, frame)
-        for record, frame in zip(problem.records, problem.frames, strict=True)
-    ]
-    words = {"u": model.input_unit, "y": model.output_unit}
+    operator, covered = (_dual_part if model.form == "dual" else _static_part)(state, model)
+    scale, words = state.scale, {"u": model.input_unit, "y": model.output_unit}
     return Model(
-        edges=plane.edges,
-        weights=operator.weights * scale.span / scale.reach**2,
-        offset=model.polarity * (scale.zero + scale.span * operator.offset),
-        covered=coverage(problem.plane, seen),
+        edges=operator.plane.edges,
+        weights=operator.weights,
+        offset=operator.offset,
+        covered=covered,
+        form=model.form,
         weights_unit=model.weights_unit,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
@@ -213,6 +205,31 @@ def extended_model(state: State, model: Model) -> Model | None:
             for term in lasting
         ),
     )
+
+
+def _static_part(state: State, model: Model) -> tuple[Preisach, BoolArray]:
+    """Return the static operator refitted on the levels of the model, and the cells that were visited."""
+    plane, scale = Plane(model.edges), state.scale
+    if plane.n_h > LIMITS.extended_levels or not _is_even(plane):
+        plane = Plane.uniform(plane.low, plane.high, min(plane.n_h, LIMITS.extended_levels))
+    problem = state.problem.of(state.problem.records, plane.n_h)
+    terms = state.current.terms
+    operator = weights_for(problem, terms, None).simulator.operator
+    seen = [
+        seen_input(terms, record.output, frame)
+        for record, frame in zip(problem.records, problem.frames, strict=True)
+    ]
+    weights = operator.weights * scale.span / scale.reach**2
+    offset = model.polarity * (scale.zero + scale.span * operator.offset)
+    static = Preisach(plane, weights, offset, polarity=model.polarity, signed=problem.signed)
+    return static, coverage(problem.plane, seen)
+
+
+def _dual_part(state: State, model: Model) -> tuple[Preisach, BoolArray]:
+    """Return the same of the dual form: the operator from the output to the input."""
+    found = dual_behind(state.current, model, state.scale)
+    outputs = [model.polarity * state.scale.outputs(r.output) for r in state.problem.records]
+    return found, coverage(found.plane, outputs)
 
 
 def _constants(term: Term, scale: Scale) -> list[Estimate]:

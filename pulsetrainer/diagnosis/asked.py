@@ -11,6 +11,7 @@ from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.initial_state import known_from
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.diagnosis.state import Given, Question
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
@@ -33,7 +34,7 @@ def question_of(
         Runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is too
         short, or has too few samples with a number.
     """
-    low, high = float(model.edges[0]), float(model.edges[-1])
+    low, high = input_range(model)
     *called, model_name = names or (*(f"run {k}" for k in range(1, len(runs) + 1)), "the model")
     records, notes, fingerprints = [], [], []
     stamps: list[FloatArray | None] = []
@@ -62,17 +63,12 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
             f"{model.input_unit} and {model.output_unit}",
             hint="use a model of the same device, in the same units",
         )
-    if model.form != "direct":
-        raise DataError(
-            f"{model_name} has the form {model.form}: causes are told apart on top of direct models only",
-            hint="evaluate it on a held-out run, or diagnose a model of the direct form",
-        )
     if model.reading != "continuous":
         raise DataError(
             f"{model_name} reads its weights as relays, whose steps would be mistaken for causes",
             hint="identify it with the continuous operator: pulsetrainer identify RUN.h5 -o model.h5",
         )
-    low, high = float(model.edges[0]), float(model.edges[-1])
+    low, high = input_range(model)
     u, slack = run.input[np.isfinite(run.input)], LIMITS.beyond_range * (high - low)
     inside = (u >= low - slack) & (u <= high + slack)
     if u.size == 0 or np.mean(inside) < LIMITS.least_inside:
@@ -82,6 +78,12 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
             f"({low:.4g} .. {high:.4g} {model.input_unit})",
             hint="if the model is of another device, identify this one first",
         )
+
+
+def input_range(model: Model) -> tuple[float, float]:
+    """Return the range of the input that was identified."""
+    operator = operator_of(model)
+    return operator.low, operator.high
 
 
 def measured_of(

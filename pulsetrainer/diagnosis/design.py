@@ -201,9 +201,15 @@ class Design:
         diagonal = np.einsum("ij,ij->j", self.matrix, self.matrix)
         return np.asarray(penalty(self.plane, diagonal, self.smoothing).toarray())
 
-    def fit(self, y: FloatArray, passive: NDArray[np.bool_] | None = None) -> nnls.NonNegative:
-        """Non-negative masses for binned outputs (count,)."""
-        return nnls.solve(self.gram, self.matrix.T @ self.bins.settled(y), passive=passive)
+    def fit(
+        self, y: FloatArray, passive: NDArray[np.bool_] | None = None, *, signed: bool = False
+    ) -> nnls.NonNegative:
+        """Masses for binned outputs (count,), non-negative unless ``signed``."""
+        rhs = self.matrix.T @ self.bins.settled(y)
+        if not signed:
+            return nnls.solve(self.gram, rhs, passive=passive)
+        masses = nnls.solve_signed(self.gram, rhs)
+        return nnls.NonNegative(masses, masses != 0, 1)
 
     def offset(self, y: FloatArray, masses: FloatArray) -> float:
         """Offset y0 that belongs to the masses; rows here rise from 0, so W is added back."""
@@ -228,19 +234,24 @@ class Followed:
     trace: Trace
     own: sparse.csr_array  # (n, n_q) from the anchor to the sample, node space
     step: sparse.csr_array  # (m, n_q) from turning point to turning point
+    base: FloatArray | None = None  # (n,) output of what the weights only correct
 
     @classmethod
-    def along(cls, plane: Plane, u: FloatArray) -> Followed:
+    def along(
+        cls, plane: Plane, u: FloatArray, base: Callable[[FloatArray], FloatArray] | None = None
+    ) -> Followed:
         """Follow an input (n,) from negative saturation."""
         path = follow(plane, u, None, "continuous")
         own = steps(plane, path.value, path.node_value[path.anchor])
-        return cls(path, own, steps(plane, path.node_value, path.node_value[path.parent]))
+        step = steps(plane, path.node_value, path.node_value[path.parent])
+        return cls(path, own, step, None if base is None else base(u))
 
     def output(self, operator: Preisach) -> FloatArray:
         """Output (n,), polarity 1."""
         turning = self.trace.along_tree(self.step @ operator.nodes)
         level = operator.offset - operator.total
-        return np.asarray(self.own @ operator.nodes + turning[self.trace.anchor] + level)
+        y = np.asarray(self.own @ operator.nodes + turning[self.trace.anchor] + level)
+        return y if self.base is None else y + self.base
 
 
 def _to_cells(plane: Plane, packed: sparse.csr_array) -> FloatArray:

@@ -20,7 +20,7 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.extended import Term, in_order
 from pulsetrainer.diagnosis.fitting import Simulator
-from pulsetrainer.diagnosis.problem import Problem, problem_for
+from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
@@ -56,9 +56,9 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     found = []
     for (name, shares), faster in product(_experiments().items(), FASTER):
         u = plane.low + (plane.high - plane.low) * shares
-        y = state.current.simulator.operator(u)
+        y = state.current.simulator.static(u)
         record = Record(u, y, dt_s=1.0 / (faster * LIMITS.experiment_Hz))
-        problem = problem_for([record], plane.low, plane.high, plane.n_h)
+        problem = state.problem.of([record], plane.n_h)
         found.append(Experiment(name, _smallest_distance(state, problem, terms, others), here, faster))
     return max(found, key=lambda one: one.distance)
 
@@ -116,6 +116,7 @@ def _smallest_distance(
     rows = Design.build(problem.plane, problem.bins, problem.paths(()), problem.smoothing)
     free = rows.projector(state.current.passive)(changes)
     size = np.maximum(np.linalg.norm(free, axis=0), TINY)
-    cosine = np.abs(free.T @ free) / np.outer(size, size) - np.eye(len(terms))
+    along = free / size  # a change that is nowhere stays zero
+    cosine = np.abs(along.T @ along) - np.eye(len(terms))
     sine = np.sqrt(np.maximum(1.0 - np.max(cosine, axis=0) ** 2, 0.0))
     return float(np.min(size * sine) / np.sqrt(problem.bins.count))

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pulsetrainer.core import inversion, learning
+from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.causes import cause_named
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
 from pulsetrainer.diagnosis.past import Past
@@ -84,12 +85,12 @@ class Tracked:
 class Extended:
     """An identified model with its extensions; ``static`` has polarity 1, ``polarity`` turns the output."""
 
-    static: Preisach
+    static: Preisach | Dual
     terms: tuple[Term, ...] = ()
     polarity: int = 1
 
     @classmethod
-    def of(cls, static: Preisach, extensions: Sequence[tuple[str, Values]]) -> Extended:
+    def of(cls, static: Preisach | Dual, extensions: Sequence[tuple[str, Values]]) -> Extended:
         """Build from stored names and values.
 
         Raises
@@ -97,18 +98,14 @@ class Extended:
         DataError
             A cause is unknown.
         """
-        sign = static.polarity
-        upright = Preisach(static.plane, static.weights, sign * static.offset, static.reading)
         terms = in_order([Term(*cause_named(name).restored(values)) for name, values in extensions])
-        return cls(upright, terms, sign)
+        return cls(_upright(static), terms, static.polarity)
 
     def frame(self, u: FloatArray, dt_s: float, past: Past | None = None) -> Frame:
         """What the causes are told of an input, and of what came before it."""
-        plane = self.static.plane
-        middle, half = self.static.offset, self.static.total
-        ends = (middle - half, middle + half)
-        reach = plane.high - plane.low
-        return Frame(dt_s, u, 2.0 * half, reach, low=plane.low, ends=ends, zero=ends[0], past=past)
+        low, ends = self.static.low, self.static.saturation
+        reach = self.static.high - low
+        return Frame(dt_s, u, ends[1] - ends[0], reach, low=low, ends=ends, zero=ends[0], past=past)
 
     def __call__(self, u: FloatArray, dt_s: float) -> FloatArray:
         """Output (n,) for an input (n,) at even steps, from negative saturation and rest."""
@@ -120,12 +117,19 @@ class Extended:
         dt_s: float,
         *,
         lead: FloatArray,
+        inverse: Callable[[FloatArray], inversion.Inverse] | None = None,
         band_Hz: float | None = None,
         steps: int = LIMITS.inverse_rounds,
     ) -> Tracked:
         """Input (n,) whose output is ``target`` (n,), after the input ``lead`` (m,) has been played.
 
         The best iterate is kept; where none is better than the static inverse, that one is.
+
+        Parameters
+        ----------
+        inverse
+            Of the static part, after the lead, for outputs as they are measured; None: over all its range,
+            which signed weights do not have.
 
         Raises
         ------
@@ -134,11 +138,17 @@ class Extended:
         """
         upright = Extended(self.static, self.terms)
         target = self.polarity * np.asarray(target)
-        state = self.static.run(lead)[1] if lead.size else None
+        static_inverse = self._inverse(lead)
+        if inverse is not None:
+            within = inverse
+
+            def static_inverse(wanted: FloatArray) -> inversion.Inverse:
+                return within(self.polarity * wanted)
+
         best = None
         for tried in learning.passes(
             target,
-            lambda wanted: inversion.invert(self.static, wanted, state),
+            static_inverse,
             lambda u: upright(np.concatenate((lead, u)), dt_s)[lead.size :],
             smooth=learning.LowPass(band_Hz, dt_s),
         ):
@@ -153,3 +163,29 @@ class Extended:
                 break
         assert best is not None
         return best
+
+    def _inverse(self, lead: FloatArray) -> Callable[[FloatArray], inversion.Inverse]:
+        """Return the inverse of the static part after a lead (m,)."""
+        static = self.static
+        if isinstance(static, Dual):
+            return lambda wanted: static.inverse(wanted, lead)
+        state = static.run(lead)[1] if lead.size else None
+        return lambda wanted: inversion.invert(static, wanted, state)
+
+
+def _upright(static: Preisach | Dual) -> Preisach | Dual:
+    """Return the operator whose output rises with the input: the same, or its mirror image."""
+    if isinstance(static, Dual):
+        return static if static.polarity > 0 else Dual(_mirrored(static.inner))
+    offset = static.polarity * static.offset
+    return Preisach(static.plane, static.weights, offset, static.reading, signed=static.signed)
+
+
+def _mirrored(falling: Preisach) -> Preisach:
+    """Return the rising operator that does to -x what a falling one does to x."""
+    plane = falling.plane
+    i, j = plane.cell_indices
+    weights = np.empty((plane.n_h, plane.n_h))
+    weights[i, j] = falling.weights
+    last = plane.n_h - 1
+    return Preisach(Plane(-plane.edges[::-1]), weights[last - j, last - i], falling.offset)

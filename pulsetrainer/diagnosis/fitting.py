@@ -86,8 +86,14 @@ class Simulator:
 
     def __init__(self, problem: Problem, operator: Preisach) -> None:
         self.problem, self.operator = problem, operator
-        self.frames = [frame.about(operator.offset - operator.total) for frame in problem.frames]
+        rest = float(self.static(np.asarray([problem.plane.low]))[0])
+        self.frames = [frame.about(rest) for frame in problem.frames]
         self._static: dict[tuple[Term, ...], list[FloatArray]] = {}
+
+    def static(self, u: FloatArray) -> FloatArray:
+        """Output (n,) of the hysteresis for what it sees (n,), from negative saturation."""
+        y, base = self.operator(u), self.problem.base
+        return y if base is None else y + base(u)
 
     def inner(self, terms: Sequence[Term]) -> list[FloatArray]:
         """Outputs of the hysteresis of every record at the full rate."""
@@ -95,7 +101,7 @@ class Simulator:
         if before not in self._static:
             if any(t.cause.feeds_back for t in before):
                 self._static[before] = [
-                    chain(before, self.operator, frame, record.output)
+                    chain(before, self.static, frame, record.output)
                     for record, frame in zip(self.problem.records, self.problem.frames, strict=True)
                 ]
             else:
@@ -130,12 +136,14 @@ def weights_for(
     added = np.zeros(problem.bins.count)
     if simulator is not None:
         added = simulator(terms) - design.output(simulator.operator)
+    elif problem.base is not None:
+        added = _none(problem)(terms)
     for _ in range(LIMITS.passes):
         wanted = problem.measured - added
-        found = design.fit(wanted, passive)
+        found = design.fit(wanted, passive, signed=problem.signed)
         passive = found.passive
         offset = design.offset(wanted, found.x)
-        simulator = Simulator(problem, Preisach(problem.plane, found.x / problem.plane.areas, offset))
+        simulator = Simulator(problem, _operator(problem, found.x, offset))
         simulated = simulator(terms)
         residual = problem.bins.settled(problem.measured - simulated)
         before, added = added, simulated - design.output(simulator.operator)
@@ -146,6 +154,17 @@ def weights_for(
     assert simulator is not None
     squares = float(residual @ residual)
     return Fitted(tuple(terms), simulator, design, found.passive, simulated, residual, squares)
+
+
+def _operator(problem: Problem, masses: FloatArray, offset: float) -> Preisach:
+    """Return the operator with masses (n_q,) on the plane of the problem."""
+    plane = problem.plane
+    return Preisach(plane, masses / plane.areas, offset, signed=problem.signed)
+
+
+def _none(problem: Problem) -> Simulator:
+    """Return the simulator before anything is fitted: what the weights correct, alone."""
+    return Simulator(problem, _operator(problem, np.zeros(problem.plane.n_q), 0.0))
 
 
 def _rows(problem: Problem, terms: Sequence[Term]) -> Design:

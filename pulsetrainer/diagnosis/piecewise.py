@@ -19,6 +19,7 @@ import numpy as np
 from pulsetrainer.core import inversion, learning
 from pulsetrainer.core.memory import State, negative_saturation
 from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.extended import Extended, chain
 from pulsetrainer.diagnosis.past import Past
@@ -57,11 +58,14 @@ class Piecewise:
     def __init__(
         self, extended: Extended, dt_s: float, *, slew_per_s: float, band_Hz: float | None = None
     ) -> None:
-        self._upright = Extended(extended.static, extended.terms)
+        static = extended.static
+        assert isinstance(static, Preisach)  # a session plays direct models only
+        self._static = static
+        self._upright = Extended(static, extended.terms)
         self._polarity = extended.polarity
         self._dt_s = dt_s
         self._slew_per_s = slew_per_s
-        plane = extended.static.plane
+        plane = static.plane
         self.reach = int(np.ceil((plane.high - plane.low) / (slew_per_s * dt_s))) + 1
         self._smooth = learning.LowPass(band_Hz, dt_s)
         self._kept = round(_CARRIED * learning.PAD / (band_Hz * dt_s)) if band_Hz else 0
@@ -75,7 +79,7 @@ class Piecewise:
 
     def play(self, inputs: FloatArray) -> FloatArray:
         """Take in that the input (n,) is played as it is, and return the output (n,) that the model says."""
-        self._turns = self._upright.static.run(inputs, self._turns)[1]
+        self._turns = self._static.run(inputs, self._turns)[1]
         self._wished = np.concatenate((self._wished, inputs))[-self.reach :]
         return self._give(inputs, np.zeros(self._kept))
 
@@ -93,19 +97,19 @@ class Piecewise:
         lift[:known] = self._lift[:known]
         best = None
         for _ in range(LIMITS.inverse_rounds + 1 if self._upright.terms else 1):
-            exact = inversion.invert(self._upright.static, wanted + lift, self._turns)
+            exact = inversion.invert(self._static, wanted + lift, self._turns)
             inputs = self._limited(exact.input)
             error = wanted - self._predicted(inputs, self._past)[0]
             rms = root_mean_square(error[:n])
             if best is not None and rms > _GAIN * best[0]:
                 break
             best = rms, lift, inputs, exact.input, error
-            if rms < _ENOUGH * 2.0 * self._upright.static.total:
+            if rms < _ENOUGH * 2.0 * self._static.total:
                 break
             lift = lift + learning.STEP * self._correction(error)
         assert best is not None
         _, lift, inputs, wished, error = best
-        final = inversion.invert(self._upright.static, (wanted + lift)[:n], self._turns)
+        final = inversion.invert(self._static, (wanted + lift)[:n], self._turns)
         self._turns, self._lift = final.final, lift[n:]
         self._wished = np.concatenate((self._wished, wished[:n]))[-self.reach :]
         return Piece(inputs[:n], self._give(inputs[:n], error[:n]), final.clipped)
@@ -126,7 +130,7 @@ class Piecewise:
 
         def static(seen: FloatArray) -> FloatArray:
             nonlocal relays
-            output, relays = self._upright.static.run(seen, self._relays)
+            output, relays = self._static.run(seen, self._relays)
             return output
 
         return chain(self._upright.terms, static, frame), relays

@@ -54,14 +54,8 @@ def extended_of(model: Model) -> Extended:
     # scipy.signal and scipy.stats come with it: a static model need not wait for them
     from pulsetrainer.diagnosis.extended import Extended  # noqa: PLC0415
 
-    static = operator_of(model)
-    if model.form != "direct" or isinstance(static, Dual):
-        raise DataError(
-            f"this model has the form {model.form} and extensions, which only direct models have",
-            hint="identify the model again",
-        )
     named = [(one.cause, tuple(p.value for p in one.parameters)) for one in model.extensions]
-    return Extended.of(static, named)
+    return Extended.of(operator_of(model), named)
 
 
 def predict(model: Model, inputs: FloatArray, dt_s: float | None, start: State | None = None) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +16,8 @@ from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 
+Static = Callable[[FloatArray], FloatArray]
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -27,13 +29,15 @@ class Problem:
     bins: Bins
     measured: FloatArray  # (count,) averaged output
     smoothing: float
+    signed: bool = False  # weights of either sign
+    base: Static | None = None  # what the weights only correct, input to output; None: they are all there is
     _followed: OrderedDict[tuple[Term, ...], list[Followed]] = field(default_factory=OrderedDict, repr=False)
 
     def paths(self, terms: tuple[Term, ...]) -> list[Followed]:
         """Follow what the hysteresis sees of each record behind some input causes; the last few are kept."""
         if terms not in self._followed:
             self._followed[terms] = [
-                Followed.along(self.plane, seen_input(terms, record.output, frame))
+                Followed.along(self.plane, seen_input(terms, record.output, frame), self.base)
                 for record, frame in zip(self.records, self.frames, strict=True)
             ]
             if len(self._followed) > LIMITS.followed_kept:
@@ -41,8 +45,21 @@ class Problem:
         self._followed.move_to_end(terms)
         return self._followed[terms]
 
+    def of(self, records: Sequence[Record], levels: int) -> Problem:
+        """Return the same of other records, or on another number of levels."""
+        plane = self.plane
+        return problem_for(records, plane.low, plane.high, levels, signed=self.signed, base=self.base)
 
-def problem_for(records: Sequence[Record], low: float, high: float, levels: int = LIMITS.levels) -> Problem:
+
+def problem_for(
+    records: Sequence[Record],
+    low: float,
+    high: float,
+    levels: int = LIMITS.levels,
+    *,
+    signed: bool = False,
+    base: Static | None = None,
+) -> Problem:
     """The records with masks applied, ready to be fitted.
 
     Raises
@@ -67,7 +84,8 @@ def problem_for(records: Sequence[Record], low: float, high: float, levels: int 
         Frame(r.step, r.input, span, reach, k, len(records), low, ends, begin_s=begins[k], longest_s=longest)
         for k, r in enumerate(records)
     )
-    return Problem(tuple(records), frames, Plane.uniform(low, high, levels), bins, measured, LIMITS.smoothing)
+    plane = Plane.uniform(low, high, levels)
+    return Problem(tuple(records), frames, plane, bins, measured, LIMITS.smoothing, signed, base)
 
 
 def _ends(records: Sequence[Record], low: float, high: float) -> tuple[float, float]:

@@ -112,6 +112,14 @@ class State:
         common = [one.id for one in library().values() if one.common and one.id not in self.current.names]
         return tuple(one for one in common if not self.limits.get(one, np.inf) <= LIMITS.matters)
 
+    @property
+    def left_rms(self) -> float:
+        """Rms error with the causes found; a cause that was only screened counts with its linearised gain."""
+        if not (self.question.quick and self.findings and self.findings[0].found):
+            return self.current.rms
+        left = max(self.current.squares - self.scores.scores[0].gain, self.floor.squares)
+        return float(np.sqrt(left / self.floor.count))
+
     def is_whole(self, fitted: Fitted) -> bool:
         """Whether what a fit leaves is noise, as far as it matters."""
         left = fitted.squares - self.floor.squares

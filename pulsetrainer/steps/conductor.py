@@ -133,8 +133,8 @@ class Conductor:
         self._pulses, self._reach, self._rhythm = tuple(pulses), reach, rhythm
         self._decide, self._give = decide, give
         self._inverse = Piecewise(extended, 1.0 / RATE_HZ, slew_per_s=SLEW_A_PER_S, band_Hz=BAND_HZ)
-        self._plane = extended.static.plane
-        self._rest_force = extended.polarity * (extended.static.offset - extended.static.total)
+        self._static = extended.static
+        self._rest_force = extended.polarity * extended.static.saturation[0]
         self._heat, self._heated, self._cooling_s = heat, heated, cooling_s
         self._loss = loss
         self._samples = 0
@@ -151,7 +151,7 @@ class Conductor:
     def part(self, longest_s: float) -> Iterator[FloatArray]:
         """Yield the currents (n,) in A of a part of at most ``longest_s``; it ends at rest."""
         until = self._samples + round((longest_s - MARGIN_S) * RATE_HZ)
-        yield self._played(major_loop(self._plane.low, self._plane.high))
+        yield self._played(major_loop(self._static.low, self._static.high))
         place: _Place | None = None  # None: at rest
         while True:
             decision = self._decide(self._number, place.start_s if place else self.time_s + RAMP_S)
@@ -200,7 +200,7 @@ class Conductor:
         return current
 
     def _rest(self, seconds: float) -> FloatArray:
-        return self._played(np.full(max(round(seconds * RATE_HZ), 1), self._plane.low))
+        return self._played(np.full(max(round(seconds * RATE_HZ), 1), self._static.low))
 
     def _up(self, play: Play) -> tuple[FloatArray, _Place]:
         count = round(RAMP_S * RATE_HZ)
@@ -212,7 +212,7 @@ class Conductor:
 
     def _down(self, place: _Place) -> FloatArray:
         current = self._inverted(self._fall(place.force), np.full(self._inverse.reach, self._rest_force))
-        return np.append(current, self._played(np.asarray([self._plane.low])))
+        return np.append(current, self._played(np.asarray([self._static.low])))
 
     def _fall(self, force: float) -> FloatArray:
         count = round(RAMP_S * RATE_HZ)

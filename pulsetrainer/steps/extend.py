@@ -68,7 +68,8 @@ def extend(
             f"{model_name} is not the model that {diagnosis_name} is of",
             hint="give the model that was diagnosed, or diagnose this one: pulsetrainer diagnose",
         )
-    same_range = np.allclose(extended.edges[[0, -1]], model.edges[[0, -1]])
+    # the levels of a dual model lie on the output, and a refit moves them
+    same_range = model.form == "dual" or np.allclose(extended.edges[[0, -1]], model.edges[[0, -1]])
     if not same_range or (extended.input_unit, extended.output_unit) != (model.input_unit, model.output_unit):
         raise DataError(
             f"{diagnosis_name} is of a model over {extended.edges[0]:.4g} .. {extended.edges[-1]:.4g} "

@@ -104,7 +104,7 @@ def invert(
     progress(0.2)
     layout = _laid_out(shape, part, forces, periods, rate_Hz)
     if chosen == "extended":
-        exact, clipped = _tracked(model, layout, notes)
+        exact, clipped = _tracked(model, part, layout, notes)
     else:
         exact, clipped = _compensated(part, chosen, layout)
     if clipped:
@@ -290,20 +290,27 @@ def _within_beats(
     A lag, a creep or heat keep a pulse from the ends that the hysteresis would reach in a long time.
     """
     low, high = part.low, part.high
-    rising = part.polarity > 0
-    inputs = train(
-        shape, periods=4, rate_Hz=rate_Hz, low=low if rising else high, high=high if rising else low
-    )
+    inputs = train(shape, periods=4, rate_Hz=rate_Hz, low=low, high=high)
+    if part.polarity < 0:
+        inputs = low + high - inputs
     settle = np.full(round(rate_Hz), inputs[0])
     lead = part.lead
     made = predict(model, np.concatenate((lead, settle, inputs)), 1.0 / rate_Hz)[lead.size + settle.size :]
     period = round(shape.period_s * rate_Hz)
     beats = [made[k * period : (k + 1) * period] for k in range(1, made.size // period)]
     reached = max(float(b.min()) for b in beats), min(float(b.max()) for b in beats)
-    return (
+    within = (
         max(forces[0], reached[0]) if asked[0] is None else forces[0],
         min(forces[1], reached[1]) if asked[1] is None else forces[1],
     )
+    if not within[0] < within[1]:
+        named = ", ".join(one.cause for one in model.extensions)
+        raise DataError(
+            f"there is no {model.output_quantity} that every beat reaches: with {named} the output wanders "
+            "further from beat to beat than the pulse moves it",
+            hint="give `force_min` and `force_max`, a faster pulse, or the model without extensions",
+        )
+    return within
 
 
 @dataclass(frozen=True, slots=True)
@@ -368,9 +375,15 @@ def _compensated(part: Invertible, method: Inversion, layout: _Layout) -> tuple[
     return inversion.smoothed(matched.input, time_s, step, plane.low, plane.high), matched.clipped
 
 
-def _tracked(model: Model, layout: _Layout, notes: list[str]) -> tuple[FloatArray, int]:
+def _tracked(model: Model, part: Invertible, layout: _Layout, notes: list[str]) -> tuple[FloatArray, int]:
     """Return the input that makes the extended model give what is wanted, and what was clipped."""
-    found = extended_of(model).invert(layout.wanted, 1.0 / layout.rate_Hz, lead=layout.lead, band_Hz=BAND_HZ)
+    found = extended_of(model).invert(
+        layout.wanted,
+        1.0 / layout.rate_Hz,
+        lead=layout.lead,
+        inverse=part.inverse if model.form == "signed" else None,
+        band_Hz=BAND_HZ,
+    )
     notes.append(
         f"by the extended model the rms tracking error is {with_unit(f'{found.rms:.3g}', model.output_unit)} "
         f"after {found.steps} steps, {found.rms_static:.3g} with the static inverse"

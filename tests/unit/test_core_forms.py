@@ -187,13 +187,6 @@ def test_closest_match_is_for_direct_models(clockwise):
         pt.invert("normal", clockwise, method="closest-match")
 
 
-def test_a_diagnosis_is_of_direct_models(clockwise):
-    """It says so instead of naming causes of another form's residual."""
-    _, u, y, _, _ = measured(devices.stop_sum, 4004)
-    with pytest.raises(DataError):
-        pt.diagnose(run_of(u, y), clockwise, quick=True)
-
-
 def test_evaluate_knows_every_form(clockwise, butterfly):
     """The error on the record itself is that of the fit."""
     for draw, seed, model in (

@@ -106,6 +106,7 @@ PROBLEM = SimpleNamespace(
     frames=(Frame(1e-3, np.zeros(10_000), 1.0, 1.0),),
     measured=np.asarray([0.0, 1.0]),
     plane=SimpleNamespace(low=0.0, high=2.0),
+    base=None,
 )
 
 
@@ -423,7 +424,7 @@ def test_jumps_that_the_causes_found_make_are_withdrawn(monkeypatch, again):
     assert (asked[0].low, asked[0].high) == (0.0, 2.0)
 
 
-def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firings=(), none=False):
+def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firings=(), none=False, base=None):
     held = None if none else Contrast(0.003, 0.001, p, at_bound)
     monkeypatch.setattr(equal_loops.congruency, "fitted_contrast", lambda *_: held)
     monkeypatch.setattr(
@@ -431,7 +432,8 @@ def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firin
         "weights_for",
         lambda problem, terms, near, rebuild: Fit(near.squares + rise, tuple(terms)),
     )
-    return equal_loops.stage(_state(_fit(left, "creep"), firings=firings))
+    problem = SimpleNamespace(**{**vars(PROBLEM), "base": base})
+    return equal_loops.stage(_state(_fit(left, "creep"), firings=firings, problem=problem))
 
 
 @pytest.mark.parametrize(
@@ -445,6 +447,7 @@ def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firin
         ({"left": 700.0}, False),
         ({"firings": ((0, FIRED),)}, False),
         ({"firings": ((0, Firing("outliers", "gate", 1.0, "{y}")),)}, True),
+        ({"base": np.sin}, False),  # the loops of a dual model are not congruent
     ],
 )
 def test_equal_loops_show_a_feedback_or_do_not(monkeypatch, how, found):

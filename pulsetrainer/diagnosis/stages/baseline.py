@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.floor import floor_of
+from pulsetrainer.diagnosis.forms import base_of
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.residual import excitation_limits
@@ -29,8 +30,11 @@ def stage(masked: Masked) -> State:
         The data do not suffice for any statement.
     """
     records, firings = masked.records, masked.firings
-    problem = problem_for(records, 0.0, 1.0)
-    coarse = problem_for(records, 0.0, 1.0, LIMITS.coarse_levels)
+    given = masked.question.given
+    signed = given is not None and given.model.form != "direct"
+    base = None if given is None else base_of(given.model, masked.scale)
+    problem = problem_for(records, 0.0, 1.0, signed=signed, base=base)
+    coarse = problem.of(records, LIMITS.coarse_levels)
     fitted = weights_for(problem, (), None)
     fired = [firing for _, firing in firings]
     floor = floor_of(masked.question.records, fired, problem, masked.scale.span)

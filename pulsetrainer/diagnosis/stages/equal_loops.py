@@ -5,7 +5,7 @@ all minor loops between the same two turns are congruent in a Preisach model, wh
 differences are tested by exchanging the loops, at p of at most 0.005. The cause is dropped if its strength
 runs into its bound, or if the rest of the record denies it: with it in the model the squares must not rise
 by a relevant amount. Not asked where much is unexplained or jagged: either makes equal loops differ
-(decision 042).
+(decision 042). Nor of the dual form, whose loops between equal turns of the input are not congruent.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 def stage(state: State) -> State:
     """Return the state with the causes that only equal loops show."""
-    if state.unexplained or state.jagged:
+    if state.unexplained or state.jagged or state.problem.base is not None:
         return state
     for cause in library().values():
         if cause.by_contrast and cause.id not in state.current.names:

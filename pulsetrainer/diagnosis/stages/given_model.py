@@ -64,7 +64,7 @@ def stage(state: State) -> State:
     if judged.speed.wrong:
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
-    elif left_by(judged.measured, judged.predicted, noise) <= span * state.current.rms:
+    elif left_by(judged.measured, judged.predicted, noise) <= span * state.left_rms:
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
