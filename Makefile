@@ -87,7 +87,8 @@ bounds: $(D)/report.html tests/regression/bounds.toml  ## hold the demo's figure
 
 # --- checks -------------------------------------------------------------------------------------------
 # an emulator that keeps pace with the wall clock has the machine to itself; then one worker a core
-PYTEST := $(BIN)/python -m pytest
+# what one start has compiled serves the others, whatever the environment says
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
 test: $(VENV)/installed-test  ## every part of the program, in a few minutes
 	$(PYTEST) -m "realtime and not slow"
 	$(PYTEST) -m "not realtime and not slow" -n $(JOBS) --dist worksteal

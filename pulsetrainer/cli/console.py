@@ -33,6 +33,11 @@ def plain(value: Any) -> Any:
     return value
 
 
+def picked(noun: Any, *names: str) -> dict[str, Any]:
+    """Return some attributes by name."""
+    return {name: getattr(noun, name) for name in names}
+
+
 class Screen:
     """The screen of one command."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
@@ -83,28 +83,22 @@ def _show(job: Job, found: Diagnosis) -> None:
 
 def _payload(found: Diagnosis) -> dict[str, Any]:
     """Return the contract's JSON object."""
-    levels = ("rms", "rms_percent", "noise_percent", "static_percent", "extended_percent", "floor_percent")
+    errors = ("rms", "rms_percent", "noise_percent", "static_percent", "extended_percent", "floor_percent")
     figures = (
-        "found",
-        "p_value",
-        "explains_percent",
-        "confounded_with",
-        "held_out_gain_percent",
-        "detectable_from_percent",
-        "text",
-        "doubts",
-    )
+        "found", "p_value", "explains_percent", "confounded_with", "held_out_gain_percent",
+        "detectable_from_percent", "text", "doubts",
+    )  # fmt: skip
     return {
         "verdict": found.verdict,
         "quick": found.quick,
-        "baseline": {name: getattr(found, name) for name in levels},
+        "baseline": picked(found, *errors),
         "left": found.left._asdict(),
         "causes": [
             {
                 "id": one.cause,
-                **{name: getattr(one, name) for name in figures},
+                **picked(one, *figures),
                 "parameters": {
-                    p.name: {"value": plain(p.value), "unit": p.unit, "interval": plain([p.lower, p.upper])}
+                    p.name: {"value": p.value, "unit": p.unit, "interval": (p.lower, p.upper)}
                     for p in one.parameters
                 },
             }

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pulsetrainer.cli.console import Screen, plain
+from pulsetrainer.cli.console import Screen, picked, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import DriveError, Evaluation, Session
+    from pulsetrainer.artefacts import Evaluation, Session
 
 
 def evaluate(
@@ -114,28 +114,17 @@ def show_tables(screen: Screen, evaluation: Evaluation) -> None:
 
 
 def _payload(evaluation: Evaluation) -> dict[str, Any]:
-    from pulsetrainer.artefacts.evaluation import MODEL_METRICS
+    from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 
     waveforms = [
         {
-            "name": w.name,
-            "inversion": w.inversion,
-            "repeats": w.repeats,
-            "full_force": w.full_force,
+            **picked(w, "name", "inversion", "repeats", "full_force"),
             "unit": w.output_unit,
-            "scaled": _figures(w.scaled),
-            "compensated": _figures(w.compensated),
-            "mean_error_reduction_percent": w.mean_error_reduction_percent,
-            "noise_percent": w.noise_percent,
+            "scaled": picked(w.scaled, *METRICS),
+            "compensated": picked(w.compensated, *METRICS),
+            **picked(w, "mean_error_reduction_percent", "noise_percent"),
         }
         for w in evaluation.waveforms
     ]
-    names = ("name", *MODEL_METRICS, "start", "outside_percent")
-    models = [{name: getattr(m, name) for name in names} for m in evaluation.models]
+    models = [picked(m, "name", *MODEL_METRICS, "start", "outside_percent") for m in evaluation.models]
     return ({"waveforms": waveforms} if waveforms else {}) | ({"models": models} if models else {})
-
-
-def _figures(errors: DriveError) -> dict[str, float]:
-    from pulsetrainer.artefacts.evaluation import METRICS
-
-    return {name: getattr(errors, name) for name in METRICS}

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
@@ -42,14 +43,13 @@ def extend(
         )
         added = [one.cause for one in extended.extensions]
         job.save(out, extended, f"Model extended by {', '.join(added)}")
-    figures = ("static_percent", "extended_percent", "held_out_gain_percent")
     job.screen.result(
         {
             "output": out,
             "added": added,
             "extensions": extended.extensions,
             "levels": extended.levels,
-            **{name: getattr(found, name) for name in figures},
+            **picked(found, "static_percent", "extended_percent", "held_out_gain_percent"),
         }
     )
     rows = {one.cause: "; ".join(map(parameter, one.parameters)) for one in extended.extensions}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 from pulsetrainer.cli.settings import variable
@@ -127,16 +128,12 @@ def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
     )  # fmt: skip
     return {
         "output": out,
-        "levels": model.levels,
         "cells": model.weights.size,
-        "offset": model.offset,
-        "output_unit": model.output_unit,
+        **picked(model, "levels", "offset", "output_unit", "polarity", "form"),
         "fit_rms": fit.rms,
         "fit_rms_percent": fit.rms_percent,
         "fit_max_percent": fit.max_percent,
-        "polarity": model.polarity,
-        "form": model.form,
-        **{name: getattr(fit, name) for name in same},
+        **picked(fit, *same),
         "seconds": seconds,
     }
 

@@ -47,6 +47,7 @@ def lagged():
     return _problem({"output-lag": TAU_S})
 
 
+@pytest.mark.slow
 def test_one_rate_is_said_to_be_one_rate():
     """On a record of one rate the weights swallow a lag: the answer must say what is missing."""
     value = excitations.identification(0.0, 1.5, n_h=16, speed=1.5, rate_Hz=1000.0).value

@@ -174,7 +174,9 @@ def _rgb(colour):
     return [float(part) for part in re.findall(r"[\d.]+", colour)[:3]]
 
 
-@pytest.mark.parametrize("width", [320, 360, 412])
+@pytest.mark.parametrize(
+    "width", [320, *(pytest.param(width, marks=pytest.mark.slow) for width in (360, 412))]
+)
 def test_a_phone_never_scrolls_sideways(opened, width):
     """Wide tables scroll by themselves; text stays large enough, in figures too."""
     page = opened(width=width, height=740)

@@ -63,7 +63,6 @@ def test_a_figure_with_its_data(tmp_path, name):
     assert done.json["data"] == "figure.csv"
     assert pulsetrainer(tmp_path, "export", file, "-o", "table.csv").code == 0
     assert (tmp_path / "figure.csv").read_bytes() == (tmp_path / "table.csv").read_bytes()
-    assert pulsetrainer(tmp_path, "plot", file, "-o", "other.png", "--data").code == 0
     (tmp_path / "figure.png").unlink()
     refusal(
         pulsetrainer(tmp_path, "plot", file, "-o", "figure.png", "--data", "--json"),

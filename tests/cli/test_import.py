@@ -15,7 +15,9 @@ import pulsetrainer as pt
 DATA = Path(__file__).resolve().parents[1] / "data"
 
 
-@pytest.mark.parametrize("name", ["bh_ferrite_mnzn_1", "bh_steel_m130_27s_1"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("bh_ferrite_mnzn_1", marks=pytest.mark.slow), "bh_steel_m130_27s_1"]
+)
 def test_a_magnetic_loop_without_time_fits_within_a_third_of_a_percent(run, name):
     """Field in A/m, flux density in T: nothing depends on the unit's size."""
     words = ["--input", "u", "--output", "y", "--input-unit", "A/m", "--output-unit", "T", "--time", "t_s"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds import worlds
 
@@ -83,6 +83,7 @@ def test_a_static_inverse_in_pieces_is_the_whole(world, seed, cuts):
     np.testing.assert_allclose(np.concatenate(got)[settled], whole[settled], atol=1e-9 * span, rtol=0)
 
 
+@settings(max_examples=settings.default.max_examples // 4)  # each is five pieces of an iteration
 @given(seed=st.integers(0, 99), wrong=st.integers(100, 199))
 def test_a_change_of_mind_makes_no_step(seed, wrong):
     """What comes ahead may turn out to be something else: no step is longer than the slew limit."""

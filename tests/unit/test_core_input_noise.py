@@ -34,7 +34,9 @@ def test_the_noise_is_estimated(kind, sigma):
     assert input_noise.estimate(u) == pytest.approx(sigma, rel=0.1)
 
 
-@pytest.mark.parametrize("level", [0.001, 0.0025, 0.005, 0.01])
+@pytest.mark.parametrize(
+    "level", [0.001, *(pytest.param(level, marks=pytest.mark.slow) for level in (0.0025, 0.005)), 0.01]
+)
 def test_false_reversals_go_and_prediction_gains(level):
     """The job of the benchmarks with noise in the input too: nearly the true turns, a smaller error."""
     world = job(1)

@@ -28,7 +28,7 @@ def noise(rng, memory):
     return lfilter([np.sqrt(1 - memory**2)], [1.0, -memory], white)[200:]
 
 
-@pytest.mark.parametrize("memory", [0.0, 0.8])
+@pytest.mark.parametrize("memory", [pytest.param(0.0, marks=pytest.mark.slow), 0.8])
 def test_intervals_hold_the_truth(memory):
     """Nominal 90 % intervals of output, offset and weights, in white and in coloured noise."""
     unseen = random_reversals(np.random.default_rng(1), 300, 20)

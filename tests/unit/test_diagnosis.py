@@ -317,6 +317,7 @@ def test_a_hum_has_a_phase_of_its_own_in_every_record():
     assert np.hypot(values["sine 2"], values["cosine 2"]) == pytest.approx(0.1, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_step_in_the_second_record_is_found_there():
     """Its moment is told on one clock, as if the records had been made one after another."""
     t = np.arange(4000) / 200

@@ -32,7 +32,7 @@ def drive_of(plant: str, pulse: str = "normal") -> pt.Waveform:
     return pt.invert(pulse, model, slew=SLEW, force_min=low + edge, force_max=high - edge)
 
 
-@pytest.mark.parametrize("pulse", ["normal", "bifid"])
+@pytest.mark.parametrize("pulse", ["normal", pytest.param("bifid", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("plant", PLANTS)
 def test_what_is_left_on_a_foreign_plant_is_noise(plant, pulse):
     """Within 1.2 times the noise in five passes; no pass worse than the one before by more than noise."""

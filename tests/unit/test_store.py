@@ -27,7 +27,7 @@ ANY_KIND = pytest.mark.parametrize("kind", sorted(KINDS))
 
 
 @ANY_KIND
-@settings(max_examples=EXAMPLES // 3, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=EXAMPLES // 5, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_round_trip(kind, data, tmp_path_factory):
     """Whatever its shapes, NaN, missing parts and texts: what is read equals what was written."""
@@ -81,7 +81,7 @@ def _fields(cls, group=""):
 
 
 @ANY_KIND
-@settings(max_examples=EXAMPLES // 12, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=EXAMPLES // 25, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_every_field_of_every_kind_is_readable_without_us(kind, data, tmp_path_factory):
     """Whatever fields a kind has: h5py finds each, xarray opens it with named axes, pint knows its units."""
