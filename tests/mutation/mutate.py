@@ -45,7 +45,12 @@ WARM = (hypothesis, np, scipy)  # loaded once: every fork has them
 ROOT = Path(__file__).resolve().parents[2]
 UNIT = "tests/unit/test_"
 PACKAGES = {  # the tests that answer for a package
-    "core": ("tests/law", f"{UNIT}core_*.py", f"{UNIT}beats.py", f"{UNIT}waveform*.py"),
+    "core": (
+        "tests/law",
+        *(f"{UNIT}{one}*.py" for one in ("core_", "beats", "coil", "minor_coverage", "rhythm", "scale")),
+        *(f"{UNIT}{one}.py" for one in ("conductor", "steps_correct", "steps_refine", "temperature")),
+        f"{UNIT}waveform*.py",
+    ),
     "diagnosis": (
         f"{UNIT}diagnosis*.py",
         f"{UNIT}congruency.py",
@@ -53,8 +58,15 @@ PACKAGES = {  # the tests that answer for a package
         "tests/blind/test_p*.py",
         "tests/api",
     ),
-    "files": tuple(
-        f"{UNIT}{one}*.py" for one in ("store", "table", "recorder", "provenance", "units", "file", "signal")
+    "files": (
+        *(
+            f"{UNIT}{one}*.py"
+            for one in ("store", "table", "recorder", "provenance", "units", "file", "signal", "series")
+        ),
+        *(
+            f"tests/cli/test_{one}.py"
+            for one in ("import", "long_capture", "session_command", "tune_command")
+        ),
     ),
     "device": ("tests/link",),
     "simulation": ("tests/link",),

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 import pulsetrainer as pt
-from pulsetrainer.core.forms import try_all
+from pulsetrainer.core.forms import try_all, white
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
@@ -81,6 +81,16 @@ def test_the_form_is_named_right(draws, form):
     """Twelve devices of each kind: at most one of twenty may be named wrongly."""
     found = named(draws, range(5000, 5012))
     assert found.count(form) / len(found) >= 0.95
+
+
+def test_records_of_unlike_ranges_are_judged_on_one_plane():
+    """A second record within a third of the range: what the form leaves is noise, in both."""
+    device, u, y, noise, rng = measured(devices.stop_sum, 4000)
+    small = device(u / 3) + rng.normal(0.0, noise, u.size)
+    tried = try_all([(u, y), (u / 3, small)], u.min(), u.max())
+    assert tried.form == "dual"
+    assert tried.left["dual"] <= 2.0 * noise
+    assert white(np.array([0.0, 0.0, 1.0, 0.0, 0.0])) > 0.0
 
 
 def held_out(draw, seed):
