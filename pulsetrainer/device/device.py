@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, Self
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.feed import Feed
+from pulsetrainer.device.follower import STOPPED, Follower
 from pulsetrainer.device.gains import DELIVERED, Gains
-from pulsetrainer.device.heat import HeatMemory, added, in_words, wait_s
+from pulsetrainer.device.heat import HeatMemory, added
 from pulsetrainer.device.identity import DeviceInfo
-from pulsetrainer.device.limits import RAMP_S, Limits, checked_wire, too_hot_ever
-from pulsetrainer.device.plausibility import ForceWatch
+from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire
 from pulsetrainer.device.player import Player, tells_duty
 from pulsetrainer.device.ports import find_device_port
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
@@ -27,7 +27,6 @@ from pulsetrainer.device.session import Session
 from pulsetrainer.device.trace import Block, FloatArray, Trace
 from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.device.wording import (
-    FORCE_REMEDY,
     NOT_OFF_REMEDY,
     describe_fault,
     describe_not_off,
@@ -43,8 +42,6 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger(__name__)
 PORT_VARIABLE = "PULSETRAINER_PORT"
 DEFAULT_PORT = "bench:"
-_INTERRUPTED = "interrupted"
-_STOPPED = "stopped"
 _REST_S = 0.5  # for a run that an earlier program left to come to rest
 # The limits that the greeting tells, by their parameters' names.
 _GREETED = {
@@ -53,7 +50,6 @@ _GREETED = {
     "heartbeat": "heartbeat_ms",
 }
 _STREAMS_SINCE = (2, 1)  # the protocol of the first firmware that takes a wave without a known end
-_TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
 
 
 class Device:
@@ -116,16 +112,7 @@ class Device:
         """Refuse what would be cut off in mid-play by the heat of the coil, and say how long to wait."""
         status = self._status()
         heat = status.heat * codes.HEAT_UNIT
-        seconds = wait_s(heat, reference_A, rate_Hz)
-        if math.isinf(seconds):
-            raise too_hot_ever()
-        if seconds > 0:
-            assumed = status.flags & codes.STATUS_HEAT_ASSUMED
-            raise DeviceError(
-                f"the coil is too hot for this: it is at {100 * heat:.0f} % of its limit"
-                + (", as far as is known: nobody has seen this device cool" if assumed else ""),
-                hint=f"wait {in_words(seconds)}, then run the command again",
-            )
+        check_cool(heat, reference_A, rate_Hz, assumed=bool(status.flags & codes.STATUS_HEAT_ASSUMED))
         # Should nobody be left to ask afterwards, as if it had been played to its end.
         self._remember_heat(max(heat, float(added(reference_A, rate_Hz).max())), reference_A.size / rate_Hz)
 
@@ -185,7 +172,7 @@ class Device:
         """
         with self._turn:
             if self._player is not None:
-                self._player.stop(_STOPPED)
+                self._player.stop(STOPPED)
             else:
                 self._session.request(m.Stop())
 
@@ -378,12 +365,13 @@ class Device:
                     "the device is playing already", hint="wait for the play to end, or stop() it"
                 )
             self._player = player
-        watch, interrupted = ForceWatch(), False
+        follower = Follower(player, self.info.tick_rate_Hz, monotonic=self._monotonic, sleep=self._sleep)
+        interrupted = False
         try:
             thread.start()
-            interrupted = self._follow(player, watch, on_block, should_stop, keep=keep, top_up=top_up)
+            interrupted = follower.follow(on_block, should_stop, keep=keep, top_up=top_up)
         finally:
-            player.stop(_STOPPED)
+            player.stop(STOPPED)
             while thread.is_alive():  # it is stopping the device: not to be interrupted, and soon over
                 try:
                     thread.join()
@@ -396,72 +384,7 @@ class Device:
                 self._remember_heat(player.heat * codes.HEAT_UNIT)
         if player.error is not None:
             raise player.error
-        return self._trace(player, watch.finish(), interrupted)
-
-    def _follow(
-        self,
-        player: Player,
-        watch: ForceWatch,
-        on_block: Callable[[Block], None] | None,
-        should_stop: Callable[[], bool] | None,
-        *,
-        keep: bool,
-        top_up: Callable[[], bool] | None,
-    ) -> bool:
-        """Hand over the telemetry as it comes until the play has ended; True if Ctrl-C hastened the end."""
-        passed = forgotten = 0
-        ended = interrupted = False
-        while not ended:
-            try:
-                ended = player.ended.is_set()  # before the count: then nothing comes after it
-                count = len(player.received)
-                fresh, passed = player.received[passed:count], count
-                player.taken_at_s = self._monotonic()
-                if any(b.count for b in fresh):
-                    block = Block.from_wire(fresh, player.decimation)
-                    watch.add(block.time_s(self.info.tick_rate_Hz), block.current_A, block.force_N)
-                    if watch.fault:
-                        player.stop(watch.fault, FORCE_REMEDY)
-                    if on_block is not None:
-                        on_block(block)
-                if not keep:
-                    player.forget(forgotten, passed)
-                    forgotten = passed
-                hungry = top_up is not None and not ended and top_up()
-                if should_stop is not None and should_stop():
-                    player.stop(_STOPPED)
-                if not ended and not hungry:
-                    self._sleep(_TAKE_EVERY_S)
-            except KeyboardInterrupt:
-                interrupted = True
-                player.stop(_INTERRUPTED)
-        return interrupted
-
-    def _trace(self, player: Player, implausible: str, interrupted: bool) -> Trace:
-        outcome = player.outcome
-        block = Block.from_wire(player.received, player.decimation)
-        assert outcome is not None
-        received = player.samples
-        if outcome.produced >= 0:
-            dropped = outcome.produced - received
-        else:  # the device is gone: what is missing between the samples that came
-            dropped = player.last_tick // player.decimation + 1 - received if received else 0
-        return Trace(
-            tick=block.tick,
-            reference_A=block.reference_A,
-            current_A=block.current_A,
-            force_N=block.force_N,
-            duty=block.duty,
-            tick_rate_Hz=self.info.tick_rate_Hz,
-            dropped_samples=dropped,
-            # Interrupted even if it came during the last ramp: the user wants out.
-            complete=outcome.played_to_end and not interrupted and not implausible,
-            fault=outcome.fault or (_INTERRUPTED if interrupted else implausible),
-            samples=received,
-            remedy=outcome.remedy or (FORCE_REMEDY if implausible else ""),
-            underrun=bool(outcome.fault) and player.seen[0] == codes.Fault.UNDERRUN,
-            fault_code=player.seen[0] if outcome.fault else 0,
-        )
+        return follower.trace(interrupted=interrupted)
 
 
 def open_device(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.device import codes
-from pulsetrainer.device.heat import added, cooled, wait_s
+from pulsetrainer.device.heat import added, cooled, in_words, wait_s
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
 from pulsetrainer.errors import ArgumentError, DeviceError
 
@@ -140,3 +140,24 @@ def too_hot_ever() -> ArgumentError:
         "this reference heats the coil beyond its limit, however cold it is at the start",
         hint="play less of it at a time, or at a lower current",
     )
+
+
+def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed: bool) -> None:
+    """Refuse a reference (n,) in A that the heat of the coil would cut off, and say how long to wait.
+
+    Raises
+    ------
+    ArgumentError
+        Even a cold coil would be too hot.
+    DeviceError
+        The coil is; ``assumed``: as far as is known.
+    """
+    seconds = wait_s(heat, reference_A, rate_Hz)
+    if math.isinf(seconds):
+        raise too_hot_ever()
+    if seconds > 0:
+        raise DeviceError(
+            f"the coil is too hot for this: it is at {100 * heat:.0f} % of its limit"
+            + (", as far as is known: nobody has seen this device cool" if assumed else ""),
+            hint=f"wait {in_words(seconds)}, then run the command again",
+        )

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import diagnosis_figures, panels, session_figures
+from pulsetrainer.report import diagnosis_figures, heat_figures, panels, session_figures
 from pulsetrainer.report.style import (
     COLUMN_IN,
     COMPENSATED,
@@ -130,9 +130,14 @@ def waveform(drive: Waveform) -> Figure:
 
 @styled
 def playback(played: Playback) -> Figure:
-    """Return every repeat of both drives: force, current, and how well the current followed."""
-    figure = _sheet(1.5 * COLUMN_IN, 1.5 * _ROW_IN)
-    asked = played.waveform
+    """Return every repeat of both drives: force, current, how well it followed, and the coil's heat."""
+    asked, kelvin = played.waveform, played.temperature_K
+    if kelvin is None or not kelvin.size:
+        whole = figure = _sheet(1.5 * COLUMN_IN, 1.5 * _ROW_IN)
+    else:
+        whole = _sheet(1.5 * COLUMN_IN, 1.9 * _ROW_IN)
+        figure, below = whole.subfigures(2, 1, squeeze=False, height_ratios=(3.2, 0.8))[:, 0]
+        heat_figures.temperature_of_repeats(below.subplots(), kelvin)
     force, current, error = figure.subplots(3, 1, sharex=True, height_ratios=(1.4, 1.0, 0.8))
     panels.trace(force, asked.time_s, asked.target, **TARGET, label="target")
     for name, drive, style in (
@@ -151,7 +156,7 @@ def playback(played: Playback) -> Figure:
     for axes in (force, current, error):
         panels.unscored(axes, asked)
     panels.headroom(force)
-    return figure
+    return whole
 
 
 @styled

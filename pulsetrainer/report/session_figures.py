@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from pulsetrainer.report import panels
+from pulsetrainer.errors import DataError
+from pulsetrainer.report import heat_figures, panels
 from pulsetrainer.report.style import BLUE, COLUMN_IN, INK, MEASURED, TARGET, VERMILION, label, styled
 
 if TYPE_CHECKING:
@@ -19,9 +20,25 @@ _SHOWN_S = 6.0
 
 @styled
 def course(session: Session) -> Figure:
-    """Return the middle of a session, target and force, and the errors of all its beats."""
-    figure = Figure(figsize=(1.5 * COLUMN_IN, 5.6), layout="constrained")
-    above, below = figure.subplots(2, 1, height_ratios=(1.5, 1.0))
+    """Return the middle of a session, target and force, the errors of all its beats, and the coil's heat.
+
+    Raises
+    ------
+    DataError
+        The session was cut off before its first sample.
+    """
+    if not session.time_s.size:
+        raise DataError(
+            "nothing was pressed yet, so there is nothing to draw", hint="begin the session again"
+        )
+    warm_s, warm_K = session.temperature_s, session.temperature_K
+    if warm_s is None or warm_K is None:
+        figure = Figure(figsize=(1.5 * COLUMN_IN, 5.6), layout="constrained")
+        above, below = figure.subplots(2, 1, height_ratios=(1.5, 1.0))
+    else:
+        figure = Figure(figsize=(1.5 * COLUMN_IN, 7.2), layout="constrained")
+        above, below, lowest = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 0.8))
+        heat_figures.temperature(lowest, warm_s, warm_K)
     middle = session.time_s[session.time_s.size // 2]
     near = np.abs(session.time_s - middle) <= 0.5 * _SHOWN_S
     panels.trace(above, session.time_s[near], session.target[near], **TARGET, label="target")

@@ -10,14 +10,16 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 import report_examples as examples
+import store_examples as stored
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib import rcParams
 from matplotlib.collections import PolyCollection, QuadMesh
+from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Evaluation, Run, units
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.report import figures
+from pulsetrainer.report import figures, heat_figures
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
 from pulsetrainer.report.thin import MOST_POINTS, extremes, path
@@ -283,6 +285,39 @@ def test_playback_draws_every_repeat_and_shades_the_lead_in():
     assert len(shaded) == 1
     assert shaded[0].get_x() == 0.0
     assert shaded[0].get_x() + shaded[0].get_width() == pytest.approx(0.8)
+
+
+def test_the_temperature_is_drawn_where_heat_was_tracked():
+    """A point for each repeat of a play, a curve for a session; without it the figure is as before."""
+    played, session = examples.playback(repeats=3), stored.session()
+    kelvin = np.array([0.4, 1.0, 1.5])
+    for whole, warm, size in (
+        (played, replace(played, temperature_K=kelvin), 3),
+        (session, replace(session, temperature_s=np.arange(3.0), temperature_K=kelvin), 3),
+    ):
+        before, after = figures.draw(whole), figures.draw(warm)
+        assert len(after.axes) == len(before.axes) + 1
+        (axes,) = (one for one in after.axes if "[K]" in one.get_ylabel())
+        (drawn,) = (line for line in axes.lines if line.get_label()[0] != "_")
+        np.testing.assert_array_equal(drawn.get_ydata(), kelvin)
+        assert len(drawn.get_xdata()) == size
+        assert encode(after, "png").startswith(b"\x89PNG")
+
+
+def test_the_true_temperature_stands_beside_the_told_one_where_it_is_known():
+    """Of a simulated device, whose room somebody set."""
+    axes = Figure().subplots()
+    heat_figures.temperature(axes, np.arange(3.0), np.ones(3), np.zeros(3))
+    named = [line.get_label() for line in axes.lines if line.get_label()[0] != "_"]
+    assert named == ["true", "told by the duty"]
+
+
+def test_a_session_without_a_sample_has_no_figure():
+    """It was cut off before it began."""
+    session = stored.session()
+    nothing = {name: np.zeros(0) for name in ("time_s", "target", "reference", "input", "output")}
+    with pytest.raises(DataError):
+        figures.draw(replace(session, **nothing))
 
 
 def test_error_panel_is_in_percent_of_full_force():

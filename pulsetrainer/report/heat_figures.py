@@ -1,0 +1,41 @@
+"""The figure of the coil's temperature: what a play told of it, and the truth where somebody knows it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.ticker import MaxNLocator
+
+from pulsetrainer.report import panels
+from pulsetrainer.report.style import COMPENSATED, GUIDE, TARGET
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from pulsetrainer.core.plane import FloatArray
+
+
+def temperature(axes: Axes, time_s: FloatArray, told_K: FloatArray, true_K: FloatArray | None = None) -> None:
+    """Draw how much warmer the copper was than at calibration, arrays (w,) in s and K.
+
+    ``true_K`` is known of a simulated device only, and to who set its room.
+    """
+    if true_K is not None:
+        panels.trace(axes, time_s, true_K, **TARGET, label="true")
+    panels.trace(axes, time_s, told_K, **COMPENSATED, label="told by the duty")
+    _finish(axes)
+    axes.set_xlabel("time [s]")
+
+
+def temperature_of_repeats(axes: Axes, told_K: FloatArray) -> None:
+    """Draw how much warmer the copper was before each repeat (r,), K."""
+    axes.plot(range(1, told_K.size + 1), told_K, marker="o", **COMPENSATED, label="told by the duty")
+    _finish(axes)
+    axes.set_xlabel("repeat [number]")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def _finish(axes: Axes) -> None:
+    axes.axhline(0.0, **GUIDE)
+    axes.set_ylabel("coil, against\ncalibration [K]")
+    panels.headroom(axes)
