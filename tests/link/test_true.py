@@ -121,3 +121,17 @@ def test_nothing_changes_where_there_is_no_thermal_term(model):
             played.append(pt.play(drive, device, repeats=1, track_heat=track))
     np.testing.assert_array_equal(played[0].compensated.output, played[1].compensated.output)
     assert played[0].temperature_K is None
+
+
+def test_a_session_keeps_the_temperature_that_it_told(model, tmp_path):
+    """Every second, within 2 K of the room's 16 K and the coil's own heat; the file has it, to the bit."""
+    warm = replace(model, extensions=(THERMAL,))
+    with pt.open_device("bench:?seed=1&ambient=16") as device:
+        pressed = pt.session(warm, device, pulses="normal", beats=8, track_heat=True)
+    assert pressed.temperature_K.size >= 5
+    assert ((pressed.temperature_K > 14.0) & (pressed.temperature_K < 18.0 + 1.5)).all()
+    assert 0 < pressed.temperature_s[0] < pressed.temperature_s[-1] <= pressed.time_s[-1]
+    pt.save(pressed, tmp_path / "s.h5")
+    again = pt.load(tmp_path / "s.h5")
+    np.testing.assert_array_equal(again.temperature_K, pressed.temperature_K)
+    np.testing.assert_array_equal(again.temperature_s, pressed.temperature_s)
