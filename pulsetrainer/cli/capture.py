@@ -18,9 +18,8 @@ from pulsetrainer.cli.options import (
     Overwrite,
     Port,
     ShowLive,
-    positive,
+    setting,
 )
-from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
     from pulsetrainer.core.course import Course
@@ -39,28 +38,13 @@ def capture(
     out: Out,
     port: Port = None,
     levels: Annotated[
-        int,
-        typer.Option(min=2, help="Levels whose cells the signal shall switch.", envvar=variable("levels")),
+        int, setting("levels", "--levels", "Levels whose cells the signal shall switch.", min=2)
     ] = 48,
-    current_max_A: Annotated[
-        float,
-        typer.Option(
-            "--current-max", callback=positive, help="Top of the range, A.", envvar=variable("current_max_A")
-        ),
-    ] = 1.5,
+    current_max_A: Annotated[float, setting("current_max_A", "--current-max", "Top of the range, A.")] = 1.5,
     speed_A_per_s: Annotated[
-        float,
-        typer.Option(
-            "--speed",
-            callback=positive,
-            help="Speed of the identification signal, A/s.",
-            envvar=variable("speed_A_per_s"),
-        ),
+        float, setting("speed_A_per_s", "--speed", "Speed of the identification signal, A/s.")
     ] = 0.75,
-    rate_Hz: Annotated[
-        float,
-        typer.Option("--rate", callback=positive, help="Samples a second, Hz.", envvar=variable("rate_Hz")),
-    ] = 1000.0,
+    rate_Hz: Annotated[float, setting("rate_Hz", "--rate", "Samples a second, Hz.")] = 1000.0,
     condition: Annotated[bool, typer.Option(help="Go around the major loop once before recording.")] = True,
     repeats: Annotated[int, typer.Option(min=1, help="How often the signal is played, without a pause.")] = 1,
     resume: Annotated[

@@ -9,8 +9,7 @@ import typer
 
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Out, Overwrite
-from pulsetrainer.cli.settings import variable
+from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import Model
@@ -26,11 +25,12 @@ def identify(
     out: Out,
     levels: Annotated[
         int | None,
-        typer.Option(
+        setting(
+            "levels",
+            "--levels",
+            "Levels of the Preisach plane; default: 48, fewer for a short record.",
             min=2,
             max=_MOST_LEVELS,
-            help="Levels of the Preisach plane; default: 48, fewer for a short record.",
-            envvar=variable("levels"),
         ),
     ] = None,
     form: Annotated[

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Out, Overwrite, positive
-from pulsetrainer.cli.settings import variable
+from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import Waveform
@@ -42,16 +41,15 @@ def invert(
         ),
     ] = None,
     periods: Annotated[
-        int, typer.Option(min=1, help="Periods to play; the first is not scored.", envvar=variable("periods"))
+        int, setting("periods", "--periods", "Periods to play; the first is not scored.", min=1)
     ] = 4,
     slew_A_per_s: Annotated[
         float | None,
-        typer.Option(
+        setting(
+            "slew_A_per_s",
             "--slew",
-            callback=positive,
-            help="Fastest the drive may move, input unit a second; default: 30 A/s for a model of our own "
+            "Fastest the drive may move, input unit a second; default: 30 A/s for a model of our own "
             "device, none for any other.",
-            envvar=variable("slew_A_per_s"),
         ),
     ] = None,
     despite_warning: Annotated[

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -16,6 +16,16 @@ def positive(value: float | None) -> float | None:
     if value is not None and not 0 < value < math.inf:
         raise typer.BadParameter(f"must be a finite number above 0, got {value:g}")
     return value
+
+
+def setting(key: str, name: str, words: str, **more: Any) -> Any:
+    """Return an option whose value may stand in the file of settings or in the environment.
+
+    Without ``min`` any number above 0 goes.
+    """
+    return typer.Option(
+        name, help=words, envvar=variable(key), callback=None if "min" in more else positive, **more
+    )
 
 
 Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.")]
@@ -45,19 +55,17 @@ TrackHeat = Annotated[
 ]
 LimitCurrent = Annotated[
     float | None,
-    typer.Option(
+    setting(
+        "limits.current_A",
         "--limit-current",
-        callback=positive,
-        help="Highest current the device may drive, A; this can only lower the device's own limit.",
-        envvar=variable("limits.current_A"),
+        "Highest current the device may drive, A; this can only lower the device's own limit.",
     ),
 ]
 LimitForce = Annotated[
     float | None,
-    typer.Option(
+    setting(
+        "limits.force_N",
         "--limit-force",
-        callback=positive,
-        help="Force above which the device switches off, N; this can only lower the device's own limit.",
-        envvar=variable("limits.force_N"),
+        "Force above which the device switches off, N; this can only lower the device's own limit.",
     ),
 ]

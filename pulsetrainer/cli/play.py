@@ -18,8 +18,8 @@ from pulsetrainer.cli.options import (
     Port,
     ShowLive,
     TrackHeat,
+    setting,
 )
-from pulsetrainer.cli.settings import variable
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import FloatArray, Playback, Waveform
@@ -35,8 +35,7 @@ def play(
     out: Out,
     port: Port = None,
     repeats: Annotated[
-        int,
-        typer.Option(min=1, help="How often each of the two drives is played.", envvar=variable("repeats")),
+        int, setting("repeats", "--repeats", "How often each of the two drives is played.", min=1)
     ] = 5,
     track_heat: TrackHeat = None,
     limit_current_A: LimitCurrent = None,

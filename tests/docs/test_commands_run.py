@@ -76,7 +76,7 @@ RUN = {
     HOW_TO / "check.md": ("model.h5",),
     HOW_TO / "batches.md": ("workflow",),
 }  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
-SLOW = ("README", "measured", "tutorial")
+SLOW = ("README", "measured", "tutorial", "own-bench")
 PAGES = [
     pytest.param(page, id=page.stem, marks=pytest.mark.slow if page.stem in SLOW else ()) for page in RUN
 ]

@@ -25,6 +25,7 @@ def built(what: str, folder: Path) -> str:
     return str(folder / what)
 
 
+@pytest.mark.slow
 def test_every_break_alone_and_in_pairs_is_off_in_time(tmp_path):
     """At 20 moments, four references, three trips; the table in PROTOCOL.md is the one of this very run."""
     done = subprocess.run([built("matrix", tmp_path)], capture_output=True, text=True, check=False)
@@ -37,6 +38,7 @@ def test_every_break_alone_and_in_pairs_is_off_in_time(tmp_path):
     assert plays > 30_000
 
 
+@pytest.mark.slow
 def test_nothing_trips_where_nothing_is_wrong(tmp_path):
     """Pulses, sines, squares, saws, plateaus on twenty devices, noise as built and three times that."""
     program = built("healthy", tmp_path)

@@ -16,6 +16,8 @@ import pytest
 
 from program import program_on_path, pulsetrainer
 
+SLOW = pytest.mark.slow  # each starts the engine anew
+
 ROOT = Path(__file__).parents[2]
 SNAKEFILE = ROOT / "workflow" / "Snakefile"
 # a short record, one repeat: the point is which commands run, not how good the model is
@@ -170,6 +172,7 @@ def test_the_local_profile_is_one(tmp_path):
     assert done.returncode == 0, done.said
 
 
+@pytest.mark.slow
 def test_a_folder_of_records(tmp_path, hand):
     """Runs as they are, tables imported first; each gets a model, and a diagnosis when asked for."""
     records = tmp_path / "records"
@@ -190,8 +193,8 @@ def test_a_folder_of_records(tmp_path, hand):
 @pytest.mark.parametrize(
     ("config", "words"),
     [
-        ({"devices": "", "runs": ""}, "nothing to do: set `devices` or `runs`"),
-        ({"devices": "", "runs": "nowhere"}, "nowhere: no such folder"),
+        pytest.param({"devices": "", "runs": ""}, "nothing to do: set `devices` or `runs`", marks=SLOW),
+        pytest.param({"devices": "", "runs": "nowhere"}, "nowhere: no such folder", marks=SLOW),
         ({"devices": "twice.tsv"}, "stands there twice"),
     ],
 )
