@@ -12,7 +12,8 @@ import pytest
 from matplotlib.axes import Axes
 
 import pulsetrainer as pt
-from pulsetrainer.errors import DataError, NotAnArtefactError, UsageError
+from pulsetrainer.errors import ArgumentError, DataError, NotAnArtefactError, UsageError
+from wording import raises
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 NOUNS = {"Run", "Model", "Waveform", "Playback", "Evaluation", "Diagnosis", "Session"}
@@ -57,8 +58,9 @@ def test_every_artefact_shows_itself(path):
 def test_errors_are_python_exceptions(tmp_path, capfd):
     """Nothing exits, nothing is printed; a ValueError where a caller expects one."""
     model = pt.load(KEPT / "model.h5")
-    with pytest.raises(ValueError, match="n_h"):
+    with raises(ArgumentError, "not such an argument", argument="n_h", got="1") as caught:
         pt.identify(pt.load(KEPT / "run.h5"), levels=1)
+    assert isinstance(caught.value, ValueError)
     with pytest.raises(UsageError):
         pt.invert("normel", model)
     with pytest.raises(UsageError):

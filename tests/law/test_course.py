@@ -14,6 +14,7 @@ from pulsetrainer.core.memory import negative_saturation, trace
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.errors import ArgumentError
+from wording import raises
 
 RATE_HZ = 100.0
 HIGH = 1.5
@@ -105,5 +106,5 @@ def test_a_deep_memory_is_gone_through_in_time():
 
 def test_no_repeats_are_an_error():
     """A course without a signal in it."""
-    with pytest.raises(ArgumentError, match="repeats"):
+    with raises(ArgumentError, "not such an argument", argument="repeats", got="0"):
         Course(Signal(np.zeros(3), 1.0, "x"), 0)

@@ -14,6 +14,7 @@ import oracle
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
+from wording import raises
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 
@@ -111,13 +112,12 @@ def test_a_drifting_record_repeats_without_a_jump():
 @pytest.mark.parametrize("number", [0, 7, -1])
 def test_a_beat_that_is_not_there(number):
     """The message says how many there are."""
-    with pytest.raises(DataError, match="holds 6 whole beats") as caught:
+    with raises(DataError, "no beat of that number", count=6):
         find_beats(_recorded("fingerbp_AAC3_3")).single(number)
-    assert "1 .. 6" in caught.value.hint
 
 
 def test_no_beat_at_all():
     """Half a beat is none."""
     t = np.linspace(0.0, 0.3, 100)
-    with pytest.raises(DataError, match="no whole beat"):
+    with raises(DataError, "no whole beat"):
         find_beats(Shape("flank", t, np.sin(5.0 * t)))

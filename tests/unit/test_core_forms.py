@@ -13,6 +13,7 @@ from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.errors import ArgumentError, DataError
+from wording import raises
 
 NOISE = 0.003  # of the span
 SAMPLES = 3000
@@ -221,7 +222,7 @@ def test_other_forms_are_fitted_jointly_and_continuously(other, option):
 def test_an_unknown_form_is_refused():
     """By its name."""
     _, u, y, _, _ = measured(devices.play_sum, 1, 500)
-    with pytest.raises(ArgumentError, match="sideways"):
+    with raises(ArgumentError, "not such an argument", argument="form", got="'sideways'"):
         pt.identify(run_of(u, y), form="sideways")
 
 

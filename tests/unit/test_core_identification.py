@@ -16,6 +16,7 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.uncertainty import bootstrap
 from pulsetrainer.errors import ArgumentError
+from wording import raises
 
 PLANE = Plane.uniform(-1.0, 1.0, 12)
 
@@ -238,7 +239,7 @@ def test_dense_matrices_are_refused_beyond_the_stated_memory():
     assert identification.fits_dense(Plane.uniform(0.0, 1.0, 82))
     large = Plane.uniform(0.0, 1.0, 84)
     assert not identification.fits_dense(large)
-    with pytest.raises(ArgumentError, match="alternating"):
+    with raises(ArgumentError, "method too large", method="alternating"):
         identify([Record(np.linspace(0, 1, 200), np.linspace(0, 1, 200))], large, method="alternating")
 
 
@@ -293,5 +294,5 @@ def test_full_coverage_has_no_gap():
     assert nothing is not None
     assert nothing.words(plane, "T") == "never switched: all relays (100 % of the plane)"
     assert nothing == Gap(-1.0, 1.0, -1.0, 1.0, 1.0, 1.0)
-    with pytest.raises(ArgumentError, match="covered must have shape"):
+    with raises(ArgumentError, "not such an argument", argument="covered", got="(3,)"):
         largest_gap(plane, np.zeros(3, dtype=bool))

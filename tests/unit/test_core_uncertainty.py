@@ -13,6 +13,7 @@ from pulsetrainer.core.identification import identify
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
+from wording import raises
 
 N_H = 10
 PLANE = Plane.uniform(-1.0, 1.0, N_H)
@@ -149,12 +150,12 @@ def test_bad_requests_are_named(monkeypatch):
     record = Record(INPUT, CLEAN)
     fit = identify([record], PLANE)
     rng = np.random.default_rng(7)
-    with pytest.raises(ArgumentError, match="draws must be at least 2"):
+    with raises(ArgumentError, "not such an argument", argument="draws", got="1"):
         uncertainty.bootstrap([record], fit, rng=rng, draws=1)
-    with pytest.raises(ArgumentError, match="at least 2 blocks"):
+    with raises(ArgumentError, "too few blocks"):
         uncertainty.bootstrap([record], fit, rng=rng, block=2000)
-    with pytest.raises(ArgumentError, match="level must be between 0 and 1"):
+    with raises(ArgumentError, "not such an argument", argument="level", got="90"):
         uncertainty.bootstrap([record], fit, rng=rng, draws=2).offset_interval(90)
     monkeypatch.setattr(identification, "DENSE_BYTES", 1000)
-    with pytest.raises(ArgumentError, match="dense"):
+    with raises(ArgumentError, "plane too large"):
         uncertainty.bootstrap([record], fit, rng=rng)

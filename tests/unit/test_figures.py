@@ -23,6 +23,7 @@ from pulsetrainer.report import figures, heat_figures
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
 from pulsetrainer.report.thin import MOST_POINTS, extremes, path
+from wording import raises
 
 
 @pytest.fixture(autouse=True)
@@ -86,7 +87,7 @@ def test_pdf_and_svg_carry_no_date():
 
 def test_unknown_format_is_a_usage_error():
     """The message names the format asked for and those there are."""
-    with pytest.raises(UsageError, match=r"'gif'.*png, svg, pdf"):
+    with raises(UsageError, "no such form", got="gif"):
         encode(figures.preisach_density(examples.model(n_h=3)), "gif")
 
 
@@ -99,9 +100,9 @@ def test_drawing_leaves_the_settings_of_matplotlib_alone():
 
 def test_draw_refuses_what_it_does_not_know():
     """An evaluation of nothing, and a thing that is no artefact."""
-    with pytest.raises(DataError, match="neither"):
+    with raises(DataError, "nothing to draw"):
         figures.draw(Evaluation())
-    with pytest.raises(DataError, match="no figure for a str"):
+    with raises(DataError, "no figure of it", got="str"):
         figures.draw("text")
 
 

@@ -24,6 +24,7 @@ from pulsetrainer.files.provenance import (
     redact,
     sha256_of,
 )
+from wording import raises
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 SECRETS = ["creep", "0.05", "ideal", "speed"]
@@ -128,9 +129,8 @@ def test_json_round_trip():
 )
 def test_broken_json_is_a_data_error(text):
     """A provenance that is no JSON object of the right form is a DataError, not a traceback."""
-    with pytest.raises(DataError, match="provenance") as caught:
+    with raises(DataError, "provenance itself"):
         Provenance.from_json(text)
-    assert caught.value.hint
 
 
 def test_unknown_json_fields_are_ignored():
@@ -142,7 +142,7 @@ def test_created_is_utc_whatever_the_zone():
     """The time is written in UTC; a time without a zone is refused."""
     east = NOW.astimezone(timezone(timedelta(hours=5)))
     assert make_header("t", argv=[], now=east).created == "2026-01-02T03:04:05Z"
-    with pytest.raises(ArgumentError, match="time zone"):
+    with raises(ArgumentError, "no time zone"):
         make_header("t", argv=[], now=datetime(2026, 1, 2, 3, 4, 5))  # noqa: DTZ001 - that is the point
 
 
@@ -167,5 +167,5 @@ def test_digests_keep_the_name_the_user_gave(tmp_path, monkeypatch):
     Path("run.h5").write_bytes(b"abc")
     expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     assert digests([Path("run.h5")]) == {"run.h5": expected}
-    with pytest.raises(DataError, match=r"absent\.h5 cannot be read"):
+    with raises(DataError, "cannot be read", file="absent.h5"):
         sha256_of("absent.h5")

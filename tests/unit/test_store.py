@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from pulsetrainer import artefacts as kinds
 from pulsetrainer.artefacts import KINDS, Data, FloatArray
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import WrongKindError
 from pulsetrainer.files.schema import plan_of
 from pulsetrainer.files.store import read, read_any, read_header, read_one_of, write
 
@@ -220,8 +220,9 @@ def test_read_one_of(tmp_path):
     """Where a command takes several kinds, any of them is read, and the message names all."""
     write(tmp_path / "run.h5", examples.run(), examples.header())
     assert isinstance(read_one_of(tmp_path / "run.h5", kinds.Playback, kinds.Run), kinds.Run)
-    with pytest.raises(DataError, match="expected a playback or an evaluation, got a run"):
+    with pytest.raises(WrongKindError) as caught:
         read_one_of(tmp_path / "run.h5", kinds.Playback, kinds.Evaluation)
+    assert (caught.value.expected, caught.value.found) == (("playback", "evaluation"), "run")
 
 
 @dataclass(frozen=True)
