@@ -66,7 +66,7 @@ def _random(seed, minutes=0.5):
     )
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
 def test_no_change_is_a_step(model, seed):
     """Changes of rate, amplitude and pulse, at any time, move the current no faster than the slew limit."""
     rhythm = Rhythm(0.1, 0.1, 0.2, seed)

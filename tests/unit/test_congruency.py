@@ -110,6 +110,7 @@ def test_the_permutations_are_exact():
     assert 0.4 < np.median(p) < 0.6
 
 
+@pytest.mark.slow
 def test_what_another_cause_may_still_change_is_taken_off():
     """A lag in the model whose constant is known within some error must not pass for a feedback."""
     model = Extended.of(_operator(90), [("output-lag", (0.01,))])
