@@ -88,13 +88,14 @@ bounds: $(D)/report.html tests/regression/bounds.toml  ## hold the demo's figure
 # --- checks -------------------------------------------------------------------------------------------
 # an emulator that keeps pace with the wall clock has the machine to itself; then one worker a core
 # what one start has compiled serves the others, whatever the environment says
+REALTIME := tests/cli tests/link
 PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
 test: $(VENV)/installed-test  ## every part of the program, in a few minutes
-	$(PYTEST) -m "realtime and not slow"
+	$(PYTEST) -m "realtime and not slow" $(REALTIME)
 	$(PYTEST) -m "not realtime and not slow" -n $(JOBS) --dist worksteal
 
 test-slow: $(VENV)/installed-test  ## the tests that are left: long records, whole chains, every fault of the emulated device
-	$(PYTEST) -m "realtime and slow"
+	$(PYTEST) -m "realtime and slow" $(REALTIME)
 	$(PYTEST) -m "not realtime and slow" -n $(JOBS) --dist worksteal
 
 lint: $(VENV)/installed-test  ## style, types, import contracts

@@ -58,6 +58,14 @@ def test_every_target_and_file_that_is_named_is_there():
     assert not [path for path in paths if not (ROOT / path).exists()]
 
 
+def test_what_keeps_pace_with_the_clock_is_where_it_is_sought():
+    """Make looks for these tests in two folders only."""
+    named = re.search(r"^REALTIME := (.*)$", MAKEFILE, flags=re.MULTILINE)[1].split()
+    mark = re.compile(r"\bpytest\.mark\.realtime\b")
+    marked = [path for path in (ROOT / "tests").rglob("test_*.py") if mark.search(path.read_text())]
+    assert {str(path.parent.relative_to(ROOT)) for path in marked} == set(named)
+
+
 MARKS = """
 import sys, pytest
 class Marks:

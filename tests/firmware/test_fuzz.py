@@ -44,6 +44,7 @@ def test_a_million_damaged_frames_and_wild_sequences(tmp_path):
     assert faults > 10
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("clang"), reason="needs clang: apt-get install clang libclang-rt-14-dev")
 def test_libfuzzer_finds_nothing_in_seconds(tmp_path):
     """The same sequences led by coverage; skipped where clang has no fuzzer library."""

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import truncnorm
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter, Recorded
+from pulsetrainer.core import coarse as coarse_steps
 from pulsetrainer.core.coarse import between_steps
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
@@ -129,6 +131,11 @@ def test_between_coarse_steps_lies_what_the_hysteresis_says(clean):
     done = between_steps(Record(clean.input, coarse), plane, q)
     assert np.abs(done - coarse).max() <= 0.5 * q * (1 + 1e-9)
     assert np.std(done - true) < 0.33 * np.std(coarse - true)
+    apart, least = np.linspace(-3.0, 3.0, 25), coarse_steps._LEAST_COUNT
+    mean, count = coarse_steps._left_possible(apart, 1.0, 0.5)
+    left = truncnorm(2.0 * (apart - 0.5), 2.0 * (apart + 0.5))
+    np.testing.assert_allclose(mean, 0.5 * left.mean(), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(count, np.clip(1.0 - left.var(), least, 1.0), rtol=1e-6)
     noisy = q * np.round((true + q * np.random.default_rng(0).standard_normal(true.size)) / q)
     assert between_steps(Record(clean.input, noisy), plane, q) is noisy
 
