@@ -125,11 +125,17 @@ def invert(
 ) -> Inverse:
     """Return the input whose output is ``target`` (n,), exactly, from ``start``.
 
-    Targets outside the reachable range are clipped to it and counted. Where cells have no weight the
-    output does not answer: the input stays where it was until the target moves on, then crosses at once.
+    On a branch from a turn at u_t with the output y_t, u solves |y - y_t| = 2 E(max(u, u_t), min(u, u_t)),
+    with the Everett function E. Targets outside the reachable range are clipped to it and counted. Where
+    cells have no weight the output does not answer: the input stays where it was until the target moves on,
+    then crosses at once.
 
     Parameters
     ----------
+    target
+        Outputs (n,), output unit; the result's ``input`` is (n,) in the input unit.
+    start
+        The memory before the first target; default: negative saturation.
     monotone
         Weights of either sign are allowed: the caller knows that all branches are monotone.
 
@@ -138,6 +144,8 @@ def invert(
     ArgumentError
         The target is not a finite vector, the operator uses the relay reading (its output is a
         staircase: use ``closest_match``), all its weights are zero, or some are negative.
+
+    Source: own; the memory that it rests on is that of Mayergoyz 2003, chapter 1 (wiping out).
     """
     wanted = finite_vector("target", target)
     _check_invertible(operator, monotone=monotone)
@@ -203,7 +211,12 @@ class InverseStream:
     """The exact inverse one sample at a time, with the same result as ``invert``, to the last digit.
 
     The stack holds output and input of every remembered turning point; a call costs one bisection, plus
-    what the memory pushes or wipes out.
+    what the memory pushes or wipes out. ``clipped`` counts the targets out of reach so far.
+
+    Raises
+    ------
+    ArgumentError
+        As ``invert``, of the operator.
     """
 
     operator: Preisach
@@ -227,7 +240,7 @@ class InverseStream:
         self._heights, self._inputs = list(extremes[:-1] or extremes), inputs[:-1] or inputs
 
     def step(self, target: float) -> float:
-        """Return the input for the next target.
+        """Return the input, input unit, for the next target, output unit.
 
         Raises
         ------
@@ -253,7 +266,7 @@ class InverseStream:
 
 
 def closest_match(operator: Preisach, target: ArrayLike, start: State | None = None) -> Inverse:
-    """Return the edges (n,) as inputs whose relay output is nearest to each target (n,) in turn.
+    """Return the edges (n,), input unit, whose relay output is nearest to each target (n,) in turn.
 
     From the present edge and memory: while the output is below the target step up one edge, keeping
     the memory before the step; at the target, or at saturation, keep the nearer of the last two
@@ -318,16 +331,19 @@ class _EdgeMemory:
 
 
 def smoothed(inputs: ArrayLike, time_s: ArrayLike, step: float, low: float, high: float) -> FloatArray:
-    """Return a staircase of edges ``step`` apart as a cubic smoothing spline, kept within [low, high].
+    """Return a staircase (n,) of edges ``step`` apart as a cubic smoothing spline (n,), within [low, high].
 
     The spline may differ from the staircase by the rounding error of the edges and no more: its
-    residual is allowed the variance of a uniform error, step^2 / 12 per sample.
+    residual is allowed the variance of a uniform error, sum (u_k - spline(t_k))^2 <= n step^2 / 12. Inputs,
+    step and range are in the input unit, times in s.
 
     Raises
     ------
     ArgumentError
         Fewer than five samples, one that is not finite, times that do not increase, a step that is not
         positive, or an empty range.
+
+    Source: Reinsch 1967, Smoothing by spline functions (the condition on the residual).
     """
     u, t = finite_vector("inputs", inputs, at_least=5), finite_vector("time", time_s)
     if t.shape != u.shape or not np.all(np.diff(t) > 0):
@@ -342,7 +358,9 @@ def smoothed(inputs: ArrayLike, time_s: ArrayLike, step: float, low: float, high
 
 
 def slew_limited(inputs: ArrayLike, rate_Hz: float, slew: float) -> FloatArray:
-    """Nearest input (n,) that moves at most ``slew`` input units per second: jumps become ramps.
+    """Nearest input (n,), input unit, that moves at most ``slew`` input units per second: jumps become ramps.
+
+    |v_k+1 - v_k| <= slew / rate, v = (max{w <= u} + min{w >= u}) / 2 over the paths w with that slope.
 
     Where cells have no weight the exact inverse jumps, and a coil cannot. The mean of the highest
     path below the input and the lowest path above it, both with that slope (McShane 1934), starts a ramp as

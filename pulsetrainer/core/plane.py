@@ -29,7 +29,7 @@ Reading = Literal["continuous", "relay"]
 
 
 def float_array(name: str, values: ArrayLike) -> FloatArray:
-    """Return ``values`` as an array of floats.
+    """Return ``values`` as an array of floats of any shape.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def float_array(name: str, values: ArrayLike) -> FloatArray:
 
 
 def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatArray:
-    """Return ``values`` as a one-dimensional float array.
+    """Return ``values`` as a float array (n,), n no less than ``at_least``.
 
     Raises
     ------
@@ -104,7 +104,15 @@ MOST_LEVELS = 10_000  # fifty million cells
 
 @dataclass(frozen=True)
 class Plane:
-    """The edges of the cells of a discrete Preisach plane; everything else follows from them."""
+    """The edges of the cells of a discrete Preisach plane; everything else follows from them.
+
+    Raises
+    ------
+    ArgumentError
+        Fewer than 3 edges, one that is not finite, or edges that do not strictly increase.
+
+    Source: Preisach 1935; Mayergoyz, Mathematical Models of Hysteresis, 2003, chapter 1.
+    """
 
     edges: FloatArray  # (n_h + 1,) borders of the cells, input unit, strictly increasing
 
@@ -142,44 +150,49 @@ class Plane:
 
     @property
     def n_h(self) -> int:
-        """Number of levels."""
+        """Number of levels: one less than there are edges."""
         return self.edges.size - 1
 
     @property
     def n_q(self) -> int:
-        """Number of cells."""
+        """Number of cells: n_q = n_h (n_h + 1) / 2."""
         return self.n_h * (self.n_h + 1) // 2
 
     @property
     def low(self) -> float:
-        """Lower end of the input range."""
+        """Lower end L_0 of the input range, input unit."""
         return float(self.edges[0])
 
     @property
     def high(self) -> float:
-        """Upper end of the input range."""
+        """Upper end L_n of the input range, input unit."""
         return float(self.edges[-1])
 
     @cached_property
     def cell_indices(self) -> tuple[IntArray, IntArray]:
-        """Bands (i, j) of every cell, each (n_q,)."""
+        """Bands (i, j), i >= j, of every cell k = i (i + 1) / 2 + j, each (n_q,)."""
         i, j = np.tril_indices(self.n_h)
         return i.astype(np.int64), j.astype(np.int64)
 
     @cached_property
     def areas(self) -> FloatArray:
-        """Areas A_k of the cells (n_q,), input unit squared; diagonal cells count half."""
+        """Areas of the cells (n_q,), input unit squared.
+
+        A_k = (L_i+1 - L_i) (L_j+1 - L_j), half of that on the diagonal.
+        """
         i, j = self.cell_indices
         step = np.diff(self.edges)
         return step[i] * step[j] * np.where(i == j, 0.5, 1.0)
 
     @cached_property
     def thresholds(self) -> FloatArray:
-        """Middles of the bands (n_h,): where the relays of the paper's reading switch."""
+        """Middles of the bands (n_h,), input unit: where the relays of the paper's reading switch."""
         return 0.5 * (self.edges[1:] + self.edges[:-1])
 
     def check_weights(self, weights: ArrayLike, *, signed: bool = False) -> FloatArray:
         """Return ``weights`` (n_q,) when they can belong to this plane; ``signed`` ones may be negative.
+
+        A weight is a density: output unit per input unit squared.
 
         Raises
         ------
@@ -221,9 +234,16 @@ class Plane:
         return square
 
     def everett_nodes(self, masses: FloatArray) -> FloatArray:
-        """Everett values at the nodes, packed (..., n_q), from the cells' masses (..., n_q).
+        """Everett values at the nodes, packed (..., n_q), from masses of cells (..., n_q), both output unit.
 
         E[i + 1, j] = sum of masses over p <= i, q >= j: two cumulative sums.
+
+        Raises
+        ------
+        ArgumentError
+            As ``unpack``.
+
+        Source: Everett 1955; Mayergoyz 2003, eq. 1.15.
         """
         square = self.unpack(masses)
         np.cumsum(square, axis=-2, out=square)
@@ -232,7 +252,15 @@ class Plane:
         return square[..., i, j]
 
     def masses_of(self, nodes: FloatArray) -> FloatArray:
-        """Masses of the cells (n_q,) from packed Everett nodes: the inverse of ``everett_nodes``."""
+        """Masses of the cells (n_q,) from packed Everett nodes (n_q,): the inverse of ``everett_nodes``.
+
+        m[i, j] = E[i + 1, j] - E[i, j] - E[i + 1, j + 1] + E[i, j + 1]
+
+        Raises
+        ------
+        ArgumentError
+            As ``everett_grid``.
+        """
         grid = self.everett_grid(nodes)
         square = grid[1:, :-1] - grid[:-1, :-1] - grid[1:, 1:] + grid[:-1, 1:]
         i, j = self.cell_indices
@@ -241,7 +269,13 @@ class Plane:
     def adjoint(self, node_values: FloatArray) -> FloatArray:
         """Transpose of ``everett_nodes``: (..., n_q) node space to (..., n_q) cell space.
 
-        Cell (p, q) collects the nodes (i + 1, j) with i >= p and j <= q.
+        Cell (p, q) collects the nodes (i + 1, j) with i >= p and j <= q, so that for all a and b
+        a . everett_nodes(b) = adjoint(a) . b.
+
+        Raises
+        ------
+        ArgumentError
+            As ``unpack``.
         """
         square = self.unpack(node_values)
         square = np.cumsum(square[..., ::-1, :], axis=-2)[..., ::-1, :]
@@ -250,7 +284,7 @@ class Plane:
         return square[..., i, j]
 
     def everett_grid(self, nodes: FloatArray) -> FloatArray:
-        """Everett values on the full (n_h + 1, n_h + 1) grid of nodes, zero on and above the diagonal.
+        """Everett values (n_q,) on the full (n_h + 1, n_h + 1) grid of nodes, zero on and above the diagonal.
 
         Raises
         ------
@@ -268,7 +302,10 @@ class Plane:
         return grid
 
     def bands(self, values: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Band index and fraction in [0, 1] of each input value; values outside are clipped to the ends."""
+        """Band and fraction in [0, 1] of input values (n,), each (n,); those outside are clipped to the ends.
+
+        u = L_k + s (L_k+1 - L_k) for the band k and the fraction s.
+        """
         fraction = np.clip(values, self.low, self.high)
         band = self.edges[1:-1].searchsorted(fraction, side="right")
         fraction -= self.edges[band]
@@ -280,7 +317,7 @@ class Plane:
         return np.diff(self.edges)
 
     def round_to_nodes(self, values: FloatArray) -> FloatArray:
-        """Round each value to an edge, as the relays of the paper's reading see it.
+        """Round input values (n,) to edges (n,), as the relays of the paper's reading see them.
 
         Relays switch at the middles of the bands: a relay is up from its threshold on.
         """
@@ -288,14 +325,20 @@ class Plane:
 
     @cached_property
     def signed_nodes(self) -> tuple[IntArray, FloatArray]:
-        """Number and sign of node (a, b) on the flattened (n_h + 1)^2 grid: -1 where a < b, 0 where a = b."""
+        """Number k and sign of node (a, b) on the flattened grid, each ((n_h + 1)^2,).
+
+        k = a (a - 1) / 2 + b for a > b with the sign +1; -1 where a < b, the two exchanged; 0 where a = b.
+        """
         a, b = np.indices((self.n_h + 1, self.n_h + 1)).reshape(2, -1)
         upper, lower = np.maximum(a, b), np.minimum(a, b)
         number = np.where(a == b, 0, upper * (upper - 1) // 2 + lower)
         return number.astype(np.int64), np.sign(a - b).astype(np.float64)
 
     def corners(self, to: FloatArray, origin: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Flat grid numbers and bilinear shares, each (4, n), of the points (to, origin)."""
+        """Flat grid numbers and bilinear shares, each (4, n), of the points (to, origin), inputs (n,) each.
+
+        For fractions s of ``to`` and t of ``origin``: (1 - s)(1 - t), (1 - s) t, s (1 - t), s t.
+        """
         i, s = self.bands(to)
         j, t = self.bands(origin)
         first = i * (self.n_h + 1) + j
@@ -304,7 +347,7 @@ class Plane:
         return number, np.stack((1.0 - s - t + st, t - st, s - st, st))
 
     def signed_everett(self, nodes: FloatArray) -> FloatArray:
-        """Everett values on the flattened grid of nodes, continued antisymmetrically: G(b, a) = -G(a, b).
+        """Everett values (n_q,) on the flattened grid, ((n_h + 1)^2,), antisymmetric: G(b, a) = -G(a, b).
 
         Interpolated bilinearly, G(to, origin) is the signed step of the output from ``origin`` to
         ``to``. Off the diagonal that is the exact integral of a density constant over each cell. In a
