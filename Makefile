@@ -130,7 +130,7 @@ docs: $(VENV)/installed-test $(D)/evaluation.h5 $(D)/prediction.h5 ideal  ## the
 	$(BIN)/python docs/figures.py
 
 site: $(VENV)/installed-test  ## the documentation as a site in build/site, which fetches nothing
-	$(BIN)/python docs/site.py
+	$(BIN)/python docs/site.py --run
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --config-file build/mkdocs.yml
 	@echo "site: build/site/index.html; with its search: $(BIN)/python -m http.server -d build/site"
 

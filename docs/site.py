@@ -1,6 +1,6 @@
 """Gather the pages of the site: ``python docs/site.py`` fills build/site-pages and writes build/mkdocs.yml.
 
-The pages are those of the repository in the same folders, so that each link works in both places. The Python
+With ``--run`` the notebooks among them are run, all at a time; without it they show no results. The pages are those of the repository in the same folders, so that each link works in both places. The Python
 API alone is made anew: of the docstrings, by mkdocstrings.
 """  # noqa: INP001 - a folder of pages with its scripts, not a package
 
@@ -8,15 +8,27 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import nbformat
 from api_reference import HEAD, NOUNS, VERBS
+from nbclient import NotebookClient
 
 import pulsetrainer as pt
 
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "build" / "site-pages"
-PAGES = ("*.md", "docs/**/*.md", "docs/notebooks/*.ipynb", "firmware/PROTOCOL.md", "waveforms/README.md")
+PAGES = (
+    "*.md",
+    "docs/**/*.md",
+    "docs/site.css",
+    "docs/site.js",
+    "docs/notebooks/*.ipynb",
+    "firmware/PROTOCOL.md",
+    "waveforms/README.md",
+)
 LINK = re.compile(r"(\]\(|src=\"|srcset=\")([^)#\"]+)")
 DATA = re.compile(r"(?:\.\./)+tests/data/[\w.]+")  # what a notebook reads
 LISTS = {"HOW_TO": "docs/how-to/*.md", "DECISIONS": "docs/decisions/*.md"}
@@ -29,7 +41,10 @@ def gather() -> None:
     for file in sorted(pages.union(*map(linked, pages))):
         copy = SITE / file.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(file, copy)
+        if file.suffix == ".ipynb":  # its links to others: there they are pages
+            copy.write_text(file.read_text(encoding="utf-8").replace(".ipynb)", ".html)"), encoding="utf-8")
+        else:
+            shutil.copyfile(file, copy)
     (SITE / "docs" / "api.md").write_text(api(), encoding="utf-8")
 
 
@@ -52,6 +67,18 @@ def api() -> str:
     return "\n".join(parts)
 
 
+def run(notebook: Path) -> None:
+    """Run a copied notebook and keep its results in it."""
+    content = nbformat.read(notebook, 4)
+    folder = {"metadata": {"path": str(notebook.parent)}}
+    quiet = ["--log-level=40"]  # a kernel warns of its port, which is this computer's own
+    client = NotebookClient(
+        content, timeout=600, startup_timeout=300, extra_arguments=quiet, resources=folder
+    )
+    client.execute()
+    nbformat.write(content, notebook)
+
+
 def settings() -> str:
     """Return docs/mkdocs.yml with its lists of pages filled in, its folders seen from build/."""
     text = (ROOT / "docs" / "mkdocs.yml").read_text(encoding="utf-8").replace("../build/", "")
@@ -65,4 +92,7 @@ def settings() -> str:
 
 if __name__ == "__main__":
     gather()
+    if "--run" in sys.argv:
+        with ProcessPoolExecutor() as processes:
+            list(processes.map(run, sorted(SITE.glob("docs/notebooks/*.ipynb"))))
     (ROOT / "build" / "mkdocs.yml").write_text(settings(), encoding="utf-8")

@@ -102,6 +102,7 @@ def main() -> None:
     # many small products: threads of BLAS that wait for each other take two to three times as long, and ten
     # times on a busy computer; who wants them sets the variable
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown: no display, no toolkit is needed
     guard.end_like_ctrl_c()
     guard.speak_any_encoding()
     guard.hush_libraries(sys.argv)

@@ -80,6 +80,11 @@ class Screen:
         names = [tables.label(name) for name in rows]
         width = max((len(name) for name in names), default=0)
         self.line("", title, indent=2)
+        if self.is_terminal and 2 * width + 8 > self.width:  # no room beside the names: below them
+            for name, value in zip(names, rows.values(), strict=True):
+                self.line("  ", name)
+                self.line("    ", tables.text(value))
+            return
         for name, value in zip(names, rows.values(), strict=True):
             self.line(f"  {name:<{width}}  ", tables.text(value))
 

@@ -20,6 +20,8 @@ PAGES = (
     "docs/tutorial.html",
     "docs/api.html",
     "docs/commands.html",
+    "docs/format.html",
+    "docs/theory.html",
     "docs/notebooks/first-pulse.html",
 )
 pytestmark = pytest.mark.slow
@@ -40,7 +42,7 @@ def site(made_once) -> Path:
             "--config-file",
             ROOT / "build" / "mkdocs.yml",
         ]
-        environment = {**os.environ, "SITE_RUNS_NOTEBOOKS": "false", "NO_MKDOCS_2_WARNING": "1"}
+        environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
         done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         shutil.copytree(ROOT / "build" / "site", here, dirs_exist_ok=True)
@@ -66,9 +68,10 @@ class Quiet(SimpleHTTPRequestHandler):
 
 
 @pytest.fixture
-def visit(browser, served):
+def visit(browser, served, request):
     """Open a page of the site at a phone's width; what the console says and what is asked for is kept."""
-    context = browser.new_context(viewport={"width": 390, "height": 844})
+    scheme = getattr(request, "param", "light")
+    context = browser.new_context(viewport={"width": 390, "height": 844}, color_scheme=scheme)
 
     def open_page(name: str):
         page = context.new_page()
@@ -94,6 +97,15 @@ def test_a_page_is_quiet_and_fits_a_phone(visit, served, name):
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     pictures = page.evaluate("[...document.images].map(i => [i.src, i.complete && i.naturalWidth > 0])")
     assert [source for source, drawn in pictures if not drawn] == []
+
+
+@pytest.mark.parametrize("visit", ["light", "dark"], indirect=True)
+@pytest.mark.parametrize("name", PAGES)
+def test_axe_finds_nothing(visit, name):
+    """The rules of axe-core, in both schemes: names, contrast, links that are seen, the keyboard."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+    found = axe.Axe().run(visit(name)).response["violations"]
+    assert [(one["id"], [node["html"][:120] for node in one["nodes"]]) for one in found] == []
 
 
 def test_the_search_works_without_a_network(visit):

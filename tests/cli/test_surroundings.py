@@ -1,0 +1,72 @@
+"""Odd surroundings: no UTF-8, no display, no home, a narrow terminal. It works, or says what to mend."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from test_screen import on_terminal
+
+from program import cold
+
+NOWHERE = "/proc/nowhere"  # cannot be made, by root neither
+SURROUNDINGS = {
+    "no UTF-8": {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii"},
+    "no such backend": {"MPLBACKEND": "nonsense", "DISPLAY": ""},
+    "no home": {"HOME": NOWHERE} | {f"XDG_{name}_HOME": NOWHERE for name in ("CACHE", "CONFIG", "STATE")},
+    "no colour, no terminal": {"TERM": "dumb", "NO_COLOR": "1"},
+}
+# what a visitor does first, each with what it leaves
+COMMANDS = {
+    "show played.h5": (),
+    "plot played.h5 --data": ("played.png", "played.csv"),
+    "evaluate played.h5 -o e.h5 --html e.html": ("e.h5", "e.html"),
+    "export run.h5 -o x.csv": ("x.csv",),
+    "compare e.h5 e.h5 -o compared.svg": ("compared.svg",),
+    "identify run.h5 --levels 12 -o again.h5": ("again.h5",),
+    "diagnose run.h5 --model model.h5 --quick -o d.h5 --html d.html": ("d.h5", "d.html"),
+}
+
+
+@pytest.fixture
+def there(small_chain, tmp_path) -> Path:
+    """A folder with a run, a model, a drive and a playback."""
+    shutil.copytree(small_chain, tmp_path, dirs_exist_ok=True)
+    return tmp_path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SURROUNDINGS)
+def test_every_common_command_works(there, name):
+    """Each writes what it should, from a cold start."""
+    for line, made in COMMANDS.items():
+        done = cold(there, *line.split(), env=SURROUNDINGS[name])
+        assert done.code == 0, (line, done)
+        assert "Traceback" not in done.err
+        assert all((there / file).stat().st_size > 100 for file in made), line
+
+
+def test_a_figure_needs_no_backend(there):
+    """What the environment asks matplotlib for does not matter to a file."""
+    assert cold(there, "plot", "model.h5", env=SURROUNDINGS["no such backend"]).code == 0
+
+
+def test_without_a_home_the_bench_says_where_it_wanted_to_compile(there):
+    """The folder, and the variable that names another."""
+    done = cold(there, "play", "drive.h5", "-o", "q.h5", env=SURROUNDINGS["no home"])
+    if done.code:
+        assert done.code == 4
+        assert NOWHERE in done.err
+        assert "XDG_CACHE_HOME" in done.err.partition("try: ")[2]
+
+
+def test_a_terminal_of_twenty_columns(there):
+    """Names and values are folded to it; what is to be copied in one piece, a command, is not."""
+    said = on_terminal(there, "show", "played.h5", COLUMNS="20", TERM="dumb").decode()
+    lines = [line.rstrip("\r") for line in said.partition("history")[0].splitlines()]
+    facts = lines[next(k for k, line in enumerate(lines) if line.strip() == "waveform") :]
+    assert len(facts) > 15
+    assert max(map(len, facts)) <= 20
+    evaluated = on_terminal(there, "evaluate", "played.h5", COLUMNS="20", TERM="dumb").decode()
+    assert "mean error, compensated" in evaluated
