@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.pulses import train
-from pulsetrainer.core.rhythm import COUPLING, BREATH_Hz, Rhythm
+from pulsetrainer.core.rhythm import BREATH_Hz, Rhythm
 from pulsetrainer.errors import ArgumentError
 from pulsetrainer.files.pulses import library, read_pulse
 
@@ -51,7 +51,7 @@ def test_premature_beats_are_early_weak_and_followed_by_a_full_pause():
     assert len(early) == pytest.approx(400, abs=60)
     for k in early:
         assert timings[k].strength < 1.0
-        assert timings[k - 1].interval == pytest.approx(COUPLING)
+        assert timings[k - 1].interval == pytest.approx(0.65)
         assert timings[k - 1].interval + timings[k].interval == pytest.approx(2.0)
         assert not timings[k - 1].premature
 
