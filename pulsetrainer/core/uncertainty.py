@@ -106,7 +106,7 @@ def bootstrap(
     fit: Identified,
     *,
     rng: np.random.Generator,
-    draws: int = 200,
+    draws: int,
     block: int | None = None,
 ) -> Ensemble:
     """Refit ``draws`` resamples of blocks of the records.

@@ -153,9 +153,9 @@ def test_bad_requests_are_named(monkeypatch):
     with raises(ArgumentError, "not such an argument", argument="draws", got="1"):
         uncertainty.bootstrap([record], fit, rng=rng, draws=1)
     with raises(ArgumentError, "too few blocks"):
-        uncertainty.bootstrap([record], fit, rng=rng, block=2000)
+        uncertainty.bootstrap([record], fit, rng=rng, draws=9, block=2000)
     with raises(ArgumentError, "not such an argument", argument="level", got="90"):
         uncertainty.bootstrap([record], fit, rng=rng, draws=2).offset_interval(90)
     monkeypatch.setattr(identification, "DENSE_BYTES", 1000)
     with raises(ArgumentError, "plane too large"):
-        uncertainty.bootstrap([record], fit, rng=rng)
+        uncertainty.bootstrap([record], fit, rng=rng, draws=9)

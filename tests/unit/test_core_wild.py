@@ -127,6 +127,11 @@ def test_a_median_of_neighbours_is_what_it_says():
     assert np.flatnonzero(wild.isolated(u)).tolist() == [77]
     assert wild.repaired(u, wild.isolated(u))[77] == pytest.approx(0.5 * (u[76] + u[78]))
     assert not wild.isolated(u[:40]).any()
+    u = np.linspace(0.0, 1.0, 200)
+    u[77:80] += (2.0, -2.0, 2.0)
+    assert np.flatnonzero(wild.isolated(u)).tolist() == [77, 78, 79]
+    u[80] -= 2.0  # four in a row are no exceptions
+    assert not wild.isolated(u).any()
 
 
 @pytest.mark.parametrize("at", [0, 1, 199, 198])
