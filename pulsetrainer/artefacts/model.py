@@ -61,6 +61,8 @@ class Fit:
     # of the identification record: what was measured there
     wild_input: Annotated[FloatArray | None, Data("@input_unit", "input of wild samples", "wild")] = None
     wild_output: Annotated[FloatArray | None, Data("@output_unit", "output of wild samples", "wild")] = None
+    # of the cells within the range, told apart by minor loops, and not by the major loop only; NaN: unknown
+    minor_percent: float = float("nan")
     loop: str = ""  # "counterclockwise" | "clockwise" | "butterfly" | "none"; empty in files of 0.1
     notes: tuple[str, ...] = ()  # what a person should know about the fit
 

@@ -119,14 +119,19 @@ def shown(unit: str) -> str:
     return head.replace("*", "·")
 
 
+_WHOLE = 100.0  # from here on no decimals
+_EASY = (  # unit, its length, the shortest time told in it; s
+    *(("d", 86400.0, 172800.0), ("h", 3600.0, 7200.0), ("min", 60.0, 600.0), ("s", 1.0, 1.0)),
+    *((unit, one, one) for unit, one in (("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("ps", 1e-12))),
+)
+
+
 def with_seconds(seconds: float) -> str:
-    """Return a time in the unit in which it is easily read: ``2.5 ms``, ``20 ns``, ``173 s``."""
-    size = abs(seconds)
-    if size >= 100.0:
-        return f"{seconds:.0f} s"
-    for unit, one in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("ps", 1e-12)):
-        if size >= one:
-            return f"{seconds / one:.3g} {unit}"
+    """Return a time in the unit in which it is easily read: ``2.5 ms``, ``20 ns``, ``173 s``, ``2.5 h``."""
+    for unit, one, least in _EASY:
+        if abs(seconds) >= least:
+            size = seconds / one
+            return f"{size:.0f} {unit}" if abs(size) >= _WHOLE else f"{size:.3g} {unit}"
     return f"{seconds:.3g} s"
 
 

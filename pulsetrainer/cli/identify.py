@@ -94,7 +94,7 @@ def identify(
 
 def _show(job: Job, out: Path, model: Model) -> None:
     from pulsetrainer.artefacts.units import with_unit
-    from pulsetrainer.report.facts import loop_words
+    from pulsetrainer.report.facts import loop_words, minor_words
 
     fit, unit = model.fit, model.output_unit
     assert fit is not None
@@ -110,6 +110,7 @@ def _show(job: Job, out: Path, model: Model) -> None:
             "fit rms": with_unit(f"{fit.rms:.4g}", unit),
             "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
             "cells switched": f"{fit.coverage_percent:.1f} %",
+            "by minor loops": minor_words(fit.minor_percent),
             "smoothing": f"{fit.smoothing:.3g} of the range" if fit.smoothing else "none",
             "loop": loop_words(model),
             "form": model.form,
@@ -123,8 +124,9 @@ def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
     fit = model.fit
     assert fit is not None
     same = (
-        "coverage_percent", "smoothing", "input_noise", "false_reversals", "output_uncertainty", "offsets",
-        "spacing", "stiffness", "loop", "masked_samples", "warning", "iterations",
+        "coverage_percent", "minor_percent", "smoothing", "input_noise", "false_reversals",
+        "output_uncertainty", "offsets", "spacing", "stiffness", "loop", "masked_samples", "warning",
+        "iterations",
     )  # fmt: skip
     return {
         "output": out,

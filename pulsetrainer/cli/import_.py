@@ -15,7 +15,6 @@ from pulsetrainer.errors import UsageError
 if TYPE_CHECKING:
     from pulsetrainer.steps.import_ import Imported
 
-_HARDLY = 50.0  # % of the cells: with fewer a person should know what the coverage does not say
 _NAME = "{name}"  # in the output: one run for each file
 
 
@@ -128,7 +127,7 @@ def _show(job: Job, groups: dict[Path, tuple[Path, ...]], read: list[Imported]) 
 def _facts(imported: Imported) -> dict[str, Any]:
     """Return the main figures in the order in which a person would ask."""
     from pulsetrainer.artefacts.units import with_unit
-    from pulsetrainer.report.facts import run_facts
+    from pulsetrainer.report.facts import minor_words, run_facts
 
     report = imported.report
     shown = run_facts(imported.run, report.reversals)
@@ -138,9 +137,7 @@ def _facts(imported: Imported) -> dict[str, Any]:
     direction = "unclear, identify tries both" if report.polarity == "unclear" else report.polarity
     shown["loop"] = f"{direction} (correlation {report.correlation:+.2f})"
     shown["coverage_percent"] = report.coverage_percent
-    shown["told apart by minor loops"] = f"{report.minor_percent:.0f} % of the cells" + (
-        "; the rest only the major loop has switched" if report.minor_percent < _HARDLY else ""
-    )
+    shown["told apart by minor loops"] = minor_words(report.minor_percent)
     stamps = {True: "even", False: "uneven", None: "none: only the order counts"}[report.even]
     shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps
     for name in ("signal", "complete", "dropped_samples"):  # the title; of a device, not of a file

@@ -101,6 +101,9 @@ def _show(job: Job, out: Path, drive: Waveform) -> None:
     job.notes(drive.notes)
     force = float(drive.target[drive.scored].min()), float(drive.target[drive.scored].max())
     current = float(drive.compensated.min()), float(drive.compensated.max())
+    given, made = (
+        (drive.model.input_quantity, drive.model.output_quantity) if drive.model else ("current", "force")
+    )
     seconds = drive.time_s.size / drive.rate_Hz
     job.screen.result(
         {
@@ -121,9 +124,9 @@ def _show(job: Job, out: Path, drive: Waveform) -> None:
         f"{out}: {drive.name} by {drive.inversion} inversion",
         {
             "length": f"{seconds:.2f} s, {drive.time_s.size} samples",
-            "force": with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
-            "current": with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
+            made: with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
+            given: with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
             "out of reach": f"{drive.clipped_samples} samples",
-            "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full force, by the model",
+            "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model",
         },
     )

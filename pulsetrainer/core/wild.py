@@ -30,6 +30,8 @@ _WINDOW = 7  # samples of a median: three wild ones do not move it
 _AROUND = 31  # samples whose steps tell how fast the signal moves
 _STEPS = 4.0  # such steps a turn may be away from the median of its neighbours
 _TURN = 2.0  # such steps a turn may be away from the line between its neighbours
+_LOOKS = 4  # each without what the one before it found
+_MIDDLE = 1.5  # times the steps of the medians: a median is slower than the signal near a turn
 _FAST = 80.0  # percentile of the steps near by
 _QUICK_LEVELS = 16
 _QUICK_SMOOTHING = 0.05
@@ -37,13 +39,29 @@ _QUANTA = 3.0  # usual steps: a converter that flickers is not wild
 
 
 def isolated(values: FloatArray) -> BoolArray:
-    """Tell for each sample (n,) of a signal whether it is far from its neighbours."""
-    if values.size < FEWEST:
-        return np.zeros(values.size, dtype=bool)
+    """Tell for each sample (n,) of a signal whether it is far from its neighbours.
+
+    Several wild samples close together look like motion. So what is found is taken out and the rest looked at
+    again, and it moves no faster than the medians of its neighbours do.
+    """
+    found = np.zeros(values.size, dtype=bool)
+    for _ in range(_LOOKS if values.size >= FEWEST else 0):
+        left = repaired(values, found)
+        step, moving = _motion(left)
+        middle = scipy.ndimage.median_filter(left, size=_WINDOW, mode="mirror")
+        moving = np.minimum(moving, _MIDDLE * _motion(middle)[1])
+        usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+        more = _far(left, _STEPS * moving + _QUANTA * usual) & ~found
+        if not more.any():
+            break
+        found |= more
+    return found if np.mean(found) <= MOST else np.zeros_like(found)
+
+
+def _motion(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Steps (n,) of a signal (n,), and how large they are near by."""
     step = np.abs(np.diff(values, prepend=values[0]))
-    moving = scipy.ndimage.percentile_filter(step, _FAST, size=_AROUND, mode="mirror")
-    usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
-    return _far(values, _STEPS * moving + _QUANTA * usual)
+    return step, scipy.ndimage.percentile_filter(step, _FAST, size=_AROUND, mode="mirror")
 
 
 def off(residuals: Sequence[FloatArray], span: float) -> list[BoolArray]:
@@ -83,16 +101,23 @@ def repaired(values: FloatArray, wild: BoolArray) -> FloatArray:
     return np.interp(place, place[~wild], values[~wild])
 
 
-def repaired_where_off(values: FloatArray, suspect: BoolArray) -> FloatArray:
+def repaired_where_off(
+    values: FloatArray, suspect: BoolArray, instead: FloatArray | None = None
+) -> FloatArray:
     """Return a signal (n,) with those suspect samples between their neighbours that are off their path.
 
     A residual does not tell whether input or output was wild. The one that was not is kept: between its
     neighbours a turn would lose its extreme, which is remembered.
+
+    Parameters
+    ----------
+    instead
+        What is put there (n,), such as what a fit predicts; None: the line between the neighbours.
     """
     between = repaired(values, suspect)
-    step = np.abs(np.diff(between, prepend=between[0]))
-    moving = scipy.ndimage.percentile_filter(step, _FAST, size=_AROUND, mode="mirror")
-    return repaired(values, suspect & (np.abs(values - between) > _TURN * moving))
+    _, moving = _motion(between)
+    off = suspect & ~(np.abs(values - between) <= _TURN * moving)
+    return repaired(values, off) if instead is None else np.where(off, instead, values)
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,6 +69,7 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
     }
 
 
+_HARDLY = 50.0  # % of the cells: with fewer a person should know what the coverage does not say
 _LOOPS = {
     "counterclockwise": "counterclockwise, the output lags",
     "clockwise": "clockwise, the output leads",
@@ -84,6 +85,12 @@ def loop_words(model: Model) -> str:
     if model.form == "signed":
         return turns or "of either direction"
     return f"{trend}, {turns}" if turns else trend
+
+
+def minor_words(percent: float) -> str:
+    """Say how many cells minor loops tell apart, and what of the others is known."""
+    rest = "; the rest only the major loop has switched" if percent < _HARDLY else ""
+    return f"{percent:.0f} % of the cells{rest}"
 
 
 def _model(model: Model) -> dict[str, Any]:

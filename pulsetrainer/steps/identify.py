@@ -12,7 +12,8 @@ import numpy as np
 from pulsetrainer.artefacts import BoolArray, Fit, Model, Run
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core import input_noise, metrics, uncertainty, wild
-from pulsetrainer.core.coverage import coverage, largest_gap
+from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
+from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
 from pulsetrainer.core.forms import Form
 from pulsetrainer.core.identification import Method, Smoothing
@@ -103,9 +104,7 @@ def identify(
     for title, run in zip(titles, whole, strict=True):
         if not run.complete:
             notes.append(f"{title} is incomplete; fitting the {run.input.size} samples it has")
-    cut = [run.parts(SHORTEST_PART) for run in whole]
-    titles = [title for title, parts in zip(titles, cut, strict=True) for _ in parts]
-    measured = [part for parts in cut for part in parts]
+    titles, measured = _with_samples(titles, whole)
     raw = measured
     masked = [np.zeros(p.input.size, dtype=bool) if p.masked is None else p.masked for p in measured]
     tamed = wild.tame([(p.input, wild.repaired(p.output, m)) for p, m in zip(measured, masked, strict=True)])
@@ -122,7 +121,7 @@ def identify(
     n_h = _levels(measured, notes) if levels is None else levels
     on = partial(fit, n_h=n_h, reading=reading, method=method, smoothing=smoothing, form=form)
     left_out = [t.wild | m for t, m in zip(tamed, masked, strict=True)]
-    fitted, measured, masks = _without_wild(on, reach, measured, left_out)
+    fitted, measured, masks = _without_wild(on, reach, measured, left_out, [part.output for part in raw])
     wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
@@ -141,36 +140,51 @@ def identify(
     if operator.polarity < 0:
         notes.append("the output falls when the input rises: fitted as a falling loop")
     dual = fitted.form == "dual"
-    covered = coverage(plane, [part.output if dual else part.input for part in measured])
+    remembered = [x for x, _ in (exchanged(_signals(measured)) if dual else _signals(measured))]
+    covered = coverage(plane, remembered)
     notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
     warning = fit_notes.warning(fitted, measured, form)
     progress(1.0)
     model = _model(fitted, measured, covered, ensemble, cleaned, tuple(notes), warning)
-    return _with_wild(model, raw[0], wild_ones[0], sum(int(mask.sum()) for mask in masks))
+    model = _with_wild(model, raw[0], wild_ones[0], sum(int(mask.sum()) for mask in masks))
+    assert model.fit is not None
+    return replace(model, fit=replace(model.fit, minor_percent=100.0 * minor_coverage(plane, remembered)))
 
 
 def _without_wild(
-    on: Callable[..., Fitted], reach: tuple[float, float], runs: list[Run], masks: list[BoolArray]
+    on: Callable[..., Fitted],
+    reach: tuple[float, float],
+    runs: list[Run],
+    masks: list[BoolArray],
+    raw: Sequence[FloatArray],
 ) -> tuple[Fitted, list[Run], list[BoolArray]]:
     """Fit without the samples that are known to be wild, then without those that its residual shows.
 
     Whether input or output is wild there a residual does not tell: what is off its own path is mended.
+    The dual form remembers its output: there what the fit before predicts takes the place of ``raw`` outputs
+    (n,) that are wild, since between its neighbours a turn would lose its extreme.
     The range of the levels and the form are decided anew, as wild samples move both.
     """
     fitted = on(_signals(runs), *reach, kept=[~m for m in masks] if any(map(np.any, masks)) else None)
     span = float(np.ptp(np.concatenate([run.output for run in runs])))
-    for _ in range(_ROUNDS):
+    for number in range(_ROUNDS):
         more = wild.off(fitted.residuals, span)
-        if not any(np.any(new & ~mask) for new, mask in zip(more, masks, strict=True)):
+        remembered = number == 0 and fitted.form == "dual" and any(map(np.any, masks))
+        if not (remembered or any(np.any(new & ~mask) for new, mask in zip(more, masks, strict=True))):
             break
         masks = [mask | new for mask, new in zip(masks, more, strict=True)]
+        if fitted.form == "dual":
+            outputs = [
+                wild.repaired_where_off(y, mask, said)
+                for y, mask, said in zip(raw, masks, fitted.predicted, strict=True)
+            ]
+        else:
+            outputs = [
+                wild.repaired_where_off(run.output, mask) for run, mask in zip(runs, masks, strict=True)
+            ]
         runs = [
-            replace(
-                run,
-                input=wild.repaired_where_off(run.input, mask),
-                output=wild.repaired_where_off(run.output, mask),
-            )
-            for run, mask in zip(runs, masks, strict=True)
+            replace(run, input=wild.repaired_where_off(run.input, mask), output=y)
+            for run, mask, y in zip(runs, masks, outputs, strict=True)
         ]
         ranges = np.asarray([input_range(run) for run in runs])
         reach = max(reach[0], float(ranges[:, 0].min())), min(reach[1], float(ranges[:, 1].max()))
@@ -224,6 +238,22 @@ def _check_units(names: Sequence[str], runs: Sequence[Run]) -> None:
                 f"but {names[0]} is in {first.input_unit} and {first.output_unit}",
                 hint="import the runs again with the same --input-unit and --output-unit",
             )
+
+
+def _with_samples(titles: Sequence[str], runs: Sequence[Run]) -> tuple[list[str], list[Run]]:
+    """Return the parts of all runs with their runs' names, or DataError where all samples are masked."""
+    cut = [
+        (title, part)
+        for title, run in zip(titles, runs, strict=True)
+        for part in run.parts(SHORTEST_PART)
+        if part.masked is None or not part.masked.all()
+    ]
+    if not cut:
+        raise DataError(
+            f"all samples of {', '.join(titles)} are masked as wild or lost, so there is nothing to fit",
+            hint="check the wiring and the range of the sensor, and record again",
+        )
+    return [title for title, _ in cut], [part for _, part in cut]
 
 
 def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:

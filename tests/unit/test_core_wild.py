@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import form_devices as devices
@@ -10,6 +11,7 @@ import pytest
 
 import pulsetrainer as pt
 from pulsetrainer.core import wild
+from pulsetrainer.errors import DataError
 from pulsetrainer.report.figures import draw
 
 KINDS = {
@@ -105,6 +107,24 @@ def test_wild_samples_do_not_move_the_fit(share, where):
     assert np.median(ratios) <= 1.1
 
 
+def test_wild_samples_that_lie_close_together_are_found():
+    """Four among eleven look like motion; all that are far off are found, and none that is true."""
+    _, u, _, rng = clean(523)
+    bad, at = spoilt(u, 0.03, rng)
+    found = wild.isolated(bad)
+    assert found[np.abs(bad - u) > 0.3].all()
+    assert not found[~at].any()
+
+
+@pytest.mark.parametrize("seed", [505, 521])
+def test_a_wild_output_of_the_dual_form_keeps_its_turns(seed):
+    """The output is remembered there: at a wild sample the fit takes its place, not the line beside it."""
+    device, u, y, rng = clean(seed)
+    model = fitted(u, spoilt(y, 0.03, rng)[0])
+    assert model.form == "dual"
+    assert error(model, device) <= 1.2 * unspoilt(seed)
+
+
 def test_what_was_left_out_is_counted_kept_and_drawn(tmp_path):
     """In the note, in the file and in the figure."""
     _, u, y, rng = clean(300)
@@ -159,3 +179,16 @@ def test_a_fit_that_describes_nothing_calls_nothing_wild():
     for residual in (small, large):
         residual[250] += 0.9
     assert [int(found.sum()) for found in wild.off([small, large], 1.0)] == [1, 0]
+
+
+def test_a_record_in_which_all_samples_are_wild_is_refused():
+    """An error of the data; of several parts, those with samples are fitted."""
+    _, u, y, _ = clean(310)
+    run = pt.Run(time_s=np.arange(u.size) / 100.0, input=u, output=y)
+    nothing = replace(run, masked=np.ones(u.size, dtype=bool))
+    with pytest.raises(DataError):
+        pt.identify(nothing, levels=8)
+    assert pt.identify([run, nothing], levels=8).fit.samples == pt.identify(run, levels=8).fit.samples
+    model = pt.identify(run, levels=8)
+    with pytest.raises(DataError):
+        pt.diagnose(nothing, model, quick=True)

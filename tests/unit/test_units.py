@@ -5,7 +5,7 @@ from __future__ import annotations
 import pint
 import pytest
 
-from pulsetrainer.artefacts.units import check_unit, is_unit
+from pulsetrainer.artefacts.units import check_unit, is_unit, with_seconds
 from pulsetrainer.errors import DataError
 from wording import raises
 
@@ -51,3 +51,15 @@ def test_no_units(text):
     assert not is_unit(text)
     with raises(DataError, "no such unit", argument="input unit", place="the heading 'x' of a.csv"):
         check_unit(text, "input unit", "the heading 'x' of a.csv")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [
+        (2e-8, "20 ns"), (0.0025, "2.5 ms"), (1.0, "1 s"), (173.0, "173 s"), (599.0, "599 s"),
+        (600.0, "10 min"), (7199.0, "120 min"), (7200.0, "2 h"), (173_000.0, "2 d"), (-20.0, "-20 s"),
+    ],
+)  # fmt: skip
+def test_a_time_is_told_in_the_unit_that_fits(seconds, said):
+    """From nanoseconds to days."""
+    assert with_seconds(seconds) == said
