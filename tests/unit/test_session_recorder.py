@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -126,3 +127,22 @@ def _begin_and_stop(recorder: SessionRecorder, whole: Session) -> None:
     recorder.press(*(getattr(whole, name)[:SAMPLES] for name in SAMPLED))
     recorder.judge(_so_far(whole, 1))
     raise KeyboardInterrupt
+
+
+def test_the_end_of_a_long_session_takes_no_more_memory_than_that_of_a_short_one(tmp_path):
+    """Written piece by piece: the peak is that of a piece, at ten times the length too."""
+    peaks = []
+    for minutes in (2, 20):
+        recorder = SessionRecorder(tmp_path / f"{minutes}.h5", examples.header(), signal="session")
+        with recorder:
+            recorder.judge(_so_far(_whole(), 0))
+            for second in range(60 * minutes):
+                time_s = second + np.arange(1000) / 1000
+                recorder.press(time_s, *(np.cos(time_s + k) for k in range(4)))
+            tracemalloc.start()
+            try:
+                recorder.finish()
+                peaks.append(tracemalloc.get_traced_memory()[1])
+            finally:
+                tracemalloc.stop()
+    assert peaks[1] < peaks[0] + 1e6
