@@ -149,6 +149,16 @@ def test_a_model_of_another_device_is_refused(run, tmp_path):
     assert "V" in done.err
 
 
+def test_heat_cannot_be_tracked_with_a_model_that_does_not_know_its_coil(run, tmp_path):
+    """A static model from before captures told the duty: exit 3, what to do, nothing pressed and no file."""
+    static = str(KEPT / "model.h5")
+    done = run("session", "--model", static, "-o", "s.h5", "--beats", 2, "--track-heat", "--json")
+    assert (done.code, done.json["error"]["kind"]) == (3, "data")
+    assert "coil" in done.json["error"]["message"]
+    assert "capture" in done.json["error"]["hint"]
+    assert not list(tmp_path.glob("s.h5*"))
+
+
 def _started(folder: Path, *words: object, port: str = "bench:?speed=real") -> subprocess.Popen[bytes]:
     env = {**os.environ, "PULSETRAINER_PORT": port}
     return subprocess.Popen(
