@@ -51,6 +51,14 @@ class Windows:
         self._held = np.empty((4, 0))
         self.rows: list[FloatArray] = []  # seconds, n, mean d, i, di/dt, d i, i^2, i di/dt; mean i^2 of all
 
+    def begin_part(self) -> None:
+        """Say that the device was off since the last sample: no window goes across.
+
+        One that held the beginning of a major loop alone, without its way down, would take the error of e for
+        two kelvin.
+        """
+        self._held = np.empty((4, 0))
+
     def add(
         self, time_s: FloatArray, reference_A: FloatArray, current_A: FloatArray, duty: FloatArray
     ) -> int:
@@ -169,6 +177,10 @@ class Thermometer:
     def loss(self) -> float:
         """Share of the force that is lost to heat, against a cold coil at calibration."""
         return self.share * self.rise
+
+    def begin_part(self) -> None:
+        """Say that the device was off since the last sample."""
+        self._windows.begin_part()
 
     def restart(self) -> None:
         """Say that the model begins anew with a cold coil, as for each drive that is played by itself."""

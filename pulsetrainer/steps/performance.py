@@ -153,6 +153,8 @@ class Performance:
         while not conductor.ended and not self._fault:
             beats, dropped = self._ledger.count, self._dropped
             self._begun = self._next = round(conductor.time_s * RATE_HZ)
+            if self._thermometer is not None:
+                self._thermometer.begin_part()
             trace = device.stream(
                 partial(next, conductor.part(device.longest_play_s), None),
                 RATE_HZ,

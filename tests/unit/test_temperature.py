@@ -110,3 +110,17 @@ def test_without_a_clear_rise_half_is_taken():
     assert Thermometer(vague, TERM).share == 0.5
     assert Thermometer(COLD, Thermal(0.0072, 20.0)).share == pytest.approx(0.6)
     assert Thermometer(COLD).share == 0.5
+
+
+def test_no_window_goes_across_two_parts():
+    """The device was off between them: each window has samples of one part only, and none is lost within."""
+    windows = Windows()
+    time_s = np.arange(0.0, 4.8, 0.001)
+    first = time_s < 2.4
+    for part, current in ((time_s[first], 0.5), (time_s[~first], 1.0)):
+        windows.begin_part()
+        level = np.full(part.size, current)
+        windows.add(part, level, level, np.full(part.size, 0.3))
+    rows = np.array(windows.rows)
+    np.testing.assert_allclose(rows[:, 3], [0.5, 0.5, 1.0, 1.0])
+    np.testing.assert_allclose(rows[:, 1], 1000, atol=1)
