@@ -71,7 +71,15 @@ class Recorded:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Diagnosis(Shown):
-    """What a model gets wrong on some runs, why, and the model extended by the causes found."""
+    """What a model gets wrong on some runs, why, and the model extended by the causes found.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> found = pt.load("tests/data/files-0.1/diagnosis.h5")
+    >>> found.verdict, [one.cause for one in found.causes if one.found]
+    ('accommodation', ['accommodation'])
+    """
 
     kind: ClassVar[str] = "diagnosis"
 

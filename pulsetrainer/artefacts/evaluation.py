@@ -92,7 +92,16 @@ class ModelEvaluation:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Evaluation(Shown):
-    """An error report: of played waveforms, or of models on a held-out run."""
+    """An error report: of played waveforms, or of models on a held-out run.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> report = pt.load("tests/data/files-0.1/evaluation.h5")
+    >>> figures = report.figures()
+    >>> figures["pulse.continuous.mean_error_reduction_percent"] > 0
+    True
+    """
 
     kind: ClassVar[str] = "evaluation"
 

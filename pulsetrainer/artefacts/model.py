@@ -99,6 +99,15 @@ class Model(Shown):
 
     ``form`` says what the weights are of: "direct", y = P[u] with mu >= 0; "dual", u = P[y] with mu >= 0,
     where edges are of the output and the offset is of the input; "signed", y = P[u] with mu of either sign.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> model = pt.load("tests/data/files-0.1/model.h5")
+    >>> model.levels, model.weights.size, model.form
+    (8, 36, 'direct')
+    >>> model.predict([0.0, 1.0, 0.5], dt_s=1e-3).round(2)
+    array([ 0.51, 10.52,  7.85])
     """
 
     kind: ClassVar[str] = "model"

@@ -23,7 +23,15 @@ class DrivePlayback:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Playback(Shown):
-    """A waveform and what the device measured for each of its drives."""
+    """A waveform and what the device measured for each of its drives.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> played = pt.load("tests/data/files-0.1/played.h5")
+    >>> played.complete, played.compensated.output.shape  # repeats, samples
+    (True, (1, 6042))
+    """
 
     kind: ClassVar[str] = "playback"
 

@@ -28,7 +28,16 @@ class Coil:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Run(Shown):
-    """What a device, or a table from any bench, reported: nothing that a real device does not know."""
+    """What a device, or a table from any bench, reported: nothing that a real device does not know.
+
+    Examples
+    --------
+    >>> import numpy as np, pulsetrainer as pt
+    >>> t = np.arange(100) / 1000
+    >>> run = pt.Run(time_s=t, input=np.sin(t), output=2 * np.sin(t), input_unit="A", output_unit="N")
+    >>> run.input.size, run.output_unit, run.complete
+    (100, 'N', True)
+    """
 
     kind: ClassVar[str] = "run"
 

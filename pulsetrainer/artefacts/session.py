@@ -74,7 +74,17 @@ class Score:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Session(Shown):
-    """Pulses pressed without a fixed end: what was asked, what was measured, how true every beat was."""
+    """Pulses pressed without a fixed end: what was asked, what was measured, how true every beat was.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> model = pt.load("tests/data/files-0.1/model.h5")
+    >>> with pt.open_device("bench:") as device:
+    ...     pressed = pt.session(model, device, beats=2)
+    >>> pressed.pulses, pressed.beats.start_s.size, pressed.quiz
+    (('normal',), 2, None)
+    """
 
     kind: ClassVar[str] = "session"
 

@@ -25,7 +25,15 @@ class RefinePass:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Waveform(Shown):
-    """A target force and the two currents that shall press it: compensated and merely scaled."""
+    """A target force and the two currents that shall press it: compensated and merely scaled.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> drive = pt.load("tests/data/files-0.1/drive.h5")
+    >>> drive.inversion, drive.target.shape == drive.compensated.shape == drive.time_s.shape
+    ('continuous', True)
+    """
 
     kind: ClassVar[str] = "waveform"
 

@@ -20,4 +20,10 @@ def test_examples(name, monkeypatch):
     monkeypatch.chdir(ROOT)
     failed, tried = doctest.testmod(importlib.import_module(name))
     assert not failed
-    assert tried or name.startswith("pulsetrainer.artefacts")
+    assert tried
+
+
+@pytest.mark.parametrize("name", sorted(set(pt.__all__) - {"__version__"}))
+def test_every_public_name_has_an_example(name):
+    """In its own docstring."""
+    assert ">>> " in (getattr(pt, name).__doc__ or "")
