@@ -49,6 +49,8 @@ def named(draws, seeds):
 def test_a_direct_device_is_called_direct():
     """Planes, sums of plays and falling loops."""
     assert named(devices.DIRECT, range(1000, 1009)) == ["direct"] * 9
+    _, u, y, _, _ = measured(devices.DIRECT[0], 1000)
+    assert set(try_all([(u, y)], u.min(), u.max()).left) == {"direct", "signed"}  # a look is enough
 
 
 def late(y, samples):
