@@ -23,6 +23,7 @@ PAGES = (
     "docs/format.html",
     "docs/theory.html",
     "docs/notebooks/first-pulse.html",
+    "docs/notebooks/your-own-record.html",
 )
 pytestmark = pytest.mark.slow
 
