@@ -14,10 +14,10 @@ which lags on neither side.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
-import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike
 
 from pulsetrainer.core.memory import turning_points
@@ -153,12 +153,26 @@ def _local_polynomial(piece: FloatArray, sigma: float, n: int) -> FloatArray:
     """Filter a piece with the widest window that leaves noise of size ``sigma`` behind, and no more."""
     for window in _WINDOWS:
         if window <= piece.size:
-            path = scipy.signal.savgol_filter(piece, window, 2)
+            path = _parabolas(piece, window)
             rest = piece - path
             noise_only = np.std(rest) <= _NOISE_ONLY * sigma
             if noise_only and np.abs(rest).max() <= 0.5 * _NOISE_ONLY * dead_band(sigma, n):
                 return path
     return piece
+
+
+def _parabolas(piece: FloatArray, window: int) -> FloatArray:
+    """Local parabolas of a piece; its ends are continued by that of the first and the last window."""
+    fit, half = _hat(window), window // 2
+    middle = np.convolve(piece, fit[half], mode="valid")
+    return np.concatenate((fit[:half] @ piece[:window], middle, fit[half + 1 :] @ piece[-window:]))
+
+
+@cache
+def _hat(window: int) -> FloatArray:
+    """Fit (window, window) of a parabola to as many samples; savgol_filter makes it anew for each piece."""
+    basis = np.linalg.qr(np.vander(np.arange(window) - window // 2, 3))[0]
+    return np.asarray(basis @ basis.T)
 
 
 def _monotone(piece: FloatArray) -> FloatArray:

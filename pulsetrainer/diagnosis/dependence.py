@@ -9,6 +9,7 @@ scores as much (Davison and Hinkley, Bootstrap Methods and their Application, 19
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,7 +97,8 @@ def best_dependence(
             found += [(tau, part, own) for (tau, (part, _)), own in zip(made, parts, strict=True)]
     if not found:
         return None
-    scores = [_score(own, bank.residual[:, None], bank.piece)[0] for _, _, own in found]
+    seen = [own for _, _, own in found]
+    scores = _falls(seen, bank.residual[:, None], bank.piece)[:, 0].tolist()
     tau, part, own = found[int(np.argmax(scores))]
     axes = linalg.orth(own.astype(np.float64))
 
@@ -106,21 +108,21 @@ def best_dependence(
 
     problem = fitted.problem
     like = noise_in(bank.residual, free_of_both, problem.bins, problem.measured, rng)
-    noise = bank.project(_drawn(like, LIMITS.draws, rng))
-    largest = np.max([_score(one, noise, bank.piece) for _, _, one in found], axis=0)
+    noise = bank.project(_drawn(like, LIMITS.bank_draws, rng))
+    largest = np.max(_falls(seen, noise, bank.piece), axis=0)
     part, values = _refined(bank, part.state, tau)
     return Dependence(part, values, max(scores), p_value(max(scores), largest))
 
 
 def _drawn(noise: Noise, draws: int, rng: np.random.Generator) -> FloatArray:
     """Noise (count, draws) with a spectrum and a local size."""
-    drawn = np.empty((noise.bins.count, draws))
+    drawn = np.empty((draws, noise.bins.count))
     for own, at in noise.bins.places:
         size = fft.next_fast_len(int(at[-1]) + 1, real=True)
         lines = fft.rfft(rng.standard_normal((draws, size)), axis=1)
         lines *= np.sqrt(noise.at(fft.rfftfreq(size)))
-        drawn[own] = fft.irfft(lines, size, axis=1)[:, at].T
-    return drawn * noise.scale[:, None]
+        drawn[:, own] = np.take(fft.irfft(lines, size, axis=1), at, axis=1)
+    return np.asarray((drawn * noise.scale).T)
 
 
 def _refined(bank: Bank, kind: int, tau: float) -> tuple[Part, Values]:
@@ -153,16 +155,25 @@ def _penalty(gram: FloatArray) -> FloatArray:
     )
 
 
-def _score(free: NDArray[np.float32], signals: FloatArray, piece: IntArray) -> FloatArray:
-    """Falls (m,) of the squares of signals (count, m) on pieces left out of the fit of columns (count, k)."""
-    inside = [piece == k for k in range(LIMITS.pieces)]
-    own = [free[one].astype(np.float64) for one in inside]
-    grams = [one.T @ one for one in own]
-    along = [one.T @ signals[where] for one, where in zip(own, inside, strict=True)]
-    gram, whole = sum(grams), sum(along)
-    fall = np.zeros(signals.shape[1])
-    for one, here in zip(grams, along, strict=True):
-        rest = gram - one
-        curve = np.linalg.solve(rest + _penalty(gram), whole - here)
-        fall += 2.0 * np.sum(curve * here, axis=0) - np.sum(curve * (one @ curve), axis=0)
+def _falls(states: Sequence[NDArray[np.float32]], signals: FloatArray, piece: IntArray) -> FloatArray:
+    """Falls (k, m) of the squares of signals (count, m) on pieces left out of the fit, for each state."""
+    ends = np.cumsum([one.shape[1] for one in states])[:-1]
+    grams, along = [], []
+    for k in range(LIMITS.pieces):
+        inside = np.flatnonzero(piece == k)
+        own = np.hstack([one[inside] for one in states])
+        # all states at once: one by one the product is bound by reading the signals
+        product = (own.T @ signals[inside].astype(np.float32)).astype(np.float64)
+        along.append(np.split(product, ends))
+        grams.append([(one.T @ one).astype(np.float64) for one in np.split(own, ends, axis=1)])
+    return np.stack([_fall([one[k] for one in grams], [one[k] for one in along]) for k in range(len(states))])
+
+
+def _fall(grams: Sequence[FloatArray], along: Sequence[FloatArray]) -> FloatArray:
+    """Fall (m,) for one state from its products (k, k) and those with the signals (k, m), of each piece."""
+    gram, whole = np.sum(grams, axis=0), np.sum(along, axis=0)
+    fall = np.zeros(whole.shape[1])
+    for inner, here in zip(grams, along, strict=True):
+        curve = np.linalg.solve(gram - inner + _penalty(gram), whole - here)
+        fall += 2.0 * np.sum(curve * here, axis=0) - np.sum(curve * (inner @ curve), axis=0)
     return fall

@@ -270,7 +270,7 @@ class Projector:
         # where a cause explains all, no cell is left: an unused one stands in, whose mass is close to nothing
         if free.size == 0:
             free = np.asarray([int(np.argmax(np.diagonal(design.gram)))], dtype=np.int64)
-        self.design, self.free = design, free
+        self.design, self.rows = design, np.take(design.matrix, free, axis=1)
         block = design.gram[np.ix_(free, free)].copy()
         block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max())
         self.factor = linalg.cho_factor(block, lower=True, check_finite=False)
@@ -278,8 +278,6 @@ class Projector:
     def __call__(self, columns: FloatArray) -> FloatArray:
         """Columns (count, k) without their fitted part."""
         settled = self.design.bins.settled(columns)
-        masses = np.zeros((self.design.plane.n_q, columns.shape[1]))
-        along = self.design.matrix.T @ settled
-        masses[self.free] = linalg.cho_solve(self.factor, along[self.free], check_finite=False)
-        settled -= self.design.matrix @ masses
+        masses = linalg.cho_solve(self.factor, self.rows.T @ settled, check_finite=False)
+        settled -= self.rows @ masses
         return settled

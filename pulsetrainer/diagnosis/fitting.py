@@ -10,7 +10,7 @@ weights have already swallowed most of it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,9 +26,9 @@ from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fitted:
-    """A jointly fitted model."""
+    """A jointly fitted model; one fit is the same as itself only."""
 
     terms: tuple[Term, ...]
     simulator: Simulator
@@ -37,6 +37,7 @@ class Fitted:
     simulated: FloatArray  # (count,) as the causes and the operator give it
     residual: FloatArray  # (count,) measured less simulated, without offset and start
     squares: float
+    _without: dict[str, Fitted] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def problem(self) -> Problem:
@@ -57,6 +58,13 @@ class Fitted:
     def projector(self) -> Projector:
         """What its weights can fit."""
         return self.design.projector(self.passive)
+
+    def without(self, term: Term) -> Fitted:
+        """Return the same with one of its causes taken out; made once for all who ask."""
+        if term.cause.id not in self._without:
+            others = [other for other in self.terms if other.cause is not term.cause]
+            self._without[term.cause.id] = refit(self.problem, others, self, rounds=LIMITS.without_rounds)
+        return self._without[term.cause.id]
 
     @cached_property
     def slopes(self) -> FloatArray:

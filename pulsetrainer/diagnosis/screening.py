@@ -17,8 +17,9 @@ at zero stay there, and other parameters that enter nonlinearly are taken on the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy import linalg, stats
@@ -118,19 +119,40 @@ class _Block:
         return np.asarray(surprise)
 
 
-def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: int = LIMITS.draws) -> Screen:
-    """Score every cause that is not in the model yet; without ``draws`` no p-values are found."""
-    project = fitted.projector
+_RANKED: WeakKeyDictionary[Fitted, tuple[Score, ...]] = WeakKeyDictionary()
+
+
+def screen(fitted: Fitted, rng: np.random.Generator) -> Screen:
+    """Score every cause that is not in the model yet, with the chance that noise scores as much."""
+    project, problem = fitted.projector, fitted.problem
     residual = project(fitted.residual[:, None])[:, 0]
     blocks = _blocks(problem, fitted)
+    if not blocks:
+        return Screen()
+    noise = noise_in(residual, _less(project, blocks), problem.bins, problem.measured, rng)
+    covariance = noise.covariance(project(_side_by_side(blocks)))
+    known, critical = _p_values(blocks, residual, covariance, LIMITS.draws, rng)
+    return Screen(_scores(fitted, blocks, residual, known, _sights(blocks, covariance, critical)), noise)
+
+
+def ranked(fitted: Fitted) -> tuple[Score, ...]:
+    """Scores of every cause that is not in the model yet, best first; made once for all who ask."""
+    if fitted not in _RANKED:
+        residual = fitted.projector(fitted.residual[:, None])[:, 0]
+        blocks = _blocks(fitted.problem, fitted)
+        _RANKED[fitted] = _scores(fitted, blocks, residual, np.ones(len(blocks)), {})
+    return _RANKED[fitted]
+
+
+def _scores(
+    fitted: Fitted,
+    blocks: Sequence[_Block],
+    residual: FloatArray,
+    known: FloatArray,
+    sights: Mapping[str, Sight],
+) -> tuple[Score, ...]:
+    """Return the score of each cause's best block, best first."""
     gains = [float(block.gains(residual[:, None])[0]) for block in blocks]
-    noise, known = None, np.ones(len(blocks))
-    sights: dict[str, Sight] = {}
-    if draws and blocks:
-        noise = noise_in(residual, _less(project, blocks), problem.bins, problem.measured, rng)
-        covariance = noise.covariance(project(_side_by_side(blocks)))
-        known, critical = _p_values(blocks, residual, covariance, draws, rng)
-        sights = _sights(blocks, covariance, critical)
     best: dict[str, int] = {}
     p_values: dict[str, float] = {}
     for k, block in enumerate(blocks):
@@ -138,12 +160,12 @@ def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: in
         p_values[name] = min(p_values.get(name, 1.0), float(known[k]))
         if name not in best or gains[k] > gains[best[name]]:
             best[name] = k
-    left = _at_full_rate(problem, fitted)
+    frames, left = fitted.problem.frames, _at_full_rate(fitted.problem, fitted)
     scores = [
         Score(
             block.cause,
             gains[k],
-            block.cause.sharpened(_start(block, residual, problem.frames[0]), problem.frames, left),
+            block.cause.sharpened(_start(block, residual, frames[0]), frames, left),
             p_values[name],
             block.basis,
             sights.get(name),
@@ -151,7 +173,7 @@ def screen(problem: Problem, fitted: Fitted, rng: np.random.Generator, draws: in
         for name, k in best.items()
         for block in [blocks[k]]
     ]
-    return Screen(tuple(sorted(scores, key=lambda s: -s.gain)), noise)
+    return tuple(sorted(scores, key=lambda s: -s.gain))
 
 
 def _side_by_side(blocks: Sequence[_Block]) -> FloatArray:

@@ -100,7 +100,7 @@ def test_autocorrelated_noise_does_not_alarm():
     noisy = replace(record, output=y)
     again = problem_for([noisy], 0.0, high)
     base = weights_for(again, (), None)
-    scores = screen(again, base, np.random.default_rng(0))
+    scores = screen(base, np.random.default_rng(0))
     independent = base.squares / again.bins.count
     best = scores.scores[0]
     assert best.gain / independent > 6.6  # the one per cent point of F(1, many)

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from pulsetrainer.diagnosis import residual, velocity, wording
+from pulsetrainer.diagnosis import fitting, residual, velocity, wording
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.congruency import Contrast
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.raw import Firing
 from pulsetrainer.diagnosis.scale import Scale
@@ -50,6 +51,10 @@ class Fit:
 
     squares: float
     terms: tuple[Term, ...] = ()
+    problem: object = None
+    _without: dict = field(default_factory=dict)
+
+    without = Fitted.without
 
     @property
     def names(self):
@@ -330,34 +335,31 @@ def _exchanged(monkeypatch, squares: dict[str, float]):
         frozenset({"field-lag"}): 460.0,
         frozenset({"delay"}): 460.0,
     }
-    asked = _refitting(monkeypatch, exchange, acceptance, squares=fits)
+    asked = _refitting(monkeypatch, exchange, acceptance, fitting, squares=fits)
     names = ("output-lag", "rate-widening", "delay", "accommodation", "step")
-    screens = []
 
-    def screen(problem, fitted, rng, draws):
-        screens.append(draws)
-        return Screen(tuple(_score(name, 1.0) for name in names if name not in fitted.names))
+    def ranked(fitted):
+        return tuple(_score(name, 1.0) for name in names if name not in fitted.names)
 
-    monkeypatch.setattr(exchange, "screen", screen)
+    monkeypatch.setattr(exchange, "ranked", ranked)
     state = _state(_fit(400.0, "creep", "field-lag"), p_values={"creep": 0.006, "field-lag": 0.007})
-    return exchange.stage(state), asked, screens
+    return exchange.stage(state), asked
 
 
 def test_a_cause_is_exchanged_for_a_better_one_of_its_family(monkeypatch):
     """It inherits the p-value; the step, of another family, is not tried in its place."""
-    after, asked, screens = _exchanged(
+    after, asked = _exchanged(
         monkeypatch, {"output-lag": 395.0, "rate-widening": 405.0, "delay": 390.0}
     )
     assert after.current.names == ("creep", "delay")
     assert dict(after.p_values) == {"creep": 0.006, "delay": 0.007}
     assert not [names for names, _, _ in asked if "step" in names]
-    assert screens == [0, 0]
     assert asked[-1] == (("creep", "delay"), None, False)
 
 
 def test_a_cause_stays_where_no_other_of_its_family_is_better(monkeypatch):
     """The fit is left as it was."""
-    after, asked, _ = _exchanged(monkeypatch, {"output-lag": 401.0, "rate-widening": 405.0, "delay": 400.0})
+    after, asked = _exchanged(monkeypatch, {"output-lag": 401.0, "rate-widening": 405.0, "delay": 400.0})
     assert after.current.names == ("creep", "field-lag")
     assert after.current.squares == 400.0
     assert (("field-lag",), 1, False) in asked
@@ -367,7 +369,7 @@ def test_a_cause_stays_where_no_other_of_its_family_is_better(monkeypatch):
 def test_a_cause_that_is_not_missed_is_dropped(monkeypatch, without, kept):
     """By a relevant amount; the scores are made again for the smaller model."""
     squares = {frozenset({"step"}): without, frozenset({"creep"}): 450.0}
-    asked = _refitting(monkeypatch, elimination, squares=squares)
+    asked = _refitting(monkeypatch, fitting, squares=squares)
     monkeypatch.setattr(screened, "stage", lambda state: replace(state, scores="anew"))
     p_values = {"creep": 0.006, "step": 0.007}
     after = elimination.stage(_state(_fit(400.0, "creep", "step"), p_values=p_values, scores="old"))
@@ -485,17 +487,10 @@ def _rivals(
 ):
     fits = {frozenset({one}): squares for one in scores}
     asked = _refitting(monkeypatch, rivals, squares=fits)
-    screened_draws = []
-
-    def screen(problem, fitted, rng, draws):
-        screened_draws.append(draws)
-        return Screen(tuple(_score(one, gain) for one in scores))
-
-    monkeypatch.setattr(rivals, "screen", screen)
+    monkeypatch.setattr(rivals, "ranked", lambda _fitted: tuple(_score(one, gain) for one in scores))
     without = {name: _fit(current + 400.0)}
     state = _state(_fit(current, name), without=without, lacks=lacks)
     found = rivals.rivals(state, state.current.terms[0])
-    assert screened_draws == [0]
     return found, asked
 
 
@@ -521,7 +516,7 @@ def test_a_rival_of_a_large_gain_may_be_a_little_worse(monkeypatch):
     for squares, found in ((50.9, ("delay",)), (51.1, ())):
         fits = {frozenset({"delay"}): squares}
         _refitting(monkeypatch, rivals, squares=fits)
-        monkeypatch.setattr(rivals, "screen", lambda *_, **__: Screen((_score("delay", 6000.0),)))
+        monkeypatch.setattr(rivals, "ranked", lambda _fitted: (_score("delay", 6000.0),))
         state = _state(_fit(1.0, "field-lag"), without={"field-lag": _fit(10_001.0)})
         assert rivals.rivals(state, state.current.terms[0]) == found
 

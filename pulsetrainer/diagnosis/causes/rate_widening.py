@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import atan, tan, tanh
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, r
 
 _TRIED = (0.005, 0.015)  # of the root of the range
 _NONE = 3e-8  # of the root of range and time step: a smaller coefficient widens nothing
-_PARTS = 4  # of a sample: after a turn the excess moves fast
 
 
 class RateWidening(Cause):
@@ -38,17 +38,37 @@ class RateWidening(Cause):
         k = values[0]
         if k <= _NONE * (frame.reach * frame.dt_s) ** 0.5:
             return u
-        # v' = sgn(e) (e/k)^2 with e = u - v: exact over a part of a sample with u held at its middle value
-        per_step = frame.dt_s / _PARTS / k**2
-        parts = (np.arange(_PARTS) + 0.5) / _PARTS
         begun, inner = remembered(frame.past, self.id, np.repeat(u[:1], 2)).tolist()
-        path = [inner]
         if frame.past is not None and frame.past.before:
             u = np.append(begun, u)
-        middles = (u[:-1, None] + np.diff(u)[:, None] * parts).ravel().tolist()
-        for middle in middles:
-            excess = middle - inner
-            inner = middle - excess / (1.0 + abs(excess) * per_step)
-            path.append(inner)
-        remember(frame.past, self.id, np.asarray([u[-1], inner]))
-        return np.asarray(path[::_PARTS])[-frame.input.size :]
+        excess = [u[0] - inner, *_excess(u, u[0] - inner, k, frame.dt_s)]
+        path = np.asarray(u - excess)
+        remember(frame.past, self.id, np.asarray([u[-1], path[-1]]))
+        return path[-frame.input.size :]
+
+
+def _excess(u: FloatArray, e: float, k: float, dt_s: float) -> list[float]:
+    """Excess e = u - v (n - 1,) at the samples of ``u`` (n,) after the first, where it is ``e``.
+
+    Exact for an input that is straight between samples: e' = u' - sgn(e) (e/k)^2 is a Riccati equation. With
+    E = k sqrt|u'| and a = sqrt|u'| dt/k its solution is E (e + E tanh a)/(E + e tanh a) where e has the sign
+    of u', and E tan(atan(e/E) + a) where it has the other one, until it is zero.
+    """
+    rate = np.diff(u) / dt_s
+    root = np.sqrt(np.abs(rate))
+    turn = root * dt_s / k
+    found = []
+    for end, angle, th, up in zip(
+        (k * root).tolist(), turn.tolist(), np.tanh(turn).tolist(), (rate > 0).tolist(), strict=True
+    ):
+        own = e if up else -e  # along the input's motion
+        if end == 0.0:
+            own = own / (1.0 + abs(own) * dt_s / k**2)
+        elif own >= 0.0:
+            own = end * (own + end * th) / (end + own * th)
+        else:
+            rest = atan(own / end) + angle
+            own = end * (tan(rest) if rest < 0.0 else tanh(rest))
+        e = own if up else -own
+        found.append(e)
+    return found

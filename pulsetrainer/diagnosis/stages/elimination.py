@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.stages import screened
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
@@ -24,15 +23,7 @@ def stage(state: State) -> State:
 def _eliminated(state: State) -> tuple[Fitted, dict[str, Fitted]]:
     current = state.current
     while len(current.terms) > 1:
-        without = [
-            refit(
-                state.problem,
-                [other for other in current.terms if other is not term],
-                current,
-                rounds=LIMITS.without_rounds,
-            )
-            for term in current.terms
-        ]
+        without = [current.without(term) for term in current.terms]
         weakest = min(without, key=lambda fitted: fitted.squares)
         if weakest.squares - current.squares >= state.floor.relevant:
             return current, {t.cause.id: one for t, one in zip(current.terms, without, strict=True)}

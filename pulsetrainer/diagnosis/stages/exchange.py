@@ -13,10 +13,9 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit
-from pulsetrainer.diagnosis.screening import screen
+from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
@@ -32,12 +31,10 @@ def _exchanged(state: State, cause: Cause) -> State:
     if not kin:
         return state
     # by its cause: an exchange before this one has moved all terms
-    others = [term for term in current.terms if term.cause is not cause]
-    without = refit(problem, others, current, rounds=LIMITS.without_rounds)
-    known = screen(problem, without, state.question.rng, draws=0)
+    without = current.without(next(term for term in current.terms if term.cause is cause))
     trials = [
         refit(problem, (*without.terms, Term(score.cause, score.start)), without)
-        for score in known.scores
+        for score in ranked(without)
         if score.cause.id in kin
     ]
     best = min((current, *trials), key=lambda fitted: fitted.squares)

@@ -22,7 +22,7 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
-from pulsetrainer.diagnosis.screening import screen
+from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -71,14 +71,13 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     """Causes that repair the data as well as ``term``, within the noise of the comparison."""
     fitted, without, floor = state.current, state.without[term.cause.id], state.floor
     gain = without.squares - fitted.squares
-    scores = screen(state.problem, without, state.question.rng, draws=0)
     margin = max(
         LIMITS.rival_gain * gain,
         LIMITS.rival_relevant * floor.relevant,
         LIMITS.rival_noise * fitted.squares / floor.count,
     )
     found = []
-    for score in scores.scores[: LIMITS.closest]:
+    for score in ranked(without)[: LIMITS.closest]:
         known = score.cause.id in (term.cause.id, *fitted.names)
         if known or score.gain < LIMITS.rival_screened * gain:
             continue

@@ -22,7 +22,7 @@ from pulsetrainer.diagnosis.state import State
 
 def stage(state: State) -> State:
     """Return the state with the scores of all causes that are not in the model."""
-    scores = screen(state.problem, state.current, state.question.rng)
+    scores = screen(state.current, state.question.rng)
     norm = state.floor.span * float(np.sqrt(state.floor.count))
     limits = {
         one.cause.id: one.sight.least(state.floor.relevant) / norm
