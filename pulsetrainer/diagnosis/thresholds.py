@@ -155,6 +155,7 @@ class Thresholds:
     rival_gain: float = 0.005  # of that gain: as good, if no farther behind than the largest of this,
     rival_relevant: float = 0.3  # ... of the relevant fall of squares,
     once_in_twenty: float = 1.645  # standard deviations of their difference under noise as it is
+    cut_turns: float = 0.3  # of the second difference of the output: drawn plants needed up to 0.26
     rival_noise: float = 12.0  # ... and mean squares: the noise of comparing two fits
     alike: float = 0.9  # cosine of screened columns: above, a quick screen names both
 

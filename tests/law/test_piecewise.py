@@ -30,7 +30,7 @@ VALUES = {
     "rate-widening": (0.01,),
     "resonance": (20.0, 0.2),
     "thermal-drift": (0.05, 3.0),
-    "viscous": (0.02,),
+    "viscous": (0.02, 0.01),
     # every kind of state at once
     "unlisted": (
         *(one for k, (low, high) in enumerate(ENDS) for one in (float(k), low, high)),

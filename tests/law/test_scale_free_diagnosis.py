@@ -34,7 +34,7 @@ HIDDEN = {
     "output-lag": (0.03,),
     "creep": (0.1, 1.0),
     "thermal-drift": (0.1, 15.0),
-    "viscous": (0.01,),
+    "viscous": (0.01, 0.0),
     "offset-drift": (0.0005,),
 }
 POWERS = st.floats(-9, 6).map(lambda power: 10.0**power)

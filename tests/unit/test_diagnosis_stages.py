@@ -348,9 +348,7 @@ def _exchanged(monkeypatch, squares: dict[str, float]):
 
 def test_a_cause_is_exchanged_for_a_better_one_of_its_family(monkeypatch):
     """It inherits the p-value; the step, of another family, is not tried in its place."""
-    after, asked = _exchanged(
-        monkeypatch, {"output-lag": 395.0, "rate-widening": 405.0, "delay": 390.0}
-    )
+    after, asked = _exchanged(monkeypatch, {"output-lag": 395.0, "rate-widening": 405.0, "delay": 390.0})
     assert after.current.names == ("creep", "delay")
     assert dict(after.p_values) == {"creep": 0.006, "delay": 0.007}
     assert not [names for names, _, _ in asked if "step" in names]

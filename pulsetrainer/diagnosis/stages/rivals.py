@@ -1,10 +1,10 @@
 """Rivals: which causes explain the data as well as the one found.
 
 A name is unique only if no other cause fits as well in its place. The three that score best without it are
-fitted jointly; one that comes as close as two fits of the same data may differ is named beside it. On a
-record of one single rate all causes that widen the loop with the rate are named together: there they are
-just a wider loop. Causes that equal loops show have no rivals here: equal loops differ by nothing else that
-is known.
+fitted jointly; one that comes as close as two fits of the same data may differ, by noise or by what happens
+between two samples, is named beside it. On a record of one single rate all causes that widen the loop with
+the rate are named together: there they are just a wider loop. Causes that equal loops show have no rivals
+here: equal loops differ by nothing else that is known.
 
 What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
 than the model without it, the interval of its strength spans zero, or a parameter sits on its bound.
@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.extended import Term
@@ -77,13 +78,15 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
         LIMITS.rival_noise * fitted.squares / floor.count,
     )
     found = []
-    for score in ranked(without)[: LIMITS.closest]:
-        known = score.cause.id in (term.cause.id, *fitted.names)
-        if known or score.gain < LIMITS.rival_screened * gain:
+    others = [score for score in ranked(without) if score.cause.id not in fitted.names]
+    for score in others[: LIMITS.closest]:
+        if score.gain < LIMITS.rival_screened * gain:
             continue
         terms = (*without.terms, Term(score.cause, score.start))
         trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds)
-        if trial.squares - fitted.squares < max(margin, _by_chance(state, trial)):
+        apart = fitted.projector((trial.simulated - fitted.simulated)[:, None])[:, 0]
+        doubt = _by_chance(state, apart) + _between_samples(fitted, apart)
+        if trial.squares - fitted.squares < max(margin, doubt):
             found.append(score.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
         alike = [c.id for c in library().values() if c.widens and c is not term.cause]
@@ -91,13 +94,23 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _by_chance(state: State, trial: Fitted) -> float:
+def _by_chance(state: State, apart: FloatArray) -> float:
     """Difference of squares of two models that noise exceeds once in twenty, if neither is better.
 
-    Of squares |e + d|^2 - |e|^2 with e noise and d the difference of the models, 2 d'e is chance.
+    Of squares |e + d|^2 - |e|^2 with e noise and d (count,) the difference of the models, 2 d'e is chance.
     """
     if state.scores.noise is None:
         return 0.0
-    apart = state.current.projector((trial.simulated - state.current.simulated)[:, None])
-    variance = float(state.scores.noise.covariance(apart)[0, 0])
+    variance = float(state.scores.noise.covariance(apart[:, None])[0, 0])
     return 2.0 * LIMITS.once_in_twenty * float(np.sqrt(variance))
+
+
+def _between_samples(fitted: Fitted, apart: FloatArray) -> float:
+    """Difference of squares of two models that what happens between samples can make.
+
+    A turn of the input lies anywhere between two samples, and what is cut off there looks like a share of the
+    second difference of the output: the formulas of short lags differ by just that.
+    """
+    bent = [np.diff(y, 2, prepend=y[:1], append=y[-1:]) for y in fitted.simulator.full(fitted.terms)]
+    cut = fitted.projector(fitted.problem.bins.average(bent)[:, None])[:, 0]
+    return 2.0 * LIMITS.cut_turns * abs(float(apart @ cut))
