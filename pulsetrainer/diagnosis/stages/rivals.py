@@ -23,6 +23,7 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.noise import Noise
 from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -84,9 +85,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
             continue
         terms = (*without.terms, Term(score.cause, score.start))
         trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds)
-        apart = fitted.projector((trial.simulated - fitted.simulated)[:, None])[:, 0]
-        doubt = _by_chance(state, apart) + _between_samples(fitted, apart)
-        if trial.squares - fitted.squares < max(margin, doubt):
+        if trial.squares - fitted.squares < max(margin, _doubt(state, trial)):
             found.append(score.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
         alike = [c.id for c in library().values() if c.widens and c is not term.cause]
@@ -94,19 +93,25 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _by_chance(state: State, apart: FloatArray) -> float:
+def _doubt(state: State, trial: Fitted) -> float:
+    """Difference of squares that tells nothing: what noise makes, and what happens between samples."""
+    fitted, noise = state.current, state.scores.noise
+    if noise is None:
+        return 0.0
+    apart = fitted.projector((trial.simulated - fitted.simulated)[:, None])
+    return _by_chance(noise, apart) + _between_samples(fitted, apart[:, 0])
+
+
+def _by_chance(noise: Noise, apart: FloatArray) -> float:
     """Difference of squares of two models that noise exceeds once in twenty, if neither is better.
 
-    Of squares |e + d|^2 - |e|^2 with e noise and d (count,) the difference of the models, 2 d'e is chance.
+    Of squares |e + d|^2 - |e|^2 with e noise and d (count, 1) the difference of the models, 2 d'e is chance.
     """
-    if state.scores.noise is None:
-        return 0.0
-    variance = float(state.scores.noise.covariance(apart[:, None])[0, 0])
-    return 2.0 * LIMITS.once_in_twenty * float(np.sqrt(variance))
+    return 2.0 * LIMITS.once_in_twenty * float(np.sqrt(noise.covariance(apart)[0, 0]))
 
 
 def _between_samples(fitted: Fitted, apart: FloatArray) -> float:
-    """Difference of squares of two models that what happens between samples can make.
+    """Difference of squares of two models, ``apart`` (count,), that what happens between samples can make.
 
     A turn of the input lies anywhere between two samples, and what is cut off there looks like a share of the
     second difference of the output: the formulas of short lags differ by just that.
