@@ -53,20 +53,21 @@ def shown_output(terms: Sequence[Term], y: FloatArray, frame: Frame) -> FloatArr
     return y
 
 
-def chain(
-    terms: Sequence[Term],
-    static: Callable[[FloatArray], FloatArray],
-    frame: Frame,
-    y: FloatArray | None = None,
-) -> FloatArray:
-    """Output (n,) of the whole chain; ``y`` is a first guess of it for a term that feeds it back."""
-    feeds_back = any(term.cause.feeds_back for term in terms)
-    if not feeds_back:
-        return shown_output(terms, static(seen_input(terms, frame.input, frame)), frame)
-    inner = static(frame.input) if y is None else y
+def chain(terms: Sequence[Term], static: Callable[[FloatArray], FloatArray], frame: Frame) -> FloatArray:
+    """Output (n,) of the whole chain."""
+    return shown_output(terms, hysteresis(terms, static, frame), frame)
+
+
+def hysteresis(terms: Sequence[Term], static: Callable[[FloatArray], FloatArray], frame: Frame) -> FloatArray:
+    """Output (n,) of the hysteresis behind the input terms; what is fed back is passed until it settles."""
+    if not any(term.cause.feeds_back for term in terms):
+        return static(seen_input(terms, frame.input, frame))
+    inner = static(frame.input)
     for _ in range(LIMITS.feedback_passes):
-        inner = static(seen_input(terms, inner, frame))
-    return shown_output(terms, inner, frame)
+        before, inner = inner, static(seen_input(terms, inner, frame))
+        if np.max(np.abs(inner - before)) <= LIMITS.feedback_settled * frame.span:
+            break
+    return inner
 
 
 @dataclass(frozen=True)

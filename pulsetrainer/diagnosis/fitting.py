@@ -21,7 +21,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Frame, Quantity
 from pulsetrainer.diagnosis.design import Design, Projector
-from pulsetrainer.diagnosis.extended import Term, chain, in_order, shown_output
+from pulsetrainer.diagnosis.extended import Term, hysteresis, in_order, shown_output
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -109,8 +109,7 @@ class Simulator:
         if before not in self._static:
             if any(t.cause.feeds_back for t in before):
                 self._static[before] = [
-                    chain(before, self.static, frame, record.output)
-                    for record, frame in zip(self.problem.records, self.problem.frames, strict=True)
+                    hysteresis(before, self.static, frame) for frame in self.problem.frames
                 ]
             else:
                 self._static[before] = [one.output(self.operator) for one in self.problem.paths(before)]

@@ -196,6 +196,7 @@ class Thresholds:
     inverse_rounds: int = 16  # of the inverse
     inverse_patience: int = 3  # rounds without gain that end it
     feedback_passes: int = 6  # each multiplies the error of a fed back output by some per cent
+    feedback_settled: float = 1e-9  # of the span: passes end when they change less
     extended_levels: int = 64  # at most: the joint refit holds dense rows
     trace_samples: int = 6000  # kept for the figures
     experiment_Hz: float = 200.0  # sample rate of the experiments tried on paper

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import integrate
 
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import causes, wording
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import library, rate_widening
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass, settled
 from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.raw import Raw, coarse_step, noise_of, spacing_of
@@ -441,3 +445,19 @@ def test_a_gap_in_time_hides_no_wild_sample_elsewhere():
     for values, fires in ((at_gap, False), (elsewhere, True)):
         raw = replace(_raw(values, dt=1.0), stamps=stamps)
         assert (CAUSE["outliers"].gate(raw) is not None) is fires
+
+
+@given(seed=st.integers(0, 10**6), k=st.floats(0.01, 0.3), begin=st.floats(-1.0, 1.0), rest=st.booleans())
+def test_a_widening_solves_its_equation(seed, k, begin, rest):
+    """The trailing v' = sgn(u - v) ((u - v)/k)^2, integrated in small steps on straight lines."""
+    u = np.cumsum(np.random.default_rng(seed).normal(0.0, 0.03, 12))
+    if rest:
+        u[4:7] = u[4]
+    seen = [begin]
+    for a, b in pairwise(u):
+        slope, e = (b - a) / DT, seen[-1]
+        found = integrate.solve_ivp(
+            lambda _, e, slope=slope: slope - np.sign(e) * (e / k) ** 2, (0.0, DT), [e], rtol=1e-9, atol=1e-12
+        )
+        seen.append(found.y[0, -1])
+    np.testing.assert_allclose(rate_widening._excess(u, begin, k, DT), seen[1:], atol=1e-7)

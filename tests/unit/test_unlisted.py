@@ -6,15 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Extension, Parameter
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.diagnosis import dependence
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, STATES, Part, Unlisted
 from pulsetrainer.diagnosis.repeats import repeats
+from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 from wording import raises
 
@@ -201,3 +205,21 @@ def test_what_repeats(after, expected):
     """Half of what the fit gains, and no piece worse by a tenth of it."""
     held_out = _Pieces(before=[2.0] * 5, after=after)
     assert repeats(held_out, _Fit("before", 10.0), _Fit("after", 5.0)) is expected
+
+
+@given(st.integers(0, 10**6))
+def test_the_bank_is_scored_as_piece_by_piece(seed):
+    """Each state's curve fitted to all pieces but one, and the fall of the squares on that one."""
+    rng = np.random.default_rng(seed)
+    piece = rng.permutation(np.arange(100) % LIMITS.pieces)
+    states = [rng.normal(size=(100, KNOTS - 1)).astype(np.float32) for _ in range(3)]
+    signals = rng.normal(size=(100, 2)) + states[1][:, :2]
+    naive = np.zeros((3, 2))
+    for k, columns in enumerate(states):
+        for left_out in range(LIMITS.pieces):
+            rest, own = columns[piece != left_out], columns[piece == left_out]
+            ridge = dependence._penalty(np.asarray(columns.T @ columns, dtype=np.float64))
+            curve = np.linalg.solve(rest.T @ rest + ridge, rest.T @ signals[piece != left_out])
+            before = signals[piece == left_out]
+            naive[k] += np.sum(before**2 - (before - own @ curve) ** 2, axis=0)
+    np.testing.assert_allclose(dependence._falls(states, signals, piece), naive, rtol=1e-4, atol=1e-3)
