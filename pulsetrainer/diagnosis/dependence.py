@@ -87,7 +87,8 @@ def best_dependence(
     bank = Bank(fitted, held_out, order)
     frame = fitted.problem.frames[0]
     slowest = LIMITS.slowest_state * frame.length_s
-    taus = spread(min(max(LIMITS.fastest_state_s, 2.0 * frame.dt_s), slowest), slowest, LIMITS.state_ratio)
+    fastest = min(max(LIMITS.fastest_state_s, 2.0 * frame.dt_s), slowest)
+    taus = spread(fastest, slowest, LIMITS.state_ratio)
     found = []
     for kind in range(len(STATES)):
         made = [(tau, one) for tau in taus if (one := bank.columns(kind, tau)) is not None]
@@ -110,7 +111,7 @@ def best_dependence(
     like = noise_in(bank.residual, free_of_both, problem.bins, problem.measured, rng)
     noise = bank.project(_drawn(like, LIMITS.bank_draws, rng))
     largest = np.max(_falls(seen, noise, bank.piece), axis=0)
-    part, values = _refined(bank, part.state, tau)
+    part, values = _refined(bank, part.state, tau, fastest)
     return Dependence(part, values, max(scores), p_value(max(scores), largest))
 
 
@@ -125,8 +126,8 @@ def _drawn(noise: Noise, draws: int, rng: np.random.Generator) -> FloatArray:
     return np.asarray((drawn * noise.scale).T)
 
 
-def _refined(bank: Bank, kind: int, tau: float) -> tuple[Part, Values]:
-    """Return the time constant near ``tau`` that fits best, and its curve."""
+def _refined(bank: Bank, kind: int, tau: float, fastest: float) -> tuple[Part, Values]:
+    """Return the time constant near ``tau``, from ``fastest``, that fits best, and its curve."""
 
     def left(log_tau: float) -> float:
         made = bank.columns(kind, float(np.exp(log_tau)))
@@ -135,7 +136,7 @@ def _refined(bank: Bank, kind: int, tau: float) -> tuple[Part, Values]:
         free = bank.project(made[1])
         return float(np.sum((bank.residual - free @ bank.curve(free)) ** 2))
 
-    near = (np.log(tau / LIMITS.state_ratio), np.log(tau * LIMITS.state_ratio))
+    near = (np.log(max(tau / LIMITS.state_ratio, fastest)), np.log(tau * LIMITS.state_ratio))
     best = optimize.minimize_scalar(
         left, bounds=near, method="bounded", options={"xatol": LIMITS.state_settled}
     )

@@ -4,8 +4,9 @@ Where more is left than noise, the device may depend on something that is in no 
 fitted by a curve over one state after another: averages of input and output over many times, of their squares
 and speeds, how far each is from its average, the last turn, the way and the time since, and how long the
 input has rested. The state is taken that best predicts whole pieces of the time that were left out, if noise
-alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if it matters, and if,
-refitted with all weights, it repeats (`repetition`). The next one is sought in what is left, up to three.
+alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if it matters and is more
+than the formulas of listed causes may miss (8 % of what they explain), and if, refitted with all weights, it
+repeats (`repetition`). The next one is sought in what is left, up to three.
 
 Where the listed causes found leave more than half unexplained, the search begins without them: they may have
 been taken for what they are not. They are then asked for again, beside the curve; and every cause, listed or
@@ -69,7 +70,8 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
         ):
             return (current if parts else None), largest, False
         trial = _refitted(state, current, [*parts, best.part], [*values, *best.values])
-        falls = current.squares - trial.squares > state.floor.relevant
+        listed = LIMITS.imperfect * (state.baseline.squares - state.current.squares)
+        falls = current.squares - trial.squares > max(state.floor.relevant, listed)
         if not falls or not repeats(state.held_out, current, trial):
             return (current if parts else None), largest, falls and not parts
         parts.append(best.part)
