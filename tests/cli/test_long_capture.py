@@ -144,7 +144,7 @@ def test_what_cannot_be_resumed_says_why(tmp_path):
     assert noted.code == 0, noted
     assert "run.h5.partial holds" in noted.err
     assert "--resume" in noted.err
-    refused(("--speed", "0.75"), "run.h5 already exists", "--overwrite")
+    refused(("--speed", "0.75"), "run.h5 (-o) already exists", "--overwrite")
     (tmp_path / "run.h5.partial").unlink()
     refused((), "nothing to resume: run.h5 is complete", "leave --resume out")
     (tmp_path / "run.h5").unlink()
