@@ -968,3 +968,15 @@ def test_gain_and_shape_are_unchanged_within_a_hundredth(gain, left, explains, k
     """Of the span; and a change is everything but a thousandth of the squared error."""
     found = condition_change.Change(gain, 0.0, 1.0, 0.0, explains, left, 1.0, 10.0)
     assert (found.kind, found.is_everything) == (kind, everything)
+
+
+@pytest.mark.parametrize(("apart", "first"), [(9.9, "delay"), (10.1, "resonance")])
+def test_of_two_as_good_the_simpler_is_tried_first(monkeypatch, apart, first):
+    """One parameter before two, where noise and what lies between samples could make the difference."""
+    squares = {frozenset({"resonance"}): 50.0, frozenset({"delay"}): 50.0 + apart, frozenset({"step"}): 51.0}
+    _refitting(monkeypatch, joint_fit, squares=squares)
+    monkeypatch.setattr(joint_fit, "doubt", lambda best, trial, noise: 10.0)
+    scores = Screen(tuple(_score(name, 100.0) for name in ("resonance", "delay", "step")))
+    found = joint_fit.stage(_state(_fit(500.0), scores=scores))
+    rest = [name for name in ("resonance", "step", "delay") if name != first]
+    assert [score.cause.id for _, score in found.trials] == [first, *rest]

@@ -4,13 +4,15 @@ The weights have swallowed most of any effect, so that its fit to their residual
 best three candidates are therefore fitted jointly: parameters of all causes and all weights at once. A
 candidate must be significant, and its linearised score half of what is relevant, since the score shows less
 than a refit does. Of a family that is in the model already none is tried: what a cause of its own kind
-leaves is its imperfect formula, not a second cause.
+leaves is its imperfect formula, not a second cause. The best fit comes first; but one with fewer parameters
+comes before it, if noise or what happens between two samples could make the difference.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.screening import Score
@@ -27,7 +29,17 @@ def stage(state: State) -> State:
         if score.cause.family not in state.families:
             terms = (*state.current.terms, Term(score.cause, score.start))
             trials.append((refit(state.problem, terms, state.current, rounds=LIMITS.trial_rounds), score))
-    return replace(state, trials=tuple(sorted(trials, key=lambda pair: pair[0].squares)))
+    trials.sort(key=lambda pair: pair[0].squares)
+    if trials:
+        best = trials[0][0]
+        trials.sort(key=lambda pair: not _simpler(state, best, pair[0]))  # stable: else by their squares
+    return replace(state, trials=tuple(trials))
+
+
+def _simpler(state: State, best: Fitted, trial: Fitted) -> bool:
+    """Whether a trial has fewer parameters than the best one, and is as good as can be told."""
+    known, own = (sum(len(term.values) for term in fitted.terms) for fitted in (best, trial))
+    return own < known and trial.squares - best.squares < doubt(best, trial, state.scores.noise)
 
 
 def promising(state: State, score: Score) -> bool:

@@ -15,15 +15,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
-
-from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
-from pulsetrainer.diagnosis.fitting import Fitted, refit
-from pulsetrainer.diagnosis.noise import Noise
+from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -85,37 +82,9 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
             continue
         terms = (*without.terms, Term(score.cause, score.start))
         trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds)
-        if trial.squares - fitted.squares < max(margin, _doubt(state, trial)):
+        if trial.squares - fitted.squares < max(margin, doubt(fitted, trial, state.scores.noise)):
             found.append(score.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
         alike = [c.id for c in library().values() if c.widens and c is not term.cause]
         found += [name for name in alike if name not in (*found, *fitted.names)]
     return tuple(found)
-
-
-def _doubt(state: State, trial: Fitted) -> float:
-    """Difference of squares that tells nothing: what noise makes, and what happens between samples."""
-    fitted, noise = state.current, state.scores.noise
-    if noise is None:
-        return 0.0
-    apart = fitted.projector((trial.simulated - fitted.simulated)[:, None])
-    return _by_chance(noise, apart) + _between_samples(fitted, apart[:, 0])
-
-
-def _by_chance(noise: Noise, apart: FloatArray) -> float:
-    """Difference of squares of two models that noise exceeds once in twenty, if neither is better.
-
-    Of squares |e + d|^2 - |e|^2 with e noise and d (count, 1) the difference of the models, 2 d'e is chance.
-    """
-    return 2.0 * LIMITS.once_in_twenty * float(np.sqrt(noise.covariance(apart)[0, 0]))
-
-
-def _between_samples(fitted: Fitted, apart: FloatArray) -> float:
-    """Difference of squares of two models, ``apart`` (count,), that what happens between samples can make.
-
-    A turn of the input lies anywhere between two samples, and what is cut off there looks like a share of the
-    second difference of the output: the formulas of short lags differ by just that.
-    """
-    bent = [np.diff(y, 2, prepend=y[:1], append=y[-1:]) for y in fitted.simulator.full(fitted.terms)]
-    cut = fitted.projector(fitted.problem.bins.average(bent)[:, None])[:, 0]
-    return 2.0 * LIMITS.cut_turns * abs(float(apart @ cut))
