@@ -17,18 +17,73 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 
 NEAR = 0.01  # of the range: a noisy record touches its extreme only once, late
+_APART = 0.03  # of the span of the output: a first stroke that runs so far from the later ones is another ...
+_TIMES = 5.0  # ... if these run nearer to each other by this factor
+_COMPARED = 0.2  # of the range: shorter strokes are not compared ...
+_PLACES = 20  # ... nor those of fewer samples; and at so many places
 
 
-def known_from(inputs: FloatArray, low: float, high: float) -> int:
+def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray | None = None) -> int:
     """First sample (n,) at which the memory is known, whatever came before the record.
 
     Where the input reaches an end of [low, high], every remembered extreme is wiped out. Reached means within
     ``NEAR`` of the range. An input that never gets there is known, up to a constant, from where it first
     reaches an end of its own range: see ``start_of``.
+
+    A device that begins at an end may never have come there: then its first stroke is another than all later
+    ones from that end, which wiping-out makes alike (Mayergoyz 2003, section 1.2). With the ``outputs`` (n,)
+    this is seen, and the memory is known from where it next reaches an end.
     """
     near = NEAR * (high - low)
     ends = np.flatnonzero((inputs <= low + near) | (inputs >= high - near))
-    return int(ends[0]) if ends.size else first_extreme(inputs)[0]
+    if not ends.size:
+        return first_extreme(inputs)[0]
+    if outputs is None or ends[0] > 0:
+        return int(ends[0])
+    return _past_a_first_stroke(inputs, outputs, low, high)
+
+
+def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> str:
+    """Say what of a record (n,) is left out as it lies apart from all later strokes; empty: nothing."""
+    left = known_from(inputs, low, high, outputs) - known_from(inputs, low, high)
+    if left <= 0:
+        return ""
+    return (
+        f"the first stroke runs elsewhere than the later ones from there: its {left} samples are left out "
+        "(cycle the device once before a recording)"
+    )
+
+
+def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> int:
+    """First sample that counts of a record that begins at an end: 0, or the next end after a stroke apart."""
+    reach = high - low
+    away = inputs - low if inputs[0] <= low + NEAR * reach else high - inputs
+    at_end = away <= NEAR * reach
+    leaves = np.flatnonzero(at_end[:-1] & ~at_end[1:])
+    strokes = [_stroke(away[at:], outputs[at:], reach) for at in leaves.tolist()]
+    told = [way.size >= _PLACES and float(way[-1]) >= _COMPARED * reach for way, _ in strokes]
+    if sum(told) < 2 or not told[0]:
+        return 0
+    strokes = [one for one, enough in zip(strokes, told, strict=True) if enough]
+    top = min(float(way[-1]) for way, _ in strokes)
+    places = np.linspace(2.0 * NEAR * reach, top, _PLACES)
+    first, *later = (np.interp(places, way, y) for way, y in strokes)
+    usual = np.median(later, axis=0)
+    apart = float(np.sqrt(np.mean((first - usual) ** 2)))
+    alike = max(float(np.sqrt(np.mean((one - usual) ** 2))) for one in later)
+    if apart <= max(_APART * float(np.ptp(outputs)), _TIMES * alike):
+        return 0
+    back = np.flatnonzero((at_end | (away >= reach - NEAR * reach))[leaves[0] + 1 :])
+    return int(leaves[0] + 1 + back[0]) if back.size else 0
+
+
+def _stroke(away: FloatArray, outputs: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:
+    """Way (k,) from an end up to the first turn, rising, and the output (k,) on it."""
+    farthest = np.maximum.accumulate(away)
+    turned = np.flatnonzero(away < farthest - NEAR * reach)
+    until = int(turned[0]) if turned.size else away.size
+    rising = np.concatenate(([True], np.diff(farthest[:until]) > 0))
+    return farthest[:until][rising], outputs[:until][rising]
 
 
 def first_extreme(inputs: FloatArray) -> tuple[int, bool]:
@@ -67,7 +122,7 @@ def record_of(inputs: FloatArray, outputs: FloatArray, low: float, high: float) 
         There are too few samples, or NaN or infinity.
     """
     counts = np.ones(inputs.size)
-    counts[: known_from(inputs, low, high)] = 0.0
+    counts[: known_from(inputs, low, high, outputs)] = 0.0
     return Record(inputs, outputs, counts, start_of(inputs, low, high))
 
 

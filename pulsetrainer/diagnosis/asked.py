@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Model, Run
-from pulsetrainer.core.initial_state import known_from
+from pulsetrainer.core.initial_state import first_stroke_words, known_from
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of
@@ -45,6 +45,8 @@ def question_of(
             records.append(record)
             fingerprints.append(part.fingerprint)
             stamps.append(times)
+            words = first_stroke_words(record.input, record.output, low, high)
+            notes += [f"{name}: {words}"] if words else []
         if not run.complete:
             notes.append(f"{name} is incomplete; diagnosing the {run.input.size} samples it has")
     ours = all(
@@ -106,7 +108,7 @@ def measured_of(
         )
     u = run.input[good]
     weight = np.ones(u.size)
-    weight[: known_from(u, low, high)] = 0.0
+    weight[: known_from(u, low, high, run.output[good])] = 0.0
     if run.masked is not None:
         weight[run.masked[good]] = 0.0
     reference = None if run.reference is None else run.reference[good]

@@ -17,7 +17,7 @@ from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
 from pulsetrainer.core.forms import Form
 from pulsetrainer.core.identification import Method, Smoothing
-from pulsetrainer.core.initial_state import known_from
+from pulsetrainer.core.initial_state import first_stroke_words, known_from
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.errors import DataError
@@ -127,6 +127,7 @@ def identify(
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += fit_notes.of_form(fitted, measured[0])
     notes += _of_offsets(titles, fitted, measured)
+    notes += _of_first_strokes(titles, measured, operator.low, operator.high)
     if not fitted.evenly_spaced:
         notes.append("the loop is steep: the levels lie closer where the output changes")
     progress(0.4 if bootstrap else 0.8)
@@ -294,6 +295,12 @@ def _of_offsets(names: Sequence[str], fitted: Fitted, runs: Sequence[Run]) -> li
     return [f"{found}: each was fitted with an offset of its own ({listed}); the model has their mean"]
 
 
+def _of_first_strokes(names: Sequence[str], runs: Sequence[Run], low: float, high: float) -> list[str]:
+    """Say of which runs the first stroke lies apart from the later ones."""
+    said = [first_stroke_words(run.input, run.output, low, high) for run in runs]
+    return [f"{name}: {words}" for name, words in zip(names, said, strict=True) if words]
+
+
 def _of_gaps(plane: Plane, covered: BoolArray, unit: str) -> list[str]:
     """Name the largest part of the plane that the runs never reached."""
     gap = largest_gap(plane, covered)
@@ -317,7 +324,9 @@ def _model(
     predicted = np.concatenate([y[c] for y, c in zip(fitted.predicted, counted, strict=True)])
     errors = metrics.prediction(measured, predicted)
     thinned = slice(
-        known_from(first.input, operator.low, operator.high), None, max(1, first.input.size // TRACE_SAMPLES)
+        known_from(first.input, operator.low, operator.high, first.output),
+        None,
+        max(1, first.input.size // TRACE_SAMPLES),
     )
     band = None if ensemble is None else ensemble.output_band(first.input)
     weights = None if ensemble is None else ensemble.weight_interval()

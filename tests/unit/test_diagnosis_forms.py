@@ -184,7 +184,11 @@ def test_a_falling_extended_model_is_inverted():
     model = pt.identify(run, levels=24, form="direct")
     assert model.polarity == -1
     drive = pt.invert("normal", pt.extend(model, pt.diagnose(run, model)))
-    assert drive.predicted_max_error_percent < 1.0
+    error = (drive.predicted - drive.target)[drive.scored] / np.ptp(run.output)
+    # a few samples at the end of the range are out of reach: they are counted, and are the largest errors
+    assert 0 < drive.clipped_samples < 0.05 * drive.target.size
+    assert np.sqrt(np.mean(error**2)) < 0.002  # the static inverse leaves 0.016 of the span
+    assert drive.predicted_max_error_percent < 2.0
 
 
 def test_a_pulse_that_moves_less_than_the_output_wanders_is_refused():

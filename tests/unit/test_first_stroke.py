@@ -1,0 +1,53 @@
+"""A device that was never cycled: its first stroke is one that no later one repeats."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from pulsetrainer.core.initial_state import first_stroke_words, known_from
+
+DT_S = 0.02
+RADII = np.linspace(0.1, 1.5, 8)
+TURNS = (0.0, 5.0, 0.5, 4.5, 1.0, 5.0, 0.0, 3.5, 0.8, 4.8, 0.0, 4.2, 1.1, 5.0, 0.0)
+
+
+def _record(*, cycled: bool, down: bool = False, noise: float = 0.01):
+    """Input and output of eight plays that begin on their own loop, or anywhere; 5 to 0 where ``down``."""
+    u = np.interp(np.arange(0.0, 28.0, DT_S), np.arange(len(TURNS)) * 2.0, TURNS)
+    plays, found = RADII.copy() if cycled else np.zeros(8), []
+    for value in u.tolist():
+        plays = np.clip(plays, value - RADII, value + RADII)
+        found.append(plays.sum() + 2.0 * value)
+    y = np.asarray(found) + noise * np.random.default_rng(1).standard_normal(u.size)
+    return (5.0 - u, -y) if down else (u, y)
+
+
+@pytest.mark.parametrize("down", [False, True])
+def test_a_first_stroke_apart_does_not_count(down):
+    """From the next end on the memory is known; where the device was cycled before, from the first sample."""
+    u, y = _record(cycled=False, down=down)
+    at = known_from(u, 0.0, 5.0, y)
+    assert u[at] == pytest.approx(0.0 if down else 5.0, abs=0.05)
+    assert at * DT_S == pytest.approx(2.0, abs=0.05)
+    assert str(at) in first_stroke_words(u, y, 0.0, 5.0)
+    u, y = _record(cycled=True, down=down)
+    assert known_from(u, 0.0, 5.0, y) == 0
+    assert first_stroke_words(u, y, 0.0, 5.0) == ""
+
+
+def test_it_neither_spoils_the_fit_nor_is_it_a_cause():
+    """The fit is as good as of the cycled device; it is said; the diagnosis finds nothing."""
+    left = []
+    for cycled in (False, True):
+        u, y = _record(cycled=cycled)
+        run = pt.Run(time_s=np.arange(u.size) * DT_S, input=u, output=y, input_unit="V", output_unit="um")
+        model = pt.identify(run, levels=24)
+        said = [note for note in model.fit.notes if "first stroke" in note]
+        assert len(said) == (0 if cycled else 1)
+        left.append(model.fit.rms_percent)
+        found = pt.diagnose(run, model, quick=True)
+        assert not any(one.found for one in found.causes)
+        assert any("first stroke" in note for note in found.notes) is not cycled
+    assert left[0] < 1.3 * left[1]
