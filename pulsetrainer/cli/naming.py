@@ -26,6 +26,12 @@ _HOLDS = {
     "file": (),
 }
 
+# (command, kind of file): what to do instead of making one in the usual way
+_WANTED = {
+    ("diagnose", "run"): "to make one: pulsetrainer capture diagnostic -o run.h5, or import your own table",
+    ("correct", "run"): "give the run that was diagnosed: pulsetrainer show DIAGNOSIS.h5 says which",
+}
+
 
 class Command(TyperCommand):
     """A command that adds to an error about a file what only the command line knows."""
@@ -43,7 +49,7 @@ class Command(TyperCommand):
         except (AbsentError, ExistsError) as error:
             given = _given_as(ctx, error.path)
             if given is not None:
-                _name(error, given)
+                _name(error, given, ctx.info_name or "")
             raise
 
 
@@ -57,7 +63,7 @@ def _given_as(context: typer.Context, path: Path) -> Any:
     return None
 
 
-def _name(error: AbsentError | ExistsError, given: Any) -> None:
+def _name(error: AbsentError | ExistsError, given: Any, command: str) -> None:
     """Say which argument it is, and for an input which files of its kind are near."""
     option = next((name for name in given.opts if name.startswith("-")), "")
     typed = option or f"argument {str(given.human_readable_name).rstrip('.')}"
@@ -70,6 +76,8 @@ def _name(error: AbsentError | ExistsError, given: Any) -> None:
     if near:
         error.hint = f"{' or '.join(kinds) or 'pulsetrainer'} files {where}: {', '.join(near)}"
     elif kinds:
-        error.hint = f"there is no {' or '.join(kinds)} file {where}; to make one: {MAKES[kinds[0]]}"
+        error.hint = f"there is no {' or '.join(kinds)} file {where}; " + _WANTED.get(
+            (command, kinds[0]), f"to make one: {MAKES[kinds[0]]}"
+        )
     else:
-        error.hint = f"there is no file of pulsetrainer {where}: check the folder"
+        error.hint = f"there is no .h5 file of pulsetrainer {where}: give the path of one"

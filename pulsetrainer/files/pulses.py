@@ -36,7 +36,7 @@ def pulse_file(name: str) -> Path:
         raise UsageError(
             f"there is no pulse {name!r}; the library has {', '.join(known)}",
             hint=(f"did you mean {' or '.join(near)}? Or " if near else "name one of them, or ")
-            + "give a CSV file with the columns t_s and p",
+            + "give any CSV file with a time and a value column, such as my-pulse.csv",
         )
     check_file(path)
     return path

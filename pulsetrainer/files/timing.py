@@ -23,7 +23,7 @@ def check_timing(time: str | None, rate_Hz: float | None, *, no_time: bool, resa
         )
     if no_time and (time is not None or rate_Hz is not None):
         raise UsageError(
-            "`no_time` was given together with `time` or `rate_Hz`", hint="give one of the three"
+            "`no_time` was given together with `time` or `rate_Hz`", hint="leave out `no_time`, or the other"
         )
     if rate_Hz is not None and not 0 < rate_Hz < math.inf:
         raise UsageError(f"`rate_Hz` must be above 0, got {rate_Hz:g} Hz", hint="for instance `rate_Hz` 1000")

@@ -18,7 +18,10 @@ def check_beat(beat: str | int | None) -> None:
         It is something else.
     """
     if beat is not None and beat != "mean" and not (str(beat).isdecimal() and int(beat) > 0):
-        raise UsageError(f"`beat` must be a number from 1, or mean, got {beat!r}", hint="give `beat` mean")
+        raise UsageError(
+            f"`beat` must be a whole number, 1 for the first beat, or mean, got {beat!r}",
+            hint="give `beat` 1, or `beat` mean",
+        )
 
 
 def check_force_range(low: float | None, high: float | None) -> None:
