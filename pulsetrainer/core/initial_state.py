@@ -7,6 +7,7 @@ makes the memory known tries several states and takes the one that predicts best
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,6 +22,7 @@ _APART = 0.03  # of the span of the output: a first stroke that runs so far from
 _TIMES = 5.0  # ... if these run nearer to each other by this factor
 _COMPARED = 0.2  # of the range: shorter strokes are not compared ...
 _PLACES = 20  # ... nor those of fewer samples; and at so many places
+_STROKES = 3  # of two nobody knows which is the odd one
 
 
 def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray | None = None) -> int:
@@ -60,9 +62,12 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
     away = inputs - low if inputs[0] <= low + NEAR * reach else high - inputs
     at_end = away <= NEAR * reach
     leaves = np.flatnonzero(at_end[:-1] & ~at_end[1:])
-    strokes = [_stroke(away[at:], outputs[at:], reach) for at in leaves.tolist()]
+    strokes = [
+        _stroke(away[at:until], outputs[at:until], reach)
+        for at, until in pairwise([*leaves.tolist(), away.size])
+    ]
     told = [way.size >= _PLACES and float(way[-1]) >= _COMPARED * reach for way, _ in strokes]
-    if sum(told) < 2 or not told[0]:
+    if sum(told) < _STROKES or not told[0]:
         return 0
     strokes = [one for one, enough in zip(strokes, told, strict=True) if enough]
     top = min(float(way[-1]) for way, _ in strokes)
