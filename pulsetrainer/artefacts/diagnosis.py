@@ -117,6 +117,9 @@ class Diagnosis(Shown):
     model: str = ""  # fingerprint of the model
     records: tuple[Recorded, ...] = ()
     correctable: tuple[str, ...] = ()  # faults of the measurement that were found, and can be taken out
+    extended_rms_percent: Annotated[
+        float, Data("percent", "rms error of the extended model over single samples, of the span")
+    ] = float("nan")  # NaN where nothing was extended
     polarity: int = 1  # of the model: parameters are of the output times it
     empty: Annotated[float, Data("@output_unit", "output of the empty memory, times the polarity")] = float(
         "nan"

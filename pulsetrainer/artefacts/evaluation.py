@@ -57,6 +57,10 @@ class WaveformEvaluation:
     full_force: Annotated[float, Data("@output_unit", "full applied force")]
     noise_percent: Annotated[float, Data("percent", "spread between repeats, of full force")]
     output_unit: str = "N"
+    # (r,) before each compensated drive, where the heat was tracked
+    temperature_K: Annotated[
+        FloatArray | None, Data("K", "copper warmer than at calibration", "repeat", path="temperature")
+    ] = None
 
 
 @dataclass(frozen=True, slots=True)

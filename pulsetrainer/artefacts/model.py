@@ -83,6 +83,7 @@ class Parameter:
     unit: str
     lower: float
     upper: float
+    meaning: str = ""  # of what it is, in words; empty in files of 0.1
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pulsetrainer.cli.console import picked
+from pulsetrainer.cli.console import Screen, picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
@@ -54,7 +54,7 @@ def diagnose(
     job.screen.result(
         _payload(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
     )
-    _show(job, found)
+    show_diagnosis(job.screen, found)
     for line in commands:
         job.screen.whole(line)
     job.wrote(out, html)
@@ -71,19 +71,23 @@ def _commands(found: Diagnosis, runs: list[Path], model: Path, out: Path) -> lis
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
 
 
-def _show(job: Job, found: Diagnosis) -> None:
+def show_diagnosis(screen: Screen, found: Diagnosis) -> None:
+    """Print what a diagnosis says."""
     from pulsetrainer.report.diagnosis_text import Facts, sections
 
     for part in sections(found):
         if isinstance(part, Facts):
-            job.screen.facts(part.title, part.rows)
+            screen.facts(part.title, part.rows)
         else:
-            job.screen.table(part.title, part.columns, part.rows)
+            screen.table(part.title, part.columns, part.rows)
 
 
 def _payload(found: Diagnosis) -> dict[str, Any]:
     """Return the contract's JSON object."""
-    errors = ("rms", "rms_percent", "noise_percent", "static_percent", "extended_percent", "floor_percent")
+    errors = (
+        "rms", "rms_percent", "noise_percent", "extended_rms_percent",
+        "static_percent", "extended_percent", "floor_percent",
+    )  # fmt: skip
     figures = (
         "found", "p_value", "explains_percent", "confounded_with", "held_out_gain_percent",
         "detectable_from_percent", "text", "doubts",
@@ -98,7 +102,12 @@ def _payload(found: Diagnosis) -> dict[str, Any]:
                 "id": one.cause,
                 **picked(one, *figures),
                 "parameters": {
-                    p.name: {"value": p.value, "unit": p.unit, "interval": (p.lower, p.upper)}
+                    p.name: {
+                        "value": p.value,
+                        "unit": p.unit,
+                        "interval": (p.lower, p.upper),
+                        "meaning": p.meaning,
+                    }
                     for p in one.parameters
                 },
             }

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
+
+if TYPE_CHECKING:
+    from pulsetrainer.artefacts import Diagnosis, Model
 
 
 def extend(
@@ -30,7 +34,7 @@ def extend(
     inputs = (diagnosis, model, *([] if verify is None else [verify]))
     job = Job(context, inputs=inputs, outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.artefacts import Diagnosis, Model, Run
-    from pulsetrainer.report.diagnosis_text import parameter
+    from pulsetrainer.report.diagnosis_text import parameters
     from pulsetrainer.steps.extend import extend as extended_by
 
     with job.working("extending"):
@@ -49,9 +53,28 @@ def extend(
             "added": added,
             "extensions": extended.extensions,
             "levels": extended.levels,
-            **picked(found, "static_percent", "extended_percent", "held_out_gain_percent"),
+            **picked(
+                found,
+                "rms_percent",
+                "extended_rms_percent",
+                "static_percent",
+                "extended_percent",
+                "held_out_gain_percent",
+            ),
         }
     )
-    rows = {one.cause: "; ".join(map(parameter, one.parameters)) for one in extended.extensions}
-    left = f"{found.static_percent:.3f} % -> {found.extended_percent:.3f} % rms of the span"
-    job.screen.facts(f"{out}: extended model of {extended.levels} levels", rows | {"residual": left})
+    job.screen.facts(f"{out}: extended model of {extended.levels} levels", _left(found, extended))
+    for one in extended.extensions:
+        job.screen.facts(f"with {one.cause}", parameters(one.parameters))
+
+
+def _left(found: Diagnosis, extended: Model) -> dict[str, str]:
+    """Say what both models leave of the recordings, in the figures that evaluate gives."""
+    assert found.extended is not None
+    if not math.isfinite(found.extended_rms_percent) or found.extended.extensions != extended.extensions:
+        return {}  # a file of 0.1; or --verify took a cause out
+    before, after = found.rms_percent, found.extended_rms_percent
+    return {
+        "error before": f"{before:.3f} % of the span, rms of single samples, as evaluate tells it",
+        "error now": f"{after:.3f} %; noise alone is {found.noise_percent:.3f} %",
+    }

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from pulsetrainer.cli.diagnose import show_diagnosis
 from pulsetrainer.cli.evaluate import show_tables
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson
@@ -24,7 +25,7 @@ def show(
     Example: pulsetrainer show model.h5
     """
     job = Job(context, inputs=(file,), as_json=json)
-    from pulsetrainer.artefacts import Evaluation
+    from pulsetrainer.artefacts import Diagnosis, Evaluation
     from pulsetrainer.files import store
     from pulsetrainer.report.facts import facts
 
@@ -45,6 +46,9 @@ def show(
     if isinstance(artefact, Evaluation):
         job.screen.facts(title, {})
         show_tables(job.screen, artefact)
+    elif isinstance(artefact, Diagnosis):
+        job.screen.facts(title, {})
+        show_diagnosis(job.screen, artefact)
     else:
         job.screen.facts(title, {name: value for name, value in found.items() if value is not None})
     job.screen.whole("\n".join(["history", *(f"  {line}" for line in header.history)]))

@@ -17,11 +17,13 @@ from pulsetrainer.artefacts import (
     Profile,
     Recorded,
 )
+from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import BoolArray, Plane
 from pulsetrainer.diagnosis import residual, wording
+from pulsetrainer.diagnosis.causes.base import Cause as Asked
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.finding import Estimate, Finding
@@ -43,17 +45,29 @@ def diagnosis_of(state: State) -> Diagnosis:
     problem, model = state.problem, given.model
     scale = state.scale
     percent = PERCENT / float(np.ptp(problem.measured))
-    rms, extended = _rms_given(state, model), state.current if state.extends else state.baseline
+    of_samples = PERCENT / float(
+        np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in problem.records]))
+    )
+    rms, extended = _rms_of(state, model), state.current if state.extends else state.baseline
+    better = extended_model(state, model)
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
-    sign, words = model.polarity, _words(given)
+    bench = wording.Bench(
+        scale,
+        model.input_unit,
+        state.question.timed,
+        given.ours,
+        given.input_quantity,
+        given.output_quantity,
+    )
+    sign, words = model.polarity, _words(given) | bench.numbers()
     dependences = learned(state, words)
     return Diagnosis(
         verdict=state.verdict,
         quick=state.question.quick,
         rms=rms,
-        rms_percent=rms * percent / scale.span,
-        noise_percent=state.floor.noise * percent,
+        rms_percent=rms * of_samples / scale.span,
+        noise_percent=state.floor.noise * of_samples,
         static_percent=state.baseline.rms * percent,
         extended_percent=extended.rms * percent,
         floor_percent=state.floor.rms * percent,
@@ -61,16 +75,17 @@ def diagnosis_of(state: State) -> Diagnosis:
             one for finding in state.findings for one in _causes(state, finding, words, dependences)
         ),
         evidence=tuple(wording.sentence(one, words) for one in state.evidence),
-        next_experiment=wording.advice(
-            state.advice, wording.Bench(scale, model.input_unit, state.question.timed, given.ours)
-        ),
+        next_experiment=wording.advice(state.advice, bench),
         profiles=_profiles(state, words),
         time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
         input=scale.inputs(problem.bins.average([r.input for r in problem.records]))[thin],
         output=sign * scale.outputs(problem.measured)[thin],
         before=sign * scale.outputs(problem.measured - state.baseline.residual)[thin],
         after=sign * scale.outputs(problem.measured - state.current.residual)[thin],
-        extended=extended_model(state, model),
+        extended=better,
+        extended_rms_percent=float("nan")
+        if better is None
+        else _rms_of(state, better) * of_samples / scale.span,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
         held_out_gain_percent=_held_out_gain(state),
@@ -99,18 +114,19 @@ def _held_out_gain(state: State) -> float:
 
 
 def _words(given: Given) -> Words:
-    unit = given.model.output_unit
+    unit, of_input = given.model.output_unit, given.model.input_unit
     return {
         "input": given.input_quantity,
         "output": given.output_quantity,
         "u": given.model.input_unit,
         "y": unit,
-        "in_y": "" if unit == "1" else f" {unit}",
+        "in_y": with_unit("", unit),
+        "in_u": with_unit("", of_input),
     }
 
 
-def _rms_given(state: State, model: Model) -> float:
-    """Rms error of the model as it was given, over the samples with weight."""
+def _rms_of(state: State, model: Model) -> float:
+    """Rms error of a model, as given or extended, over the single samples with weight."""
     errors = [
         (predict(model, r.input, r.step) * model.polarity - r.output)[r.sample_weight > 0]
         for r in map(state.scale.restored, state.problem.records)
@@ -122,8 +138,16 @@ def _unit(text: str, words: Words) -> str:
     return text.replace("{u}", words["u"]).replace("{y}", words["y"])
 
 
-def _parameters(estimates: Sequence[Estimate], words: Words) -> tuple[Parameter, ...]:
-    return tuple(Parameter(e.name, e.value, _unit(e.unit, words), e.lower, e.upper) for e in estimates)
+def _parameters(
+    state: State, cause: Asked, estimates: Sequence[Estimate], words: Words
+) -> tuple[Parameter, ...]:
+    meanings = {q.name: q.meaning for q in cause.quantities(state.problem.frames[0])} | {"size": cause.size}
+    return tuple(
+        Parameter(
+            e.name, e.value, _unit(e.unit, words), e.lower, e.upper, meanings.get(e.name, "").format(**words)
+        )
+        for e in estimates
+    )
 
 
 def _causes(state: State, finding: Finding, words: Words, dependences: Sequence[Dependence]) -> list[Cause]:
@@ -145,7 +169,7 @@ def _cause(state: State, finding: Finding, words: Words) -> Cause:
         p_value=finding.p_value,
         explains_percent=finding.explains_percent,
         held_out_gain_percent=finding.held_out_gain_percent,
-        parameters=_parameters(finding.parameters, words),
+        parameters=_parameters(state, finding.cause, finding.parameters, words),
         confounded_with=finding.confounded_with,
         text=wording.cause_text(finding, words),
         doubts=tuple(wording.DOUBTS[one] for one in finding.doubts),
@@ -184,7 +208,8 @@ def extended_model(state: State, model: Model) -> Model | None:
     if not lasting:
         return None
     operator, covered = (_dual_part if model.form == "dual" else _static_part)(state, model)
-    scale, words = state.scale, {"u": model.input_unit, "y": model.output_unit}
+    assert state.question.given is not None
+    scale, words = state.scale, _words(state.question.given)
     return Model(
         edges=operator.plane.edges,
         weights=operator.weights,
@@ -200,7 +225,10 @@ def extended_model(state: State, model: Model) -> Model | None:
         polarity=model.polarity,
         extensions=tuple(
             Extension(
-                term.cause.id, _parameters((*_constants(term, scale), *state.estimates[term.cause.id]), words)
+                term.cause.id,
+                _parameters(
+                    state, term.cause, (*_constants(term, scale), *state.estimates[term.cause.id]), words
+                ),
             )
             for term in lasting
         ),

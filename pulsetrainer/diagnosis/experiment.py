@@ -34,6 +34,7 @@ CYCLE = (0.8, 0.2)
 _CYCLES = (0.0, *CYCLE * 20, 0.0)
 _CYCLE_RATES = (1.5, 4.0)
 HEATING_S = 30.0
+PACE = 1.0  # of minor loops, and of those around the heating
 FASTER = (1.0, 4.0)  # a slow record may hide what is quicker than its own second
 
 
@@ -63,6 +64,11 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
     return max(found, key=lambda one: one.distance)
 
 
+def length_s(name: str) -> float:
+    """Return how long an experiment takes, s, at the rates of ``RATES``."""
+    return _experiments()[name].size / LIMITS.experiment_Hz
+
+
 def _experiments() -> dict[str, FloatArray]:
     """Inputs (n,) in shares of the range, by name."""
 
@@ -76,12 +82,12 @@ def _experiments() -> dict[str, FloatArray]:
         part for last, level in pairwise(LEVELS) for part in (path((last, level), _FAST), hold(level, HOLD_S))
     ]
     biases = [
-        path((*above, bias, bias + WIDTH, bias, bias + WIDTH, bias, 0.0), 1.0)
+        path((*above, bias, bias + WIDTH, bias, bias + WIDTH, bias, 0.0), PACE)
         for bias in BIASES
         for above in ((0.0,), (0.0, 1.0))
     ]
-    loop = path((0.0, 1.0, 0.0), 1.0)
-    rise, fall = path((0.0, 1.0), 1.0), path((1.0, 0.0), 1.0)
+    loop = path((0.0, 1.0, 0.0), PACE)
+    rise, fall = path((0.0, 1.0), PACE), path((1.0, 0.0), PACE)
     heating = (loop, rise, hold(1.0, HEATING_S), fall, loop, hold(0.0, HEATING_S), loop)
     return {
         "nested loops": np.concatenate([path(_NESTED, rate) for rate in RATES]),

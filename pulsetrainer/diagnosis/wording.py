@@ -19,14 +19,14 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 # What evidence says, by its kind: figures in braces, and {input} and {output} for what was measured
 TEXTS: Mapping[str, str] = {
     "static": (
-        "With its weights refitted to these recordings, the static model leaves {left:.3f} % of the span "
-        "(rms of short averages); noise and discretisation alone would leave {floor:.3f} %."
+        "Fitted anew to these recordings, the model without any cause leaves {left:.3f} % of the span (rms "
+        "of short averages). Noise and the number of levels alone would leave {floor:.3f} %."
     ),
     "tested": (
-        "p = {p:.3f} across the whole library; it accounts for {explains:.1f} % of the error that can be "
-        "explained. What gives it away: {signature}."
+        "noise alone looks like it with a probability of {p:.3f}. It accounts for {explains:.1f} % of the "
+        "squared error beyond noise. What gives it away: {signature}."
     ),
-    "extended": "With these causes in the model, {left:.3f} % of the span remains.",
+    "extended": "With these causes in the model, {left:.3f} % of the span remains (rms of short averages).",
     "would have shown": (
         "The smallest effects that these recordings would have shown, rms, % of the span: {limits}"
     ),
@@ -35,16 +35,16 @@ TEXTS: Mapping[str, str] = {
         "levels do not account for"
     ),
     "not accepted": (
-        "{names} would explain {explains:.0f} % of the error that can be explained, more than noise does "
-        "(p = {p:.3f}), but refitted with all weights it is too small to matter, or does not predict blocks "
-        "that were left out. It is not named."
+        "Noise alone hardly looks like {names} (p = {p:.3f}), which would explain {explains:.0f} % of the "
+        "squared error beyond noise. But once the model is fitted together with it, it is too small to "
+        "matter, or does not predict the parts of the recordings that were left out. So it is not named."
     ),
     "not repeated": (
         "What is left can be fitted by a learned dependence, but that did not repeat when whole pieces of "
         "the time were left out: it is no property of the device"
     ),
-    "largest": "The remaining error is largest at {names} {at:.3g}, {times:.1f} times its smallest value.",
-    "quick": "Quick screen: nothing was refitted, so strengths are linearised and come out too small.",
+    "largest": "The remaining error is largest {place}, {times:.1f} times its smallest value.",
+    "quick": "Quick screen: no model was fitted again, so the strengths are rough and come out too small.",
     "lacks": "The recording is limited: {names}.",
     "untimed": (
         "The recordings have no time, so only causes that depend on the order of the samples were tried "
@@ -64,13 +64,27 @@ TEXTS: Mapping[str, str] = {
         "remainder, {left:.2g} % of the span: too little to be named."
     ),
 }
+# Where an error is largest, by the quantity that it was sorted by
+PLACES: Mapping[str, str] = {
+    "rate": "at a speed of {at:.3g} ranges of the {input} per second",
+    "level": "where the {input} is about {at:.3g}{in_u}",
+    "direction": "while the {input} {way}",
+    "time": "about {at:.3g} s after the start",
+}
+WAYS = {-1.0: "falls", 0.0: "rests", 1.0: "rises"}
+PLAIN = {"input": "input", "output": "output", "in_y": "", "in_u": ""}  # where nothing better is known
+AGAIN = (
+    "Record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
+    "recording.{command}"
+)
 ADVICE: Mapping[str, str] = {
     "tied, quick": "Run the full diagnosis: a quick screen cannot distinguish between {names}.",
     "tied": (
-        "To tell {names} apart, record {experiment}. There the two most alike differ by {there:.2g} % of "
-        "the span (rms, weights refitted); on this recording they differ by {here:.2g} %.{command}"
+        "To tell {names} apart, record {experiment}{lasting}. There the two that are most alike differ by "
+        "{there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ by "
+        "{here:.2g} %. Then diagnose that recording.{command}"
     ),
-    "lacks": "This recording has limits: {names}. Record {missing}, and diagnose that.{command}",
+    "lacks": f"This recording has limits: {{names}}. {AGAIN}",
     "unknown": (
         "No known cause fits. Repeat the recording to see whether the remaining error repeats; if it does, "
         "vary one thing at a time: temperature, load, amplitude."
@@ -81,10 +95,12 @@ ADVICE: Mapping[str, str] = {
         "{times:.2g} times as long, or with less noise, and diagnose that."
     ),
     "inconclusive": (
-        "These recordings could not have shown {names} of {matters:.2g} % of the span. Record {missing}, and "
-        "diagnose that.{command}"
+        f"These recordings could not have shown {{names}} of {{matters:.2g}} % of the span. {AGAIN}"
     ),
-    "extend": "Extend the model, then test it on a recording that was not fitted: pulsetrainer evaluate.",
+    "extend": (
+        "Extend the model with what was found, then test it on another recording, which was not fitted: "
+        "pulsetrainer evaluate."
+    ),
     "correct": (
         "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
         "correct), and identify the model from what that gives, or diagnose it again."
@@ -99,29 +115,41 @@ ADVICE: Mapping[str, str] = {
     ),
 }
 DOUBTS: Mapping[str, str] = {
-    "predicts worse": "with it, blocks that were left out are predicted worse than without it",
+    "predicts worse": "with it, parts of the recordings that were left out are predicted worse",
     "does not repeat": "it fits, but does not repeat: it is not added to the model",
-    "spans zero": "the interval of its strength spans zero",
-    "at bound": "a parameter sits at the end of the range in which it was sought",
+    "spans zero": "its strength may be nothing, as the interval spans zero",
+    "at bound": "a parameter is at the end of the range that was searched",
 }
-OURS = " The diagnostic signal includes it: pulsetrainer capture diagnostic -o run.h5."
+OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o run.h5."
+# What recordings may lack, with {hold_least} and {short} for the bench: see ``Bench.numbers``
 LACKS: Mapping[str, str] = {
     "rates": "only one rate of change",
-    "holds": "no holds",
-    "length": "few crossings of the range",
+    "holds": "no holds (a hold is {hold_least} or more at one value)",
+    "length": "few crossings of the range (it is shorter than {short})",
 }
-# What to record, with {numbers} for the bench: see ``Bench.numbers``
+# What to record instead
 MISSING: Mapping[str, str] = {
     "rates": "the same loops at {slow}, {middle} and {fast}",
-    "holds": "stops of {hold} at {levels}",
-    "length": "{short} or more",
+    "holds": "stops of {hold} at each of {levels}",
+    "length": "{short} or more in all",
 }
 EXPERIMENTS: Mapping[str, str] = {
-    "nested loops": "nested loops between {low} and {high} at {slow}, {middle}, {quick} and {fast}",
-    "steps and holds": "steps at {fast} to {levels}, each followed by a stop of {hold}",
-    "equal minor loops": "minor loops {width} wide from {biases}, each reached from below and from above",
-    "equal cycles": "twenty equal cycles between {bottom} and {top} at {middle}, and twenty at {quick}",
-    "heating": "major loops before and after {heating} at {high}, and again after {heating} at {low}",
+    "nested loops": (
+        "loops of the {input} between {low} and {high}, ever smaller, once each at {slow}, {middle}, {quick} "
+        "and {fast}"
+    ),
+    "steps and holds": "steps of the {input} at {fast} to {levels}, with a stop of {hold} after each",
+    "equal minor loops": (
+        "loops of the {input} at {pace} that are {width} wide, up from {biases}, each reached once from "
+        "below and once from above"
+    ),
+    "equal cycles": (
+        "twenty equal cycles of the {input} between {bottom} and {top} at {middle}, and twenty at {quick}"
+    ),
+    "heating": (
+        "full loops of the {input} at {pace}, one before and one after {heating} at {high}, and one more "
+        "after {heating} at {low}"
+    ),
 }
 
 
@@ -133,13 +161,23 @@ class Bench:
     unit: str = "1"  # of the input
     timed: bool = True
     ours: bool = False  # recorded by this program, which plays experiments itself
+    input: str = "input"  # what was measured, in words
+    output: str = "output"
 
     def numbers(self, faster: float = 1.0) -> dict[str, str]:
         """Levels, rates and times of the experiments, so much faster, to be set on that bench."""
         rates = dict(zip(("slow", "middle", "quick", "fast"), sorted(experiment.RATES), strict=True))
-        times = {"hold": experiment.HOLD_S, "heating": experiment.HEATING_S, "short": LIMITS.short_s}
+        rates["pace"] = experiment.PACE
+        times = {
+            "hold": experiment.HOLD_S,
+            "hold_least": LIMITS.hold_s,
+            "heating": experiment.HEATING_S,
+            "short": LIMITS.short_s,
+        }
         shares = {"low": 0.0, "high": 1.0, "bottom": min(experiment.CYCLE), "top": max(experiment.CYCLE)}
         return {
+            "input": self.input,
+            "output": self.output,
             **{name: self._level(share) for name, share in shares.items()},
             "levels": self._levels(experiment.LEVELS[1:-1]),
             "biases": self._levels(experiment.BIASES),
@@ -147,6 +185,10 @@ class Bench:
             **{name: self._rate(faster * one) for name, one in rates.items()},
             **{name: self._time(one / faster) for name, one in times.items()},
         }
+
+    def lasting(self, name: str, faster: float) -> str:
+        """Return how long an experiment takes, as the end of a phrase."""
+        return f", about {self._time(experiment.length_s(name) / faster)} in all" if self.timed else ""
 
     def _level(self, share: float) -> str:
         return with_unit(self._number(share), self.unit)
@@ -183,13 +225,17 @@ def text(one: Evidence, words: Mapping[str, str] | None = None) -> str:
     """Return evidence in words, without the name of its cause."""
     cause = library()[one.cause] if one.cause else None
     own = cause.texts.get(one.kind) if cause else None
+    known = {**PLAIN, **(words or {})}
     figures = {
-        **(words or {}),
+        **known,
         **one.figures,
-        "names": _listed(one.names),
+        "names": _listed(one.names, known),
         "limits": _joined([f"{name} {size:.2g}" for name, size in sorted(one.figures.items())]),
         "signature": cause.signature if cause else "",
     }
+    if one.kind == "largest":
+        figures["way"] = WAYS.get(one.figures["at"], "")
+        figures["place"] = PLACES[one.names[0]].format(**figures)
     where = f"record {one.record + 1}: " if one.record is not None else ""
     return where + (TEXTS[one.kind] if own is None else own).format(**figures)
 
@@ -198,26 +244,29 @@ def cause_text(finding: Finding, words: Mapping[str, str]) -> str:
     """Return what a finding says of its cause."""
     if finding.seen is not None:
         return text(finding.seen, words)
-    return finding.cause.title.format(**{"input": "input", "output": "output", **words})
+    return finding.cause.title.format(**{**PLAIN, **words})
 
 
 def advice(one: Evidence, bench: Bench) -> str:
     """Return what to measure next, as a sentence, in numbers of the bench."""
-    numbers = bench.numbers(one.figures.get("faster", 1.0))
+    faster = one.figures.get("faster", 1.0)
+    numbers = bench.numbers(faster)
     tied = one.kind == "tied"  # its first name is that of the experiment
     names = one.names[1:] if tied else one.names
     return ADVICE[one.kind].format(
-        names=_listed([name for name in names if name not in LACKS] or names),
+        **numbers,
+        names=_listed([name for name in names if name not in LACKS] or names, numbers),
         experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
-        missing=_joined([MISSING[name].format(**numbers) for name in names if name in MISSING]),
+        lasting=bench.lasting(one.names[0], faster) if tied else "",
+        missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),
         command=OURS if bench.ours else "",
         **one.figures,
     )
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Return ``a, b and c``; what a record lacks is spelled out."""
-    return _joined([LACKS.get(name, name) for name in names])
+def _listed(names: Sequence[str], numbers: Mapping[str, str]) -> str:
+    """Return ``a, b and c``; what a record lacks is spelled out in numbers."""
+    return _joined([LACKS[name].format(**numbers) if name in LACKS else name for name in names])
 
 
 def _joined(words: Sequence[str]) -> str:

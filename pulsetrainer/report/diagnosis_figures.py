@@ -10,6 +10,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from pulsetrainer.report import panels
+from pulsetrainer.report.diagnosis_text import answer
 from pulsetrainer.report.style import (
     BLUE,
     COLUMN_IN,
@@ -36,15 +37,16 @@ def course(found: Diagnosis) -> Figure:
     figure = Figure(figsize=(COLUMN_IN, 4.4), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1.0))
     panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
-    panels.trace(above, found.time_s, found.before, **MODEL, label="static model, refitted")
+    panels.trace(above, found.time_s, found.before, **MODEL, label="model, fitted anew")
     above.set_ylabel(label(panels.quantity_of(found.output_unit), found.output_unit))
     above.set_title(_verdict(found), wrap=True)
     panels.headroom(above)
-    panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="left by the static model")
-    if not found.quick:
-        panels.trace(below, found.time_s, found.output - found.after, **MODEL, label="by the extended")
+    panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="left without causes")
+    if found.extended_percent < found.static_percent:
+        left = found.output - found.after
+        panels.trace(below, found.time_s, left, **MODEL, label="with the causes found")
     below.axhline(0.0, **GUIDE)
-    below.set_ylabel(label("residual", found.output_unit))
+    below.set_ylabel(label("measured − model", found.output_unit))
     below.set_xlabel(label("time, runs one after another", "s"))
     panels.headroom(below)
     return figure
@@ -58,13 +60,13 @@ def _verdict(found: Diagnosis) -> str:
 
 @styled
 def profile(one: Profile, *, extended: bool) -> Figure:
-    """Return the rms residual against one quantity, before the extension and, where there is one, after."""
+    """Return the rms error against one quantity, before the extension and, where there is one, after."""
     figure = Figure(figsize=(_SMALL_IN, 2.6), layout="constrained")
     axes = figure.add_subplot()
     known = np.isfinite(one.before)
-    axes.plot(one.at[known], one.before[known], color=VERMILION, marker="o", markersize=3, label="static")
+    axes.plot(one.at[known], one.before[known], "o-", color=VERMILION, markersize=3, label="without causes")
     if extended:
-        axes.plot(one.at[known], one.after[known], color=BLUE, marker="s", markersize=3, label="extended")
+        axes.plot(one.at[known], one.after[known], "s-", color=BLUE, markersize=3, label="with them")
     if one.name in ("rate", "frequency"):
         axes.set_xscale("log" if one.name == "frequency" else "symlog")
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))  # powers of ten would need mathtext
@@ -72,11 +74,22 @@ def profile(one: Profile, *, extended: bool) -> Figure:
     if one.name == "direction":
         axes.set_xticks([-1, 0, 1], ["falling", "rest", "rising"])
         axes.margins(x=0.08)
-    axes.set_xlabel(one.name if one.name == "direction" else label(one.name, one.unit))
-    axes.set_ylabel(label("rms residual", one.output_unit))
+    axes.set_xlabel(axis_of(one))
+    axes.set_ylabel(label("rms error left", one.output_unit))
     axes.set_ylim(bottom=0.0)
     panels.headroom(axes)
     return figure
+
+
+def axis_of(one: Profile) -> str:
+    """Return what a profile is drawn over: the quantity, and its unit."""
+    known = {
+        "rate": label("speed of the input", "input ranges/s"),
+        "direction": "direction of the input",
+        "level": label(panels.quantity_of(one.unit, "input"), one.unit),
+        "frequency": label("frequency of the error", one.unit),
+    }
+    return known.get(one.name, label(one.name, one.unit))
 
 
 @styled
@@ -96,7 +109,7 @@ def dependence(one: Dependence) -> Figure:
 
 @styled
 def ranking(found: Diagnosis) -> Figure:
-    """Return how much of what can be explained each cause explains, with its p-value."""
+    """Return how much of the error beyond noise each cause explains, whether it was found, and why not."""
     shown = [one for one in found.causes if one.found or one.explains_percent > 0][:_MOST_BARS][::-1]
     figure = Figure(figsize=(COLUMN_IN, 1.0 + 0.34 * max(len(shown), 1)), layout="constrained")
     axes = figure.add_subplot()
@@ -109,15 +122,15 @@ def ranking(found: Diagnosis) -> Figure:
     )
     for k, one in enumerate(shown):
         axes.annotate(
-            "" if one.p_value is None else f"p = {one.p_value:.3f}",
+            answer(one, quick=found.quick),
             (max(one.explains_percent, 1e-3), k),
             xytext=(4, 0),
             textcoords="offset points",
             va="center",
             fontsize=8.5,
         )
-    axes.set_xlim(0.0, 1.25 * max([*share, 1.0]))
-    axes.set_xlabel("explains [% of what can be explained]")
+    axes.set_xlim(0.0, 1.7 * max([*share, 1.0]))
+    axes.set_xlabel("explains [% of the squared error beyond noise]")
     axes.grid(visible=False, axis="y")
     keys = [Patch(color=BLUE, label="found"), Patch(color=MUTED, label="not found")]
     figure.legend(handles=keys, loc="outside lower center", ncols=2)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import diagnosis_figures as figures
+from pulsetrainer.report.diagnosis_text import COLUMNS, ERRORS, answer, parameters, stands
 from pulsetrainer.report.html import environment, indented
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.views import Number, Picture, number
@@ -46,8 +46,9 @@ def render_diagnosis(
             found=found,
             headline=headline(found),
             named=[_words(one) for one in found.found],
-            levels=[(words, number(getattr(found, name), name, ".3f")) for name, words in _levels(found)],
-            rows=[_row(one) for one in shown],
+            levels=_levels(found),
+            rows=[_row(one, quick=found.quick) for one in shown],
+            columns=COLUMNS,
             course=_course(found),
             profiles=[*_dependences(found), *_profiles(found)],
             ranking=_ranking(found),
@@ -72,42 +73,36 @@ def headline(found: Diagnosis) -> str:
     return f"{words}{tied}{'; in addition, ' + '; '.join(also) if also else ''}{rest}."
 
 
-def _words(one: Cause) -> dict[str, str]:
-    parameters = ", ".join(
-        f"{p.name} {p.value:.3g} {shown(p.unit)}".rstrip()
-        + (f" (95 %: {p.lower:.3g} to {p.upper:.3g})" if math.isfinite(p.lower) and p.lower < p.upper else "")
-        for p in one.parameters
-    )
+def _words(one: Cause) -> dict[str, Any]:
     doubt = f" In doubt: {'; '.join(one.doubts)}." if one.doubts else ""
     return {
         "id": one.cause,
         "text": f"{one.text[:1].upper()}{one.text[1:]}{doubt}",
-        "parameters": parameters,
+        "parameters": parameters(one.parameters),
         "tied": ", ".join(one.confounded_with),
     }
 
 
-def _levels(found: Diagnosis) -> list[tuple[str, str]]:
-    """Return field and words of every row of the table of before and after."""
+def _levels(found: Diagnosis) -> list[tuple[str, list[Number]]]:
+    """Return the table of errors: words, then of single samples and of averages."""
     return [
-        ("rms_percent", "the model as given, single samples"),
-        ("noise_percent", "noise of single samples"),
-        ("static_percent", "weights refitted, short averages"),
-        *([] if found.quick else [("extended_percent", "extended, short averages")]),
-        ("floor_percent", "if nothing were wrong, short averages"),
+        (words, [_number(getattr(found, name), name, ".3f") if name else Number("") for name in fields])
+        for words, *fields in ERRORS
+        if stands(found, fields)
     ]
 
 
-def _row(one: Cause) -> dict[str, str | Number]:
-    measured = one.found and math.isfinite(one.held_out_gain_percent)
+def _number(value: float, metric: str, digits: str) -> Number:
+    return number(value, metric, digits) if math.isfinite(value) else Number("")
+
+
+def _row(one: Cause, *, quick: bool) -> dict[str, str | Number]:
+    gain = one.held_out_gain_percent if one.found else float("nan")
     return {
         "id": one.cause,
-        "found": ("in doubt" if one.doubts else "yes") if one.found else "no",
-        "p": Number("") if one.p_value is None else number(one.p_value, f"{one.cause}.p_value", ".3f"),
-        "explains": number(one.explains_percent, f"{one.cause}.explains_percent"),
-        "gain": number(one.held_out_gain_percent, f"{one.cause}.held_out_gain_percent", ".1f")
-        if measured
-        else Number(""),
+        "found": answer(one, quick=quick),
+        "explains": number(one.explains_percent, f"{one.cause}.explains_percent", ".1f"),
+        "gain": _number(gain, f"{one.cause}.held_out_gain_percent", ".1f"),
     }
 
 
@@ -117,8 +112,11 @@ def _picture(name: str, figure: Figure, title: str, words: str) -> Picture:
 
 
 def _course(found: Diagnosis) -> Picture:
-    words = "Measured output and static model; below, what the static and the extended model leave."
-    return _picture("course", figures.course(found), "Output and residual over time", words)
+    words = (
+        "What was measured, and the model fitted anew to it without any cause; below, the error that is left "
+        "without the causes found and with them. Each point is a short average."
+    )
+    return _picture("course", figures.course(found), "Output and error over time", words)
 
 
 def _dependences(found: Diagnosis) -> list[Picture]:
@@ -132,14 +130,14 @@ def _profiles(found: Diagnosis) -> list[Picture]:
     return [
         _picture(
             f"profile-{one.name}",
-            figures.profile(one, extended=not found.quick),
-            f"Residual against {one.name}",
-            f"Where the residual is: against {one.name}.",
+            figures.profile(one, extended=found.extended_percent < found.static_percent),
+            f"Error against {one.name}",
+            f"Where the error is, by {figures.axis_of(one)}: rms of the averages in each group.",
         )
         for one in found.profiles
     ]
 
 
 def _ranking(found: Diagnosis) -> Picture:
-    words = "Ranking of the causes, found ones in colour."
+    words = "How much of the error beyond noise each cause explains; those that were found in colour."
     return _picture("ranking", figures.ranking(found), "Ranking of the causes", words)

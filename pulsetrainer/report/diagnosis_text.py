@@ -3,14 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter
 from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 _SHOWN = 8  # causes in the table
+_CURVE = re.compile(r"f\d+")  # the values of a learned curve: one by one they say nothing
+_OF_A_CURVE = ("state", "low", "high")
+# what is left by each model: in words, then the fields of single samples and of short averages
+ERRORS = (
+    ("the model as given", "rms_percent", ""),
+    ("fitted anew to these recordings", "", "static_percent"),
+    ("with the causes found", "extended_rms_percent", "extended_percent"),
+    ("noise alone; of averages: noise and levels", "noise_percent", "floor_percent"),
+)
+COLUMNS = {
+    "explains": "share of the squared error beyond noise that goes with this cause in the model",
+    "gain": "the same share, on parts of the recordings that were left out of the fit",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,58 +37,90 @@ class Facts:
 
 
 @dataclass(frozen=True, slots=True)
-class Causes:
-    """The table of causes: the first column is text, the others are numbers."""
+class Table:
+    """A table: the first column is text, the others are numbers or words."""
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
 
 
-def sections(found: Diagnosis) -> Iterator[Facts | Causes]:
+def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     """Yield what there is to say, in the order in which a person would ask."""
-    averages = "rms, short averages"
-    yield Facts(
-        f"verdict: {found.verdict}" + (" (quick screen)" if found.quick else ""),
-        {
-            "model as given": f"{found.rms_percent:.3f} % rms of the span, single samples",
-            "noise": f"{found.noise_percent:.3f} % rms, single samples",
-            "weights refitted": f"{found.static_percent:.3f} % {averages}",
-            **({} if found.quick else {"extended": f"{found.extended_percent:.3f} % {averages}"}),
-            "floor": f"{found.floor_percent:.3f} % {averages}: noise and levels",
-        },
+    yield Facts(f"verdict: {found.verdict}" + (" (quick screen)" if found.quick else ""), {})
+    for one in found.found:
+        yield Facts(f"found: {one.cause}, {one.text}", _said(one))
+    yield Table(
+        "error that is left, rms, % of the span of the output",
+        ("", "of single samples", "of short averages"),
+        tuple(
+            (words, *(_figure(getattr(found, name), ".3f") if name else None for name in fields))
+            for words, *fields in ERRORS
+            if stands(found, fields)
+        ),
     )
     others = [one for one in found.causes if not one.found][: max(_SHOWN - len(found.found), 0)]
-    yield Causes(
+    yield Table(
         "causes, strongest first",
-        ("cause", "found", "p", "explains %", "held-out gain %"),
-        tuple(_row(one) for one in (*found.found, *others)),
+        ("cause", "found", "explains, %", "gain, %"),
+        tuple(_row(one, quick=found.quick) for one in (*found.found, *others)),
     )
-    if found.found:
-        yield Facts("found", {one.cause: _said(one) for one in found.found})
+    yield Facts("in this table", COLUMNS)
     yield Facts("evidence", {str(k): text for k, text in enumerate(found.evidence, start=1)})
     yield Facts("next", {"": found.next_experiment})
 
 
+def stands(found: Diagnosis, fields: Sequence[str]) -> bool:
+    """Tell whether a row of ``ERRORS`` applies: without causes there is no model with them."""
+    return "extended_percent" not in fields or bool(found.found and not found.quick)
+
+
+def answer(one: Cause, *, quick: bool) -> str:
+    """Say whether a cause was found, and if not, why."""
+    if one.found:
+        return "in doubt" if one.doubts else "yes"
+    if one.p_value is None:
+        return "no"
+    if one.p_value > LIMITS.p_max:
+        return "no: noise does as much"
+    return "no: another explains more" if quick else "no: too small, or predicts no better"
+
+
+def parameters(several: Sequence[Parameter]) -> dict[str, str]:
+    """Return parameters by name, each with unit, interval and meaning; the values of a curve in one line."""
+    said: dict[str, str] = {}
+    for one in several:
+        if _CURVE.fullmatch(one.name) or one.name in _OF_A_CURVE:
+            continue
+        number = len([name for name in said if name.split(" ")[0] == one.name]) + 1
+        said[one.name if number == 1 else f"{one.name} {number}"] = parameter(one)
+    curve = [one for one in several if _CURVE.fullmatch(one.name)]
+    if curve:
+        values = [0.0, *(one.value for one in curve)]
+        ends = with_unit(f"{min(values):.3g} to {max(values):.3g}", curve[0].unit)
+        said["curve"] = f"{ends}: what it adds to the output; the report (--html) draws it"
+    return said
+
+
 def parameter(one: Parameter) -> str:
-    """Return a parameter with its unit and its interval."""
-    interval = f" [{one.lower:.4g}, {one.upper:.4g}]" if math.isfinite(one.lower) else ""
-    return f"{one.name} {with_unit(f'{one.value:.4g}', one.unit)}{interval}"
+    """Return a parameter with its unit, its 95 % interval and what it is of."""
+    known = math.isfinite(one.lower) and one.lower < one.upper
+    interval = f" (95 %: {one.lower:.3g} to {one.upper:.3g})" if known else ""
+    return with_unit(f"{one.value:.4g}", one.unit) + interval + (f": {one.meaning}" if one.meaning else "")
 
 
-def _said(one: Cause) -> str:
-    parameters = "; ".join(map(parameter, one.parameters))
-    tied = f"; could equally be {' or '.join(one.confounded_with)}" if one.confounded_with else ""
-    doubt = f"; in doubt: {'; '.join(one.doubts)}" if one.doubts else ""
-    return f"{one.text}{': ' if parameters else ''}{parameters}{tied}{doubt}"
+def _said(one: Cause) -> dict[str, str]:
+    return {
+        **parameters(one.parameters),
+        **({"or": f"could equally be {' or '.join(one.confounded_with)}"} if one.confounded_with else {}),
+        **({"in doubt": "; ".join(one.doubts)} if one.doubts else {}),
+    }
 
 
-def _row(one: Cause) -> tuple[Any, ...]:
-    measured = one.found and math.isfinite(one.held_out_gain_percent)
-    return (
-        one.cause,
-        "in doubt" if one.found and one.doubts else one.found,
-        None if one.p_value is None else f"{one.p_value:.3f}",
-        one.explains_percent,
-        one.held_out_gain_percent if measured else None,
-    )
+def _row(one: Cause, *, quick: bool) -> tuple[Any, ...]:
+    gain = one.held_out_gain_percent if one.found else float("nan")
+    return (one.cause, answer(one, quick=quick), _figure(one.explains_percent, ".1f"), _figure(gain, ".1f"))
+
+
+def _figure(value: float, form: str) -> str | None:
+    return format(value, form) if math.isfinite(value) else None

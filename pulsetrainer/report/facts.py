@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Parameter, Playback, Run, Session, Waveform
+from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
 from pulsetrainer.artefacts.time_steps import gaps_of, steps_of
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.report.diagnosis_text import parameters
 
 
 def facts(artefact: Any) -> dict[str, Any]:
@@ -138,16 +139,13 @@ def _refined(waveform: Waveform) -> dict[str, Any]:
     }
 
 
-def _parameter(one: Parameter) -> str:
-    return f"{one.name} {with_unit(f'{one.value:.4g}', one.unit)}"
-
-
 def _diagnosis(found: Diagnosis) -> dict[str, Any]:
     return {
         "verdict": found.verdict,
         "quick": found.quick,
         "found": [
-            f"{one.cause} ({', '.join(map(_parameter, one.parameters))})" for one in found.causes if one.found
+            f"{one.cause} ({', '.join(map(' '.join, parameters(one.parameters).items()))})"
+            for one in found.found
         ],
         "rms_percent": found.rms_percent,
         "noise_percent": found.noise_percent,

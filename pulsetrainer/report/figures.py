@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import diagnosis_figures, heat_figures, panels, session_figures
+from pulsetrainer.report.directions import directions
 from pulsetrainer.report.style import (
     COLUMN_IN,
     COMPENSATED,
@@ -110,7 +111,8 @@ def run(record: Run) -> Figure:
     panels.orbit(loop, record.input, record.output, **FINE)
     loop.set_xlabel(input_label)
     loop.set_ylabel(output_label)
-    loop.set_title(f"{record.output_quantity} over {record.input_quantity}")
+    directions(loop, record.input, record.output)
+    loop.set_title(f"{record.output_quantity} over {record.input_quantity}, arrows: the way it goes")
     return figure
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from pulsetrainer.report import panels
-from pulsetrainer.report.style import COMPENSATED, GUIDE, TARGET
+from pulsetrainer.report.style import COLUMN_IN, COMPENSATED, GUIDE, TARGET, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,6 +34,16 @@ def temperature_of_repeats(axes: Axes, told_K: FloatArray) -> None:
     _finish(axes)
     axes.set_xlabel("repeat [number]")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+@styled
+def of_playback(told_K: FloatArray) -> Figure:
+    """Return the coil's temperature before each repeat (r,), K."""
+    figure = Figure(figsize=(COLUMN_IN, 2.6), layout="constrained")
+    axes = figure.add_subplot()
+    temperature_of_repeats(axes, told_K)
+    axes.set_title("Coil temperature, made up for")
+    return figure
 
 
 def _finish(axes: Axes) -> None:

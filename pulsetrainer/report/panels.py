@@ -92,9 +92,9 @@ def headroom(axes: Axes, share: float = 0.16) -> None:
     axes.legend(loc="upper left", ncols=4, columnspacing=1.2, borderaxespad=0.2)
 
 
-def quantity_of(unit: str) -> str:
-    """Return what is measured in a unit, where an artefact tells no more; "output" where nothing is known."""
-    return _QUANTITIES.get(unit, "output")
+def quantity_of(unit: str, otherwise: str = "output") -> str:
+    """Return what is measured in a unit, where an artefact tells no more."""
+    return _QUANTITIES.get(unit, otherwise)
 
 
 def density(panel: FigureBase, model: Model) -> None:

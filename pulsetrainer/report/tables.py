@@ -38,7 +38,8 @@ def drawn(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> 
 
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1))
     for number, name in enumerate(columns):
-        table.add_column(Text(name), justify="right" if number else "left", no_wrap=True)
+        words = number == 0 or any(text(row[number])[:1].isalpha() for row in rows)
+        table.add_column(Text(name), justify="left" if words else "right", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(text(cell)) for cell in row))
     # in a notebook the text is part of a page: nothing is to be shown beside it

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation
 from pulsetrainer.artefacts.evaluation import PUBLISHED
 from pulsetrainer.report import tables
-from pulsetrainer.report.diagnosis_text import Facts, sections
+from pulsetrainer.report.diagnosis_text import Facts, Table, sections
 from pulsetrainer.report.facts import facts
 
 _TITLED = {
@@ -28,15 +27,6 @@ _FIGURES = (
     ("loop area, compensated", "compensated.hysteresis_percent"),
     ("current tracking, worst", "compensated.current_tracking_max_percent"),
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A table: the first column is text, the others are numbers."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Any, ...], ...]
 
 
 def title(artefact: Any) -> str:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 from markupsafe import Markup
 
 from pulsetrainer.artefacts.units import shown
-from pulsetrainer.report import alternatives, figures
+from pulsetrainer.report import alternatives, figures, heat_figures
 from pulsetrainer.report.panels import largest_residual
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
@@ -222,8 +222,26 @@ def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
                 alternatives.loops(played),
                 "Force against target over one beat. Hysteresis opens a loop; without it there is a line.",
             ),
+            *_temperature(played, identifier),
         ),
     )
+
+
+def _temperature(played: WaveformEvaluation, identifier: str) -> list[Picture]:
+    """Return the figure of the coil's temperature, where the play told it."""
+    kelvin = played.temperature_K
+    if kelvin is None or not kelvin.size:
+        return []
+    return [
+        _picture(
+            heat_figures.of_playback(kelvin),
+            f"{identifier}-temperature",
+            f"Temperature of the coil: {titled(played)}",
+            f"from {kelvin[0]:+.1f} K before the first repeat to {kelvin[-1]:+.1f} K before the last",
+            "How much warmer the coil was than at calibration before each compensated repeat, as its duty "
+            "told; the drive made up for the force that this costs.",
+        )
+    ]
 
 
 def model_section(model: Model, which: str = "") -> Section:

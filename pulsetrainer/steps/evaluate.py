@@ -113,6 +113,7 @@ def _of_playback(name: str, playback: Playback) -> WaveformEvaluation:
         full_force=waveform.full_force,
         noise_percent=100.0 * spread / waveform.full_force,
         output_unit=waveform.output_unit,
+        temperature_K=playback.temperature_K,
     )
 
 

@@ -126,12 +126,12 @@ def _prediction(file):
 def _diagnosis(file):
     """Return every number of the two tables of a diagnosis by the name that it has in the page."""
     names = ("rms_percent", "noise_percent", "static_percent", "extended_percent", "floor_percent")
-    found = {name: file[name][()] for name in names}
+    found = {name: file[name][()] for name in (*names, "extended_rms_percent")}
     listed = [cause.attrs for cause in file["causes"].values()]
     chosen = [one for one in listed if one["found"]]
     chosen += [one for one in listed if not one["found"] and one["explains_percent"] > 0]
     for one in chosen[:12]:
-        for name in ("p_value", "explains_percent", "held_out_gain_percent"):
+        for name in ("explains_percent", "held_out_gain_percent"):
             value = float(one[name])
             if name != "held_out_gain_percent" or (one["found"] and math.isfinite(value)):
                 found[f"{one['cause']}.{name}"] = value

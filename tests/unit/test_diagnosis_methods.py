@@ -23,6 +23,7 @@ from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.raw import evenly
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import p_value
+from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 
 CAUSE = library()
@@ -441,7 +442,14 @@ def test_start_values_scale_with_span_range_and_length(name, starts):
 # --- words
 def test_every_kind_of_evidence_and_advice_has_words():
     """With all its figures, and no brace left over."""
-    words = {"input": "current", "output": "force", "y": "N", "in_y": " N"}
+    words = {
+        "input": "current",
+        "output": "force",
+        "y": "N",
+        "in_y": " N",
+        "hold_least": "1 s",
+        "short": "20 s",
+    }
     figures = dict.fromkeys(
         [
             "left",
@@ -464,9 +472,8 @@ def test_every_kind_of_evidence_and_advice_has_words():
         1.25,
     )
     for kind in wording.TEXTS:
-        said = wording.sentence(
-            Evidence(kind, "creep" if kind == "tested" else "", figures, ("rates", "x")), words
-        )
+        names = ("level",) if kind == "largest" else ("holds", "x")
+        said = wording.sentence(Evidence(kind, "creep" if kind == "tested" else "", figures, names), words)
         assert said.endswith(".")
         assert "{" not in said
     for kind in wording.ADVICE:
@@ -490,11 +497,11 @@ def test_every_experiment_is_told_in_numbers_of_the_bench(name):
     assert " V" in said
     assert " A" not in said
     told = {
-        "nested loops": ["between 20 V and 120 V", "2.5e+04 V/s", "4e+05 V/s"],
+        "nested loops": ["between 20 V and 120 V", "2.5e+04 V/s", "4e+05 V/s", "about 34.1 ms in all"],
         "steps and holds": ["110, 50, 90 and 30 V", "6 ms"],
-        "equal minor loops": ["15 V wide", "from 30, 50, 70 and 90 V"],
+        "equal minor loops": ["15 V wide", "from 30, 50, 70 and 90 V", "5e+04 V/s"],
         "equal cycles": ["between 40 V and 100 V", "7.5e+04 V/s"],
-        "heating": ["60 ms at 120 V", "60 ms at 20 V"],
+        "heating": ["60 ms at 120 V", "60 ms at 20 V", "about 136 ms in all"],
     }
     assert [words for words in told[name] if words not in said] == []
 
@@ -505,6 +512,35 @@ def test_what_a_record_lacks_is_asked_for_in_numbers():
     said = wording.advice(Evidence("lacks", names=("rates", "holds", "length")), bench)
     for words in ("0.01 mm/s", "0.16 mm/s", "300 s", "1.8, 0.6, 1.4 and 0.2 mm", "33.3 min or more"):
         assert words in said, said
+    assert "between 0 mm and 2 mm" in said
+    least = f"{100.0 * LIMITS.hold_s:.0f} s"  # what counts as a hold on a bench whose second is 100 s
+    assert least in said
+    evidence = wording.sentence(Evidence("lacks", names=("holds", "length")), bench.numbers())
+    assert least in evidence
+    assert "33.3 min" in evidence
+
+
+def test_where_an_error_is_largest_is_told_with_its_quantity():
+    """A speed, a level with its unit, a direction in words, a time."""
+    words = {"input": "voltage", "in_u": " V"}
+    told = {
+        name: wording.sentence(Evidence("largest", figures={"at": at, "times": 3.0}, names=(name,)), words)
+        for name, at in {"rate": 2.0, "level": 1.5, "direction": -1.0, "time": 40.0}.items()
+    }
+    assert "2 ranges of the voltage per second" in told["rate"]
+    assert "1.5 V" in told["level"]
+    assert "falls" in told["direction"]
+    assert "40 s" in told["time"]
+
+
+@pytest.mark.parametrize("name", sorted(CAUSE))
+def test_every_parameter_of_every_cause_says_of_what_it_is(name):
+    """Fitted ones by their quantities, what a gate tells as a size; no brace but those of the two names."""
+    frame = Frame(0.01, np.linspace(0.0, 1.0, 100), span=1.0, reach=1.0)
+    meanings = [one.meaning for one in CAUSE[name].quantities(frame)]
+    meanings += [CAUSE[name].size] if CAUSE[name].stage == "record" else []
+    assert all(meanings)
+    assert not any("{" in one.format(input="u", output="y") for one in meanings)
 
 
 def test_evidence_names_its_cause_and_its_record():

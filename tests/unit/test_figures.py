@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from pulsetrainer.artefacts import Evaluation, Run, units
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.report import figures, heat_figures
+from pulsetrainer.report.directions import directions, turns
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
 from pulsetrainer.report.thin import MOST_POINTS, extremes, path
@@ -376,3 +377,24 @@ def test_inline_svg_fits_a_page():
         assert f":{colour}" not in svg
     outside = set(re.findall(r"https?://[^\"'\s<]+", svg))
     assert outside <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
+
+
+def test_a_run_shows_which_way_its_loop_goes():
+    """One arrow up and one down, each in the direction of time; wiggles of noise make no strokes."""
+    t = np.linspace(0.0, 4.0 * np.pi, 4000)
+    u = 1.0 - np.cos(t) + 0.01 * np.random.default_rng(2).normal(size=t.size)
+    axes = Figure().subplots()
+    directions(axes, u, np.sin(t - 0.5))
+    ends = [(one.xyann[0], one.xy[0]) for one in axes.texts]
+    assert len(ends) == 2
+    assert ends[0][0] < ends[0][1]
+    assert ends[1][0] > ends[1][1]
+    assert len(turns(u)) == 5  # four strokes
+
+
+def test_an_input_that_only_rises_has_one_arrow():
+    """And one that stands still has none."""
+    for u, count in ((np.linspace(0.0, 1.0, 50), 1), (np.zeros(50), 0)):
+        axes = Figure().subplots()
+        directions(axes, u, u)
+        assert len(axes.texts) == count

@@ -44,6 +44,7 @@ class Quantity:
     low: float
     high: float
     small: float  # a step that matters little: for differences
+    meaning: str = ""  # of what it is, in words; {input} and {output} are what was measured
 
 
 @dataclass(frozen=True)
@@ -114,6 +115,7 @@ class Cause:
     order: ClassVar[int]  # place in the chain
     family: ClassVar[str]  # causes of one family are easily taken for one another
     parameters: ClassVar[tuple[Quantity, ...]] = ()
+    size: ClassVar[str] = ""  # of what the size is that its gate tells, in words as those of a quantity
     strengths: ClassVar[int] = 1  # so many leading parameters enter almost linearly
     texts: ClassVar[Mapping[str, str]] = {}  # what its gate says, by the kind of firing, figures in braces
     # how it is sought

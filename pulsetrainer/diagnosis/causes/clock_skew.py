@@ -24,7 +24,7 @@ class ClockSkew(Cause):
     stage = "output"
     order = 150
     family = "skew"
-    parameters = (Quantity("skew", "1", -0.01, 0.01, 1e-6),)
+    parameters = (Quantity("skew", "1", -0.01, 0.01, 1e-6, "share by which the {output}'s clock is slow"),)
     lasting = False
     corrects = True
 

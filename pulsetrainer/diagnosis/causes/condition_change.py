@@ -44,8 +44,8 @@ class ConditionChange(Cause):
     needs_time = False
     strengths = 2
     parameters = (
-        Quantity("offset", "{y}", -1e6, 1e6, 1e-4),
-        Quantity("gain", "1", -0.9, 0.9, 1e-4),
+        Quantity("offset", "{y}", -1e6, 1e6, 1e-4, "added to the {output}"),
+        Quantity("gain", "1", -0.9, 0.9, 1e-4, "change of the gain, as a share of it"),
     )
     lasting = False
     texts: ClassVar[Mapping[str, str]] = {

@@ -35,8 +35,8 @@ class Creep(Cause):
     family = "slow memory"
     common = True
     parameters = (
-        Quantity("amplitude", "1", -0.3, 0.6, 0.002),
-        Quantity("tau", "s", 0.04, 20.0, 0.02),
+        Quantity("amplitude", "1", -0.3, 0.6, 0.002, "what follows slowly, per change at once"),
+        Quantity("tau", "s", 0.04, 20.0, 0.02, "time constant; others at a quarter and four times"),
     )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:

@@ -27,8 +27,9 @@ class CurrentTracking(Cause):
     order = 4
     family = "current-tracking"
     lasting = False
+    size = "from the {input} to its reference; one sample in a hundred is further off"
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": "one sample in a hundred of the input is {worst:.3g} or more away from its reference"
+        "gate": "one sample in a hundred of the input is {worst:.3g}{in_u} or more away from its reference"
     }
 
     def gate(self, raw: Raw) -> Firing | None:

@@ -41,7 +41,7 @@ class Delay(Cause):
     family = "lag"
     widens = True
     common = True
-    parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005),)
+    parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005, "by which the {output} is late"),)
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""

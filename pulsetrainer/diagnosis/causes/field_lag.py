@@ -24,7 +24,7 @@ class FieldLag(Cause):
     family = "lag"
     widens = True
     common = True
-    parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005),)
+    parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the lag"),)
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""

@@ -30,7 +30,7 @@ class LoadDependence(Cause):
     order = 40
     family = "load"
     needs_time = False
-    parameters = (Quantity("coefficient", "{u}/{y}", -0.9, 0.9, 2e-3),)
+    parameters = (Quantity("coefficient", "{u}/{y}", -0.9, 0.9, 2e-3, "added to the {input}, per {output}"),)
     feeds_back = True
     by_contrast = True
 

@@ -27,8 +27,12 @@ class OutOfRange(Cause):
     order = 5
     family = "out-of-range"
     lasting = False
+    size = "beyond the range of the model, at most"
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": "{count:.0f} samples of the input lie outside {low:.4g} .. {high:.4g}, by up to {beyond:.3g}"
+        "gate": (
+            "{count:.0f} samples of the input lie outside {low:.4g} .. {high:.4g}{in_u}, "
+            "by up to {beyond:.3g}{in_u}"
+        )
     }
 
     def gate(self, raw: Raw) -> Firing | None:

@@ -39,8 +39,9 @@ class Outliers(Cause):
     lasting = False
     corrects = True
     wild = True
+    size = "from the worst sample to those around it"
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": "{count:.0f} isolated samples differ from those around them by more than {limit:.3g}"
+        "gate": "{count:.0f} isolated samples differ from those around them by more than {limit:.3g}{in_y}"
     }
 
     def gate(self, raw: Raw) -> Firing | None:

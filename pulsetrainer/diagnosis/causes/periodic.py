@@ -39,9 +39,9 @@ class Periodic(Cause):
     family = "periodic"
     strengths = 2
     parameters = (
-        Quantity("sine", "{y}", -1e6, 1e6, 1e-4),
-        Quantity("cosine", "{y}", -1e6, 1e6, 1e-4),
-        Quantity("frequency", "Hz", 0.0, 1e6, 1e-4),
+        Quantity("sine", "{y}", -1e6, 1e6, 1e-4, "of the {output}, times sin(2 pi f t)"),
+        Quantity("cosine", "{y}", -1e6, 1e6, 1e-4, "of the {output}, times cos(2 pi f t)"),
+        Quantity("frequency", "Hz", 0.0, 1e6, 1e-4, "f, of the disturbance"),
     )
     lasting = False
     corrects = True

@@ -37,8 +37,9 @@ class Quantisation(Cause):
     lasting = False
     jagged = True
     corrects = True
+    size = "of one step of the {output}"
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": "the output changes in steps of {step:.4g}, {percent:.2g} % of its span"
+        "gate": "the output changes in steps of {step:.4g}{in_y}, {percent:.2g} % of its span"
     }
 
     def gate(self, raw: Raw) -> Firing | None:

@@ -27,7 +27,9 @@ class RateWidening(Cause):
     order = 30
     family = "lag"
     widens = True
-    parameters = (Quantity("coefficient", "({u} s)^0.5", 0.0, 0.16, 4e-4),)
+    parameters = (
+        Quantity("coefficient", "({u} s)^0.5", 0.0, 0.16, 4e-4, "lag of the {input}, per root of its speed"),
+    )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""

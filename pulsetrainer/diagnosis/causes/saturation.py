@@ -37,9 +37,12 @@ class Saturation(Cause):
     family = "saturation"
     lasting = False
     corrects = True
+    size = "{output} at which it is clipped"
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": "{count:.0f} samples sit at exactly {rail:.4g}: the output is clipped there",
-        "both": "{count:.0f} samples sit at exactly {rail:.4g} or {other:.4g}: the output is clipped there",
+        "gate": "{count:.0f} samples sit at exactly {rail:.4g}{in_y}: the output is clipped there",
+        "both": (
+            "{count:.0f} samples sit at exactly {rail:.4g} or {other:.4g}{in_y}: the output is clipped there"
+        ),
     }
 
     def gate(self, raw: Raw) -> Firing | None:

@@ -32,9 +32,9 @@ class Step(Cause):
     needs_time = False
     strengths = 2
     parameters = (
-        Quantity("offset", "{y}", -1e6, 1e6, 1e-4),
-        Quantity("gain", "1", -0.9, 0.9, 1e-4),
-        Quantity("time", "s", 0.0, 1e6, 0.01),
+        Quantity("offset", "{y}", -1e6, 1e6, 1e-4, "added to the {output} from then on"),
+        Quantity("gain", "1", -0.9, 0.9, 1e-4, "change of the gain, as a share of it"),
+        Quantity("time", "s", 0.0, 1e6, 0.01, "of the change, since the first sample"),
     )
     lasting = False
     corrects = True

@@ -82,9 +82,10 @@ class StickSlip(Cause):
     jagged = True
     blinded_by = ("saturation",)
     doubted = True
+    size = "of a typical jump of the {output}"
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": "{count:.0f} jumps of about {size:.3g} between flat stretches in slow motion",
-        "left": "the output moves in jumps of about {size:.3g}, whatever the rate",
+        "gate": "{count:.0f} jumps of about {size:.3g}{in_y} between flat stretches in slow motion",
+        "left": "the output moves in jumps of about {size:.3g}{in_y}, whatever the rate",
     }
 
     def gate(self, raw: Raw) -> Firing | None:

@@ -39,8 +39,10 @@ class ThermalDrift(Cause):
     family = "slow gain"
     common = True
     parameters = (
-        Quantity("coefficient", "1/({u})^2", -1.1, 1.1, 0.002),
-        Quantity("tau", "s", 1.0, 300.0, 0.5),
+        Quantity(
+            "coefficient", "1/({u})^2", -1.1, 1.1, 0.002, "share of the {output} lost, per squared {input}"
+        ),
+        Quantity("tau", "s", 1.0, 300.0, 0.5, "time constant of the heat"),
     )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:

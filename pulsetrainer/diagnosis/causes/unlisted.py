@@ -194,10 +194,13 @@ class Unlisted(Cause):
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """A constant and the values of the curve, of each part."""
         curve = tuple(
-            Quantity(f"f{k}", "{y}", -_STEEPEST, _STEEPEST, _SMALL_CHANGE * frame.span)
+            Quantity(f"f{k}", "{y}", -_STEEPEST, _STEEPEST, _SMALL_CHANGE * frame.span, "point of the curve")
             for k in range(2, KNOTS + 1)
         )
-        tau = Quantity("tau", "s", frame.dt_s, max(frame.length_s, 2.0 * frame.dt_s), _SMALL_TIME_S)
+        longest = max(frame.length_s, 2.0 * frame.dt_s)
+        tau = Quantity(
+            "tau", "s", frame.dt_s, longest, _SMALL_TIME_S, "time over which the state is averaged"
+        )
         return (tau, *curve) * len(self.parts)
 
     def constants(self) -> tuple[tuple[str, float, str], ...]:

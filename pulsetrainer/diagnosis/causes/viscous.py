@@ -38,8 +38,8 @@ class Viscous(Cause):
     widens = True
     common = True
     parameters = (
-        Quantity("coefficient", "{y} s/{u}", -1e6, 1e6, 1e-5),
-        Quantity("filter", "s", 0.0, 0.05, 1e-4),
+        Quantity("coefficient", "{y} s/{u}", -1e6, 1e6, 1e-5, "{output} per speed of the {input}"),
+        Quantity("filter", "s", 0.0, 0.05, 1e-4, "time by which it trails the speed"),
     )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:

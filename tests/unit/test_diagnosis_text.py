@@ -1,0 +1,50 @@
+"""A diagnosis in words: whether a cause was found and why not, its parameters with what they are of."""
+
+from __future__ import annotations
+
+import pytest
+
+from pulsetrainer.artefacts import Cause, Parameter
+from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.report.diagnosis_text import answer, parameters
+
+NAN = float("nan")
+
+
+def _cause(p_value, *, found=False, doubts=()):
+    return Cause("creep", found, p_value, 1.0, NAN, doubts=doubts)
+
+
+def test_a_cause_that_was_not_found_says_why():
+    """A small p beside a plain no would be a riddle; each reason has words of its own."""
+    small, large = 0.1 * LIMITS.p_max, 10.0 * LIMITS.p_max
+    said = [
+        answer(_cause(small, found=True), quick=False),
+        answer(_cause(small, found=True, doubts=("it may be nothing",)), quick=False),
+        answer(_cause(small), quick=False),
+        answer(_cause(small), quick=True),
+        answer(_cause(large), quick=False),
+        answer(_cause(None), quick=False),
+    ]
+    assert len(set(said)) == len(said)
+    assert [one.startswith("no") for one in said] == [False, False, True, True, True, True]
+    assert answer(_cause(LIMITS.p_max), quick=False) == said[2]  # the limit itself is significant
+
+
+def test_a_parameter_is_told_with_unit_interval_and_meaning():
+    """The interval says of which confidence it is; where none is known nothing is said of it."""
+    known = Parameter("tau", 1.5, "s", 1.25, 1.75, "time constant of the lag")
+    assert parameters([known])["tau"] == "1.5 s (95 %: 1.25 to 1.75): time constant of the lag"
+    assert (
+        parameters([Parameter("tau", 1.5, "s", NAN, NAN)])["tau"] == "1.5 s"
+    )  # a file of 0.1, a quick screen
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_learned_curve_is_told_by_its_ends_and_not_value_by_value(count):
+    """Its values are of the output, zero at the first knot; several time constants are counted."""
+    curve = [Parameter(f"f{k}", 0.1 * (k - 4), "N", NAN, NAN) for k in range(2, 9)]
+    kept = [Parameter("state", 3.0, "1", 3.0, 3.0), Parameter("low", 0.0, "A", 0.0, 0.0)]
+    said = parameters([*kept, *[Parameter("tau", 2.0, "s", NAN, NAN), *curve] * count])
+    assert list(said) == [*["tau", "tau 2"][:count], "curve"]
+    assert said["curve"].startswith("-0.2 to 0.4 N")
