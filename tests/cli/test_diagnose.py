@@ -71,7 +71,7 @@ def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     assert low <= LAG_S <= high
     assert first["parameters"]["tau"]["value"] == pytest.approx(LAG_S, rel=0.05)
     page = (bench / "diagnosis.html").read_text(encoding="utf-8")
-    for words in ('data-verdict="output-lag"', "What to measure next"):
+    for words in ('data-verdict="output-lag"', "What to do next"):
         assert words in page
     assert "http://" not in page.replace("http://www.w3.org", "")
     done = pulsetrainer(bench, "extend", "diagnosis.h5", "--model", "model.h5", "-o", "extended.h5")
