@@ -43,6 +43,7 @@ MESSAGES = {
     # --- files -------------------------------------------------------------------------------------------
     "wrong kind": Message("", "pulsetrainer {verb}", "{file}", "expected {expected}", "got {got}"),
     "absent": Message("does not exist", "files here: {near}", "{file}"),
+    "not an output": Message("{said}", ""),
     "a folder": Message("is a folder", "", "{file}", "expected a file"),
     "exists": Message("already exists", "another file, such as", "{file}"),
     "truncated": Message("truncated", "restore it", "{file}", got="{bytes} bytes"),
@@ -67,6 +68,13 @@ MESSAGES = {
         "does not increase", "drop the repeated rows", "{file}, column t_s", got="line 4: 0.1 s after 0.1 s"
     ),
     "no numbers": Message("no numbers", "another column", "{file}", "column t_s"),
+    "nearest column": Message("no column '{asked}'", "{near}", expected="{has}"),
+    "two lengths": Message("one length", ""),
+    "out of all bounds": Message("goes from", "", "{place}", "the limit of 1e+100"),
+    "column of text": Message("has text, not numbers", "", "{place}"),
+    "time stands": Message("does not increase", "", "{place}", got="line {line}: {stamp}"),
+    "no unit of time": Message("in {unit}", "", "{place}"),
+    "too few rows": Message("has 1 row", ""),
     "empty": Message("is empty", "export", "{file}"),
     "beyond all numbers": Message(
         "goes from", "those rows", "{file}, column {column}", "1e+100", "-1e+308 to 1e+308"
@@ -102,11 +110,15 @@ MESSAGES = {
     "no such form": Message("", "", expected="png, svg, pdf", got="'{got}'"),
     "nothing to draw": Message("nothing to draw", ""),
     "no figure of it": Message("no figure", "", got="{got}"),
+    "an empty range": Message("low < high", ""),
+    "no such cause": Message("does not know", "update", got="'{named}'"),
+    "does not vary": Message("the {constant} does not vary", "capture diagnostic"),
+    "names it": Message("", "", "{named}"),
     # --- words -------------------------------------------------------------------------------------------
     "option missing": Message("is missing", "pulsetrainer identify run.h5", expected="--out"),
     "no such command": Message("there is no command", "--help", got="frobnicate"),
     "no such signal": Message("signal", "pulsetrainer capture", expected="diagnostic", got="noise"),
-    "no such bench parameter": Message("parameter", "creep", "--port: the bench", got="'crep'"),
+    "no such bench parameter": Message("parameter", "creep", "{asked}: the bench", got="'crep'"),
     "one evaluation": Message("at least two", "pulsetrainer compare"),
     "nothing in common": Message("in common", "evaluat"),
     # --- settings ----------------------------------------------------------------------------------------
@@ -116,6 +128,16 @@ MESSAGES = {
     "no file of settings": Message("settings", "--settings", "{file}"),
     # --- device ------------------------------------------------------------------------------------------
     "no such port": Message("no port", "pulsetrainer ports", "{port}"),
+    "no such emulator": Message("{said}", "{hint}"),
+    "no emulator": Message("{missing}", "{packages}"),
+    "does not compile": Message("does not compile", "", got="error"),
+    "no cache": Message("cannot write the firmware cache", "", "{folder}"),
+    "refused by number": Message("", "", got="{code}", expected="{fault}"),
+    "too hot now": Message("too hot", "wait", got="% of its limit"),
+    "too hot ever": Message("however cold", ""),
+    "another shape": Message("shape", ""),
+    "stray current": Message("current flows although the reference is zero", ""),
+    "current flows on": Message("still flow", "plug", got="{amperes}"),
     "no compiler": Message("C compiler", "pip install ziglang"),
     "several devices": Message("2 devices", "--port", got="/dev/ttyUSB1, /dev/ttyUSB2"),
     "no device": Message("no device", "bench:", expected="0403:6015", got="/dev/ttyUSB0"),

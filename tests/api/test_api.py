@@ -31,7 +31,7 @@ def test_the_names_are_those_of_the_contract():
         assert text, name
         assert ">>>" in text, name
     assert set(dir(pt)) >= NOUNS | VERBS
-    with pytest.raises(AttributeError, match="no attribute 'identfy'"):
+    with pytest.raises(AttributeError):
         _ = pt.identfy
 
 

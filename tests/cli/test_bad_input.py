@@ -119,7 +119,7 @@ def test_an_absent_port_is_exit_4(ready):
 def test_an_unknown_bench_parameter_offers_the_nearest(ready):
     """bench:?crep is a typing error, not a device."""
     words = ["capture", "identification", "--port", "bench:?crep=0.1", "-o", "x.h5"]
-    refused(ready, words, 2, "no such bench parameter")
+    refused(ready, words, 2, "no such bench parameter", asked="--port")
 
 
 def test_no_compiler_names_both_remedies(ready, tmp_path):

@@ -18,6 +18,7 @@ from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation import build
 from pulsetrainer.simulation.bench import Bench
 from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, BenchOptions, Wire, parse_bench
+from wording import raises
 
 
 @pytest.mark.parametrize(
@@ -134,9 +135,8 @@ def test_ziglang_is_used_where_there_is_no_cc(monkeypatch):
 def test_a_compiler_that_fails_is_quoted(monkeypatch, tmp_path):
     """The compiler's own words are in the error, nothing is cached."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    with pytest.raises(DeviceError, match="does not compile") as caught:
+    with raises(DeviceError, "does not compile"):
         build.firmware_executable(("-DPT_PROTOCOL_MAJOR=not a number",))
-    assert "error" in caught.value.message
     assert list((tmp_path / "pulsetrainer" / "firmware").iterdir()) == []
 
 
@@ -144,7 +144,7 @@ def test_a_cache_that_cannot_be_written_is_told(monkeypatch, tmp_path):
     """A file where the cache folder should be."""
     (tmp_path / "pulsetrainer").write_text("in the way", encoding="utf-8")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    with pytest.raises(DeviceError, match="cannot write the firmware cache"):
+    with raises(DeviceError, "no cache", folder=tmp_path):
         build.firmware_executable()
 
 

@@ -18,6 +18,7 @@ from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DeviceError, UsageError
 from pulsetrainer.simulation import build
 from pulsetrainer.simulation.bench import open_bench
+from wording import raises
 
 
 def test_handshake_says_who_and_how_much(device):
@@ -152,19 +153,19 @@ def test_real_speed_is_the_wall_clock(pulse):
     ("reference", "rate_Hz", "says"),
     [
         ([0.1, np.nan], 1000, "sample 1 of the reference is not a number"),
-        ([0.1, 0.2, 1.6], 1000, r"sample 2 of the reference is 1.6 A; the device plays 0..1.5 A"),
+        ([0.1, 0.2, 1.6], 1000, "sample 2 of the reference is 1.6 A; the device plays 0..1.5 A"),
         ([-0.1], 1000, "sample 0 of the reference is -0.1 A"),
         ([], 1000, "shape"),
         ([[0.1]], 1000, "shape"),
         ([0.1], 3000, "3000 Hz does not divide the device's 10000 Hz"),
         ([0.1], 0, "not possible"),
         ([0.1], np.inf, "not possible"),
-        (np.zeros(901), 1, "901|900"),
+        (np.zeros(901), 1, "900"),
     ],
 )
 def test_what_cannot_be_played_is_refused_before_arming(device, reference, rate_Hz, says):
     """A reference outside the device's limits is a clear error and nothing happens."""
-    with pytest.raises(ArgumentError, match=says):
+    with raises(ArgumentError, "names it", named=says):
         device.play(reference, rate_Hz)
     assert device._status().session == 0
     assert device.play([0.1], 1000).complete
@@ -172,7 +173,7 @@ def test_what_cannot_be_played_is_refused_before_arming(device, reference, rate_
 
 def test_decimation_is_checked(device):
     """A decimation of nothing is refused."""
-    with pytest.raises(ArgumentError, match="decimation 0"):
+    with raises(ArgumentError, "names it", named="decimation 0"):
         device.play([0.1], 1000, decimation=0)
 
 
@@ -180,9 +181,9 @@ def test_parameters_can_only_lower_limits(device):
     """A limit above the compiled one is refused by the program, and by the device itself."""
     assert device.set_parameter("force_trip", 5000) == 5000
     for row in PARAMETERS:
-        with pytest.raises(ArgumentError, match="outside"):
+        with raises(ArgumentError, "names it", named=row.name):
             device.set_parameter(row.name, row.maximum + 1)
-    with pytest.raises(ArgumentError, match="no parameter"):
+    with raises(ArgumentError, "names it", named="magic"):
         device.set_parameter("magic", 1)
 
 
@@ -220,9 +221,9 @@ def test_an_error_of_the_caller_stops_the_device(device):
     """An exception in on_block reaches the caller, the output is off by then."""
 
     def fail(_: Block) -> None:
-        raise RuntimeError("disk full")
+        raise RuntimeError
 
-    with pytest.raises(RuntimeError, match="disk full"):
+    with pytest.raises(RuntimeError):
         device.play(np.full(500_000, 0.5), 1000, on_block=fail)
     assert device._status().state == 0
 
@@ -265,7 +266,7 @@ def test_closing_always_disarms(pulse):
 def test_the_environment_names_the_port(monkeypatch):
     """Without a port PULSETRAINER_PORT decides, then the bench."""
     monkeypatch.setenv("PULSETRAINER_PORT", "/dev/no-such-port")
-    with pytest.raises(DeviceError, match="no port /dev/no-such-port"):
+    with raises(DeviceError, "no such port", port="/dev/no-such-port"):
         open_device(None)
     monkeypatch.delenv("PULSETRAINER_PORT")
     with open_device(None) as device:
@@ -300,6 +301,5 @@ def _without_nonce(message):
 
 def test_bad_bench_ports_are_usage_errors():
     """An unknown parameter is answered with its neighbours."""
-    with pytest.raises(UsageError, match="no parameter 'crep'") as caught:
+    with raises(UsageError, "no such bench parameter", asked="`port`"):
         open_device("bench:?crep=0.05")
-    assert "creep" in caught.value.hint

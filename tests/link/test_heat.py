@@ -17,6 +17,7 @@ from pulsetrainer.device.device import Device, open_device
 from pulsetrainer.device.heat import HeatMemory, added, cooled, in_words, wait_s
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.errors import ArgumentError, DeviceError
+from wording import raises
 
 FULL = np.full(60_000, 1.5)
 RATE_HZ = 1000.0
@@ -68,14 +69,14 @@ def test_a_play_that_would_be_too_hot_says_how_long_to_wait():
     with open_device("bench:") as device:
         assert device.play(reference, RATE_HZ).complete
         before = device._status()
-        with pytest.raises(DeviceError, match=r"too hot.*% of its limit") as caught:
+        with raises(DeviceError, "too hot now") as caught:
             device.play(reference, RATE_HZ)
         after = device._status()
         expected = wait_s(before.heat * HEAT_UNIT, reference, RATE_HZ)
         assert re.search(r"wait \d+ (seconds|minutes)", caught.value.hint)
         assert in_words(expected) in caught.value.hint
         assert (after.session, after.fault) == (before.session, 0)
-        with pytest.raises(ArgumentError, match="however cold"):
+        with raises(ArgumentError, "too hot ever"):
             device.play(np.full(140_000, 1.5), RATE_HZ)
 
 

@@ -18,6 +18,7 @@ from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.session import RefusedError
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.simulation.build import firmware_executable
+from wording import raises
 
 # --- two hosts in a row ----------------------------------------------------------------------------------
 
@@ -68,9 +69,8 @@ def test_a_fault_that_nobody_was_told_of_is_told_before_it_is_cleared():
             return usual
 
         script.answer = answer
-        with pytest.raises(DeviceError, match="current flows although the reference is zero") as caught:
+        with raises(DeviceError, "stray current"):
             device.play([0.1, 0.1], 1000)
-        assert caught.value.exit_code == 4
         assert script.when(m.ClearFault) == []
         device.play([0.1, 0.1], 1000)
         cleared = [command for _, command in script.heard if isinstance(command, m.ClearFault)]
@@ -128,9 +128,8 @@ def test_no_device_is_opened_while_its_current_flows():
     """Nothing is played on it, and the plug is the next step."""
     script = ScriptedDevice()
     script.status = {"current": 24_000, "flags": codes.STATUS_OUTPUT_NOT_OFF}
-    with pytest.raises(DeviceError, match=r"2\.4 A still flow") as caught:
+    with raises(DeviceError, "current flows on", amperes="2.4 A"):
         script.open()
-    assert "plug" in caught.value.hint
 
 
 # --- a wire that repeats ---------------------------------------------------------------------------------
@@ -165,41 +164,32 @@ def test_a_stuck_wire_does_not_keep_a_play_alive(wire, repeated):
 
 
 @pytest.mark.parametrize(
-    ("host", "older", "remedy"),
-    [
-        (codes.PROTOCOL_MAJOR - 1, "program", "pip install --upgrade"),
-        (codes.PROTOCOL_MAJOR + 1, "device", "flash"),
-    ],
+    ("host", "older"),
+    [(codes.PROTOCOL_MAJOR - 1, "program"), (codes.PROTOCOL_MAJOR + 1, "device")],
 )
-def test_an_old_and_a_new_host_on_this_firmware(wire, monkeypatch, host, older, remedy):
+def test_an_old_and_a_new_host_on_this_firmware(wire, monkeypatch, host, older):
     """Both versions and what to do are said; and whoever arms nevertheless is refused by the firmware."""
     monkeypatch.setattr(session, "PROTOCOL_MAJOR", host)
     one = wire("bench:")
-    with pytest.raises(
-        DeviceError, match=rf"protocol {codes.PROTOCOL_MAJOR}\.\d+, this program {host}\."
-    ) as caught:
+    theirs = f"protocol {codes.PROTOCOL_MAJOR}."
+    with raises(DeviceError, f"older {older}", ours=f"this program {host}.", theirs=theirs):
         one.session.hello()
-    assert f"the {older} is older" in caught.value.message
-    assert remedy in caught.value.hint
     one.ask(m.WaveBegin(1, 10, 0))
-    with pytest.raises(RefusedError, match="no handshake") as refused:
+    with pytest.raises(RefusedError) as refused:
         one.ask(m.Arm(0))
     assert refused.value.nak.code == codes.NakCode.VERSION
 
 
 @pytest.mark.parametrize(
-    ("define", "older"),
-    [
-        (f"-DPT_PROTOCOL_MAJOR={codes.PROTOCOL_MAJOR - 1}u", "device"),
-        (f"-DPT_PROTOCOL_MAJOR={codes.PROTOCOL_MAJOR + 1}u", "program"),
-    ],
+    ("major", "older"),
+    [(codes.PROTOCOL_MAJOR - 1, "device"), (codes.PROTOCOL_MAJOR + 1, "program")],
 )
-def test_this_host_on_an_old_and_a_new_firmware(wire, define, older):
+def test_this_host_on_an_old_and_a_new_firmware(wire, major, older):
     """The firmware compiled with another version of the protocol."""
-    one = wire("bench:", firmware_executable((define,)))
-    with pytest.raises(DeviceError, match=f"the {older} is older") as caught:
+    one = wire("bench:", firmware_executable((f"-DPT_PROTOCOL_MAJOR={major}u",)))
+    ours = f"this program {codes.PROTOCOL_MAJOR}."
+    with raises(DeviceError, f"older {older}", ours=ours, theirs=f"protocol {major}."):
         one.session.hello()
-    assert ("flash" if older == "device" else "pip install") in caught.value.hint
 
 
 @pytest.mark.parametrize("length", [-1, 1, 40])
@@ -220,5 +210,6 @@ def test_a_greeting_of_another_layout_is_told_by_its_version(length):
             script._out = encode(Frame(m.HelloReply.TYPE, frame.seq, payload))
 
     script.write = answer
-    with pytest.raises(DeviceError, match=rf"protocol {major}\.{codes.PROTOCOL_MINOR}.*the program is older"):
+    theirs = f"protocol {major}.{codes.PROTOCOL_MINOR}"
+    with raises(DeviceError, "older program", ours="this program", theirs=theirs):
         script.open()

@@ -49,11 +49,10 @@ def test_parse_undoes_pack(message):
 def test_only_the_exact_length_is_a_message(message, more):
     """A byte too many or too few is an error, never a guess."""
     payload = message.pack()
-    with pytest.raises(ValueError, match=type(message).__name__):
-        type(message).parse(payload + more)
-    if payload:
-        with pytest.raises(ValueError, match=type(message).__name__):
-            type(message).parse(payload[:-1])
+    for wrong in [payload + more, *([payload[:-1]] if payload else [])]:
+        with pytest.raises(ValueError) as caught:  # noqa: PT011 - its message is looked at
+            type(message).parse(wrong)
+        assert type(message).__name__ in str(caught.value)
 
 
 def test_type_ids_are_unique():

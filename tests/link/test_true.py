@@ -11,6 +11,7 @@ import pulsetrainer as pt
 from pulsetrainer.artefacts.model import Extension, Parameter
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.check import check_updatable, updated
+from wording import raises
 
 # What a diagnosis of the as-built bench finds.
 THERMAL = Extension(
@@ -69,7 +70,7 @@ def test_another_density_is_changed_and_not_updated(model):
     with pt.open_device("bench:?seed=101") as device:
         found = pt.check(model, device)
     assert found.verdict == "changed"
-    with pytest.raises(DataError, match="shape"):
+    with raises(DataError, "another shape"):
         updated(model, found)
 
 
@@ -87,9 +88,9 @@ def test_the_model_of_another_device_is_refused(model):
     other = replace(model, coil=replace(model.coil, serial="OTHER"), extensions=(THERMAL,))
     drive = pt.invert("normal", other, periods=2)
     with pt.open_device("bench:?seed=1") as device:
-        with pytest.raises(DataError, match="OTHER"):
+        with raises(DataError, "names it", named="OTHER"):
             pt.check(other, device)
-        with pytest.raises(DataError, match="OTHER"):
+        with raises(DataError, "names it", named="OTHER"):
             pt.play(drive, device, repeats=1, track_heat=True)
         assert pt.play(drive, device, repeats=1).temperature_K is None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import signal
@@ -102,8 +103,8 @@ def test_nothing_recorded_leaves_nothing(tmp_path):
             if error:
                 raise error
 
-    with pytest.raises(RuntimeError, match="port"):
-        capture(RuntimeError("no port"))
+    with pytest.raises(RuntimeError):
+        capture(RuntimeError())
     assert not _names(tmp_path)
     with raises(DataError, "nothing recorded"):
         capture(None)
@@ -137,9 +138,9 @@ def test_a_name_taken_meanwhile_keeps_the_recording(tmp_path):
         with RunRecorder(tmp_path / "b.h5", examples.header()) as second:
             _record(second, examples.run(5))
             (tmp_path / "b.h5").write_text("first")
-            raise RuntimeError("link lost")
+            raise RuntimeError
 
-    with pytest.raises(RuntimeError, match="link lost") as caught:
+    with pytest.raises(RuntimeError) as caught:
         capture()
     assert "b.h5.partial" in caught.value.__notes__[0]
 
@@ -325,7 +326,7 @@ def test_a_full_disk_in_the_middle_of_a_block(tmp_path, monkeypatch):
         def write(self, view):
             self.writes += 1
             if self.writes > 1:
-                raise OSError(28, "No space left on device")
+                raise OSError(errno.ENOSPC, "")
             return self.stream.write(view[:10])
 
         def __getattr__(self, name):
@@ -333,8 +334,9 @@ def test_a_full_disk_in_the_middle_of_a_block(tmp_path, monkeypatch):
 
     stream = journal._stream
     monkeypatch.setattr(journal, "_stream", Short(stream))
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(OSError) as caught:  # noqa: PT011 - its number is held
         journal.append(b"DATA", np.zeros((4, 5)).tobytes())
+    assert caught.value.errno == errno.ENOSPC
     monkeypatch.setattr(journal, "_stream", stream)
     journal.append(b"DATA", np.arange(8.0).tobytes(), dropped=7)
     run = Recording.read(path).artefact

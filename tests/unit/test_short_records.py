@@ -7,6 +7,7 @@ import pytest
 
 import pulsetrainer as pt
 from pulsetrainer.errors import ArgumentError, DataError
+from wording import raises
 
 
 def loop(points):
@@ -66,5 +67,5 @@ def test_time_that_stands_or_goes_back_is_refused(step):
     u, y = loop(50)
     time = np.arange(50.0)
     time[20] = time[19] + step
-    with pytest.raises(DataError, match="20"):
+    with raises(DataError, "names it", named="sample 20"):
         pt.Run(time_s=time, input=u, output=y)

@@ -14,6 +14,7 @@ from pulsetrainer.files.csv_dialect import detect
 from pulsetrainer.files.csv_rows import PIECE, parse
 from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.table import read_table, write_table
+from wording import raises
 
 
 def read_run(path, **columns):
@@ -110,7 +111,7 @@ def test_write_and_read(tmp_path):
     with pytest.raises(ExistsError):
         write_table(tmp_path / "t.csv", columns)
     write_table(tmp_path / "t.csv", {"a": [1.0], "b": [2.0]}, overwrite=True)
-    with pytest.raises(ArgumentError, match="one length"):
+    with raises(ArgumentError, "two lengths"):
         write_table(tmp_path / "x.csv", {"a": [1.0], "b": [2.0, 3.0]})
     assert not (tmp_path / "x.csv").exists()
 
@@ -261,7 +262,7 @@ def test_the_last_rows_tell_the_order_of_a_date(table, days, encoding):
 def test_what_no_quantity_reaches_is_refused(table, cell):
     """Its square is infinite: no figure and no fit would come of it."""
     path = table(f"when,u,y\n0,1,2\n1,{cell},3\n2,1,2\n").path
-    with pytest.raises(DataError, match=r"t\.csv, column u, goes from .* the limit of 1e\+100"):
+    with raises(DataError, "out of all bounds", place="t.csv, column u"):
         read_run(path, **COLUMNS)
 
 
@@ -288,7 +289,7 @@ def test_columns_of_text_are_passed_over(table):
     read = table("when,u,y\nnoon,1,2\nlater,,4\n")
     np.testing.assert_array_equal(read.column("y"), [2, 4])
     np.testing.assert_array_equal(read.column("u"), [1, np.nan])
-    with pytest.raises(DataError, match="has text, not numbers, in column when, as in line 2"):
+    with raises(DataError, "column of text", place="column when, as in line 2"):
         read.column("when")
 
 
@@ -298,10 +299,9 @@ def test_columns_of_one_heading_are_numbered(table):
     assert read.names == ("t", "Volt#1 (V)", "Volt#2 (V)", "u")
     np.testing.assert_array_equal(read.column("Volt#2"), [2, 4])
     assert read.unit("Volt#1") == "V"
-    with pytest.raises(DataError, match="has no column 'Volt'") as refused:
-        read.column("Volt")
-    assert "Volt#1 (V)" in refused.value.hint
-    assert "Volt#2 (V)" in refused.value.hint
+    for near in ("Volt#1 (V)", "Volt#2 (V)"):
+        with raises(DataError, "nearest column", asked="Volt", has="Volt#1 (V)", near=near):
+            read.column("Volt")
 
 
 @pytest.mark.parametrize("missing", ["", "NaN", "n/a", "-", "NULL"])
@@ -309,9 +309,9 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
     """A missing value is no error by itself; a column that must be whole names line, column and how many."""
     read = table(f"# c\nt,u,y\n0,1,2\n\n1,{missing},3\n2,3,4\n")
     assert np.isnan(read.column("u")[1])
-    with pytest.raises(DataError, match=r"nan in column u, line 5 \(1 of 3 rows"):
+    with raises(DataError, "not finite", file="t.csv", value="nan", column="u", line="5 (1 of 3 rows"):
         read.check_finite("u")
-    with pytest.raises(DataError, match="line 5"):
+    with raises(DataError, "names it", named="line 5"):
         read_run(read.path, **COLUMNS)
 
 
@@ -354,15 +354,16 @@ def test_a_late_decimal_comma_is_found(table):
 def test_files_that_are_not_there(tmp_path):
     """An absent file and a folder."""
     for path in (tmp_path / "absent.csv", tmp_path):
-        with pytest.raises(DataError, match="cannot be read"):
+        with raises(DataError, "cannot be read", file=path.name):
             read_table(path)
 
 
 def test_a_column_that_does_not_exist_offers_the_nearest(table):
     """A typing error in a column's name."""
-    with pytest.raises(DataError, match="no column 'curent'; it has t_s, current_A, force_N") as caught:
+    with raises(
+        DataError, "nearest column", asked="curent", has="t_s, current_A, force_N", near="'current_A'"
+    ):
         table("t_s,current_A,force_N\n0,1,2\n").column("curent")
-    assert "'current_A'" in caught.value.hint
 
 
 @settings(max_examples=300, deadline=None)
@@ -417,7 +418,7 @@ def test_only_what_is_kept_stays(tmp_path):
     assert list(read_table(path, lambda head: {head.index("c"), 0}).columns) == ["a", "c"]
     path.write_text("a,b,c\n1,2,3\n4,x,6\n")
     np.testing.assert_array_equal(read_table(path, lambda _: {0}).column("a"), [1, 4])
-    with pytest.raises(DataError, match="'x' in column b, line 3"):
+    with raises(DataError, "names it", named="'x' in column b, line 3"):
         read_table(path, lambda _: {1})
 
 
@@ -451,7 +452,7 @@ def test_a_rate_instead_of_a_time(table):
     read = table("t,u,y\n9,1,2\n8,2,3\n")
     np.testing.assert_array_equal(read_run(read.path, **COLUMNS, rate_Hz=4).time_s, [0, 0.25])
     for bad in ({"rate_Hz": 4, "time": "t"}, {"rate_Hz": 0}, {"rate_Hz": np.nan}, {"rate_Hz": np.inf}):
-        with pytest.raises(UsageError, match="rate"):
+        with raises(UsageError, "names it", named="rate"):
             read_run(read.path, **COLUMNS, **bad)
 
 
@@ -472,9 +473,8 @@ def test_a_column_that_just_counts_is_no_time(table, first, counts):
 def test_time_that_does_not_increase_names_the_line(table):
     """A repeated and a backward time stamp, comments and blank lines counted."""
     for stamp in ("1", "0.5"):
-        with pytest.raises(
-            DataError, match=rf"t\.csv, column t, does not increase at line 6: {stamp} s after 1 s"
-        ):
+        told = {"place": "t.csv, column t", "line": "6", "stamp": f"{stamp} s after 1 s"}
+        with raises(DataError, "time stands", **told):
             read_run(table(f"# c\nt,u,y\n0,1,2\n1,1,2\n\n{stamp},1,2\n").path, **COLUMNS)
 
 
@@ -505,13 +505,13 @@ def test_what_is_wrong_far_from_the_start_is_named(tmp_path, row, said):
 
 def test_time_in_an_unknown_unit(table):
     """Samples are no time."""
-    with pytest.raises(DataError, match=r"column t .* in 'samples'"):
+    with raises(DataError, "no unit of time", place="column t", unit="'samples'"):
         read_run(table("t (samples),u,y\n0,1,2\n1,2,3\n").path, **COLUMNS, time="t")
 
 
 def test_one_row_is_no_run(table):
     """A run needs two samples."""
-    with pytest.raises(DataError, match="has 1 row"):
+    with raises(DataError, "too few rows"):
         read_run(table("t,u,y\n0,1,2\n").path, **COLUMNS)
 
 
