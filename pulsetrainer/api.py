@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 import pulsetrainer.simulation  # noqa: F401 - announces the ports bench: and qemu:
 from pulsetrainer.artefacts import Waveform
 from pulsetrainer.core.pulses import Shape
-from pulsetrainer.device import device as _device
+from pulsetrainer.device import opening as _device
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.gains import Gains
 from pulsetrainer.device.limits import Limits

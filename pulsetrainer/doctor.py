@@ -19,8 +19,8 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.api import open_device
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
-from pulsetrainer.device.device import DEFAULT_PORT
 from pulsetrainer.device.gains import DELIVERED
+from pulsetrainer.device.opening import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.diagnosis import gates, wording

@@ -214,7 +214,7 @@ class Job:
         self, what: str, plan: Any, port: str | None, out: Path, rows: Mapping[str, Any], **besides: Any
     ) -> None:
         """Say what a dry run would have played, and where; ``besides`` is for JSON."""
-        from pulsetrainer.device.device import DEFAULT_PORT
+        from pulsetrainer.device.opening import DEFAULT_PORT
         from pulsetrainer.device.schemes import redact
 
         where = redact(port or DEFAULT_PORT)

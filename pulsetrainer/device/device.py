@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
-import os
 import threading
 import time
 from dataclasses import replace
@@ -20,12 +19,10 @@ from pulsetrainer.device.heat import HeatMemory, added
 from pulsetrainer.device.identity import DeviceInfo
 from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire
 from pulsetrainer.device.player import Player, tells_duty
-from pulsetrainer.device.ports import find_device_port
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
-from pulsetrainer.device.schemes import OpenPort, find_opener, redact
+from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.session import Session
 from pulsetrainer.device.trace import Block, FloatArray, Trace
-from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.device.wording import (
     NOT_OFF_REMEDY,
     describe_fault,
@@ -40,8 +37,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 _LOG = logging.getLogger(__name__)
-PORT_VARIABLE = "PULSETRAINER_PORT"
-DEFAULT_PORT = "bench:"
 _REST_S = 0.5  # for a run that an earlier program left to come to rest
 # The limits that the greeting tells, by their parameters' names.
 _GREETED = {
@@ -385,44 +380,3 @@ class Device:
         if player.error is not None:
             raise player.error
         return follower.trace(interrupted=interrupted)
-
-
-def open_device(
-    port: str | None,
-    *,
-    limits: Limits | None = None,
-    monotonic: Callable[[], float] = time.monotonic,
-    sleep: Callable[[float], None] = time.sleep,
-) -> Device:
-    """Open a device and greet it; without a port the environment's ``PULSETRAINER_PORT``, else the bench.
-
-    Raises
-    ------
-    UsageError
-        if the port's text makes no sense.
-    ArgumentError
-        if a limit is beyond the device's own.
-    DeviceError
-        if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
-    """
-    opened = _open_port(port or os.environ.get(PORT_VARIABLE) or DEFAULT_PORT, monotonic)
-    try:
-        device = Device(opened, monotonic=monotonic, sleep=sleep)
-        _LOG.info(
-            "%s: %s, firmware %s, protocol %s, limits %g A and %g N",
-            *(opened.name, device.info.serial, device.info.firmware, device.info.protocol),
-            *(device.info.current_limit_A, device.info.force_limit_N),
-        )
-        device.lower(limits or Limits())
-        return device  # noqa: TRY300 - what fails up to here closes the port
-    except BaseException:
-        opened.close()
-        raise
-
-
-def _open_port(port: str, monotonic: Callable[[], float]) -> OpenPort:
-    opener = find_opener(port)
-    if opener is not None:
-        return opener(port, monotonic)
-    name = find_device_port() if port == "auto" else port
-    return OpenPort(SerialTransport(name), redact(name))

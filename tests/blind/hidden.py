@@ -13,7 +13,7 @@ import numpy as np
 import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 
 RATE_HZ = 1000.0
 HIGH_A = 1.5

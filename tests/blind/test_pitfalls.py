@@ -16,7 +16,7 @@ import hidden
 import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.diagnosis import gates, residual
 from pulsetrainer.diagnosis.causes import library, stick_slip
 from pulsetrainer.diagnosis.extended import Term

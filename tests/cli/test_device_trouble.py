@@ -18,7 +18,7 @@ import pytest
 from program import PROGRAM, Ran, pulsetrainer
 from pulsetrainer import load, save
 from pulsetrainer.device.codes import PROTOCOL_MAJOR, PROTOCOL_MINOR
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.simulation.build import firmware_executable
 from wording import refusal
 

@@ -9,7 +9,7 @@ import pytest
 from link_wire import Wire
 
 import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 
 if TYPE_CHECKING:
     from pathlib import Path

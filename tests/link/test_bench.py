@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation import build
 from pulsetrainer.simulation.bench import Bench
@@ -165,7 +165,7 @@ HOST = """
 import signal
 import numpy as np
 import pulsetrainer.simulation
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 signal.signal(signal.SIGINT, signal.default_int_handler)  # tests run in the background have it ignored
 device = open_device("bench:?speed=real")
 def tell(block):

@@ -11,8 +11,9 @@ from link_wire import within
 
 from pulsetrainer.device import player
 from pulsetrainer.device.codes import CURRENT_UNIT_A, PARAMETERS
-from pulsetrainer.device.device import Device, open_device
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.messages import GetParam
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DeviceError, UsageError

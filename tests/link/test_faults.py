@@ -12,8 +12,8 @@ import pytest
 
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import Fault, NakCode, State
-from pulsetrainer.device.device import open_device
 from pulsetrainer.device.frames import Frame, encode
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.session import RefusedError
 from pulsetrainer.errors import ArgumentError
 from wording import raises

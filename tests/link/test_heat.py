@@ -13,8 +13,9 @@ from scripted import ScriptedDevice
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import HEAT_LIMIT_A2, HEAT_TAU_S, HEAT_UNIT
-from pulsetrainer.device.device import Device, open_device
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.heat import HeatMemory, added, cooled, in_words, wait_s
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.errors import ArgumentError, DeviceError
 from wording import raises

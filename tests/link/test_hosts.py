@@ -11,9 +11,10 @@ from scripted import ScriptedDevice
 from pulsetrainer.device import codes, session
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import PARAMETERS, Fault, State
-from pulsetrainer.device.device import Device, open_device
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.frames import Frame, encode
 from pulsetrainer.device.limits import Limits
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.session import RefusedError
 from pulsetrainer.errors import DeviceError

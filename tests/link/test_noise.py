@@ -10,7 +10,7 @@ from link_wire import within
 
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import PARAMETERS, Fault, State
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.session import NoAnswerError, RefusedError, Session
 from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.simulation.bad_wire import KINDS, NoisyLine, NoisyTransport

@@ -10,8 +10,8 @@ import pytest
 from healthy_plays import SIGNALS, WAVEFORMS, beats, signal, stopped
 
 from pulsetrainer import load
-from pulsetrainer.device.device import open_device
 from pulsetrainer.device.limits import Limits
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.plausibility import ForceWatch, judge_against, judge_force, judge_repeat
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.play import DRIVES, play

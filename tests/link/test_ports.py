@@ -15,7 +15,7 @@ import pytest
 
 from pulsetrainer.device import ports
 from pulsetrainer.device.codes import Fault, State
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import OpenPort, find_opener
 from pulsetrainer.device.trace import Block
@@ -170,7 +170,7 @@ def test_a_cable_pulled_in_mid_play(carrier):
 def test_a_kind_of_port_announces_itself():
     """The device opens no simulation of its own: a scheme that nobody announced is a usage error."""
     script = (
-        "from pulsetrainer.device.device import open_device\n"
+        "from pulsetrainer.device.opening import open_device\n"
         "from pulsetrainer.errors import UsageError\n"
         "try:\n    open_device('bench:')\nexcept UsageError:\n    print('unknown')\n"
         "import pulsetrainer.simulation\n"

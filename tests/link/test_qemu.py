@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation import build
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES
@@ -289,7 +289,7 @@ def test_an_emulator_that_will_not_start_is_quoted(monkeypatch):
 HOST = """
 import sys
 import pulsetrainer.simulation
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 device = open_device("qemu:")
 print(device._port.machine.pid, flush=True)
 device.play([0.5] * 60_000, 1000)

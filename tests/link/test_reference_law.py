@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 
 
 @pytest.fixture(scope="module")

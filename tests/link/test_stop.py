@@ -12,7 +12,7 @@ from scripted import SLICE_S, ScriptedDevice, message
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import NakCode, State
-from pulsetrainer.device.device import open_device
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.session import Session
 from pulsetrainer.errors import DeviceError
 

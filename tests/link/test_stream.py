@@ -12,8 +12,8 @@ from scripted import ScriptedDevice
 
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import CURRENT_UNIT_A, WAVE_OPEN
-from pulsetrainer.device.device import open_device
 from pulsetrainer.device.feed import Feed
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.errors import ArgumentError, DeviceError
 
 

@@ -24,7 +24,7 @@ from pulsetrainer.core.coil import (
 from pulsetrainer.device.codes import PARAMETERS
 from pulsetrainer.device.gains import DELIVERED, Gains
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.steps.tune import from_wire, to_wire
+from pulsetrainer.steps.loop_gains import from_wire, to_wire
 
 DT_S = 1e-4
 
