@@ -106,12 +106,21 @@ def _text(file) -> str:
     return file.read().decode().replace("\r\n", "\n")
 
 
-def chain(folder: Path, port: str, *, reading: str, waveforms: tuple[str, ...]) -> dict:
+def chain(
+    folder: Path,
+    port: str,
+    *,
+    reading: str,
+    waveforms: tuple[str, ...],
+    signal: tuple[str, ...] = (),
+    levels: tuple[str, ...] = (),
+    page: bool = False,
+) -> dict:
     """Capture once, identify, invert, play and evaluate on a bench; return the evaluation as JSON."""
     steps: list[list[object]] = []
     if not (folder / "run.h5").exists():
-        steps.append(["capture", "identification", "--port", port, "-o", "run.h5"])
-    steps.append(["identify", "run.h5", "--reading", reading, "-o", f"model-{reading}.h5"])
+        steps.append(["capture", "identification", *signal, "--port", port, "-o", "run.h5"])
+    steps.append(["identify", "run.h5", *levels, "--reading", reading, "-o", f"model-{reading}.h5"])
     for name in waveforms:
         drive, played = f"drive-{name}-{reading}.h5", f"played-{name}-{reading}.h5"
         steps.append(["invert", name, "--model", f"model-{reading}.h5", "-o", drive])
@@ -120,8 +129,7 @@ def chain(folder: Path, port: str, *, reading: str, waveforms: tuple[str, ...]) 
         done = pulsetrainer(folder, *words)
         assert done.code == 0, (words, done)
     played = [f"played-{name}-{reading}.h5" for name in waveforms]
-    done = pulsetrainer(
-        folder, "evaluate", *played, "-o", f"evaluation-{reading}.h5", "--html", f"{reading}.html", "--json"
-    )
+    html = ["--html", f"{reading}.html"] if page else []
+    done = pulsetrainer(folder, "evaluate", *played, "-o", f"evaluation-{reading}.h5", *html, "--json")
     assert done.code == 0, done
     return done.json

@@ -29,6 +29,11 @@ def serve(path: str) -> None:
     for module in pkgutil.walk_packages(pulsetrainer.__path__, "pulsetrainer."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
+    import typer
+
+    from pulsetrainer.cli import app
+
+    app.app = typer.main.get_command(app.app)  # the parser, made once for all children
     listener = socket.socket(socket.AF_UNIX)
     listener.bind(path)
     listener.listen(64)

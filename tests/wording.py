@@ -168,7 +168,7 @@ MESSAGES = {
     "interrupted": Message("stopped by you", None, got=KEPT),
     # --- gates and bugs ----------------------------------------------------------------------------------
     "no such metric": Message("does not have", "it has", "{metric}"),
-    "out of bounds": Message("1 of 1 bounds", "the bound", "{metric}", "[99, 100]", " = 9"),
+    "out of bounds": Message("1 of 1 bounds", "the bound", "{metric}", "[99, 100]", " = "),
     "bug": Message("a bug: KeyError: 'force'", "--debug"),
 }
 

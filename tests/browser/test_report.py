@@ -53,6 +53,7 @@ def _labels(images):
     return [image.get_attribute("aria-labelledby").split()[0] for image in images.all()]
 
 
+@pytest.mark.slow
 def test_headings_are_in_order(opened):
     """One first heading, and none skips a level."""
     levels = opened().evaluate("[...document.querySelectorAll('h1,h2,h3,h4')].map(h => +h.tagName[1])")
@@ -147,6 +148,7 @@ def _prints(text, value):
     assert abs(float(digits) - value) <= 0.5 * unit * (1 + 1e-9), (text, value)
 
 
+@pytest.mark.slow
 def test_dark_is_dark_and_both_schemes_can_be_read(opened):
     """WCAG 2.1: 4.5 for every text, those in figures too; 3 for the colours of the curves."""
     seen = {}
@@ -187,6 +189,7 @@ def test_a_phone_never_scrolls_sideways(opened, width):
         assert [one for one in measure(page, "texts") if one["px"] < 7.0] == []
 
 
+@pytest.mark.slow
 def test_paper_has_everything(opened, report):
     """The PDF of a dark screen: dark on light, every section, and what was folded away."""
     pypdf = pytest.importorskip("pypdf", reason="pypdf is not installed")
@@ -207,6 +210,7 @@ def test_paper_has_everything(opened, report):
     assert 2 <= len(document.pages) <= 8
 
 
+@pytest.mark.slow
 def test_the_keyboard_reaches_everything_in_order(opened):
     """Tab visits what a mouse can use, in the order of the page, each with a ring around it."""
     page = opened(width=360, height=740)
@@ -223,6 +227,7 @@ def test_the_keyboard_reaches_everything_in_order(opened):
     assert expected > 8
 
 
+@pytest.mark.slow
 def test_the_first_key_leads_past_the_head(opened):
     """The skip link shows when it has the focus, and leads to the result."""
     page = opened()

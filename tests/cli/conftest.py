@@ -47,6 +47,22 @@ def as_built(made_once) -> Path:
 
 
 @pytest.fixture(scope="session")
+def built_small(made_once) -> Path:
+    """The same files of a short record and few levels, with a page of the continuous reading."""
+
+    def fill(folder: Path) -> None:
+        small = {"signal": ("--levels", "12", "--speed", "4"), "levels": ("--levels", "12")}
+        for reading in ("relay", "continuous"):
+            page = reading == "continuous"
+            document = chain(
+                folder, "bench:", reading=reading, waveforms=("normal", "bifid"), page=page, **small
+            )
+            (folder / f"{reading}.json").write_text(json.dumps(document))
+
+    return made_once("built-small", fill)
+
+
+@pytest.fixture(scope="session")
 def extended(as_built, made_once) -> Path:
     """A folder with the second act: diagnosed, extended, the pulses played again; the first act beside it."""
 

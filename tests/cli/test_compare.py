@@ -18,23 +18,26 @@ KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 
 
 @pytest.fixture
-def folder(as_built, run):
+def folder(built_small, run):
     """Run in the tests' own folder with the evaluations of the paper's and our method."""
 
     def call(*words):
-        return run("compare", as_built / "evaluation-relay.h5", as_built / "evaluation-continuous.h5", *words)
+        return run(
+            "compare", built_small / "evaluation-relay.h5", built_small / "evaluation-continuous.h5", *words
+        )
 
     return call
 
 
-@pytest.mark.slow
-def test_before_and_after(folder, as_built):
+def test_before_and_after(folder, built_small):
     """The values are those of the evaluations; the change has the right sign and word."""
     import json
 
     done = folder("--json")
     assert done.code == 0, done
-    before, after = (json.loads((as_built / f"{name}.json").read_text()) for name in ("relay", "continuous"))
+    before, after = (
+        json.loads((built_small / f"{name}.json").read_text()) for name in ("relay", "continuous")
+    )
     metrics = {m["name"]: m for m in done.json["metrics"]}
     for k, pulse in enumerate(("normal", "bifid")):
         one = metrics[f"{pulse}.mean_error_reduction_percent"]
@@ -76,19 +79,19 @@ def test_as_figure_and_as_table(folder, tmp_path):
     assert folder("-o", tmp_path / "c.docx").code == 2
 
 
-def test_bad_input(run, as_built):
+def test_bad_input(run, built_small):
     """One file, a file of another kind: each its message."""
-    refusal(run("compare", as_built / "evaluation-relay.h5", "--json"), 2, "one evaluation")
-    done = run("compare", as_built / "evaluation-relay.h5", as_built / "run.h5", "--json")
+    refusal(run("compare", built_small / "evaluation-relay.h5", "--json"), 2, "one evaluation")
+    done = run("compare", built_small / "evaluation-relay.h5", built_small / "run.h5", "--json")
     names = {"file": "run.h5", "expected": "an evaluation", "got": "a run", "verb": "evaluate"}
     refusal(done, 3, "wrong kind", **names)
 
 
-def test_two_evaluations_without_a_common_figure(run, as_built, tmp_path):
+def test_two_evaluations_without_a_common_figure(run, built_small, tmp_path):
     """A pulse against a prediction: nothing to compare, said so."""
-    model = as_built / "model-continuous.h5"
-    assert run("evaluate", as_built / "run.h5", "--model", model, "-o", tmp_path / "fit.h5").code == 0
-    done = run("compare", tmp_path / "fit.h5", as_built / "evaluation-relay.h5", "--json")
+    model = built_small / "model-continuous.h5"
+    assert run("evaluate", built_small / "run.h5", "--model", model, "-o", tmp_path / "fit.h5").code == 0
+    done = run("compare", tmp_path / "fit.h5", built_small / "evaluation-relay.h5", "--json")
     refusal(done, 3, "nothing in common")
 
 

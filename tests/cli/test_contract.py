@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 WAVEFORM_KEYS = {"mean_abs_error_percent", "max_abs_error_percent"}
 
 
+@pytest.mark.slow
 def test_identify_reports_the_agreed_keys(as_built):
     """levels, cells, offset, fit, coverage, iterations, seconds."""
     done = pulsetrainer(as_built, "identify", "run.h5", "-o", "again.h5", "--json")
@@ -31,15 +32,15 @@ def test_identify_reports_the_agreed_keys(as_built):
     assert {"offset", "fit_rms", "iterations", "seconds"} <= set(document)
 
 
-def test_evaluate_reports_the_agreed_keys(as_built):
+def test_evaluate_reports_the_agreed_keys(built_small):
     """Of a playback: both drives and the reduction; of a run: every model with its gain over the first."""
-    done = pulsetrainer(as_built, "evaluate", "played-normal-continuous.h5", "--json")
+    done = pulsetrainer(built_small, "evaluate", "played-normal-continuous.h5", "--json")
     (waveform,) = done.json["waveforms"]
     assert set(waveform["scaled"]) >= WAVEFORM_KEYS
     assert set(waveform["compensated"]) >= WAVEFORM_KEYS
     assert "mean_error_reduction_percent" in waveform
     models = ["--model", "model-relay.h5", "--model", "model-continuous.h5"]
-    done = pulsetrainer(as_built, "evaluate", "run.h5", *models, "--json")
+    done = pulsetrainer(built_small, "evaluate", "run.h5", *models, "--json")
     relay, continuous = done.json["models"]
     assert {"rms", "rms_percent", "max_percent", "gain_percent"} <= set(relay)
     assert relay["gain_percent"] == 0.0
@@ -47,7 +48,7 @@ def test_evaluate_reports_the_agreed_keys(as_built):
     assert continuous["gain_percent"] > 30
 
 
-def test_show_and_plot_take_every_kind(as_built):
+def test_show_and_plot_take_every_kind(built_small):
     """run, model, waveform, playback, evaluation."""
     kinds = {
         "run.h5": "run",
@@ -57,21 +58,21 @@ def test_show_and_plot_take_every_kind(as_built):
         "evaluation-relay.h5": "evaluation",
     }
     for name, kind in kinds.items():
-        shown = pulsetrainer(as_built, "show", name, "--json").json
+        shown = pulsetrainer(built_small, "show", name, "--json").json
         assert shown["kind"] == kind
         assert any("capture identification" in line for line in shown["history"])
-        assert pulsetrainer(as_built, "show", name).code == 0
-        done = pulsetrainer(as_built, "plot", name, "-o", f"{name}.png")
+        assert pulsetrainer(built_small, "show", name).code == 0
+        done = pulsetrainer(built_small, "plot", name, "-o", f"{name}.png")
         assert done.code == 0, done
-        assert (as_built / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    done = pulsetrainer(as_built, "plot", "run.h5", "--overwrite", "--json")
+        assert (built_small / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    done = pulsetrainer(built_small, "plot", "run.h5", "--overwrite", "--json")
     assert done.json["output"] == "run.png"  # beside it, when no name is given
-    assert (as_built / "run.png").read_bytes().startswith(b"\x89PNG")
+    assert (built_small / "run.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_pipe_gets_no_bar_and_a_terminal_does(tmp_path):
     """Progress is for people: nothing of it in a pipe, a moving bar on a terminal, none with --json."""
-    words = ["capture", "identification", "--speed", "3", "--overwrite", "-o", "run.h5"]
+    words = ["capture", "identification", "--levels", "12", "--speed", "6", "--overwrite", "-o", "run.h5"]
     done = pulsetrainer(tmp_path, *words)
     assert done.err == ""
     assert "\x1b" not in done.out

@@ -95,6 +95,7 @@ def test_quick_says_that_it_is_quick(bench):
     assert "without --quick" in done.err
 
 
+@pytest.mark.slow
 def test_one_single_rate_without_holds_gives_a_set_and_the_next_experiment(bench):
     """A lag and a model fitted at one rate: no unique name, what is missing, what to record."""
     done = _diagnose(bench, "slow.h5")

@@ -101,7 +101,8 @@ def test_the_missing_part_of_the_plane_is_named(run, record):
     tells(done.err, "cells never switched")
 
 
-def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path):
+@pytest.mark.parametrize("draws", [20, pytest.param(60, marks=pytest.mark.slow)])
+def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path, draws):
     """Stored beside weights and fit, around them, repeatable by seed, and wide enough to hold the truth."""
     from pulsetrainer.artefacts import Model
     from pulsetrainer.files import store
@@ -109,10 +110,10 @@ def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path)
     record()
     base = ("identify", "run.h5", "--levels", "12", "-o", "model.h5", "--overwrite", "--json")
     assert run(*base).json["output_uncertainty"] is None
-    first = run(*base, "--bootstrap", "60", "--seed", "5").json["output_uncertainty"]
+    first = run(*base, "--bootstrap", str(draws), "--seed", "5").json["output_uncertainty"]
     assert 1e-4 < first < 0.01  # noise of 0.01 on 4000 samples, 78 cells
     model = store.read(tmp_path / "model.h5", Model)
-    assert model.fit.draws == 60
+    assert model.fit.draws == draws
     assert np.all(model.weights_lower <= model.weights_upper)
     inside = (model.fit.predicted_lower <= model.fit.predicted) & (
         model.fit.predicted <= model.fit.predicted_upper
@@ -121,5 +122,5 @@ def test_a_bootstrap_gives_intervals_that_hold_the_device(run, record, tmp_path)
     truth = np.tanh(3 * model.fit.input - 1.5)
     spread = np.abs(truth - model.fit.predicted)
     assert np.median(spread) < 3 * first
-    assert run(*base, "--bootstrap", "60", "--seed", "5").json["output_uncertainty"] == first
-    assert run(*base, "--bootstrap", "60", "--seed", "6").json["output_uncertainty"] != first
+    assert run(*base, "--bootstrap", str(draws), "--seed", "5").json["output_uncertainty"] == first
+    assert run(*base, "--bootstrap", str(draws), "--seed", "6").json["output_uncertainty"] != first

@@ -17,15 +17,16 @@ from pulsetrainer.cli.app import app
 HEAVY = ("numpy", "scipy", "h5py", "matplotlib", "jinja2", "serial", "rich", "pydantic")
 # each in a child of one interpreter that has loaded the parser and nothing else
 JOB = """
-import json, os, sys
+import json, os, sys, typer
 from pulsetrainer.cli import app, guard
+program = typer.main.get_command(app.app)
 ended = {}
 for name, (words, *_) in json.load(sys.stdin).items():
     reading, writing = os.pipe()
     if os.fork() == 0:
         os.dup2(writing, 2)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        code = guard.funnel(app.app, words)
+        code = guard.funnel(program, words)
         sys.stderr.write(json.dumps([name for name in HEAVY if name in sys.modules]))
         sys.stderr.flush()
         os._exit(code)

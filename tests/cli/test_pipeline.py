@@ -23,6 +23,7 @@ def _waveforms(folder, reading):
     return {w["name"]: w for w in document["waveforms"]}
 
 
+@pytest.mark.slow
 def test_the_papers_method_reaches_the_papers_figures(as_built):
     """Relay, closest match, spline: the published reduction and maximum, on the as-built bench."""
     for name, figures in _waveforms(as_built, "relay").items():
@@ -32,9 +33,12 @@ def test_the_papers_method_reaches_the_papers_figures(as_built):
         assert figures["compensated"]["max_abs_error_percent"] <= PUBLISHED_MAX, (name, figures)
 
 
-def test_the_continuous_inverse_is_better_on_every_figure(as_built):
+@pytest.mark.parametrize("built", ["built_small", pytest.param("as_built", marks=pytest.mark.slow)])
+def test_the_continuous_inverse_is_better_on_every_figure(built, request):
     """Mean, max, rms and loop of the compensated drive, and the reduction."""
-    relay, continuous = (_waveforms(as_built, reading) for reading in ("relay", "continuous"))
+    relay, continuous = (
+        _waveforms(request.getfixturevalue(built), reading) for reading in ("relay", "continuous")
+    )
     for name in relay:
         for metric in ("mean_abs_error_percent", "max_abs_error_percent", "rms_error_percent"):
             assert continuous[name]["compensated"][metric] < relay[name]["compensated"][metric], (
@@ -46,6 +50,7 @@ def test_the_continuous_inverse_is_better_on_every_figure(as_built):
         ), name
 
 
+@pytest.mark.slow
 def test_the_current_loop_follows_within_one_percent(as_built):
     """Tracking error of the firmware's PID on all demo waveforms, from telemetry."""
     for reading in ("relay", "continuous"):
@@ -64,6 +69,7 @@ def test_on_the_ideal_bench_almost_nothing_is_left(tmp_path):
         assert figures["compensated"]["max_abs_error_percent"] <= 2.5, figures
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("waveform", ["alternans", "paradoxus", "parvus-et-tardus", "bigeminus"])
 def test_the_rest_of_the_library_plays_too(as_built, waveform):
     """Every pulse of the library is compensated with an error below the published maximum."""
@@ -88,23 +94,23 @@ def test_the_figures_stay_within_their_bounds(extended, request):
     assert done.json["bounds_checked"] >= 40
 
 
-def test_a_broken_bound_is_exit_1_and_names_the_metric(as_built):
+def test_a_broken_bound_is_exit_1_and_names_the_metric(built_small):
     """The gate for CI."""
-    (as_built / "tight.toml").write_text(
+    (built_small / "tight.toml").write_text(
         "[normal.continuous]\nmean_error_reduction_percent = [99.0, 100.0]\n"
     )
     words = ("evaluate", "played-normal-continuous.h5", "--bounds", "tight.toml", "--json")
-    done = pulsetrainer(as_built, *words)
+    done = pulsetrainer(built_small, *words)
     refusal(done, 1, "out of bounds", metric="normal.continuous.mean_error_reduction_percent")
     assert done.json["breaches"][0]["metric"] == "normal.continuous.mean_error_reduction_percent"
-    (as_built / "mistyped.toml").write_text("[normal.continuous]\nmean_eror = [0.0, 1.0]\n")
-    done = pulsetrainer(as_built, "evaluate", words[1], "--bounds", "mistyped.toml", "--json")
+    (built_small / "mistyped.toml").write_text("[normal.continuous]\nmean_eror = [0.0, 1.0]\n")
+    done = pulsetrainer(built_small, "evaluate", words[1], "--bounds", "mistyped.toml", "--json")
     refusal(done, 2, "no such metric", metric="normal.continuous.mean_eror")
 
 
-def test_the_report_shows_what_the_file_holds(as_built):
+def test_the_report_shows_what_the_file_holds(built_small):
     """The numbers in the page are those of evaluation.h5, and the page fetches nothing."""
-    page = (as_built / "continuous.html").read_text(encoding="utf-8")
+    page = (built_small / "continuous.html").read_text(encoding="utf-8")
 
     class Values(HTMLParser):
         found: dict[str, float]
@@ -120,7 +126,7 @@ def test_the_report_shows_what_the_file_holds(as_built):
 
     parser = Values()
     parser.feed(page)
-    figures = _waveforms(as_built, "continuous")["normal"]
+    figures = _waveforms(built_small, "continuous")["normal"]
     shown = [
         v for k, v in parser.found.items() if "normal" in k and k.endswith("mean_error_reduction_percent")
     ]

@@ -16,6 +16,7 @@ from wording import refusal, tells
 RECORD = Path(__file__).resolve().parents[1] / "data" / "fingerbp_AAC3_3.csv"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("beat", ["2", "mean"])
 def test_a_recorded_beat_is_played_like_one_of_the_library(as_built, tmp_path, beat):
     """Invert, play, evaluate on the as-built bench: the compensated error is a small part of the scaled."""
@@ -48,8 +49,8 @@ def test_a_recorded_beat_is_played_like_one_of_the_library(as_built, tmp_path, b
     np.testing.assert_allclose((target[:size] - target.min()) / np.ptp(target), wanted, atol=0.005)
 
 
-def test_a_beat_that_is_not_there_is_exit_3(as_built, tmp_path):
+def test_a_beat_that_is_not_there_is_exit_3(small_chain, tmp_path):
     """And no drive is written."""
-    words = ["invert", RECORD, "--beat", "9", "--model", as_built / "model-continuous.h5", "-o", "drive.h5"]
+    words = ["invert", RECORD, "--beat", "9", "--model", small_chain / "model.h5", "-o", "drive.h5"]
     refusal(pulsetrainer(tmp_path, *words, "--json"), 3, "no such beat")
     assert not list(tmp_path.iterdir())

@@ -76,7 +76,7 @@ RUN = {
     HOW_TO / "check.md": ("model.h5",),
     HOW_TO / "batches.md": ("workflow",),
 }  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
-SLOW = ("README", "measured", "tutorial", "own-bench")
+SLOW = ("README", "measured", "tutorial", "own-bench", "ci", "teach")
 PAGES = [
     pytest.param(page, id=page.stem, marks=pytest.mark.slow if page.stem in SLOW else ()) for page in RUN
 ]
@@ -111,7 +111,7 @@ def test_commands_of_a_page_run(page, given, tmp_path):
     assert ran >= 2
 
 
-def test_what_is_not_run_is_there(given):
+def test_what_is_not_run_is_there():
     """The blocks that are left out are targets of the Makefile."""
     left_out = [
         c for block in blocks(ROOT / "README.md", "sh") for c in block.commands if c.startswith(NOT_RUN)

@@ -92,6 +92,7 @@ def test_core_divides_no_64_bit_number(tmp_path):
         assert not re.search(r"__u?(div|mod)[dt]i", symbols), source.name
 
 
+@pytest.mark.slow
 def test_loop_and_plant_give_the_same_bits_however_compiled(tmp_path):
     """100 000 ticks of PID and plant: one hash for every compiler and optimisation."""
     hashes = {}

@@ -76,6 +76,7 @@ def test_the_unit_tests_of_the_core_pass_on_this_processor(make, unit):
     assert "FAIL" not in told
 
 
+@pytest.mark.slow
 def test_loop_and_plant_give_the_same_bits_on_the_emulated_device(make, tmp_path):
     """100 000 ticks of PID and plant: one hash on every host compiler and on the Cortex-M4F."""
     hashes = {compiler[-1]: host_hash(compiler, "float", tmp_path) for compiler in host_compilers()}

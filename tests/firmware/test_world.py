@@ -49,6 +49,7 @@ def test_nothing_trips_where_nothing_is_wrong(tmp_path):
         assert f"plays {count} false trips 0" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(
     platform.machine() not in {"x86_64", "AMD64"} or sys.platform != "linux",
     reason="steps through x86-64 instructions by the trap flag",

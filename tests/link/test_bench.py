@@ -97,6 +97,7 @@ def _executable(cache: str) -> str:
     return str(build.firmware_executable())
 
 
+@pytest.mark.slow
 def test_two_processes_may_build_at_once(tmp_path):
     """Both get the same whole executable, nothing half-made stays behind."""
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
