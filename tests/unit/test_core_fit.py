@@ -41,6 +41,9 @@ def test_levels_crowd_only_where_that_fits():
     lost = fit([(U, jumps)], -1.0, 1.0, 12)
     assert lost.evenly_spaced
     assert lost.misfit > CROWDED_MISFIT
+    steep /= np.ptp(steep)
+    for share, even in ((0.08, False), (0.12, True)):  # crowded levels leave 1.9 % and 2.5 % of the span
+        assert fit([(U, steep + share * jumps)], -1.0, 1.0, 12).evenly_spaced is even
 
 
 def test_records_shifted_against_each_other_have_offsets():

@@ -122,3 +122,15 @@ def test_what_does_not_settle_says_so():
     sums = node_sums(PLANE, [Record(u, plant(120)(u))], "continuous")
     with raises(ConvergenceError, "did not settle", steps=2):
         large.solve(sums, max_iterations=2)
+
+
+def test_as_many_steps_as_are_needed_are_enough():
+    """The last one that is permitted is taken; with one less it did not settle."""
+    u = signal("curves", np.random.default_rng(1))
+    sums = node_sums(PLANE, [Record(u, plant(N_H)(u))], "continuous")
+    needed = large.solve(sums)
+    assert needed.iterations > 2
+    again = large.solve(sums, max_iterations=needed.iterations)
+    np.testing.assert_array_equal(again.masses, needed.masses)
+    with pytest.raises(ConvergenceError):
+        large.solve(sums, max_iterations=needed.iterations - 1)
