@@ -24,7 +24,6 @@ from pulsetrainer.cli.options import (
 if TYPE_CHECKING:
     from pulsetrainer.core.course import Course
     from pulsetrainer.device.device import Device
-    from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.files.resume import Earlier
     from pulsetrainer.steps.recording import Watch
 
@@ -107,7 +106,7 @@ def capture(
             job.would(does, planned, port, out, rows)
             return
         if not resume:
-            _note_leftovers(job, out)
+            job.left_over(out, "an interrupted capture: continue it with --resume, or delete it")
         view = job.view(float(played.value.max()), live=live)
         with job.working(f"capturing {signal}", view) as progress, job.open_device(port, limits) as device:
             payload = _record(
@@ -148,7 +147,7 @@ def _record(
     decimation_for(info.tick_rate_Hz, signal.rate_Hz)  # before anything is written
     tally = tally_of(signal, levels)
     if earlier is not None:
-        _check_device(earlier, info)
+        earlier.check_device(info.serial)
         job.uses(earlier.path)
         share = 100.0 * at / course.size
         job.notes(
@@ -196,30 +195,6 @@ def _record(
         "serial": info.serial,
         "firmware": info.firmware,
     }
-
-
-def _check_device(earlier: Earlier, info: DeviceInfo) -> None:
-    """Refuse to go on with a recording on another device."""
-    from pulsetrainer.errors import DeviceError
-
-    recorded = earlier.header.provenance.device
-    if recorded is not None and recorded.serial != info.serial:
-        raise DeviceError(
-            f"{earlier.path} was recorded on {recorded.serial}, this is {info.serial}",
-            hint="connect that device, or leave --resume out and name another output",
-        )
-
-
-def _note_leftovers(job: Job, out: Path) -> None:
-    from pulsetrainer.files.recorder import interrupted
-
-    job.notes(
-        [
-            f"{left} holds {samples} samples of an interrupted capture: "
-            "continue it with --resume, or delete it"
-            for left, samples in interrupted(out)
-        ]
-    )
 
 
 def _show(job: Job, got: dict[str, Any]) -> None:

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from pulsetrainer.cli import settings
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.options import AsJson, Port
+from pulsetrainer.files import settings
 
 _MARKS = {"ok": "ok", "warning": "warning", "problem": "PROBLEM"}
 
@@ -34,7 +34,7 @@ def doctor(
     screen = Screen("doctor", as_json=json)
     named = context.parent.params.get("settings_file") if context.parent else None
     file = settings.find(named, os.environ)
-    rows = settings.effective(file)
+    rows = settings.effective(file, os.environ)
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
     with screen.bar("looking") as progress:
         result = examine(port, capture=capture, settings=words, tuned=file, progress=progress)

@@ -9,7 +9,7 @@ import typer
 
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting
+from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting, word_or_number
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import Model
@@ -71,7 +71,7 @@ def identify(
     Example: pulsetrainer identify run.h5 -o model.h5
     """
     job = Job(context, inputs=runs, outputs=(out,), overwrite=overwrite, as_json=json)
-    length = _smoothing(smoothing)
+    length = word_or_number(smoothing, "auto", "--smoothing", "auto or a number from 0 to 1", least=0, most=1)
     from pulsetrainer.artefacts import Run
     from pulsetrainer.steps.identify import identify as fit
 
@@ -138,18 +138,3 @@ def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
         **picked(fit, *same),
         "seconds": seconds,
     }
-
-
-def _smoothing(text: str | None) -> float | Literal["auto"] | None:
-    """Read --smoothing: auto, or a number from 0 to 1."""
-    if text is None or text == "auto":
-        return None if text is None else "auto"
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0 <= value <= 1:
-        raise typer.BadParameter(
-            f"must be auto or a number from 0 to 1, got {text!r}", param_hint="--smoothing"
-        )
-    return value

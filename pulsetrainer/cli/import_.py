@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, Overwrite
-from pulsetrainer.errors import UsageError
+from pulsetrainer.cli.options import AsJson, Overwrite, word_or_number
 
 if TYPE_CHECKING:
     from pulsetrainer.steps.import_ import Imported
 
-_NAME = "{name}"  # in the output: one run for each file
+_RATES_HZ = {"least": sys.float_info.min, "most": sys.float_info.max}  # above 0, and finite
 
 
 def import_(
@@ -69,9 +69,12 @@ def import_(
 
     Example: pulsetrainer import scope.csv --input current_A --output force_N -o run.h5
     """
+    from pulsetrainer.files.input_file import outputs_of
     from pulsetrainer.files.timing import check_timing
 
-    groups, even = _groups(files, out), _rate(resample)
+    groups = outputs_of(files, out)
+    must = "the word even or a rate above 0 in Hz"
+    even = word_or_number(resample, "even", "--resample", must, **_RATES_HZ)
     jobs = [
         Job(context, tables=group, outputs=(target,), overwrite=overwrite, as_json=json)
         for target, group in groups.items()
@@ -143,40 +146,3 @@ def _facts(imported: Imported) -> dict[str, Any]:
     for name in ("signal", "complete", "dropped_samples"):  # the title; of a device, not of a file
         shown.pop(name, None)
     return shown
-
-
-def _groups(files: list[Path], out: Path) -> dict[Path, tuple[Path, ...]]:
-    """Return the files that are imported into each output: all into one, or each into its own.
-
-    Raises
-    ------
-    UsageError
-        Two files would be written to one output.
-    """
-    if _NAME not in str(out):
-        return {out: tuple(files)}
-    groups: dict[Path, tuple[Path, ...]] = {}
-    for path in files:
-        target = Path(str(out).replace(_NAME, path.stem))
-        if target in groups:
-            raise UsageError(
-                f"{groups[target][0]} and {path} would both be written to {target}",
-                hint="import them one by one, under other names",
-            )
-        groups[target] = (path,)
-    return groups
-
-
-def _rate(text: str | None) -> float | Literal["even"] | None:
-    """Read --resample: even, a rate, or nothing."""
-    if text is None or text == "even":
-        return "even" if text else None
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0 < value < float("inf"):
-        raise typer.BadParameter(
-            f"must be the word even or a rate above 0 in Hz, got {text!r}", param_hint="--resample"
-        )
-    return value

@@ -229,6 +229,13 @@ class Job:
             if path is not None:
                 self.screen.whole(f"wrote {path}")
 
+    def left_over(self, out: Path, said: str) -> None:
+        """Say what programs that were killed left beside an output: ``said`` names what it is of."""
+        from pulsetrainer.files.recorder import interrupted
+
+        for left, samples in interrupted(out):
+            self.notes([f"{left} holds {samples} samples of {said.format(left=left)}"])
+
     def notes(self, lines: Sequence[str]) -> None:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:

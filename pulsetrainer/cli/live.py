@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pulsetrainer.report.characters import plotted
 from pulsetrainer.steps.steering import KEYS
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from pulsetrainer.steps.performance import Now
 
 SMALLEST = (50, 10)  # columns and lines
-_BARS = " ▁▂▃▄▅▆▇█"
 _ROWS = 5  # of the trace
 _SHOWN_S = 3.0
 _DRAWN_EACH_S = 0.08
@@ -118,16 +118,3 @@ def why_not() -> str:
             f"{SMALLEST[0]} x {SMALLEST[1]}"
         )
     return ""
-
-
-def plotted(values: np.ndarray, width: int, rows: int) -> list[str]:
-    """Return a curve as ``rows`` lines of ``width`` block characters, lowest to highest value."""
-    known = np.nan_to_num(values, nan=float(np.nanmin(values)) if np.isfinite(values).any() else 0.0)
-    means = np.asarray([part.mean() if part.size else known[-1] for part in np.array_split(known, width)])
-    span = float(np.ptp(means)) or 1.0
-    height = (means - means.min()) / span * rows * (len(_BARS) - 1)
-    lines = []
-    for row in range(rows - 1, -1, -1):
-        filled = np.clip(height - row * (len(_BARS) - 1), 0, len(_BARS) - 1).round().astype(int)
-        lines.append("".join(_BARS[k] for k in filled))
-    return lines

@@ -1,8 +1,4 @@
-"""The loop of force over current, drawn in the terminal while a device plays; elsewhere nothing is drawn.
-
-Each character is a grid of 2 x 4 dots (Unicode braille); a dot is set once some sample fell on it, so a point
-costs the same however long the play lasts.
-"""
+"""The loop of force over current, drawn in the terminal while a device plays; elsewhere nothing is drawn."""
 
 from __future__ import annotations
 
@@ -14,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pulsetrainer.report.characters import Dots
 from pulsetrainer.steps.progress import Progress
 
 if TYPE_CHECKING:
@@ -25,8 +22,6 @@ FULL_SCALE_N = 15.0  # of the force sensor: the axis where no force is foretold
 SMALLEST = (40, 12)  # columns and lines
 _HIGHEST = 16  # lines of the loop
 _DRAWN_EACH_S = 0.3  # of the wall clock: a drawing takes 3 ms, so a hundredth of the time
-_BRAILLE = 0x2800
-_DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint16)  # row, column
 
 
 class LoopView:
@@ -43,7 +38,7 @@ class LoopView:
         self.fits = columns >= SMALLEST[0] and lines >= SMALLEST[1]
         self._size = max(min(columns - 2, 72), 1), max(min(lines - 4, _HIGHEST), 1)
         self._ends = max(current_A, 1e-9), max(force_N, 1e-9)
-        self._cells = np.zeros(self._size[::-1], dtype=np.uint16)
+        self._dots = Dots(*self._size)
         self._share, self._label = 0.0, ""
         self._drawn_s = -np.inf
         self._show: Callable[[RenderableType], None] = lambda _drawn: None
@@ -52,12 +47,7 @@ class LoopView:
     def take(self, current_A: FloatArray, force_N: FloatArray) -> None:
         """Take in samples (n,); those that were lost are NaN."""
         there = np.isfinite(current_A) & np.isfinite(force_N)
-        width, height = self._size
-        column = np.clip(current_A[there] / self._ends[0] * (2 * width - 1), 0, 2 * width - 1).astype(int)
-        row = np.clip((1.0 - force_N[there] / self._ends[1]) * (4 * height - 1), 0, 4 * height - 1).astype(
-            int
-        )
-        np.bitwise_or.at(self._cells, (row // 4, column // 2), _DOTS[row % 4, column % 2])
+        self._dots.add(current_A[there] / self._ends[0], force_N[there] / self._ends[1])
         self._draw()
 
     @contextmanager
@@ -85,7 +75,7 @@ class LoopView:
         """Return the loop with its axes, and the figures."""
         from rich.text import Text
 
-        loop = ["│" + "".join(chr(_BRAILLE + int(cell)) for cell in row) for row in self._cells]
+        loop = [f"│{line}" for line in self._dots.lines()]
         axis = f"└{'─' * self._size[0]}"
         ends = f"up to {self._ends[0]:.3g} A and {self._ends[1]:.3g} N"
         said = f"{self._label}: {100.0 * self._share:.0f} %, {ends}"

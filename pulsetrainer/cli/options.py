@@ -8,13 +8,26 @@ from typing import Annotated, Any
 
 import typer
 
-from pulsetrainer.cli.settings import variable
+from pulsetrainer.files.settings import variable
 
 
 def positive(value: float | None) -> float | None:
     """Refuse a number that is not above 0 and finite; None is no choice."""
     if value is not None and not 0 < value < math.inf:
         raise typer.BadParameter(f"must be a finite number above 0, got {value:g}")
+    return value
+
+
+def word_or_number(text: str | None, word: str, option: str, must: str, *, least: float, most: float) -> Any:
+    """Return the word, or the number from ``least`` to ``most`` that a text spells; None is no choice."""
+    if text is None or text == word:
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:
+        raise typer.BadParameter(f"must be {must}, got {text!r}", param_hint=option)
     return value
 
 

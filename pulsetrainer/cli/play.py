@@ -103,28 +103,22 @@ def _ends(drive: Waveform) -> tuple[float, float]:
 
 def _shown_by(view: LoopView, drive: Waveform) -> Watch:
     """Return what shows a play on a live view: loop and error of each drive as they grow."""
-    import numpy as np
+    from pulsetrainer.steps.play import ErrorsSoFar
 
-    errors: dict[str, list[float]] = {}
+    errors = ErrorsSoFar(drive)
 
     def watch(name: str, repeat: int, place: IntArray, current: FloatArray, force: FloatArray) -> None:
-        total = errors.setdefault(name, [0.0, 0.0, 0.0])  # sum, largest, count
-        counts = place < drive.scored.size
-        counts[counts] = drive.scored[place[counts]] & np.isfinite(force[counts])
-        if counts.any():
-            error = np.abs(force[counts] - drive.target[place[counts]]) * (100.0 / drive.full_force)
-            total[:] = total[0] + error.sum(), max(total[1], float(error.max())), total[2] + error.size
-        said = [
-            f"{one}: mean {add / max(n, 1):.2f} %, max {most:.1f} %" for one, (add, most, n) in errors.items()
-        ]
-        view.figures = f"repeat {repeat}, {'; '.join(said)}"
+        errors.add(name, place, force)
+        view.figures = f"repeat {repeat}, {errors}"
         view.take(current, force)
 
     return watch
 
 
 def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
-    drive, repeats = played.waveform, played.compensated.output.shape[0]
+    from pulsetrainer.report.facts import warmth_words
+
+    drive, repeats, kelvin = played.waveform, played.compensated.output.shape[0], played.temperature_K
     seconds = float(drive.time_s[-1]) * repeats * 2
     if played.dropped_samples:
         job.notes(
@@ -151,13 +145,6 @@ def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
             "repeats": f"{repeats} of each drive, {seconds:.1f} s in all",
             "samples": f"{drive.time_s.size} a repeat",
             "lost": f"{played.dropped_samples} samples",
-            **_warmth(played),
+            **({"coil": warmth_words(kelvin)} if kelvin is not None and kelvin.size else {}),
         },
     )
-
-
-def _warmth(played: Playback) -> dict[str, str]:
-    kelvin = played.temperature_K
-    if kelvin is None or not kelvin.size:
-        return {}
-    return {"coil": f"{kelvin[0]:+.1f} to {kelvin[-1]:+.1f} K against calibration, made up for"}

@@ -46,6 +46,7 @@ def tell(
     from pulsetrainer.artefacts import Session
     from pulsetrainer.errors import PulsetrainerError
     from pulsetrainer.files import store
+    from pulsetrainer.report.facts import warmth_words
     from pulsetrainer.steps.stopped import raise_if_stopped
 
     job.notes(done.notes)
@@ -57,6 +58,7 @@ def tell(
         error.message += f"; {done.beats.start_s.size} beats were kept in {out} (complete=false)"
         raise
     quizzed, right = _quizzed(quiz)
+    kelvins = [kelvin for _, kelvin in done.temperature]
     payload: dict[str, Any] = {
         "output": out,
         "beats": int(done.beats.start_s.size),
@@ -66,7 +68,7 @@ def tell(
         "force_range_N": (done.reach.low, done.reach.high),
         "clipped_samples": done.clipped,
         "dropped_samples": done.dropped,
-        "temperature_K": [kelvin for _, kelvin in done.temperature] or None,
+        "temperature_K": kelvins or None,
         "serial": info.serial,
         "firmware": info.firmware,
         **quizzed,
@@ -81,9 +83,8 @@ def tell(
         f"{done.figures['amplitude_cv_percent']:.2f} % of height",
         "underruns": done.underruns,
     }
-    if done.temperature:
-        kelvins = [kelvin for _, kelvin in done.temperature]
-        rows["coil"] = f"{kelvins[0]:+.1f} to {kelvins[-1]:+.1f} K against calibration, made up for"
+    if kelvins:
+        rows["coil"] = warmth_words(kelvins)
     job.screen.result(payload)
     job.screen.facts(f"{out}: a session on {info.serial}", rows | right)
 

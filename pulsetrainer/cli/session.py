@@ -10,7 +10,7 @@ import typer
 
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port, TrackHeat
-from pulsetrainer.cli.settings import variable
+from pulsetrainer.files.settings import variable
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import FloatArray, Model
@@ -157,19 +157,12 @@ def _press(
     """Press, record, save and say."""
     from pulsetrainer.cli.score import tell
     from pulsetrainer.files.pulses import read_pulse
-    from pulsetrainer.files.recorder import interrupted
     from pulsetrainer.files.session_recorder import SessionRecorder
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, perform
 
     out, html = outputs
-    job.notes(
-        [
-            f"{left} holds {samples} samples of a session that was cut off: look with `pulsetrainer show "
-            f"{left}`, and delete it"
-            for left, samples in interrupted(out)
-        ]
-    )
+    job.left_over(out, "a session that was cut off: look with `pulsetrainer show {left}`, and delete it")
     shapes = [read_pulse(name) for name in pulses]
     blind = chosen if isinstance(chosen, Blind) else None
     steered = hands.steer(job.screen, chosen, shapes, by_key=by_key)

@@ -131,3 +131,28 @@ def check_resumable(path: Path) -> None:
             f"there is nothing to resume: neither {path} nor {path.name}.partial exists",
             hint="leave --resume out to record from the beginning",
         )
+
+
+_NAME = "{name}"  # in an output: one for each file
+
+
+def outputs_of(files: list[Path], out: Path) -> dict[Path, tuple[Path, ...]]:
+    """Return the files that are read into each output: all into one, or each into its own.
+
+    Raises
+    ------
+    UsageError
+        Two files would be written to one output.
+    """
+    if _NAME not in str(out):
+        return {out: tuple(files)}
+    groups: dict[Path, tuple[Path, ...]] = {}
+    for path in files:
+        target = Path(str(out).replace(_NAME, path.stem))
+        if target in groups:
+            raise UsageError(
+                f"{groups[target][0]} and {path} would both be written to {target}",
+                hint="import them one by one, under other names",
+            )
+        groups[target] = (path,)
+    return groups

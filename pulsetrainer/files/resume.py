@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pulsetrainer.artefacts import Run
-from pulsetrainer.errors import DataError, ExistsError, UsageError
+from pulsetrainer.errors import DataError, DeviceError, ExistsError, UsageError
 from pulsetrainer.files import atomic_write, store
 from pulsetrainer.files.file_lock import Lease, is_abandoned
 from pulsetrainer.files.input_file import check_resumable
@@ -27,6 +27,21 @@ class Earlier:
     header: Header
     lease: Lease  # so that nobody else goes on with it meanwhile
     contains_final: bool  # what has the final name is the beginning of this recording
+
+    def check_device(self, serial: str) -> None:
+        """Refuse to go on with a recording on another device.
+
+        Raises
+        ------
+        DeviceError
+            It was recorded on the device of another serial number.
+        """
+        recorded = self.header.provenance.device
+        if recorded is not None and recorded.serial != serial:
+            raise DeviceError(
+                f"{self.path} was recorded on {recorded.serial}, this is {serial}",
+                hint="connect that device, or leave --resume out and name another output",
+            )
 
 
 def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earlier:

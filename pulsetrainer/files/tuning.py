@@ -13,6 +13,7 @@ from typing import Any
 
 from pulsetrainer.errors import ExistsError, UsageError
 from pulsetrainer.files.atomic_write import check_output, replacing
+from pulsetrainer.files.settings import read_toml
 
 TABLE = "tuned"
 Found = Mapping[str, float]
@@ -26,12 +27,7 @@ def read_tuned(path: Path | str) -> dict[str, dict[str, Any]]:
     UsageError
         The file cannot be read, or what is there is no table of numbers.
     """
-    try:
-        tree = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise UsageError(
-            f"the settings in {path} cannot be read: {error}", hint="correct the file"
-        ) from error
+    tree = read_toml(path)
     table = tree.get(TABLE, {})
     entries = table.values() if isinstance(table, dict) else [None]
     for entry in entries:

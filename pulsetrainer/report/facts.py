@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -86,6 +86,11 @@ def loop_words(model: Model) -> str:
     if model.form == "signed":
         return turns or "of either direction"
     return f"{trend}, {turns}" if turns else trend
+
+
+def warmth_words(kelvin: Sequence[float] | FloatArray) -> str:
+    """How the coil's temperature went against that of calibration, K (n,)."""
+    return f"{kelvin[0]:+.1f} to {kelvin[-1]:+.1f} K against calibration, made up for"
 
 
 def minor_words(percent: float) -> str:

@@ -284,3 +284,26 @@ def _on_grid(recording: Trace, samples: int, decimation: int) -> FloatArray:
 def _playback(rows: list[FloatArray], samples: int) -> DrivePlayback:
     stacked = np.stack(rows) if rows else np.empty((0, 3, samples))
     return DrivePlayback(reference=stacked[:, 0], input=stacked[:, 1], output=stacked[:, 2])
+
+
+class ErrorsSoFar:
+    """Force errors of each drive as far as it has been played; as text, their mean and maximum."""
+
+    def __init__(self, drive: Waveform) -> None:
+        self._drive = drive
+        self._total: dict[str, tuple[float, float, int]] = {}  # sum and largest, % of full force; count
+
+    def add(self, name: str, place: IntArray, force: FloatArray) -> None:
+        """Take in what was measured (n,) at these samples of a drive; lost samples are NaN."""
+        drive = self._drive
+        total, most, count = self._total.get(name, (0.0, 0.0, 0))
+        counts = place < drive.scored.size
+        counts[counts] = drive.scored[place[counts]] & np.isfinite(force[counts])
+        error = np.abs(force[counts] - drive.target[place[counts]]) * (100.0 / drive.full_force)
+        self._total[name] = (total + error.sum(), max(most, error.max(initial=0.0)), count + error.size)
+
+    def __str__(self) -> str:
+        return "; ".join(
+            f"{name}: mean {total / max(count, 1):.2f} %, max {most:.1f} %"
+            for name, (total, most, count) in self._total.items()
+        )

@@ -9,7 +9,8 @@ import pytest
 import typer
 
 from pulsetrainer.cli.app import app
-from pulsetrainer.cli.settings import SETTINGS, defaults, takers
+from pulsetrainer.cli.settings import defaults, takers
+from pulsetrainer.files.settings import SETTINGS
 from wording import refusal
 
 PLAN = ("capture", "identification", "--dry-run", "--json", "-o", "run.h5")

@@ -1,0 +1,147 @@
+"""Settings: what a bench's owner writes once into pulsetrainer.toml instead of on every command line.
+
+A flag wins over the environment, the environment over the file, the file over the default. The file is
+``--settings FILE``, else PULSETRAINER_SETTINGS, else ``pulsetrainer.toml`` in the folder one works in,
+else the one in the user's own configuration folder; files are not mixed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pulsetrainer.errors import UsageError
+
+FILE_NAME = "pulsetrainer.toml"
+VARIABLE = "PULSETRAINER_SETTINGS"
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One key of the file; the options of its environment variable take its value."""
+
+    key: str  # dotted where it is in a table of the file
+    kind: type
+    unit: str
+    what: str
+
+    @property
+    def variable(self) -> str:
+        """Environment variable of the same meaning."""
+        return variable(self.key)
+
+
+def variable(key: str) -> str:
+    """Environment variable of a key: ``limits.current_A`` is PULSETRAINER_LIMITS_CURRENT_A."""
+    return "PULSETRAINER_" + key.upper().replace(".", "_")
+
+
+SETTINGS = (
+    Setting("port", str, "", "the device"),
+    Setting("levels", int, "", "levels of the plane"),
+    Setting("current_max_A", float, "A", "top of the range of a capture"),
+    Setting("speed_A_per_s", float, "A/s", "speed of identification"),
+    Setting("rate_Hz", float, "Hz", "samples a second"),
+    Setting("slew_A_per_s", float, "A/s", "fastest a drive may move"),
+    Setting("periods", int, "", "periods of a pulse"),
+    Setting("repeats", int, "", "how often a drive is played"),
+    Setting("limits.current_A", float, "A", "the device refuses more"),
+    Setting("limits.force_N", float, "N", "the device switches off above"),
+)
+
+
+def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
+    """Return the file of settings that counts, or None.
+
+    Raises
+    ------
+    UsageError
+        A file was named that is not there.
+    """
+    chosen = named or environment.get(VARIABLE)
+    if chosen:
+        if not Path(chosen).is_file():
+            raise UsageError(
+                f"there is no file of settings {chosen}",
+                hint=f"check the name, or leave --settings and {VARIABLE} out",
+            )
+        return Path(chosen)
+    from platformdirs import user_config_path  # noqa: PLC0415 - a file that is named needs no search
+
+    places = (Path(FILE_NAME), user_config_path("pulsetrainer", appauthor=False) / FILE_NAME)
+    return next((place for place in places if place.is_file()), None)
+
+
+def read_toml(path: Path | str) -> dict[str, Any]:
+    """Return the content of a file of settings.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, or is no TOML.
+    """
+    import tomllib  # noqa: PLC0415 - most benches have no such file
+
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UsageError(
+            f"the settings in {path} cannot be read: {error}", hint="correct the file"
+        ) from error
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return the settings of a file by dotted key.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be read, is no TOML, has a key that is not known, or a value of the wrong type.
+    """
+    tree = read_toml(path)
+    tree.pop("tuned", None)  # what `tune` wrote: looked at when a device is opened
+    return {key: _value(path, key, value) for key, value in _leaves(tree)}
+
+
+def _leaves(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for name, value in tree.items():
+        found += _leaves(value, f"{above}{name}.") if isinstance(value, dict) else [(above + name, value)]
+    return found
+
+
+def _value(path: Path, key: str, value: Any) -> Any:
+    """Return a value of the type its key asks for."""
+    known = {setting.key: setting for setting in SETTINGS}
+    if key not in known:
+        import difflib  # noqa: PLC0415 - needed by a mistake only
+
+        near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+        raise UsageError(
+            f"{path} sets {key!r}, which is not a setting",
+            hint=f"did you mean {near[0]}?" if near else f"there are: {', '.join(known)}",
+        )
+    setting = known[key]
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if setting.kind is float and number:
+        value = float(value)
+    if type(value) is not setting.kind or (isinstance(value, int | float) and not value > 0):
+        wanted = {str: "text", int: "a whole number above 0", float: f"a number of {setting.unit} above 0"}
+        raise UsageError(
+            f"{path} sets {key} = {value!r}; it must be {wanted[setting.kind]}", hint="correct the file"
+        )
+    return value
+
+
+def effective(file: Path | None, environment: Mapping[str, str]) -> list[tuple[Setting, Any, str]]:
+    """Return every setting that is set, its value, and where it comes from: environment or file."""
+    values = read(file) if file else {}
+    rows = []
+    for setting in SETTINGS:
+        if setting.variable in environment:
+            rows.append((setting, environment[setting.variable], setting.variable))
+        elif setting.key in values:
+            rows.append((setting, values[setting.key], str(file)))
+    return rows
