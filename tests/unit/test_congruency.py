@@ -100,6 +100,7 @@ def test_the_weights_swallow_it_on_the_whole_record():
     assert np.sqrt(max(rms[1] ** 2 - rms[0] ** 2, 0.0)) < 0.02 * difference
 
 
+@pytest.mark.slow
 def test_the_permutations_are_exact():
     """Under the null p is uniform: as many values fall below a twentieth as should, within chance."""
     rng = np.random.default_rng(20260107)

@@ -77,7 +77,11 @@ def test_none_of_200_direct_devices_is_called_anything_else():
 
 @pytest.mark.parametrize(
     ("draws", "form"),
-    [(devices.CLOCKWISE, "dual"), (devices.BUTTERFLY, "signed"), (devices.MIXED, "signed")],
+    [
+        pytest.param(devices.CLOCKWISE, "dual", marks=pytest.mark.slow),
+        (devices.BUTTERFLY, "signed"),
+        pytest.param(devices.MIXED, "signed", marks=pytest.mark.slow),
+    ],
     ids=["clockwise", "butterfly", "mixed"],
 )
 def test_the_form_is_named_right(draws, form):
@@ -107,7 +111,7 @@ def held_out(draw, seed):
 
 
 @pytest.mark.parametrize("draw", [devices.exchanged_plane, devices.stop_sum])
-@pytest.mark.parametrize("seed", [4000, 4001])
+@pytest.mark.parametrize("seed", [4000, pytest.param(4001, marks=pytest.mark.slow)])
 def test_a_dual_model_predicts_within_the_noise(draw, seed):
     """Held-out error at most 1.3 times the noise."""
     model, error = held_out(draw, seed)
@@ -115,7 +119,13 @@ def test_a_dual_model_predicts_within_the_noise(draw, seed):
     assert error <= 1.3
 
 
-@pytest.mark.parametrize("draw", [devices.butterfly_density, devices.mixed_plays, devices.mixed_planes])
+@pytest.mark.parametrize(
+    "draw",
+    [
+        devices.butterfly_density,
+        *(pytest.param(draw, marks=pytest.mark.slow) for draw in (devices.mixed_plays, devices.mixed_planes)),
+    ],
+)
 def test_a_signed_model_predicts_within_twice_the_noise(draw):
     """Held-out error at most 2 times the noise."""
     model, error = held_out(draw, 4002)
@@ -154,6 +164,7 @@ def clockwise():
     return pt.identify(run_of(u, y))
 
 
+@pytest.mark.slow
 def test_units_of_a_dual_model_are_exchanged(clockwise):
     """Edges are of the output, the offset of the input."""
     assert (clockwise.edges_unit, clockwise.offset_unit) == ("mm", "V")

@@ -17,6 +17,7 @@ from pulsetrainer.core.record import Record
 ALL = slice(None)
 
 
+@pytest.mark.slow
 def test_chosen_smoothing_beats_the_peers_on_their_job():
     """20 000 samples, 0.5 % noise, 48 levels: under 0.074 % of the span on a signal never seen."""
     world = job(1)

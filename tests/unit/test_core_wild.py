@@ -116,7 +116,7 @@ def test_wild_samples_that_lie_close_together_are_found():
     assert not found[~at].any()
 
 
-@pytest.mark.parametrize("seed", [505, 521])
+@pytest.mark.parametrize("seed", [505, pytest.param(521, marks=pytest.mark.slow)])
 def test_a_wild_output_of_the_dual_form_keeps_its_turns(seed):
     """The output is remembered there: at a wild sample the fit takes its place, not the line beside it."""
     device, u, y, rng = clean(seed)

@@ -308,6 +308,7 @@ def _two(first: np.ndarray, second: np.ndarray) -> State:
     return diagnose(Question(parts, 0.0, 1.5, np.random.default_rng(0)))
 
 
+@pytest.mark.slow
 def test_a_hum_has_a_phase_of_its_own_in_every_record():
     """No clock runs through both: one frequency, two phases."""
     t = np.arange(4000) / 200
