@@ -194,6 +194,10 @@ class Preisach:
             The input is empty, not one-dimensional or not finite.
         """
         path = follow(self.plane, values, start, self.reading)
+        return self.traced(path), path.final
+
+    def traced(self, path: Trace, bands: tuple[IntArray, FloatArray] | None = None) -> FloatArray:
+        """Output (n,) along an input that was followed; ``bands`` of its samples, where they are known."""
         band, fraction = self.plane.bands(path.node_value)
         turning = path.along_tree(self._step(band, fraction, band[path.parent], fraction[path.parent]))
         turning -= self.total
@@ -201,12 +205,13 @@ class Preisach:
         for begin in range(0, y.size, _CHUNK):
             part = slice(begin, begin + _CHUNK)
             anchor = path.anchor[part]
-            step = self._step(*self.plane.bands(path.value[part]), band[anchor], fraction[anchor])
+            i, t = self.plane.bands(path.value[part]) if bands is None else (bands[0][part], bands[1][part])
+            step = self._step(i, t, band[anchor], fraction[anchor])
             step += turning[anchor]
             y[part] = step
         y *= self.polarity
         y += self.offset
-        return y, path.final
+        return y
 
 
 def outputs(

@@ -21,7 +21,7 @@ from scipy import linalg, sparse
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.memory import Trace
-from pulsetrainer.core.operator import Preisach, base_rows, follow, steps
+from pulsetrainer.core.operator import Preisach, follow, rows
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import penalty
@@ -41,11 +41,21 @@ class Bins:
 
     def average(self, signals: Sequence[FloatArray]) -> FloatArray:
         """Averages (count,) of one signal per record."""
-        total = np.zeros(self.count)
-        for number, one in zip(self.number, signals, strict=True):
-            inside = number >= 0
-            total += np.bincount(number[inside], weights=one[inside], minlength=self.count)
+        total = np.empty(self.count)
+        for (inside, first, own), one in zip(self._runs, signals, strict=True):
+            total[own] = np.add.reduceat(one if inside is None else one[inside], first)
         return total / self.sizes
+
+    @cached_property
+    def _runs(self) -> list[tuple[IntArray | None, IntArray, IntArray]]:
+        """For each record its samples with weight (None: all), where a bin begins in them, and its bins."""
+        found = []
+        for number in self.number:
+            inside = None if np.all(number >= 0) else np.flatnonzero(number >= 0)
+            used = number if inside is None else number[inside]
+            first = np.flatnonzero(np.diff(used, prepend=-1))
+            found.append((inside, first, used[first]))
+        return found
 
     @cached_property
     def free(self) -> FloatArray:
@@ -178,16 +188,16 @@ class Design:
             inside = np.flatnonzero(number >= 0)
             where = number[inside]
             share = 1.0 / bins.sizes[where]
-            shape = (bins.count, path.own.shape[0])
-            packed = packed + sparse.csr_array((share, (where, inside)), shape=shape) @ path.own
-            base = base_rows(plane, path.trace)
-            shape = (bins.count, base.shape[0])
-            packed = (
-                packed + sparse.csr_array((share, (where, path.trace.anchor[inside])), shape=shape) @ base
-            )
-        matrix = shown(_to_cells(plane, packed))
+            own, base = rows(plane, path.trace)
+            of_samples = sparse.csr_array((share, (where, inside)), shape=(bins.count, own.shape[0]))
+            anchor = path.trace.anchor[inside]
+            of_nodes = sparse.csr_array((share, (where, anchor)), shape=(bins.count, base.shape[0]))
+            packed = packed + of_samples @ own + of_nodes @ base
+        matrix = shown(packed @ plane.adjoint(np.eye(plane.n_q)))
         taken = bins.free.T @ matrix
-        matrix -= bins.free @ taken
+        for begin in range(0, bins.count, LIMITS.rows_at_once):
+            part = slice(begin, begin + LIMITS.rows_at_once)
+            matrix[part] -= bins.free[part] @ taken
         return cls(plane, bins, matrix, taken, smoothing)
 
     @cached_property
@@ -229,11 +239,10 @@ class Design:
 
 @dataclass(frozen=True)
 class Followed:
-    """An input followed through the plane's memory once: any weights then cost one sparse product."""
+    """An input followed through the plane's memory once, for any weights."""
 
     trace: Trace
-    own: sparse.csr_array  # (n, n_q) from the anchor to the sample, node space
-    step: sparse.csr_array  # (m, n_q) from turning point to turning point
+    bands: tuple[IntArray, FloatArray]  # of the samples (n,): see ``Plane.bands``
     base: FloatArray | None = None  # (n,) output of what the weights only correct
 
     @classmethod
@@ -242,25 +251,12 @@ class Followed:
     ) -> Followed:
         """Follow an input (n,) from negative saturation."""
         path = follow(plane, u, None, "continuous")
-        own = steps(plane, path.value, path.node_value[path.anchor])
-        step = steps(plane, path.node_value, path.node_value[path.parent])
-        return cls(path, own, step, None if base is None else base(u))
+        return cls(path, plane.bands(path.value), None if base is None else base(u))
 
     def output(self, operator: Preisach) -> FloatArray:
         """Output (n,), polarity 1."""
-        turning = self.trace.along_tree(self.step @ operator.nodes)
-        level = operator.offset - operator.total
-        y = np.asarray(self.own @ operator.nodes + turning[self.trace.anchor] + level)
+        y = operator.traced(self.trace, self.bands)
         return y if self.base is None else y + self.base
-
-
-def _to_cells(plane: Plane, packed: sparse.csr_array) -> FloatArray:
-    """Rows in node space to rows (count, n_q) in cell space, in pieces that fit the cache."""
-    matrix = np.empty(packed.shape)
-    for begin in range(0, packed.shape[0], LIMITS.rows_at_once):
-        part = slice(begin, begin + LIMITS.rows_at_once)
-        matrix[part] = plane.adjoint(packed[part].toarray())
-    return matrix
 
 
 class Projector:
@@ -270,14 +266,16 @@ class Projector:
         # where a cause explains all, no cell is left: an unused one stands in, whose mass is close to nothing
         if free.size == 0:
             free = np.asarray([int(np.argmax(np.diagonal(design.gram)))], dtype=np.int64)
-        self.design, self.rows = design, np.take(design.matrix, free, axis=1)
-        block = design.gram[np.ix_(free, free)].copy()
+        self.design, self.cells = design, free
+        block = design.gram[np.ix_(free, free)]
         block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max())
-        self.factor = linalg.cho_factor(block, lower=True, check_finite=False)
+        self.factor = linalg.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
 
     def __call__(self, columns: FloatArray) -> FloatArray:
         """Columns (count, k) without their fitted part."""
-        settled = self.design.bins.settled(columns)
-        masses = linalg.cho_solve(self.factor, self.rows.T @ settled, check_finite=False)
-        settled -= self.rows @ masses
+        settled, rows = self.design.bins.settled(columns), self.design.matrix
+        # all rows twice: to copy those of the positive cells takes longer
+        masses = np.zeros((rows.shape[1], columns.shape[1]))
+        masses[self.cells] = linalg.cho_solve(self.factor, (rows.T @ settled)[self.cells], check_finite=False)
+        settled -= rows @ masses
         return settled

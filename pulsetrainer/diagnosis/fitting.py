@@ -9,9 +9,11 @@ weights have already swallowed most of it.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,13 +92,14 @@ class Fitted:
 
 
 class Simulator:
-    """Averaged outputs of one operator under many chains; the static part is run once per seen input."""
+    """Averaged outputs of one operator under many chains; what chains begin with alike is run once for them."""
 
     def __init__(self, problem: Problem, operator: Preisach) -> None:
         self.problem, self.operator = problem, operator
         rest = float(self.static(np.asarray([problem.plane.low]))[0])
         self.frames = [frame.about(rest) for frame in problem.frames]
         self._static: dict[tuple[Term, ...], list[FloatArray]] = {}
+        self._shown: OrderedDict[tuple[Term, ...], list[FloatArray]] = OrderedDict()
 
     def static(self, u: FloatArray) -> FloatArray:
         """Output (n,) of the hysteresis for what it sees (n,), from negative saturation."""
@@ -117,9 +120,18 @@ class Simulator:
 
     def full(self, terms: Sequence[Term]) -> list[FloatArray]:
         """Outputs of every record at the full rate."""
-        return [
-            shown_output(terms, y, frame) for y, frame in zip(self.inner(terms), self.frames, strict=True)
-        ]
+        if not any(term.cause.stage == "output" for term in terms):
+            return self.inner(terms)
+        whole = tuple(terms)
+        if whole not in self._shown:
+            begun = self.full(whole[:-1])
+            self._shown[whole] = [
+                shown_output(whole[-1:], y, frame) for y, frame in zip(begun, self.frames, strict=True)
+            ]
+            if len(self._shown) > LIMITS.shown_kept:
+                self._shown.popitem(last=False)
+        self._shown.move_to_end(whole)
+        return self._shown[whole]
 
     def __call__(self, terms: Sequence[Term]) -> FloatArray:
         """Averaged output (count,) of the chain."""
@@ -200,8 +212,13 @@ def refit(
     rounds: int = LIMITS.refit_rounds,
     *,
     rebuild: bool = False,
+    goal: float = inf,
 ) -> Fitted:
-    """Joint refit from the parameter values in ``terms``."""
+    """Joint refit from the parameter values in ``terms``; given up where it comes nowhere near ``goal``.
+
+    The goal is a sum of squares: the steps fall off fast, so what many of the last one would not reach is
+    not reached.
+    """
     known = near.names if near is not None else ()
     rebuild = rebuild or any(t.cause.in_rows and t.cause.id not in known for t in terms)
     fitted = weights_for(problem, in_order(terms), near, rebuild=rebuild)
@@ -227,9 +244,9 @@ def refit(
             damping = max(LIMITS.damping_rises * damping, LIMITS.damping_least)
         if better is None:
             return fitted
-        done = fitted.squares - better.squares < LIMITS.enough * better.squares
+        fall = fitted.squares - better.squares
         fitted = better
-        if done:
+        if fall < LIMITS.enough * fitted.squares or LIMITS.hopeless * fall < fitted.squares - goal:
             break
     return fitted
 

@@ -76,51 +76,62 @@ class HeldOut:
         design, free = fitted.design, np.flatnonzero(fitted.passive)
         extra = design.bins.settled(fitted.slopes)
         more = np.hstack((extra, design.bins.free))
-        test = (fold_of[self.block][:, None] == np.arange(folds)).astype(np.float64)  # (count, folds)
-        size = free.size + more.shape[1]
-        if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | (test.sum(axis=0) == 0)):
+        test = fold_of[self.block][:, None] == np.arange(folds)  # (count, folds)
+        size, starts = free.size + more.shape[1], design.bins.free.shape[1]
+        if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | ~test.any(axis=0)):
             return
-        grams = self._block_grams(design)
+        # of each fold, and of all: what is left when it is taken off is what the fold is predicted from
+        grams = _of_folds(self._block_grams(design)[:, free[:, None], free], fold_of)
+        beside = np.hstack((more, fitted.residual[:, None]))
+        across = _of_folds(self._products(beside, design.matrix), fold_of)
+        among = _of_folds(self._products(beside, more), fold_of)
         masses = (fitted.simulator.operator.weights * design.plane.areas)[free]
-        pull = np.zeros(size)  # of the smoothing at the joint fit
-        smooth = np.zeros((size, size))
+        smooth, pull = np.zeros((size, size)), np.zeros(size)  # pull: of the smoothing at the joint fit
         smooth[: free.size, : free.size] = design.smooth[np.ix_(free, free)]
         pull[: free.size] = smooth[: free.size, : free.size] @ masses
         # without its first block a record says nothing of its start: what all of it said is kept
-        smooth[-design.bins.free.shape[1] :, -design.bins.free.shape[1] :] = LIMITS.start_kept * np.eye(
-            design.bins.free.shape[1]
-        )
+        smooth[-starts:, -starts:] = LIMITS.start_kept * np.eye(starts)
         told = LIMITS.piece_told if whole else 0.0  # what the rest cannot tell stays as all of it said
         share = 1.0 - (1.0 - told) / folds
+        changes = np.empty((folds, size))
         for fold in range(folds):
-            train = 1.0 - (1.0 - told) * test[:, fold]
-            weighted = more * train[:, None]
+            gram, cross, own = (total - (1.0 - told) * parts[fold] for parts, total in (grams, across, among))
             normal = share * smooth
-            kept = fold_of != fold
-            gram = grams[kept].sum(axis=0) + told * grams[~kept].sum(axis=0)
-            normal[: free.size, : free.size] += gram[np.ix_(free, free)]
-            normal[free.size :, : free.size] += (weighted.T @ design.matrix)[:, free]
-            normal[free.size :, free.size :] += weighted.T @ more
+            normal[: free.size, : free.size] += gram
+            normal[free.size :, : free.size] += cross[:-1, free]
+            normal[free.size :, free.size :] += own[:-1]
             normal[np.diag_indices(size)] *= 1.0 + LIMITS.ridge_held_out
             normal[np.diag_indices(size)] += TINY
-            left = fitted.residual * train
-            rhs = np.concatenate(((left @ design.matrix)[free], left @ more)) - share * pull
-            factor = linalg.cho_factor(normal, lower=True, check_finite=False)
-            change = linalg.cho_solve(factor, rhs, check_finite=False)
-            moved = np.zeros(design.plane.n_q)
-            moved[free] = change[: free.size]
-            error = fitted.residual - design.matrix @ moved - more @ change[free.size :]
-            yield error[test[:, fold] > 0], change[free.size : free.size + extra.shape[1]]
+            rhs = np.concatenate((cross[-1, free], own[-1])) - share * pull
+            factor = linalg.cho_factor(normal, lower=True, check_finite=False, overwrite_a=True)
+            changes[fold] = linalg.cho_solve(factor, rhs, check_finite=False)
+        moved = np.zeros((design.plane.n_q, folds))
+        moved[free] = changes[:, : free.size].T
+        told_all = design.matrix @ moved + more @ changes[:, free.size :].T
+        for fold in range(folds):
+            error = (fitted.residual - told_all[:, fold])[test[:, fold]]
+            yield error, changes[fold, free.size : free.size + extra.shape[1]]
 
     def _block_grams(self, design: Design) -> FloatArray:
         """D'D of every block (blocks, n_q, n_q): made once for each design."""
         if self._grams[0] is not design:
-            parts = np.empty((LIMITS.blocks, design.plane.n_q, design.plane.n_q))
-            for k in range(LIMITS.blocks):
-                own = design.matrix[self.block == k]
-                parts[k] = own.T @ own
-            self._grams = design, parts
+            self._grams = design, self._products(design.matrix, design.matrix)
         return self._grams[1]
+
+    def _products(self, left: FloatArray, right: FloatArray) -> FloatArray:
+        """Products L'R of the rows of every block (blocks, l, r)."""
+        found = np.zeros((LIMITS.blocks, left.shape[1], right.shape[1]))
+        ends = np.flatnonzero(np.diff(self.block, append=-1)) + 1
+        for begin, end in zip([0, *ends[:-1].tolist()], ends.tolist(), strict=True):
+            found[self.block[begin]] += left[begin:end].T @ right[begin:end]
+        return found
+
+
+def _of_folds(parts: FloatArray, fold_of: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Sums (folds, ...) over the blocks of each fold, and over all of them, of what blocks have."""
+    mine = (np.arange(fold_of.max() + 1)[:, None] == fold_of).astype(np.float64)
+    own = np.tensordot(mine, parts, axes=1)
+    return own, own.sum(axis=0)
 
 
 def _fold_of(folds: int, *, whole: bool) -> IntArray:

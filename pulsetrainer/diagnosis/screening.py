@@ -274,14 +274,13 @@ def _blocks(problem: Problem, fitted: Fitted) -> list[_Block]:
     if not tried:
         return []
     # all at once: the projection is bound by reading the rows
-    columns = np.stack(
+    columns = np.asarray(
         [
             fitted.simulator(in_order((*fitted.terms, Term(cause, one)))) - fitted.simulated
             for cause, values in tried
             for one in values
-        ],
-        axis=1,
-    )
+        ]
+    ).T
     free = project(columns)
     free -= known @ (known.T @ free)
     size, whole_size = np.linalg.norm(free, axis=0), np.linalg.norm(columns, axis=0)

@@ -36,7 +36,6 @@ class Thresholds:
     least_rows: int = 100  # averages: fewer tell no causes apart
     start_tau_s: tuple[float, ...] = (0.2, 0.8, 3.2)  # decays fitted from a record's start (decision 040)
     start_share: float = 6.0  # time constants of such a decay that a record must hold: else it is an offset
-    rows_at_once: int = 2000  # rows brought to cell space in one piece: what fits the cache
     same_value: float = 1e-9  # of the span: outputs nearer than this are one value, rounded
     jump_of_input: float = 0.1  # of its range from one sample to the next: there the output jumps as well
     noise_least: int = 8  # third differences: fewer tell no noise
@@ -47,6 +46,8 @@ class Thresholds:
     coarse_levels: int = 22  # of the plane that shows how the discretisation error falls with the cell
     smoothing: float = 0.035  # of the density, share of the range: holds the fit at the levels above
     near_end: float = 0.01  # of the range: the outputs at its two ends are averaged over so much
+    rows_at_once: int = 2000  # rows worked on in one piece: what fits the cache
+    shown_kept: int = 12  # outputs kept of what chains begin with, at the full rate
     followed_kept: int = 10  # inputs kept as they were followed through the plane: some 10 MB each
     ridge: float = 1e-10  # of the largest diagonal entry: keeps the factor of the positive cells regular
     ridge_held_out: float = 1e-9  # relative: the same where blocks are left out
@@ -59,6 +60,7 @@ class Thresholds:
     without_rounds: int = 1  # of a model that a cause was taken from: the others move little
     passes: int = 8  # at most, of the weights against what the output causes add (decision 041)
     passes_settled: float = 0.05  # change of what they add, of the residual: below, the passes end
+    hopeless: float = 4.0  # times its last fall: a refit that is further from its goal is given up
     enough: float = 2e-3  # relative fall of the sum of squares: below, the refit ends
     difference: float = 0.02  # of a parameter's value: step of its derivative, if larger than the cause's own
     step_tries: int = 4  # dampings tried for one step

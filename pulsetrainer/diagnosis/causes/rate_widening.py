@@ -43,13 +43,14 @@ class RateWidening(Cause):
         begun, inner = remembered(frame.past, self.id, np.repeat(u[:1], 2)).tolist()
         if frame.past is not None and frame.past.before:
             u = np.append(begun, u)
-        excess = [u[0] - inner, *_excess(u, u[0] - inner, k, frame.dt_s)]
-        path = np.asarray(u - excess)
+        path = u.copy()
+        path[0] = inner
+        path[1:] -= _excess(u, u[0] - inner, k, frame.dt_s)
         remember(frame.past, self.id, np.asarray([u[-1], path[-1]]))
         return path[-frame.input.size :]
 
 
-def _excess(u: FloatArray, e: float, k: float, dt_s: float) -> list[float]:
+def _excess(u: FloatArray, e: float, k: float, dt_s: float) -> FloatArray:
     """Excess e = u - v (n - 1,) at the samples of ``u`` (n,) after the first, where it is ``e``.
 
     Exact for an input that is straight between samples: e' = u' - sgn(e) (e/k)^2 is a Riccati equation. With
@@ -73,4 +74,4 @@ def _excess(u: FloatArray, e: float, k: float, dt_s: float) -> list[float]:
             own = end * (tan(rest) if rest < 0.0 else tanh(rest))
         e = own if up else -own
         found.append(e)
-    return found
+    return np.asarray(found)

@@ -33,7 +33,7 @@ def _exchanged(state: State, cause: Cause) -> State:
     # by its cause: an exchange before this one has moved all terms
     without = current.without(next(term for term in current.terms if term.cause is cause))
     trials = [
-        refit(problem, (*without.terms, Term(score.cause, score.start)), without)
+        refit(problem, (*without.terms, Term(score.cause, score.start)), without, goal=current.squares)
         for score in ranked(without)
         if score.cause.id in kin
     ]
