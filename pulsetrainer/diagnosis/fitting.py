@@ -92,7 +92,7 @@ class Fitted:
 
 
 class Simulator:
-    """Averaged outputs of one operator under many chains; what chains begin with alike is run once for them."""
+    """Averaged outputs of one operator under many chains; what they begin with alike is run once."""
 
     def __init__(self, problem: Problem, operator: Preisach) -> None:
         self.problem, self.operator = problem, operator

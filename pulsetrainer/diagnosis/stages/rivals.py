@@ -81,7 +81,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
         if score.gain < LIMITS.rival_screened * gain:
             continue
         terms = (*without.terms, Term(score.cause, score.start))
-        trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds)
+        trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds, goal=fitted.squares + margin)
         if trial.squares - fitted.squares < max(margin, doubt(fitted, trial, state.scores.noise)):
             found.append(score.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
