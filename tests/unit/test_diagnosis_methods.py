@@ -14,7 +14,7 @@ from pulsetrainer.diagnosis.causes import library, stick_slip
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.design import bins_of
 from pulsetrainer.diagnosis.evidence import Evidence
-from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.extended import Term, chain
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_for
 from pulsetrainer.diagnosis.floor import Floor
@@ -155,7 +155,70 @@ def test_one_step_finds_a_parameter_that_enters_linearly():
     np.testing.assert_allclose(np.diff(fitted.slopes[:, 0]), np.diff(time), rtol=1e-6)
 
 
+def test_a_chain_is_run_the_same_whatever_was_run_before():
+    """What chains begin with is kept: each is still the chain run alone."""
+    u = _loops()
+    problem = problem_for([Record(u, 3.0 * u, dt_s=0.01)], 0.0, 1.5)
+    fitted = weights_for(problem, (), None)
+    terms = [
+        Term(CAUSE[name], values)
+        for name, values in (("field-lag", (0.02,)), ("output-lag", (0.03,)), ("creep", (0.1, 0.7)))
+    ]
+    chains = [terms[:k] for k in range(4)] + [[terms[1]], [terms[0], terms[2]], terms]
+    kept = [fitted.simulator(chain) for chain in chains]
+    for one, chain_of in zip(kept, chains, strict=True):
+        frame = fitted.simulator.frames[0]
+        alone = problem.bins.average([chain(tuple(chain_of), fitted.simulator.static, frame)])
+        np.testing.assert_allclose(one, alone, rtol=0, atol=1e-10)
+    for _ in range(20):  # more than are kept
+        terms[2] = Term(CAUSE["creep"], (terms[2].values[0] * 1.1, 0.7))
+        fitted.simulator(terms)
+    np.testing.assert_array_equal(fitted.simulator(chains[1]), kept[1])
+
+
+def test_a_refit_far_from_its_goal_is_given_up():
+    """Without a goal it goes on; one that it can reach stops nothing."""
+    u = _loops()
+    lagged = CAUSE["output-lag"].on_output(3.0 * u, (0.08,), FRAME)
+    problem = problem_for([Record(u, lagged, dt_s=0.01)], 0.0, 1.5)
+    near = weights_for(problem, (), None)
+    begun = (Term(CAUSE["offset-drift"], (0.01,)),)  # not what it is
+    free, one = refit(problem, begun, near), refit(problem, begun, near, rounds=1)
+    assert refit(problem, begun, near, goal=free.squares * 1.01).squares == pytest.approx(free.squares)
+    assert refit(problem, begun, near, goal=1e-9 * near.squares).squares <= one.squares
+
+
 # --- blocks left out, intervals
+@pytest.mark.parametrize("whole", [False, True])
+def test_errors_of_folds_are_those_of_as_many_fits(whole):
+    """The sums over blocks against each fold fitted on its own rows, weighted one by one."""
+    u = np.tile(_loops(), 4)
+    rng = np.random.default_rng(3)
+    y = CAUSE["output-lag"].on_output(3.0 * u, (0.03,), FRAME) + 0.01 * rng.standard_normal(u.size)
+    problem = problem_for([Record(u, y, dt_s=0.01)], 0.0, 1.5)
+    fitted = refit(problem, (Term(CAUSE["output-lag"], (0.02,)),), None, rounds=2)
+    held_out, folds = HeldOut(problem), 4
+    blocks = np.arange(LIMITS.blocks)
+    fold_of = (blocks * folds // LIMITS.blocks if whole else blocks % folds)[held_out.block]
+    design, free = fitted.design, np.flatnonzero(fitted.passive)
+    columns = np.hstack((design.matrix[:, free], design.bins.settled(fitted.slopes), design.bins.free))
+    starts = design.bins.free.shape[1]
+    smooth = np.zeros((columns.shape[1], columns.shape[1]))
+    smooth[: free.size, : free.size] = design.smooth[np.ix_(free, free)]
+    smooth[-starts:, -starts:] = LIMITS.start_kept * np.eye(starts)
+    masses = np.zeros(columns.shape[1])
+    masses[: free.size] = fitted.simulator.operator.masses[free]
+    masses[free.size :] = 0.0
+    for fold, (error, _) in enumerate(held_out._left_out(fitted, folds, whole=whole)):
+        told = LIMITS.piece_told if whole else 0.0
+        weight = np.where(fold_of == fold, told, 1.0)
+        share = 1.0 - (1.0 - told) / folds
+        normal = columns.T @ (weight[:, None] * columns) + share * smooth
+        normal[np.diag_indices_from(normal)] *= 1.0 + LIMITS.ridge_held_out
+        change = np.linalg.solve(normal, columns.T @ (weight * fitted.residual) - share * smooth @ masses)
+        np.testing.assert_allclose(error, (fitted.residual - columns @ change)[fold_of == fold], atol=2e-6)
+
+
 def _told(folds: dict[int, list]) -> HeldOut:
     held_out = HeldOut.__new__(HeldOut)
     held_out._errors = []

@@ -176,7 +176,7 @@ def _refitting(monkeypatch, *modules, squares):
     """Let refits of these modules come out as told by the set of their causes; return what was asked."""
     asked = []
 
-    def refit(problem, terms, near, rounds=None, *, rebuild=False):
+    def refit(problem, terms, near, rounds=None, *, rebuild=False, goal=None):
         names = tuple(term.cause.id for term in terms)
         asked.append((names, rounds, rebuild))
         return Fit(squares[frozenset(names)], tuple(terms))
