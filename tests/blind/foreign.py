@@ -1,9 +1,9 @@
 """Plants of other kinds, on the path of a user: CSV, import, identify, diagnose, extend or correct, evaluate.
 
-None of these plants is a Preisach operator of the bench: Jiles-Atherton, Duhem, friction, plays under an envelope.
-Signal, range, units, rate, digits and noise are drawn by the seed, and so is what is hidden. Everything
-is computed at four times the rate of the record. What is asked: is the hidden cause named, what is named besides,
-and is the extended model worse than the plain one on a record that it never saw.
+None of these plants is a Preisach operator of the bench: Jiles-Atherton, Duhem, friction, plays under an
+envelope. Signal, range, units, rate, digits and noise are drawn by the seed, and so is what is hidden. All is
+computed at four times the rate of the record. What is asked: is the hidden cause named, what is named
+besides, and is the extended model worse than the plain one on a record that it never saw.
 
     python tests/blind/foreign.py --first 9000 --count 24 -o build/foreign.jsonl
 """
@@ -141,10 +141,10 @@ def drive(rate_Hz: float, rng: np.random.Generator, seconds: float) -> np.ndarra
     return np.interp(t, times, turns)
 
 
-def lagged(x: np.ndarray, tau_s: float, dt_s: float) -> np.ndarray:
-    """First-order lag from rest at the first value."""
+def lagged(x: np.ndarray, tau_s: float, dt_s: float, begin: float | None = None) -> np.ndarray:
+    """First-order lag from rest at the first value, or at ``begin``."""
     a = np.exp(-dt_s / tau_s)
-    return np.asarray(signal.lfilter([1 - a], [1, -a], x, zi=[a * x[0]])[0])
+    return np.asarray(signal.lfilter([1 - a], [1, -a], x, zi=[a * (x[0] if begin is None else begin)])[0])
 
 
 def put(
@@ -158,21 +158,16 @@ def put(
     """Output (n,) of a plant with an effect; ``tau`` in (0, 1) draws its time."""
     t = np.arange(u.size) * dt_s
     y = plant(lagged(u, strength, dt_s) if effect == "field-lag" else u)
-    if effect == "output-lag":
-        return lagged(y, strength, dt_s)
-    if effect == "creep":
-        return y + strength * lagged(y, 0.4 + 2 * tau, dt_s)
-    if effect == "thermal-drift":
-        return y * (1 - strength * lagged(np.append(0.0, u**2), 8 + 15 * tau, dt_s)[1:])
-    if effect == "viscous":
-        return y + strength * np.gradient(u, dt_s)
-    if effect == "offset-drift":
-        return y + strength * t / t[-1]
-    if effect == "step":
-        return y + strength * (t > (0.3 + 0.4 * tau) * t[-1])
-    if effect == "periodic":
-        return y + strength * np.sin(2 * np.pi * (2 + 30 * tau) * t)
-    return y
+    shown = {
+        "output-lag": lambda: lagged(y, strength, dt_s),
+        "creep": lambda: y + strength * lagged(y, 0.4 + 2 * tau, dt_s),
+        "thermal-drift": lambda: y * (1 - strength * lagged(u**2, 8 + 15 * tau, dt_s, 0.0)),
+        "viscous": lambda: y + strength * np.gradient(u, dt_s),
+        "offset-drift": lambda: y + strength * t / t[-1],
+        "step": lambda: y + strength * (t > (0.3 + 0.4 * tau) * t[-1]),
+        "periodic": lambda: y + strength * np.sin(2 * np.pi * (2 + 30 * tau) * t),
+    }
+    return shown.get(effect, lambda: y)()
 
 
 _FIRST = {"output-lag": 0.005, "field-lag": 0.005, "creep": 0.05, "thermal-drift": 0.05, "viscous": 0.002}
@@ -198,16 +193,14 @@ def records_of(seed: int) -> tuple[dict, Bench, list[np.ndarray]]:
         apart = put(effect, plant, inputs[0], dt, strength, tau) - still
         strength *= percent / float(100 * np.std(apart) / np.ptp(still))
     tables = []
-    for u in inputs:
-        y = put(effect, plant, u, dt, strength, tau)
-        u, y = u[::FINER], (y[::FINER] - still.min()) / np.ptp(still)
+    for fine in inputs:
+        y = put(effect, plant, fine, dt, strength, tau)
+        u, y = fine[::FINER], (y[::FINER] - still.min()) / np.ptp(still)
         noise = signal.lfilter([1.0], [1.0, -bench.coloured], rng.standard_normal(y.size))
         y = y + bench.noise * noise / np.std(noise)
-        u = u + bench.noisy_input * rng.standard_normal(u.size)
+        told = bench.low + (bench.high - bench.low) * (u + bench.noisy_input * rng.standard_normal(u.size))
         t = np.arange(u.size) / bench.rate_Hz
-        tables.append(
-            np.column_stack((t, bench.low + (bench.high - bench.low) * u, bench.zero + bench.scale * y))
-        )
+        tables.append(np.column_stack((t, told, bench.zero + bench.scale * y)))
     return {"seed": seed, "plant": name, "effect": effect, "percent": percent}, bench, tables
 
 
