@@ -30,9 +30,12 @@ demo: $(D)/report.html $(D)/diagnosis.html $(D)/prediction.h5  ## the whole chai
 
 # --- set-up -----------------------------------------------------------------------------------------
 $(VENV)/installed: pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable .
+	@echo "making $(VENV), a Python environment of its own"
+	@$(PYTHON) -m venv $(VENV)
+	@echo "downloading and installing pulsetrainer and its libraries (numpy, scipy, matplotlib, h5py ...): a minute or two"
+	@$(BIN)/pip install --quiet --disable-pip-version-check --editable .
 	@touch $@
+	@echo "done; now: . $(BIN)/activate"
 
 $(VENV)/installed-test: $(VENV)/installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test]'

@@ -43,7 +43,7 @@ def at_once() -> dict[str, Mistake]:
             there = _line(one, {option: f"x{Path(name).suffix}"})
             found[f"{one.name}: {option} exists"] = Mistake(there, 2, f"({option})")
             nowhere = _line(one, {option: f"no/{name}"})
-            found[f"{one.name}: {option} has no folder"] = Mistake(nowhere, 2)
+            found[f"{one.name}: {option} is in no folder"] = Mistake(nowhere, 2, f"no/{name} cannot")
     table = ("import", "run.csv", "--input", "u", "--output", "y", "-o", "out.h5")
     words = {
         "no such command": ("captur",),
@@ -103,7 +103,7 @@ def at_once() -> dict[str, Mistake]:
         for name, line in words.items()
     }
     bounds = ("evaluate", "played.h5", "--bounds", "absent.toml")
-    found["no such file of bounds"] = Mistake(bounds, 3, "(--bounds)")
+    found["no such file of bounds"] = Mistake(bounds, 2, "absent.toml")
     found["no such CSV signal"] = Mistake(("capture", "absent.csv", "-o", "out.h5"), 3, "(argument ")
     return found
 

@@ -54,7 +54,7 @@ MESSAGES = {
     "kept elsewhere": Message("kept in", "", "{file}"),
     "recording is finished": Message("finished", "a new run"),
     "disk is full": Message("is full", "kept", "{folder}", got="bytes are left"),
-    "no folder": Message("does not exist", "", "{folder}"),
+    "no folder": Message("there is no folder", "mkdir -p", "{folder}"),
     "no sound provenance": Message("the provenance is not", "", "{file}"),
     "no provenance": Message("'provenance' is missing", "", "{file}"),
     "not writable": Message("not writable", "", "{folder}"),
@@ -88,7 +88,7 @@ MESSAGES = {
         "samples", "fewer", expected="more than {most}", got="{times} times {samples}"
     ),
     "not a smoothing": Message(
-        "--smoothing", "identify --help", expected="a number from 0 to 1", got="'{got}'"
+        "--smoothing", "--smoothing auto", expected="a number from 0 to 1", got="'{got}'"
     ),
     "no such beat": Message("beat", "--beat", "fingerbp_AAC3_3", "6 ", "9"),
     "not such an argument": Message("{argument} must", "", got="{got}"),

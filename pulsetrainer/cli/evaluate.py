@@ -38,18 +38,18 @@ def evaluate(
     job = Job(
         context,
         inputs=(*inputs, *model),
-        tables=(bounds,),
         outputs=(out, html),
         overwrite=overwrite,
         as_json=json,
     )
+    from pulsetrainer.files.bounds import read_bounds
+
+    limits = read_bounds(bounds) if bounds else {}
     from pulsetrainer.artefacts import Model, Playback, Run, Session
     from pulsetrainer.errors import QualityError
-    from pulsetrainer.files.bounds import read_bounds
     from pulsetrainer.steps.evaluate import breaches
     from pulsetrainer.steps.evaluate import evaluate as errors_of
 
-    limits = read_bounds(bounds) if bounds else {}
     with job.working("evaluating") as progress:
         measured = [job.load_any(path, Playback, Run, Session) for path in inputs]
         if len(measured) == 1 and isinstance(measured[0], Session):

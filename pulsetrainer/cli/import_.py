@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -83,7 +84,7 @@ def import_(
     from pulsetrainer.files.run_from_table import run_from_table
     from pulsetrainer.steps.import_ import import_parts
 
-    read: list[Imported] = []
+    read: list[tuple[Imported, Mapping[str, str]]] = []
     with jobs[0].working(f"reading {', '.join(path.name for path in files)}") as progress:
         for group in groups.values():
             parts = [
@@ -102,11 +103,11 @@ def import_(
                 for path in group
             ]
             jobs[0].notes([note for part in parts for note in part.notes])
-            read.append(import_parts([part.run for part in parts], resample=even))
+            read.append((import_parts([part.run for part in parts], resample=even), parts[0].read_as))
             del parts
             progress(0.7 * len(read) / len(groups))
         # nothing is written before all of them have been read
-        for job, (target, group), one in zip(jobs, groups.items(), read, strict=True):
+        for job, (target, group), (one, _) in zip(jobs, groups.items(), read, strict=True):
             job.notes(one.notes)
             for path in group:
                 job.uses(path)
@@ -115,11 +116,13 @@ def import_(
     _show(jobs[0], groups, read)
 
 
-def _show(job: Job, groups: dict[Path, tuple[Path, ...]], read: list[Imported]) -> None:
-    facts = [_facts(one) for one in read]
+def _show(
+    job: Job, groups: dict[Path, tuple[Path, ...]], read: list[tuple[Imported, Mapping[str, str]]]
+) -> None:
+    facts = [{**how, **_facts(one)} for one, how in read]
     runs = [
         {"output": target, "report": {"files": group} | plain(one.report), "facts": figures}
-        for (target, group), one, figures in zip(groups.items(), read, facts, strict=True)
+        for (target, group), (one, _), figures in zip(groups.items(), read, facts, strict=True)
     ]
     job.screen.result({"output": runs[0]["output"], "facts": facts[0], "runs": runs})
     for (target, group), figures in zip(groups.items(), facts, strict=True):

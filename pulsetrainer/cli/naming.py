@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import shlex
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ _HOLDS = {
     "verify": ("run",),
     "drive": ("waveform",),
     "diagnosis": ("diagnosis",),
-    "inputs": ("playback", "run"),
+    "inputs": ("playback",),
     "evaluations": ("evaluation", "session"),
     "file": (),
 }
@@ -29,8 +30,18 @@ _HOLDS = {
 # (command, kind of file): what to do instead of making one in the usual way
 _WANTED = {
     ("diagnose", "run"): "to make one: pulsetrainer capture diagnostic -o run.h5, or import your own table",
+    ("evaluate", "run"): "to make one: pulsetrainer capture diagnostic -o run.h5, or import your own table",
     ("correct", "run"): "give the run that was diagnosed: pulsetrainer show DIAGNOSIS.h5 says which",
 }
+
+
+# what else an argument takes that may be a table; tables nearby are mostly something else
+_TABLES = {
+    "signal": "give identification, diagnostic, or a table with a column of time and one of current",
+    "waveform": "name a pulse of the library, such as normal, or give a table with a column of time "
+    "and one of values",
+}
+_NEAR = 0.7  # how alike a name must be to be taken for the one that was meant
 
 
 class Command(TyperCommand):
@@ -49,8 +60,12 @@ class Command(TyperCommand):
         except (AbsentError, ExistsError) as error:
             given = _given_as(ctx, error.path)
             if given is not None:
-                _name(error, given, ctx.info_name or "")
+                _name(error, given, ctx)
             raise
+
+
+def _tables_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.glob("*.csv"))
 
 
 def _given_as(context: typer.Context, path: Path) -> Any:
@@ -63,12 +78,20 @@ def _given_as(context: typer.Context, path: Path) -> Any:
     return None
 
 
-def _name(error: AbsentError | ExistsError, given: Any, command: str) -> None:
+def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) -> None:
     """Say which argument it is, and for an input which files of its kind are near."""
-    option = next((name for name in given.opts if name.startswith("-")), "")
-    typed = option or f"argument {str(given.human_readable_name).rstrip('.')}"
+    name, command = given.name or "", context.info_name or ""
+    option = next((one for one in given.opts if one.startswith("-")), "")
+    kinds, folder = _HOLDS.get(name), error.path.parent
+    word = str(given.human_readable_name).partition("|")[0].rstrip(".")
+    if name == "inputs" and context.params.get("model"):  # then it is models on a run
+        kinds, word = ("run",), "RUN.h5"
+    typed = option or f"argument {word}"
     error.message = error.message.replace(f"{error.path} ", f"{error.path} ({typed}) ", 1)
-    kinds, folder = _HOLDS.get(given.name or ""), error.path.parent
+    if isinstance(error, AbsentError) and name in _TABLES:
+        near = difflib.get_close_matches(error.path.name, _tables_in(folder), n=1, cutoff=_NEAR)
+        error.hint = (f"did you mean {error.path.with_name(near[0])}? " if near else "") + _TABLES[name]
+        return
     if isinstance(error, ExistsError) or kinds is None or not folder.is_dir():
         return
     where = "here" if folder == Path() else f"in {folder}"

@@ -8,13 +8,15 @@ from typing import Annotated, Any
 
 import typer
 
-from pulsetrainer.files.settings import variable
+from pulsetrainer.files.settings import SETTINGS, variable
 
 
-def positive(value: float | None) -> float | None:
+def positive(value: float | None, param: typer.CallbackParam) -> float | None:
     """Refuse a number that is not above 0 and finite; None is no choice."""
     if value is not None and not 0 < value < math.inf:
-        raise typer.BadParameter(f"must be a finite number above 0, got {value:g}")
+        unit = next((one.unit for one in SETTINGS if one.variable == param.envvar and one.unit), "")
+        least, got = (f"{number:g} {unit}".rstrip() for number in (0.0, value))
+        raise typer.BadParameter(f"must be a finite number above {least}, got {got}")
     return value
 
 

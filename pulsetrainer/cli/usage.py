@@ -8,6 +8,11 @@ from typing import Any
 from pulsetrainer.errors import UsageError
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
+# of options that take a word or a number: what they look like
+_EXAMPLES = {
+    "--smoothing": "--smoothing auto, or a share of the input's range such as --smoothing 0.02",
+    "--resample": "--resample even for the median time step, or a rate such as --resample 1000",
+}
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 
@@ -27,13 +32,14 @@ def usage_of(error: Exception) -> UsageError | None:
         return UsageError(said, hint=f"did you mean {' or '.join(near)}?" if near else help_)
     if kind == "MissingParameter" and parameter is not None:
         example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
-        like = f"; like this: {example[1]}" if example else f", see {help_}"
-        return UsageError(f"{_named(parameter)} is missing", hint=f"add it: {_meaning(parameter)}{like}")
+        like = example[1] if example else help_
+        return UsageError(f"{_named(parameter)} is missing: {_meaning(parameter)}", hint=like)
     if kind == "BadParameter" and parameter is not None:
         return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
     named = getattr(error, "param_hint", None)  # of what a command finds out itself
     if kind == "BadParameter" and isinstance(named, str):
-        return UsageError(f"{named} {str(getattr(error, 'message', error)).rstrip('.')}", hint=help_)
+        said = f"{named} {str(getattr(error, 'message', error)).rstrip('.')}"
+        return UsageError(said, hint=_EXAMPLES.get(named, help_))
     return _other(str(explain()).rstrip("."), help_)
 
 

@@ -45,8 +45,8 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
         raise UsageError(f"the output {path} is not an ordinary file", hint="name a file on disk")
     if not folder.exists():
         raise UsageError(
-            f"the folder {folder} for the output {path} does not exist",
-            hint=f"make it: mkdir -p {shlex.quote(str(folder))}",
+            f"the output {path} cannot be written: there is no folder {folder}",
+            hint=f"make the folder: mkdir -p {shlex.quote(str(folder))}",
         )
     if not folder.is_dir():
         raise UsageError(f"{folder} is a file, so {path} cannot be written", hint="name another output")
@@ -54,7 +54,7 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
         raise ExistsError(path)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise UsageError(
-            f"the folder {folder} for the output {path} is not writable",
+            f"the output {path} cannot be written: the folder {folder} is not writable",
             hint="write to another folder, or change its permissions",
         )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import UsageError
 
 
 def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
@@ -13,15 +13,25 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
 
     Raises
     ------
-    DataError
+    UsageError
         The file cannot be read, is no TOML, or a bound is not a pair low <= high.
     """
     try:
         tree = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise UsageError(
+            f"the file of bounds {path} does not exist",
+            hint="check its name, or write it, a line for each figure: "
+            "normal.continuous.mean_error_reduction_percent = [90, 100]",
+        ) from error
     except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"the bounds file {path} cannot be read: {error}", hint="check its name") from error
+        raise UsageError(
+            f"the file of bounds {path} cannot be read: {error}", hint="give a text file (TOML)"
+        ) from error
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"the bounds file {path} is not TOML: {error}", hint="correct that line") from error
+        raise UsageError(
+            f"the file of bounds {path} is not TOML: {error}", hint="correct that line of the file"
+        ) from error
     flat: dict[str, tuple[float, float]] = {}
 
     def descend(prefix: str, node: object) -> None:
@@ -32,7 +42,7 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
         pair = node if isinstance(node, list) else []
         numbers = [v for v in pair if isinstance(v, int | float) and not isinstance(v, bool)]
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] <= numbers[1]:
-            raise DataError(
+            raise UsageError(
                 f"the bound {prefix} in {path} must be a pair [low, high], got {node!r}",
                 hint=f"write {prefix.rpartition('.')[2]} = [0.0, 1.0]",
             )

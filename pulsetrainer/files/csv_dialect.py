@@ -51,6 +51,13 @@ class Dialect:
     rate_Hz: float | None = None  # where the heading says a step
     day_first: bool | None = None  # in dates with slashes
 
+    @property
+    def words(self) -> str:
+        """What separates the columns, and the decimal sign, for a person."""
+        known = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", None: "blanks", " ": "blanks"}
+        columns = f"{known.get(self.delimiter, repr(self.delimiter))} between the columns"
+        return f"{columns}, decimal {'commas' if self.decimal_comma else 'points'}"
+
     def split(self, line: str) -> list[str]:
         """Return the cells of a line, without one that only a delimiter at the end makes."""
         cells = split(line, self.delimiter)

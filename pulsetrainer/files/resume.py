@@ -67,7 +67,10 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
         if final is None and source is not None and not overwrite:
             raise ExistsError(path, f"{source} can be resumed, but {path} already exists")
         if final is None and source is None:
-            raise UsageError(f"there is nothing to resume: {path} is complete", hint="leave --resume out")
+            raise UsageError(
+                f"there is nothing to resume: {path} is complete",
+                hint="use it as it is; to record again, leave --resume out and name another output",
+            )
         if final is not None and (not found or final.input.size >= found[0][1]):
             source = path
     if source is None:

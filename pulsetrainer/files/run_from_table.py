@@ -5,7 +5,7 @@ Time stamps are taken as they are. What a file says about its time, and what was
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -31,6 +31,7 @@ class TableRun(NamedTuple):
 
     run: Run
     notes: tuple[str, ...]
+    read_as: Mapping[str, str]  # which columns were taken for what, and how a text is laid out
 
 
 def run_from_table(
@@ -97,7 +98,35 @@ def run_from_table(
         output_quantity=split_unit(table.names[table.index(output)])[0],
         signal=table.path.name,
     )
-    return TableRun(run, notes)
+    meanings = {"input": (input, run.input_unit), "output": (output, run.output_unit)}
+    if reference is not None:
+        meanings["reference"] = (reference, run.input_unit)
+    return TableRun(run, notes, _read_as(table, _time_words(table, time_s, time, rate_Hz, wanted), meanings))
+
+
+def _time_words(
+    table: Table, time_s: FloatArray | None, time: str | None, rate_Hz: float | None, wanted: Sequence[str]
+) -> str:
+    """Say where the time comes from."""
+    if time_s is None:
+        return "no time"
+    rate_Hz = table.rate_Hz if rate_Hz is None and time is None else rate_Hz
+    if rate_Hz is not None:
+        return f"time by the rate of {rate_Hz:g} Hz"
+    column = table.names[
+        table.index(time) if time is not None else _free(table, {table.index(name) for name in wanted})[0]
+    ]
+    return f"time from {split_unit(column)[0]} [{table.unit(column) or 's'}]"
+
+
+def _read_as(table: Table, time: str, meanings: Mapping[str, tuple[str, str]]) -> dict[str, str]:
+    """Say which columns were taken for what, in which units, and of a text how it is laid out."""
+    said = [time]
+    for meaning, (name, unit) in meanings.items():
+        column = split_unit(table.names[table.index(name)])[0]
+        said.append(f"{meaning} from {column} {'without unit' if unit == '1' else f'[{unit}]'}")
+    layout = f"{table.layout}, numbers from {table.place(0)} on"
+    return {"columns": ", ".join(said)} | ({"layout": layout} if table.layout else {})
 
 
 def _check_distinct(table: Table, **meanings: str | None) -> None:

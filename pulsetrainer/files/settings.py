@@ -64,8 +64,10 @@ def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
     if chosen:
         if not Path(chosen).is_file():
             raise UsageError(
-                f"there is no file of settings {chosen}",
-                hint=f"check the name, or leave --settings and {VARIABLE} out",
+                f"the file of settings {chosen} does not exist",
+                hint="check its name, or leave --settings out"
+                if named
+                else f"check its name, or take the variable {VARIABLE} away",
             )
         return Path(chosen)
     from platformdirs import user_config_path  # noqa: PLC0415 - a file that is named needs no search

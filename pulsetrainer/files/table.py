@@ -47,6 +47,7 @@ class Table:
     # (row, line) wherever their distance changes; empty where the file has no lines
     shifts: Sequence[tuple[int, int]] = ()
     rate_Hz: float | None = None  # where the file itself says one
+    layout: str = ""  # of a text, in words: what separates its columns, and its decimal sign
 
     @property
     def rows(self) -> int:
@@ -198,6 +199,7 @@ def _head(path: Path, dialect: Dialect) -> Table:
         frozenset(dialect.names[k] for k in dialect.text_columns),
         ((0, dialect.first_line),),
         dialect.rate_Hz,
+        dialect.words,
     )
 
 

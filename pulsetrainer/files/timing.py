@@ -23,11 +23,13 @@ def check_timing(time: str | None, rate_Hz: float | None, *, no_time: bool, resa
         )
     if no_time and (time is not None or rate_Hz is not None):
         raise UsageError(
-            "`no_time` was given together with `time` or `rate_Hz`", hint="leave out `no_time`, or the other"
+            f"`no_time` was given together with {'`time`' if time is not None else '`rate_Hz`'}",
+            hint="leave one of the two out",
         )
     if rate_Hz is not None and not 0 < rate_Hz < math.inf:
         raise UsageError(f"`rate_Hz` must be above 0, got {rate_Hz:g} Hz", hint="for instance `rate_Hz` 1000")
     if no_time and resampled:
         raise UsageError(
-            "a run without time cannot be resampled", hint="leave out either `no_time` or `resample`"
+            "`no_time` was given together with `resample`: a run without time has no time steps",
+            hint="leave one of the two out",
         )

@@ -90,7 +90,7 @@ def parameters(several: Sequence[Parameter]) -> dict[str, str]:
     """Return parameters by name, each with unit, interval and meaning; the values of a curve in one line."""
     said: dict[str, str] = {}
     for one in several:
-        if _CURVE.fullmatch(one.name) or one.name in _OF_A_CURVE:
+        if of_a_curve(one):
             continue
         number = len([name for name in said if name.split(" ")[0] == one.name]) + 1
         said[one.name if number == 1 else f"{one.name} {number}"] = parameter(one)
@@ -100,6 +100,11 @@ def parameters(several: Sequence[Parameter]) -> dict[str, str]:
         ends = with_unit(f"{min(values):.3g} to {max(values):.3g}", curve[0].unit)
         said["curve"] = f"{ends}: what it adds to the output; the report (--html) draws it"
     return said
+
+
+def of_a_curve(one: Parameter) -> bool:
+    """Tell whether a parameter is a value of a learned curve, or says where the curve lies."""
+    return bool(_CURVE.fullmatch(one.name)) or one.name in _OF_A_CURVE
 
 
 def parameter(one: Parameter) -> str:

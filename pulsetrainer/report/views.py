@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import alternatives, figures, heat_figures
+from pulsetrainer.report.diagnosis_text import of_a_curve
 from pulsetrainer.report.panels import largest_residual
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
@@ -281,7 +282,7 @@ def model_section(model: Model, which: str = "") -> Section:
         )
     rows = tuple(
         Row(
-            f"{extension.cause}: {parameter.name}",
+            f"{extension.cause}: {parameter.name}" + (f", {parameter.meaning}" if parameter.meaning else ""),
             shown(parameter.unit),
             tuple(
                 number(value, f"model.{extension.cause}.{parameter.name}{suffix}", ".4g")
@@ -294,6 +295,7 @@ def model_section(model: Model, which: str = "") -> Section:
         )
         for extension in model.extensions
         for parameter in extension.parameters
+        if not of_a_curve(parameter)
     )
     return Section("model", f"Model{which}", tuple(facts), rows, tuple(pictures))
 

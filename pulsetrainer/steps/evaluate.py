@@ -72,15 +72,21 @@ def evaluate(
     runs = [one for one in given if isinstance(one, Run)]
     if played and not runs:
         if tested:
-            raise UsageError("models are tested on a run, not on a playback", hint="leave `model` out")
+            raise UsageError(
+                f"{titles[0]} is a playback, and models are tested on a run",
+                hint="leave `model` out, or give a run: pulsetrainer evaluate run.h5 --model model.h5",
+            )
         errors = tuple(_of_playback(name, one) for name, one in zip(titles, played, strict=True))
         return Evaluation(waveforms=errors, model=played[-1].waveform.model)
     if len(runs) == 1 and not played and tested:
         return _of_run(
             titles[0], runs[0], tested, list(model_names) or [f"model {n}" for n in range(1, len(tested) + 1)]
         )
+    counts = {"playback": len(played), "run": len(runs), "model": len(tested)}
+    got = [f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts.items() if count]
     raise UsageError(
-        "evaluate takes playbacks, or one run together with the models to compare on it",
+        "evaluate takes playbacks, or one run together with the models to test on it; got "
+        + (", ".join(got) or "nothing"),
         hint="pulsetrainer evaluate run.h5 --model model.h5",
     )
 

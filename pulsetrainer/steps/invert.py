@@ -236,7 +236,8 @@ def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
     if asked == "extended" and not model.extensions:
         raise UsageError(
             f"{name} has no extensions, so there is no extended inverse",
-            hint="diagnose a run with it and extend it first, or leave `method` out",
+            hint="leave `method` out, or extend the model first: "
+            "pulsetrainer diagnose run.h5 --model model.h5 -o diagnosis.h5",
         )
     if asked in ("continuous", "extended") and relay:
         raise UsageError(

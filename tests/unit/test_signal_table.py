@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pulsetrainer.core.excitations import MOST_SAMPLES
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.bounds import read_bounds
 from pulsetrainer.files.signal_table import read_signal
 
@@ -49,7 +49,7 @@ def test_what_is_no_bound_is_named(tmp_path, bound):
     """Its key and its file; nothing is held against half a bound."""
     path = tmp_path / "bounds.toml"
     path.write_text(f"[normal]\nrms = {bound}\n")
-    with pytest.raises(DataError) as caught:
+    with pytest.raises(UsageError) as caught:
         read_bounds(path)
     assert "normal.rms" in str(caught.value)
     assert "bounds.toml" in str(caught.value)
