@@ -8,10 +8,16 @@ import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Run
 from pulsetrainer.core.fit import Fitted
-from pulsetrainer.core.forms import leaves_more_than_noise
+from pulsetrainer.core.forms import leaves_more_than_noise, white
+from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import velocity
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 POOR = 0.05  # of the output's span, rms: a model that leaves more of what is not noise describes nothing
+MUCH = LIMITS.matters  # of the output's span, rms: who leaves more should ask why ...
+MANY = 3.0  # ... where that is so many times the noise of single samples
+_UNCOUNTED = 1000.0  # times the noise: more is not counted
 UNEXPLAINED = 0.5  # of the output's standard deviation: what leaves more explains next to nothing
 
 
@@ -37,11 +43,29 @@ def of_wild(masks: Sequence[BoolArray]) -> list[str]:
     return [f"{count} wild {are} left out of the fit ({100 * count / size:.2g} % of the record)"]
 
 
+def of_rest(fitted: Fitted) -> list[str]:
+    """Say that a fit leaves many times the noise, and enough to matter; nothing where it does not."""
+    residuals, output = _with_weight(fitted)
+    left, noise = root_mean_square(np.concatenate(residuals)), max(white(one) for one in residuals)
+    share = left / float(np.ptp(output))
+    if share <= MUCH or left <= MANY * noise:
+        return []
+    times = f"{left / noise:.0f} times" if left < _UNCOUNTED * noise else "far more than"
+    found = f"the model leaves {100 * share:.1f} % of the span (rms), {times} the noise of single samples"
+    return [f"{found}: pulsetrainer diagnose tells what it misses"]
+
+
+def _with_weight(fitted: Fitted) -> tuple[list[FloatArray], FloatArray]:
+    """Residuals of each record (k,), and all outputs (n,), of the samples with weight."""
+    counted = [r.sample_weight > 0 for r in fitted.records]
+    residuals = [e[c] for e, c in zip(fitted.residuals, counted, strict=True)]
+    return residuals, np.concatenate([r.output[c] for r, c in zip(fitted.records, counted, strict=True)])
+
+
 def warning(fitted: Fitted, runs: Sequence[Run], asked: str) -> str:
     """Say that no form describes the record, and why where that is plain; nothing where one does."""
-    residuals = [e[r.sample_weight > 0] for e, r in zip(fitted.residuals, fitted.records, strict=True)]
-    output = np.concatenate([r.output[r.sample_weight > 0] for r in fitted.records])
-    left = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+    residuals, output = _with_weight(fitted)
+    left = root_mean_square(np.concatenate(residuals))
     span = float(np.ptp(output))
     if left <= POOR * span:
         return ""

@@ -145,6 +145,7 @@ def identify(
     covered = coverage(plane, remembered)
     notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
     warning = fit_notes.warning(fitted, measured, form)
+    notes += [] if warning else fit_notes.of_rest(fitted)
     progress(1.0)
     model = _model(fitted, measured, covered, ensemble, cleaned, tuple(notes), warning)
     model = _with_wild(model, raw[0], wild_ones[0], sum(int(mask.sum()) for mask in masks))

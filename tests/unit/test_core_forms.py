@@ -13,7 +13,7 @@ from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.errors import ArgumentError, DataError
-from wording import raises
+from wording import raises, tells
 
 NOISE = 0.003  # of the span
 SAMPLES = 3000
@@ -271,7 +271,25 @@ def test_a_record_that_no_form_describes_is_said_to_be_one(output):
 def test_a_record_that_a_form_describes_has_no_warning(draws):
     """The sentence is for others."""
     _, u, y, _, _ = measured(draws[0], 7)
-    assert pt.identify(run_of(u, y), levels=24).fit.warning == ""
+    fit = pt.identify(run_of(u, y), levels=24).fit
+    assert fit.warning == ""
+    assert not any("diagnose" in note for note in fit.notes)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.0005, 0.02])
+def test_a_record_that_leaves_many_times_its_noise_is_said_to(noise):
+    """Static hysteresis behind a lag; where noise is as large as what is left, nothing is said."""
+    rng = np.random.default_rng(17)
+    u = devices.record(rng, 3000)
+    y = lfilter([0.1], [1.0, -0.9], devices.play_sum(rng)(u))
+    fit = pt.identify(
+        run_of(u, y + noise * np.ptp(y) * rng.normal(size=y.size)), levels=16, form="direct"
+    ).fit
+    said = [note for note in fit.notes if "diagnose" in note]
+    assert len(said) == (noise < 0.02)
+    for note in said:
+        tells(note, "leaves much")
+    assert fit.warning == ""
 
 
 def test_a_single_valued_curve_has_no_loop():

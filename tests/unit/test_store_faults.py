@@ -311,7 +311,7 @@ def test_outputs_that_cannot_be(tmp_path, monkeypatch):
     """A missing or read-only folder, a folder as name, a file as folder, an odd name: a usage error."""
     (tmp_path / "file").touch()
     for path, words in [
-        (tmp_path / "no" / "a.h5", "does not exist"),
+        (tmp_path / "no" / "a.h5", "there is no folder"),
         (tmp_path, "is a folder"),
         (tmp_path / "file" / "a.h5", "is a file"),
         (Path("/dev/null"), "not an ordinary file"),
