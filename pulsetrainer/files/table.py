@@ -109,7 +109,7 @@ class Table:
         return values
 
     def index(self, name: str) -> int:
-        """Return the place of a column of numbers.
+        """Return the place of a column of numbers; ``force_N`` is the heading ``force [N]`` too.
 
         Raises
         ------
@@ -121,6 +121,8 @@ class Table:
             k = self.names.index(name)
         elif bare.count(name.lower()) == 1:
             k = bare.index(name.lower())
+        elif (same := self._spelled_otherwise(name)) is not None:
+            k = same
         else:
             near = difflib.get_close_matches(name, self.names, n=3, cutoff=0.3) or list(self.names)[:8]
             raise DataError(
@@ -134,6 +136,16 @@ class Table:
                 "01.05.2024 12:34:56",
             )
         return k
+
+    def _spelled_otherwise(self, name: str) -> int | None:
+        """Return the place of a column with this name and unit, its unit written otherwise: ``force [N]``."""
+        wanted, unit = split_unit(name)
+        found = [
+            k
+            for k, own in enumerate(self.names)
+            if unit and split_unit(own)[0].lower() == wanted.lower() and self.units.get(own) == unit
+        ]
+        return found[0] if len(found) == 1 else None
 
 
 def numbered(names: Sequence[str]) -> tuple[str, ...]:

@@ -525,3 +525,14 @@ def test_measured_records(name, rows):
     for k in (0, -1):
         expected = [float(cell) for cell in lines[1:][k].split(",")]
         np.testing.assert_array_equal([run.time_s[k], run.input[k], run.output[k]], expected)
+
+
+def test_a_column_is_found_with_its_unit_written_otherwise(tmp_path):
+    """``force_N`` is ``force [N]``; of another unit it is not that column."""
+    path = tmp_path / "scope.csv"
+    path.write_text("time [s],current [A],force [N]\n0,0,1\n1,1,2\n2,2,3\n")
+    table = read_table(path)
+    assert table.index("force_N") == 2
+    with pytest.raises(DataError) as caught:
+        table.index("force_mN")
+    assert "force [N]" in caught.value.hint
