@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
@@ -20,6 +21,7 @@ from pulsetrainer.core.record import Record
 NEAR = 0.01  # of the range: a noisy record touches its extreme only once, late
 _APART = 0.03  # of the span of the output: a first stroke that runs so far from the later ones is another ...
 _TIMES = 5.0  # ... if these run nearer to each other by this factor
+_LEFT = 2.0  # times ``NEAR``: so far away the end is left, for noise crosses a single limit again and again
 _COMPARED = 0.2  # of the range: shorter strokes are not compared ...
 _PLACES = 20  # ... nor those of fewer samples; and at so many places
 _STROKES = 3  # of two nobody knows which is the odd one
@@ -60,7 +62,7 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
     """First sample that counts of a record that begins at an end: 0, or the next end after a stroke apart."""
     reach = high - low
     away = inputs - low if inputs[0] <= low + NEAR * reach else high - inputs
-    at_end = away <= NEAR * reach
+    at_end = _at_end(away, NEAR * reach)
     leaves = np.flatnonzero(at_end[:-1] & ~at_end[1:])
     strokes = [
         _stroke(away[at:until], outputs[at:until], reach)
@@ -71,7 +73,7 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
         return 0
     strokes = [one for one, enough in zip(strokes, told, strict=True) if enough]
     top = min(float(way[-1]) for way, _ in strokes)
-    places = np.linspace(2.0 * NEAR * reach, top, _PLACES)
+    places = np.linspace(_LEFT * NEAR * reach, top, _PLACES)
     first, *later = (np.interp(places, way, y) for way, y in strokes)
     usual = np.median(later, axis=0)
     apart = float(np.sqrt(np.mean((first - usual) ** 2)))
@@ -80,6 +82,13 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
         return 0
     back = np.flatnonzero((at_end | (away >= reach - NEAR * reach))[leaves[0] + 1 :])
     return int(leaves[0] + 1 + back[0]) if back.size else 0
+
+
+def _at_end(away: FloatArray, near: float) -> NDArray[np.bool_]:
+    """Whether an input so far ``away`` (n,) from an end has come ``near`` it, and not left it since."""
+    told = np.flatnonzero((away <= near) | (away > _LEFT * near))
+    last = np.maximum(np.searchsorted(told, np.arange(away.size), side="right") - 1, 0)
+    return np.asarray(away[told[last]] <= near)
 
 
 def _stroke(away: FloatArray, outputs: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:

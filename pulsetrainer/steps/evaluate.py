@@ -18,7 +18,7 @@ from pulsetrainer.artefacts import (
     WaveformEvaluation,
 )
 from pulsetrainer.core import metrics
-from pulsetrainer.core.initial_state import estimated_start, known_from
+from pulsetrainer.core.initial_state import estimated_start, first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
@@ -163,6 +163,11 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
             )
         if one.start != "known":
             notes.append(f"{name} does not reach the ends of {title}; state before it: {one.start}")
+        operator = operator_of(model)
+        for part in run.parts(SHORTEST_PART):
+            said = first_stroke_words(part.input, part.output, operator.low, operator.high)
+            if said and f"{name}: {said}" not in notes:
+                notes.append(f"{name}: {said}")
         found.append(one)
     return Evaluation(models=tuple(found), model=models[-1], notes=tuple(notes))
 
@@ -211,7 +216,7 @@ def _second_half(measured: FloatArray, predicted: FloatArray) -> float:
 def _known(run: Run, low: float, high: float) -> BoolArray:
     """Tell which samples (n,) count: from where the memory is known, but those that are masked."""
     kept = np.ones(run.input.size, dtype=bool) if run.masked is None else ~run.masked
-    kept[: known_from(run.input, low, high)] = False
+    kept[: known_from(run.input, low, high, run.output)] = False
     return kept
 
 
