@@ -110,7 +110,7 @@ def _show(job: Job, out: Path, model: Model) -> None:
             "fit rms": with_unit(f"{fit.rms:.4g}", unit),
             "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
             "cells switched": f"{fit.coverage_percent:.1f} %",
-            "by minor loops": minor_words(fit.minor_percent),
+            "told apart by minor loops": minor_words(fit.minor_percent),
             "smoothing": f"{fit.smoothing:.3g} of the range" if fit.smoothing else "none",
             "loop": loop_words(model),
             "form": model.form,

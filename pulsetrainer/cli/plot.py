@@ -47,5 +47,5 @@ def plot(
         if table is not None:
             job.table(table, artefact, file)
     job.screen.result({"output": out, "kind": artefact.kind} | ({"data": table} if data else {}))
-    job.screen.whole(f"wrote {out}: {artefact.kind}")
+    job.screen.whole(f"wrote {out}: the {artefact.kind} in {file}")
     job.wrote(table)
