@@ -27,6 +27,7 @@ from pulsetrainer.core.edges import plane_for, thinned
 from pulsetrainer.core.equations import NormalEquations, parted_sums
 from pulsetrainer.core.identification import polarity_of
 from pulsetrainer.core.initial_state import record_of
+from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
@@ -89,14 +90,6 @@ def asked_form(
             hint="leave method and reading out, or ask for the direct form",
         )
     return form
-
-
-def white(residual: FloatArray) -> float:
-    """Standard deviation of the white part of a residual (n,), by its fourth differences."""
-    if residual.size < 5:
-        return 0.0
-    fourth = np.convolve(residual, [1.0, -4.0, 6.0, -4.0, 1.0], mode="valid")
-    return 1.4826 * float(np.median(np.abs(fourth))) / np.sqrt(70.0)
 
 
 def leaves_more_than_noise(residuals: Sequence[FloatArray], span: float) -> bool:

@@ -59,12 +59,19 @@ def estimate(values: ArrayLike) -> float:
     u = finite_vector("input", values)
     if u.size < 16:
         return float("nan")
-    moving = np.convolve(u, _FOURTH, mode="valid")
-    sigma = _MEDIAN_TO_SIGMA * float(np.median(np.abs(moving))) / np.sqrt(70.0)
+    sigma = white(u)
     scale = float(np.abs(u).max())
     if sigma <= 8 * np.finfo(float).eps * scale:  # the rounding of the differences themselves
         return 0.0
     return sigma if dead_band(sigma, u.size) <= _WIDEST * float(np.ptp(u)) else float("nan")
+
+
+def white(values: FloatArray) -> float:
+    """Standard deviation of the white part of a signal (n,), by its fourth differences; 0 below 5 samples."""
+    if values.size < _FOURTH.size:
+        return 0.0
+    fourth = np.convolve(values, _FOURTH, mode="valid")
+    return _MEDIAN_TO_SIGMA * float(np.median(np.abs(fourth))) / np.sqrt(70.0)
 
 
 def dead_band(sigma: float, n: int) -> float:

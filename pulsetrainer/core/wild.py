@@ -16,6 +16,7 @@ import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.equations import normal_equations
+from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.plane import BoolArray, FloatArray, Plane
 from pulsetrainer.core.record import Record, levelled
 from pulsetrainer.core.smoothing import smoothed
@@ -29,8 +30,14 @@ _FITS = 0.05  # of the span, median: a fit that leaves more tells nothing of sin
 _WINDOW = 7  # samples of a median: three wild ones do not move it
 _AROUND = 31  # samples whose steps tell how fast the signal moves
 _STEPS = 4.0  # such steps a turn may be away from the median of its neighbours
-_TURN = 2.0  # such steps a turn may be away from the line between its neighbours
-_LOOKS = 4  # each without what the one before it found
+_TURN = 1.0  # such steps a turn may be away from the path of its neighbours
+_USUAL = 1.0  # times the median step of a prediction: larger ones are jumps
+_SIDE = 3  # samples whose path is continued
+_SIGMAS = 8.0  # a peak of noise with exponential tails is higher once in 100 000 samples
+_BOTH = 2.5  # times the steps near by: a stroke of one sample makes two, up and down
+_HELD = 0.2  # of all steps are zero: the samples are those of a coarse converter ...
+_FLICKER = 1.5  # ... and a peak of one of its steps is a flicker
+_LOOKS = 6  # each without what the one before it found
 _MIDDLE = 1.5  # times the steps of the medians: a median is slower than the signal near a turn
 _FAST = 80.0  # percentile of the steps near by
 _QUICK_LEVELS = 16
@@ -46,16 +53,19 @@ def isolated(values: FloatArray) -> BoolArray:
     """
     found = np.zeros(values.size, dtype=bool)
     for _ in range(_LOOKS if values.size >= FEWEST else 0):
-        left = repaired(values, found)
+        kept = np.flatnonzero(~found)
+        left = values[kept]
         step, moving = _motion(left)
         middle = scipy.ndimage.median_filter(left, size=_WINDOW, mode="mirror")
         moving = np.minimum(moving, _MIDDLE * _motion(middle)[1])
         usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
-        more = _far(left, _STEPS * moving + _QUANTA * usual) & ~found
+        more = _far(left, _STEPS * moving + _QUANTA * usual)
+        if not more.any():  # what is far off is gone and spoils no path
+            more = _peaks(left, moving)
         if not more.any():
             break
-        found |= more
-    return found if np.mean(found) <= MOST else np.zeros_like(found)
+        found[kept[more]] = True
+    return _exceptions(found)
 
 
 def _motion(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -64,33 +74,90 @@ def _motion(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return step, scipy.ndimage.percentile_filter(step, _FAST, size=_AROUND, mode="mirror")
 
 
-def off(residuals: Sequence[FloatArray], span: float) -> list[BoolArray]:
-    """Tell for each sample of each record whether its residual (n,) is far from those near by.
+def off(
+    outputs: Sequence[FloatArray],
+    predicted: Sequence[FloatArray],
+    span: float,
+    doubtful: Sequence[BoolArray] | None = None,
+) -> list[BoolArray]:
+    """Tell for each sample of each record whether what a fit leaves there is far from what it leaves near by.
 
     Parameters
     ----------
+    outputs, predicted
+        Of each record (n,). Where the prediction jumps from sample to sample it may be off by as much.
     span
-        Of the output; nothing closer than a hundredth of it is wild, nor anything beside a fit that leaves
-        more than a twentieth of it throughout: that fit tells nothing of single samples.
+        Of the output; nothing closer than a hundredth of it is wild. A fit that leaves more than a twentieth
+        of it throughout tells nothing of single samples.
+    doubtful
+        Samples (n,) of each record that may be wild: they do not count for what is usual, and where the fit
+        tells nothing they are returned. None: no sample.
     """
-    return [
-        _far(e, np.full(e.size, _NEAR * span))
-        if e.size >= FEWEST and np.median(np.abs(e)) <= _FITS * span
-        else np.zeros(e.size, dtype=bool)
-        for e in residuals
-    ]
+    unsure = [np.zeros(y.size, dtype=bool) for y in outputs] if doubtful is None else doubtful
+    found = []
+    for y, said, doubt in zip(outputs, predicted, unsure, strict=True):
+        left = y - said
+        if y.size >= FEWEST and np.median(np.abs(left)) <= _FITS * span:
+            found.append(_far(left, _NEAR * span + _jumps_beside(said), ~doubt))
+        else:
+            found.append(doubt)
+    return found
 
 
-def _far(values: FloatArray, motion: FloatArray) -> BoolArray:
-    """Where values (n,) are further from their neighbours' median than noise and ``motion`` (n,) make."""
+def _jumps_beside(values: FloatArray) -> FloatArray:
+    """How much larger than usual the steps (n,) before and after the neighbours of a sample are.
+
+    Those to itself do not count.
+    """
+    step = np.abs(np.diff(values))
+    more = np.pad(np.maximum(step - _USUAL * float(np.median(step)), 0.0), 2)
+    return np.maximum(more[:-3], more[3:])
+
+
+def _far(values: FloatArray, motion: FloatArray, usual: BoolArray | slice = slice(None)) -> BoolArray:
+    """Where values (n,) are further from their neighbours' median than noise and ``motion`` (n,) make.
+
+    Noise is read off the samples (n,) that are ``usual``.
+    """
     # mirrored, so that the first and the last sample are alone among their neighbours too
     apart = np.abs(values - scipy.ndimage.median_filter(values, size=_WINDOW, mode="mirror"))
-    body = np.quantile(values, [0.01, 0.99])
-    floor = _NEAR * float(body[1] - body[0])
-    found = apart > np.maximum(_TAIL * float(np.quantile(apart, 0.95)) + motion, floor)
+    tail = _TAIL * float(np.quantile(apart[usual], 0.95))
+    found = apart > np.maximum(tail + motion, _NEAR * _body(values[usual]))
+    return _exceptions(found)
+
+
+def _exceptions(found: BoolArray) -> BoolArray:
+    """Return those of the samples (n,) that are in short runs; none where they are too many."""
     label, _ = scipy.ndimage.label(found)
-    found &= np.bincount(label.ravel())[label] <= LONGEST
+    found = found & (np.bincount(label.ravel())[label] <= LONGEST)
     return found if np.mean(found) <= MOST else np.zeros_like(found)
+
+
+def _peaks(values: FloatArray, motion: FloatArray) -> BoolArray:
+    """Where values (n,) lie beyond both neighbours, and beyond where either side was going to.
+
+    A turn lies on the line of the samples before it or of those after it, so this sees what is much smaller
+    than a stroke. A stroke that is as short as one sample is no faster than others.
+    """
+    step = np.abs(np.diff(values))
+    held = np.mean(step == 0) > _HELD and np.any(step > 0)
+    flicker = _FLICKER * float(np.median(step[step > 0])) if held else 0.0
+    noise = _SIGMAS * white(values)
+    before2, before, here, after, after2 = np.lib.stride_tricks.sliding_window_view(values, 5).T
+    around = np.stack((before, after, 2.0 * before - before2, 2.0 * after - after2))
+    beyond = np.maximum(here - around.max(axis=0), around.min(axis=0) - here)
+    both = np.abs(here - before) + np.abs(here - after)
+    found = (beyond > max(noise, flicker, _NEAR * _body(values))) & (both > noise + _BOTH * motion[2:-2])
+    found = _exceptions(found)
+    # beside a wild sample a turn looks like one too: it is looked at again without
+    found &= both >= scipy.ndimage.maximum_filter1d(np.where(found, both, 0.0), 5)
+    return np.pad(found, 2)  # at the ends there is one side only
+
+
+def _body(values: FloatArray) -> float:
+    """Span of all values (n,) but the outermost hundredths."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    return float(high - low)
 
 
 def repaired(values: FloatArray, wild: BoolArray) -> FloatArray:
@@ -101,32 +168,66 @@ def repaired(values: FloatArray, wild: BoolArray) -> FloatArray:
     return np.interp(place, place[~wild], values[~wild])
 
 
+def through_turns(values: FloatArray, wild: BoolArray) -> FloatArray:
+    """Return the signal (n,) with its wild samples on the path of their neighbours, which may turn there.
+
+    Where both sides move towards the same extreme they are continued until they meet: on the line between
+    its neighbours a turn would lose its extreme, which is remembered.
+    """
+    path = repaired(values, wild)
+    ends = np.flatnonzero(np.diff(wild, prepend=False, append=False))
+    for first, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
+        left, right = path[max(first - _SIDE, 0) : first], path[end : end + _SIDE][::-1]
+        if end - first > LONGEST or min(left.size, right.size) < _SIDE:
+            continue
+        steps = np.concatenate((np.diff(left), np.diff(right)))
+        if not (np.all(steps > 0) or np.all(steps < 0)):
+            continue
+        sign = np.sign(steps[0])
+        ahead = np.arange(1, end - first + 1)
+        met = np.minimum(_continued(sign * left, ahead), _continued(sign * right, ahead[::-1]))
+        path[first:end] = sign * np.maximum(met, sign * path[first:end])
+    return path
+
+
+def _continued(side: FloatArray, ahead: FloatArray) -> FloatArray:
+    """Three samples continued ``ahead`` (k,) samples, by a parabola where they slow down, else by a line."""
+    step = side[2] - side[1]
+    bend = min(step - (side[1] - side[0]), 0.0)
+    return side[2] + ahead * step + 0.5 * ahead * (ahead + 1) * bend
+
+
 def repaired_where_off(
     values: FloatArray, suspect: BoolArray, instead: FloatArray | None = None
 ) -> FloatArray:
-    """Return a signal (n,) with those suspect samples between their neighbours that are off their path.
+    """Return a signal (n,) with those suspect samples mended that are off the path of their neighbours.
 
-    A residual does not tell whether input or output was wild. The one that was not is kept: between its
-    neighbours a turn would lose its extreme, which is remembered.
+    A residual does not tell whether input or output was wild. The one that was not is kept.
 
     Parameters
     ----------
     instead
-        What is put there (n,), such as what a fit predicts; None: the line between the neighbours.
+        What is put there (n,), such as what a fit predicts; None: the path of the neighbours.
     """
-    between = repaired(values, suspect)
-    _, moving = _motion(between)
-    off = suspect & ~(np.abs(values - between) <= _TURN * moving)
-    return repaired(values, off) if instead is None else np.where(off, instead, values)
+    path = through_turns(values, suspect)
+    _, moving = _motion(path)
+    off = suspect & ~(np.abs(values - path) <= _TURN * moving)
+    return through_turns(values, off) if instead is None else np.where(off, instead, values)
 
 
 @dataclass(frozen=True, slots=True)
 class Tamed:
-    """A measured signal pair with its wild samples between their neighbours, and which they were."""
+    """A measured signal pair with its wild samples on the path of their neighbours, and which they were."""
 
     input: FloatArray  # (n,)
     output: FloatArray  # (n,)
-    wild: BoolArray  # (n,)
+    wild_input: BoolArray  # (n,)
+    wild_output: BoolArray  # (n,)
+
+    @property
+    def wild(self) -> BoolArray:
+        """Samples (n,) that are wild in either."""
+        return self.wild_input | self.wild_output
 
 
 def tame(signals: Sequence[tuple[FloatArray, FloatArray]]) -> list[Tamed]:
@@ -137,12 +238,12 @@ def tame(signals: Sequence[tuple[FloatArray, FloatArray]]) -> list[Tamed]:
     fits better is true.
     """
     found = [(isolated(u), isolated(y)) for u, y in signals]
-    inputs = [repaired(u, wild) for (u, _), (wild, _) in zip(signals, found, strict=True)]
+    inputs = [through_turns(u, wild) for (u, _), (wild, _) in zip(signals, found, strict=True)]
     if any(wild.any() for wild, _ in found) and not _fits_better(signals, inputs, found):
         inputs = [u for u, _ in signals]
         found = [(np.zeros_like(in_input), in_output & ~in_input) for in_input, in_output in found]
     return [
-        Tamed(u, repaired(y, in_output), in_input | in_output)
+        Tamed(u, repaired(y, in_output), in_input, in_output)
         for u, (_, y), (in_input, in_output) in zip(inputs, signals, found, strict=True)
     ]
 

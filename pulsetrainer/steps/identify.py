@@ -120,8 +120,10 @@ def identify(
         smoothing = 0.0 if reading == "relay" else "auto"
     n_h = _levels(measured, notes) if levels is None else levels
     on = partial(fit, n_h=n_h, reading=reading, method=method, smoothing=smoothing, form=form)
-    left_out = [t.wild | m for t, m in zip(tamed, masked, strict=True)]
-    fitted, measured, masks = _without_wild(on, reach, measured, left_out, [part.output for part in raw])
+    sure = [t.wild_input | m for t, m in zip(tamed, masked, strict=True)]
+    fitted, measured, masks = _without_wild(
+        on, reach, measured, sure, [t.wild_output for t in tamed], [part.output for part in raw]
+    )
     wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
@@ -157,36 +159,37 @@ def _without_wild(
     on: Callable[..., Fitted],
     reach: tuple[float, float],
     runs: list[Run],
-    masks: list[BoolArray],
+    sure: Sequence[BoolArray],
+    doubtful: Sequence[BoolArray],
     raw: Sequence[FloatArray],
 ) -> tuple[Fitted, list[Run], list[BoolArray]]:
     """Fit without the samples that are known to be wild, then without those that its residual shows.
 
-    Whether input or output is wild there a residual does not tell: what is off its own path is mended.
-    The dual form remembers its output: there what the fit before predicts takes the place of ``raw`` outputs
-    (n,) that are wild, since between its neighbours a turn would lose its extreme.
-    The range of the levels and the form are decided anew, as wild samples move both.
+    What only looks wild in the output beside its neighbours is ``doubtful``, such as a sharp turn: where the
+    fit predicts the ``raw`` output (n,) it counts again. Whether input or output is wild a residual does not
+    tell: what is off its own path is mended. The dual form remembers its output: there what the fit before
+    predicts takes the place of outputs that are wild, since between its neighbours a turn would lose its
+    extreme. The range of the levels and the form are decided anew, as wild samples move both.
     """
+    masks = [one | other for one, other in zip(sure, doubtful, strict=True)]
     fitted = on(_signals(runs), *reach, kept=[~m for m in masks] if any(map(np.any, masks)) else None)
     span = float(np.ptp(np.concatenate([run.output for run in runs])))
+    shown = list(sure)  # those that are wild by themselves, or beside a fit
     for number in range(_ROUNDS):
-        more = wild.off(fitted.residuals, span)
+        off = wild.off(raw, fitted.predicted, span, masks)
+        shown = [before | now for before, now in zip(shown, off, strict=True)]
         remembered = number == 0 and fitted.form == "dual" and any(map(np.any, masks))
-        if not (remembered or any(np.any(new & ~mask) for new, mask in zip(more, masks, strict=True))):
+        if not remembered and all(map(np.array_equal, shown, masks)):
             break
-        masks = [mask | new for mask, new in zip(masks, more, strict=True)]
-        if fitted.form == "dual":
-            outputs = [
-                wild.repaired_where_off(y, mask, said)
-                for y, mask, said in zip(raw, masks, fitted.predicted, strict=True)
-            ]
-        else:
-            outputs = [
-                wild.repaired_where_off(run.output, mask) for run, mask in zip(runs, masks, strict=True)
-            ]
+        masks = list(shown)
+        predicted = fitted.predicted if fitted.form == "dual" else [None] * len(runs)
         runs = [
-            replace(run, input=wild.repaired_where_off(run.input, mask), output=y)
-            for run, mask, y in zip(runs, masks, outputs, strict=True)
+            replace(
+                run,
+                input=wild.repaired_where_off(run.input, mask),
+                output=wild.repaired_where_off(y, mask, said),
+            )
+            for run, y, mask, said in zip(runs, raw, masks, predicted, strict=True)
         ]
         ranges = np.asarray([input_range(run) for run in runs])
         reach = max(reach[0], float(ranges[:, 0].min())), min(reach[1], float(ranges[:, 1].max()))

@@ -8,7 +8,8 @@ import pytest
 from scipy.signal import lfilter
 
 import pulsetrainer as pt
-from pulsetrainer.core.forms import try_all, white
+from pulsetrainer.core.forms import try_all
+from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane

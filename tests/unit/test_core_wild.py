@@ -67,7 +67,7 @@ def test_nothing_of_a_clean_record_is_wild(kind):
     for seed in range(100, 104):
         device, u, y, _ = clean(seed, 10_000, kind)
         (found,) = wild.tame([(u, y)])
-        (off,) = wild.off([y - device(u)], float(np.ptp(y)))
+        (off,) = wild.off([y], [device(u)], float(np.ptp(y)))
         count += int(np.count_nonzero(found.wild | off))
         size += u.size
     assert count <= size / 10_000
@@ -154,13 +154,45 @@ def test_a_median_of_neighbours_is_what_it_says():
     assert not wild.isolated(u).any()
 
 
+@pytest.mark.parametrize("at", [98, 99, 100, 101, 102])
+@pytest.mark.parametrize("off", [-0.05, 0.05, 2.0])
+@pytest.mark.parametrize("motion", ["straight", "round"])
+def test_a_turn_keeps_its_extreme(at, off, motion):
+    """A wild sample at a turn or beside it is found, and the turn is where both sides meet."""
+    u = 1.0 - np.abs(np.linspace(-1.0, 1.0, 201))
+    if motion == "round":
+        u = np.cos(np.linspace(-1.0, 1.0, 201))
+    bad = u.copy()
+    bad[at] += off
+    found = wild.isolated(bad)
+    assert np.flatnonzero(found).tolist() == [at]
+    np.testing.assert_allclose(wild.through_turns(bad, found), u, atol=1e-4)
+
+
+def test_a_stroke_of_one_sample_is_no_peak():
+    """Down for one sample between two turns, no faster than elsewhere."""
+    u = np.concatenate((np.linspace(0.0, 1.0, 101), [0.99], np.linspace(1.0, 0.0, 101)))
+    assert not wild.isolated(u).any()
+
+
+def test_sharp_turns_of_the_output_count_again():
+    """What looks wild beside its neighbours and is what the fit says: the cusps of a fast butterfly."""
+    rng = np.random.default_rng(906)
+    device = devices.rectified(rng)
+    u = devices.record(rng, 1000)
+    y = device(u)
+    (tamed,) = wild.tame([(u, y)])
+    assert tamed.wild_output.any()
+    assert fitted(u, y).fit.masked_samples == 0
+
+
 @pytest.mark.parametrize("at", [0, 1, 199, 198])
 def test_the_ends_of_a_record_have_neighbours_too(at):
     """A wild sample that is the first or the last one is as far from the others as any."""
     u = np.linspace(0.0, 1.0, 200)
     u[at] -= 0.7
     assert np.flatnonzero(wild.isolated(u)).tolist() == [at]
-    (found,) = wild.off([u - np.linspace(0.0, 1.0, 200)], 1.0)
+    (found,) = wild.off([u], [np.linspace(0.0, 1.0, 200)], 1.0)
     assert np.flatnonzero(found).tolist() == [at]
 
 
@@ -178,7 +210,8 @@ def test_a_fit_that_describes_nothing_calls_nothing_wild():
     large = small + 0.3 * np.sin(np.arange(500) / 20.0)
     for residual in (small, large):
         residual[250] += 0.9
-    assert [int(found.sum()) for found in wild.off([small, large], 1.0)] == [1, 0]
+    found = wild.off([small, large], [np.zeros(500)] * 2, 1.0)
+    assert [int(one.sum()) for one in found] == [1, 0]
 
 
 def test_a_record_in_which_all_samples_are_wild_is_refused():
