@@ -8,7 +8,8 @@ import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Run
 from pulsetrainer.core.fit import Fitted
-from pulsetrainer.core.forms import leaves_more_than_noise, white
+from pulsetrainer.core.forms import leaves_more_than_noise
+from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import velocity
