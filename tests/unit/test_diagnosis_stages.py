@@ -90,6 +90,10 @@ class HeldOut:
         """Return what was told."""
         return self.told
 
+    def error(self, fitted):
+        """As large as the squares."""
+        return fitted.squares
+
 
 class StillFloor(Floor):
     """A floor whose error of the levels stays; relevant is 9, the squares that stay are 100."""
@@ -381,6 +385,18 @@ def test_a_cause_that_is_not_missed_is_dropped(monkeypatch, without, kept):
         }
     else:
         assert dict(after.without) == {"step": after.baseline}
+
+
+@pytest.mark.parametrize(
+    ("gain", "kept"), [(-0.01, ("step",)), (0.0, ("creep", "step")), (np.nan, ("creep", "step"))]
+)
+def test_a_cause_that_predicts_worse_is_dropped(monkeypatch, gain, kept):
+    """However much its fit explains; not where too few blocks tell."""
+    _refitting(monkeypatch, fitting, squares={frozenset({"step"}): 440.0, frozenset({"creep"}): 450.0})
+    monkeypatch.setattr(screened, "stage", lambda state: state)
+    state = _state(_fit(400.0, "creep", "step"), p_values={"creep": 0.006, "step": 0.007})
+    after = elimination.stage(replace(state, held_out=HeldOut(gain)))
+    assert after.current.names == kept
 
 
 # --- raw data again, equal loops

@@ -1,11 +1,14 @@
 """Backward elimination: no cause that the others have made superfluous.
 
 From the model with all causes each is taken out in turn. While the one that is missed least makes no relevant
-difference, it is dropped. A single cause stays: it has proved itself against the baseline.
+difference, it is dropped. So is one without which blocks that were left out are predicted better: it was
+accepted before the others, and does harm beside them. A single cause stays: it has proved itself against
+the baseline.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pulsetrainer.diagnosis.fitting import Fitted
@@ -24,8 +27,17 @@ def _eliminated(state: State) -> tuple[Fitted, dict[str, Fitted]]:
     current = state.current
     while len(current.terms) > 1:
         without = [current.without(term) for term in current.terms]
-        weakest = min(without, key=lambda fitted: fitted.squares)
-        if weakest.squares - current.squares >= state.floor.relevant:
+        spare = _spare(state, current, without)
+        if spare is None:
             return current, {t.cause.id: one for t, one in zip(current.terms, without, strict=True)}
-        current = weakest
+        current = spare
     return current, {term.cause.id: state.baseline for term in current.terms}
+
+
+def _spare(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
+    """The one of the models with one cause less that is no worse; None where all of them are."""
+    weakest = min(without, key=lambda fitted: fitted.squares)
+    if weakest.squares - current.squares < state.floor.relevant:
+        return weakest
+    best = min(without, key=state.held_out.error)
+    return best if state.held_out.gain(best, current, state.floor) < 0 else None  # NaN: it cannot be told
