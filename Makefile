@@ -97,9 +97,10 @@ test: $(VENV)/installed-test  ## every part of the program, in a few minutes
 	$(PYTEST) -m "realtime and not slow" $(REALTIME)
 	$(PYTEST) -m "not realtime and not slow" -n $(JOBS) --dist worksteal
 
-test-slow: $(VENV)/installed-test  ## the tests that are left: long records, whole chains, every fault of the emulated device
+test-slow: $(VENV)/installed-test  ## the tests that are left: long records, whole chains, every fault of the emulated device; laws on more examples
 	$(PYTEST) -m "realtime and slow" $(REALTIME)
 	$(PYTEST) -m "not realtime and slow" -n $(JOBS) --dist worksteal
+	HYPOTHESIS_PROFILE=full $(PYTEST) tests/law -n $(JOBS) --dist worksteal
 
 lint: $(VENV)/installed-test  ## style, types, import contracts
 	$(BIN)/ruff check --output-format=concise .

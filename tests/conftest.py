@@ -1,6 +1,7 @@
 """How long the laws are tried, and what is made once for all workers.
 
-Laws are tried quickly by default, longer with ``HYPOTHESIS_PROFILE=ci``. Runs are not derandomised, so every
+Laws are tried quickly by default, longer with ``HYPOTHESIS_PROFILE=full`` as in ``make test-slow``, longest with
+``ci``. Runs are not derandomised, so every
 run looks at new examples; a failure prints the blob that replays it.
 """
 
@@ -24,8 +25,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile(
-    "quick", max_examples=50, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
+    "quick", max_examples=25, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )
+settings.register_profile("full", parent=settings.get_profile("quick"), max_examples=100)
 settings.register_profile("ci", parent=settings.get_profile("quick"), max_examples=300)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 

@@ -88,6 +88,7 @@ def test_a_joint_refit_finds_the_parameter_and_a_fit_to_the_residual_does_not(la
     assert naive < 0.8 * TAU_S
 
 
+@pytest.mark.slow
 def test_autocorrelated_noise_does_not_alarm():
     """Noise with memory: an F test for independent noise alarms, the simulated null does not."""
     problem = _problem({})

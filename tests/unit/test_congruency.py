@@ -80,7 +80,8 @@ def test_no_weights_make_equal_loops_differ(seed, n_h):
     assert np.abs(congruency.contrasts(loops, [output])).max() < 1e-9 * np.ptp(output)
 
 
-@pytest.mark.parametrize("k", [0.008, pytest.param(-0.008, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("k", [0.008, -0.008])
 def test_a_feedback_of_the_output_is_measured(k):
     """Found beyond doubt, its strength within three standard errors or a tenth."""
     found = _contrast(k, 0.02, 5)

@@ -86,6 +86,7 @@ def test_identify_chooses_it_when_dense_matrices_do_not_fit(monkeypatch):
     assert np.allclose(falling.operator(unseen), -free.operator(unseen), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_more_levels_than_dense_allows():
     """90 levels, 4095 cells, go the matrix-free way by themselves."""
     rng = np.random.default_rng(4)

@@ -48,7 +48,7 @@ def _quiz(asked, answered) -> Quiz:
     )
 
 
-@pytest.mark.parametrize("questions", [20, 40])
+@pytest.mark.parametrize("questions", [20, pytest.param(40, marks=pytest.mark.slow)])
 def test_the_interval_holds_the_truth(questions):
     """Of 1000 simulated learners of known skill in 93 to 97 %; skills are drawn, seeds are not looked at."""
     held = 0

@@ -444,6 +444,7 @@ def test_full_disk(run_file, limit):
     assert examples.equal(read_any(run_file), examples.run())
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments(tmp_path):
     """Kill -9 while artefacts replace each other: whatever is there under the name is whole, every time."""
     rng = random.Random(SEED)
