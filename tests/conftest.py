@@ -1,8 +1,8 @@
 """How long the laws are tried, and what is made once for all workers.
 
-Laws are tried quickly by default, longer with ``HYPOTHESIS_PROFILE=full`` as in ``make test-slow``, longest with
-``ci``. Runs are not derandomised, so every
-run looks at new examples; a failure prints the blob that replays it.
+Laws are tried quickly by default, longer with ``HYPOTHESIS_PROFILE=full`` as ``make test-slow`` does, longest
+with ``ci``. Runs are not derandomised, so every run looks at new examples; a failure prints the blob that
+replays it.
 """
 
 from __future__ import annotations

@@ -33,7 +33,9 @@ def drive_of(plant: str, pulse: str = "normal") -> pt.Waveform:
 
 
 @pytest.mark.parametrize("pulse", ["normal", pytest.param("bifid", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize(
+    "plant", [pytest.param(name, marks=pytest.mark.slow if k else ()) for k, name in enumerate(PLANTS)]
+)
 def test_what_is_left_on_a_foreign_plant_is_noise(plant, pulse):
     """Within 1.2 times the noise in five passes; no pass worse than the one before by more than noise."""
     refined = refine(drive_of(plant, pulse), ForeignDevice(plant, seed=3), slew=SLEW)
