@@ -72,7 +72,6 @@ def examine(
     capture: bool = True,
     settings: str = "",
     tuned: Path | None = None,
-    folder: Path = Path(),
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Result:
     """Look at versions, compiler, emulator, folder, ports and device; with ``capture`` its coil is driven.
@@ -83,7 +82,7 @@ def examine(
         _versions,
         _compiler,
         _emulator,
-        lambda: _folder(folder),
+        _folder,
         lambda: iter([Finding("settings", "ok", settings or "none: defaults")]),
         _ports,
         lambda: _device(port, tuned, capture=capture),
@@ -142,9 +141,9 @@ def _emulator() -> Iterator[Finding]:
         yield Finding("emulator", "ok", str(shutil.which("qemu-system-arm")))
 
 
-def _folder(folder: Path) -> Iterator[Finding]:
+def _folder() -> Iterator[Finding]:
     """Tell whether artefacts can be written here: permission and room."""
-    where = folder.resolve()
+    where = Path.cwd()
     try:
         with tempfile.NamedTemporaryFile(dir=where, prefix=".pulsetrainer-doctor-") as probe:
             probe.write(b"\0" * 4096)

@@ -2,7 +2,7 @@
 
 A message is a frozen dataclass; the annotation of each field is its place on the wire (little-endian,
 no padding), so ``pack`` and ``parse`` mirror each other by construction. Messages marked ``tail`` end
-in a counted array of equal items. ``pulsetrainer.device.header`` prints the same tables as C.
+in a counted array of equal items. ``firmware/protocol_header.py`` prints the same tables as C.
 """
 
 from __future__ import annotations

@@ -97,13 +97,13 @@ def firmware_executable(defines: tuple[str, ...] = ()) -> Path:
     return _compiled(_Image("host", (*find_compiler(), *_HOST, *defines), (), remedy))
 
 
-def firmware_image(defines: tuple[str, ...] = ()) -> Path:
+def firmware_image() -> Path:
     """Return the emulated Cortex-M4F's image, compiled now unless the cache has it."""
     compiler = find_arm_compiler()
     libraries: tuple[str, ...] = ("-T", str(firmware_dir() / "port" / "mps2" / "mps2.ld"))
     libraries = (*libraries, "-lcompiler_rt" if "ziglang" in compiler else "-lgcc")
     remedy = f"use the compiler that it was tried with: `sudo apt install {DEBIAN_PACKAGES}`"
-    return _compiled(_Image("mps2", (*compiler, *_MPS2, *defines), libraries, remedy))
+    return _compiled(_Image("mps2", (*compiler, *_MPS2), libraries, remedy))
 
 
 def find_arm_compiler() -> list[str]:

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from protocol_header import c_header
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.header import c_header
 from pulsetrainer.resources import firmware_dir
 from pulsetrainer.simulation.build import find_compiler
 

@@ -6,9 +6,9 @@ import re
 
 import pytest
 
+from protocol_header import upper
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.header import _upper
 from pulsetrainer.device.session import TIMEOUTS_S
 from pulsetrainer.device.transport import BAUD
 from pulsetrainer.resources import firmware_dir
@@ -26,17 +26,17 @@ def rows(first: str) -> list[list[str]]:
 def test_every_command_is_there_with_its_answer():
     """No more, no fewer, in the order of their ids."""
     table = rows("command")
-    assert [row[0] for row in table] == [_upper(c.__name__) for c in m.COMMANDS]
+    assert [row[0] for row in table] == [upper(c.__name__) for c in m.COMMANDS]
     for row, command in zip(table, m.COMMANDS, strict=True):
         kind = row[2].split()[0].rstrip(":")
-        (answer,) = (r for r in m.REPLIES if _upper(r.__name__) == kind)
+        (answer,) = (r for r in m.REPLIES if upper(r.__name__) == kind)
         assert answer is m._ANSWERS.get(command, m.Ack), row[0]
 
 
 @pytest.mark.parametrize("command", m.COMMANDS, ids=lambda c: c.__name__)
 def test_payloads_are_described_field_by_field(command):
     """As many things as the payload has fields; arrays and their count are told apart."""
-    (row,) = (r for r in rows("command") if r[0] == _upper(command.__name__))
+    (row,) = (r for r in rows("command") if r[0] == upper(command.__name__))
     fields = [name for name, _ in command.wire_fields()] + (["items"] if command.ITEM else [])
     told = [part for part in row[1].replace("protocol major, minor", "major, minor").split(", ") if part]
     assert len(told) == len(fields), (told, fields)

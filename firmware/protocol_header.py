@@ -40,7 +40,8 @@ _CONSTANTS = (
 )
 
 
-def _upper(name: str) -> str:
+def upper(name: str) -> str:
+    """Return a name of ours as C says it."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).upper()
 
 
@@ -50,7 +51,7 @@ def _enum(prefix: str, members: type[IntEnum]) -> Iterator[str]:
 
 
 def _message(message: type[m.Message]) -> Iterator[str]:
-    name = _upper(message.__name__)
+    name = upper(message.__name__)
     yield f"\n#define PT_{name} 0x{message.TYPE:02X}u"
     offset = 0
     for field, code in message.wire_fields():
@@ -90,7 +91,11 @@ def c_header() -> str:
     for message in (*m.COMMANDS, *m.REPLIES):
         lines += _message(message)
     lines += ["", "/* commands: X(NAME, bytes of one item of the counted tail or 0) */"]
-    rows = [f"    X({_upper(c.__name__)}, {c.ITEM})" for c in m.COMMANDS]
+    rows = [f"    X({upper(c.__name__)}, {c.ITEM})" for c in m.COMMANDS]
     lines += ["#define PT_COMMANDS(X) \\", " \\\n".join(rows)]
     lines += ["", "#endif", ""]
     return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(c_header(), end="")
