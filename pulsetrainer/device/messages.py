@@ -40,7 +40,9 @@ class Message:
     def wire_fields(cls) -> tuple[tuple[str, str], ...]:
         """Return (name, struct code) of each fixed field in wire order."""
         hints = get_type_hints(cls, include_extras=True)
-        return tuple((name, hints[name].__metadata__[0]) for name in _field_names(cls) if name != "items")
+        return tuple(
+            (name, hints[name].__metadata__[0]) for name in (f.name for f in fields(cls)) if name != "items"
+        )
 
     def pack(self) -> bytes:
         """Return the payload bytes."""
@@ -63,10 +65,6 @@ class Message:
         if not cls.MIN_ITEMS <= count <= cls.MAX_ITEMS or len(payload) != fixed + cls.ITEM * count:
             raise ValueError(f"{cls.__name__} of {len(payload)} bytes does not match its count")
         return make(*values, payload[fixed:])
-
-
-def _field_names(cls: type) -> list[str]:
-    return [f.name for f in fields(cls)]
 
 
 # --- host to device ------------------------------------------------------------------------------

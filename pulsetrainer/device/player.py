@@ -58,10 +58,6 @@ def tells_duty(hello: m.HelloReply) -> bool:
     return (hello.major, hello.minor) >= (codes.PROTOCOL_MAJOR, codes.DUTY_SINCE_MINOR)
 
 
-def _drives(status: m.StatusReply) -> bool:
-    return status.state in {codes.State.RUNNING, codes.State.RAMPING}
-
-
 class Player:
     """Plays one wave; ``received`` grows by wire blocks until ``ended`` is set."""
 
@@ -265,7 +261,8 @@ class Player:
         self._request(m.Stop())
         deadline = self._monotonic() + _RAMP_S
         status = self._status()
-        while (_drives(status) or flows_A(status)) and self._monotonic() < deadline:
+        driven = {codes.State.RUNNING, codes.State.RAMPING}
+        while (status.state in driven or flows_A(status)) and self._monotonic() < deadline:
             self._session.receive()
             status = self._status()
         deadline = self._monotonic() + _DRAIN_S

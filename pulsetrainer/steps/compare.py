@@ -86,7 +86,10 @@ def compare(
     every = [_of_session(one) for one in sessions] or _figures(
         [one for one in evaluations if isinstance(one, Evaluation)]
     )
-    wanted = [n for n in dict.fromkeys(n for one in every for n in one) if everything or _headline(n)]
+    headlines = tuple(f".{one}" for one in HEADLINES)
+    wanted = [
+        n for n in dict.fromkeys(n for one in every for n in one) if everything or n.endswith(headlines)
+    ]
     metrics = tuple(_metric(name, tuple(one.get(name) for one in every)) for name in wanted)
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
         listed = ", ".join(names) or "these evaluations"
@@ -132,10 +135,6 @@ def _of_session(one: Session) -> dict[str, float]:
         if np.isfinite(result.response_s):
             found["quiz.response_s"] = result.response_s
     return found
-
-
-def _headline(name: str) -> bool:
-    return any(name.endswith(f".{one}") for one in HEADLINES)
 
 
 def _metric(name: str, values: tuple[float | None, ...]) -> Metric:

@@ -174,7 +174,7 @@ class _Tracked:
         thermometer = thermometer_of(model, device, asked=asked)
         if thermometer is None or model is None:
             return None
-        take_temperature(device, thermometer, _top(model))
+        take_temperature(device, thermometer, float(model.edges[-1]))
         return cls(drive, model, thermometer)
 
     def current(self) -> FloatArray:
@@ -189,10 +189,6 @@ class _Tracked:
         there = np.isfinite(once.duty)
         reference, current, _ = once.rows
         self._thermometer.add(time_s[there], reference[there], current[there], once.duty[there])
-
-
-def _top(model: Model) -> float:
-    return float(model.edges[-1])
 
 
 def _input_range(model: Model) -> float:
