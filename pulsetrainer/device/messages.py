@@ -40,9 +40,8 @@ class Message:
     def wire_fields(cls) -> tuple[tuple[str, str], ...]:
         """Return (name, struct code) of each fixed field in wire order."""
         hints = get_type_hints(cls, include_extras=True)
-        return tuple(
-            (name, hints[name].__metadata__[0]) for name in (f.name for f in fields(cls)) if name != "items"
-        )
+        make: Any = cls  # a subclass is a dataclass
+        return tuple((f.name, hints[f.name].__metadata__[0]) for f in fields(make) if f.name != "items")
 
     def pack(self) -> bytes:
         """Return the payload bytes."""
