@@ -54,7 +54,14 @@ def test_an_existing_table_is_kept_unless_it_may_go(folder):
     assert not (folder / "table.h5").exists()
 
 
-@pytest.mark.parametrize("name", ["run", "model", "drive", "played", "evaluation", "diagnosis"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "model",
+        "diagnosis",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("run", "drive", "played", "evaluation")),
+    ],
+)
 def test_a_figure_with_its_data(tmp_path, name):
     """`plot --data`: beside the figure the table that `export` writes, word for word."""
     file = KEPT / f"{name}.h5"

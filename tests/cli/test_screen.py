@@ -107,7 +107,9 @@ def test_a_pipe_gets_text_alone(recorded):
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
 
-@pytest.mark.parametrize("columns", [40, 60, 80, 200])
+@pytest.mark.parametrize(
+    "columns", [40, 200, *(pytest.param(columns, marks=pytest.mark.slow) for columns in (60, 80))]
+)
 def test_no_figure_is_cut_on_a_narrow_terminal(tmp_path, columns):
     """Where a table does not fit there is a list of the same figures; no line is too long."""
     store.write(tmp_path / "evaluation.h5", report_examples.evaluation(), header())

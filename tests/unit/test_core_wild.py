@@ -94,7 +94,7 @@ def test_a_reversal_curve_that_saturates_for_one_sample_is_real():
 
 
 @pytest.mark.parametrize("share", [*(pytest.param(s, marks=pytest.mark.slow) for s in (0.003, 0.01)), 0.03])
-@pytest.mark.parametrize("where", ["input", "output"])
+@pytest.mark.parametrize("where", ["output", pytest.param("input", marks=pytest.mark.slow)])
 def test_wild_samples_do_not_move_the_fit(share, where):
     """Held-out error on clean data at most 1.1 times that of the clean record, over three devices."""
     ratios = []

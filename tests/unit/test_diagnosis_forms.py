@@ -26,7 +26,8 @@ KINDS = {  # of device: how it is drawn, and the form that describes it
     "butterfly": (devices.butterfly_density, "signed"),
     "mixed": (devices.mixed_plays, "signed"),
 }
-FORMS = ["clockwise", "butterfly", pytest.param("mixed", marks=pytest.mark.slow)]  # one of each form is quick
+SLOW = pytest.mark.slow  # one of the other forms is quick
+FORMS = ["clockwise", *(pytest.param(name, marks=SLOW) for name in ("butterfly", "mixed"))]
 NAMED = {"lag": {"output-lag"}, "creep": {"creep"}, "hum": {"periodic"}, "nothing": {"none"}}
 
 

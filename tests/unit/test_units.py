@@ -28,6 +28,7 @@ SI += [
     "kohm",
     "MΩ",
 ]
+REGISTRY = pint.UnitRegistry()  # half a second to make
 OTHER = ["kOhm", "MOhm", "1", "%", "°C", "mmHg", "a.u.", "LSB", "counts", "µm", "emu", "Oe", "psi"]
 NONE = ["measured", "Newtons per mm", "xyz", "", "??", "m//s", "3", "N N N x", "A/", "force"]
 
@@ -42,7 +43,7 @@ def test_units(text):
 def test_pint_knows_them_too(text):
     """An independent reader of units agrees."""
     plain = text.replace("·", "*").replace("²", "^2").replace("nA m", "nA*m").replace("A m", "A*m")
-    pint.UnitRegistry().Unit(plain.removeprefix("1/") if plain.startswith("1/") else plain)
+    REGISTRY.Unit(plain.removeprefix("1/") if plain.startswith("1/") else plain)
 
 
 @pytest.mark.parametrize("text", NONE)
