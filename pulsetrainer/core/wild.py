@@ -59,13 +59,16 @@ def isolated(values: FloatArray) -> BoolArray:
         middle = scipy.ndimage.median_filter(left, size=_WINDOW, mode="mirror")
         moving = np.minimum(moving, _MIDDLE * _motion(middle)[1])
         usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
-        more = _far(left, _STEPS * moving + _QUANTA * usual)
+        more = _exceptions(_far(left, _STEPS * moving + _QUANTA * usual))
         if not more.any():  # what is far off is gone and spoils no path
             more = _peaks(left, moving)
-        if not more.any():
+        longer = found.copy()
+        longer[kept[more]] = True
+        longer = found | _exceptions(longer)  # what would make a run too long is left
+        if np.array_equal(longer, found):
             break
-        found[kept[more]] = True
-    return _exceptions(found)
+        found = longer
+    return found if np.mean(found) <= MOST else np.zeros_like(found)
 
 
 def _motion(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -98,7 +101,8 @@ def off(
     for y, said, doubt in zip(outputs, predicted, unsure, strict=True):
         left = y - said
         if y.size >= FEWEST and np.median(np.abs(left)) <= _FITS * span:
-            found.append(_far(left, _NEAR * span + _jumps_beside(said), ~doubt))
+            far = _far(left, _NEAR * span + _jumps_beside(said), ~doubt)
+            found.append((far & doubt) | _exceptions(far & ~doubt))
         else:
             found.append(doubt)
     return found
@@ -122,8 +126,7 @@ def _far(values: FloatArray, motion: FloatArray, usual: BoolArray | slice = slic
     # mirrored, so that the first and the last sample are alone among their neighbours too
     apart = np.abs(values - scipy.ndimage.median_filter(values, size=_WINDOW, mode="mirror"))
     tail = _TAIL * float(np.quantile(apart[usual], 0.95))
-    found = apart > np.maximum(tail + motion, _NEAR * _body(values[usual]))
-    return _exceptions(found)
+    return apart > np.maximum(tail + motion, _NEAR * _body(values[usual]))
 
 
 def _exceptions(found: BoolArray) -> BoolArray:

@@ -175,6 +175,15 @@ def test_a_stroke_of_one_sample_is_no_peak():
     assert not wild.isolated(u).any()
 
 
+def test_a_wild_sample_beside_three_others_does_not_hide_them():
+    """Three far off and a fourth that is a little off: the fit shows the fourth."""
+    _, u, y, _ = clean(310)
+    bad = y.copy()
+    bad[468:472] += np.ptp(y) * np.array([-1.6, -1.5, -1.0, 0.08])
+    assert wild.isolated(bad)[468:471].all()
+    assert error(fitted(u, bad), clean(310)[0]) <= 1.1 * unspoilt(310)
+
+
 def test_sharp_turns_of_the_output_count_again():
     """What looks wild beside its neighbours and is what the fit says: the cusps of a fast butterfly."""
     rng = np.random.default_rng(906)
