@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import report_examples
 import store_examples as examples
 
 from pulsetrainer.artefacts import ModelEvaluation, Run, Waveform
+from pulsetrainer.artefacts.data import LARGEST, beyond_all_quantities
 from pulsetrainer.artefacts.time_steps import steps_of
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import DataError
@@ -97,3 +101,19 @@ def test_a_record_without_time_has_steps_of_one():
     """Its samples have an order only."""
     assert (Record([0.0, 1.0], [0.0, 1.0]).step, Record([0.0, 1.0], [0.0, 1.0]).timed) == (1.0, False)
     assert (Record([0.0, 1.0], [0.0, 1.0], dt_s=0.25).step) == 0.25
+
+
+def test_what_is_beyond_all_quantities_is_told_from_zero():
+    """NaN is not beyond them, nothing at all is not either."""
+    for sound in ([], [np.nan], [-LARGEST, LARGEST]):
+        assert beyond_all_quantities(np.array(sound)) == ""
+    assert "from 0 to 2e+100" in beyond_all_quantities(np.array([np.nan, 0.5, 2 * LARGEST]))
+    assert "from -2e+100 to 0" in beyond_all_quantities(np.array([-0.5, -2 * LARGEST]))
+
+
+def test_the_band_of_a_bootstrap_is_told_by_half_its_width():
+    """In the mean; without a bootstrap there is none."""
+    fit = report_examples.fit(n=50)
+    banded = replace(fit, predicted_lower=fit.predicted - 0.2, predicted_upper=fit.predicted + 0.4)
+    assert banded.output_uncertainty == pytest.approx(0.3)
+    assert replace(fit, predicted_lower=None, predicted_upper=None).output_uncertainty is None
