@@ -2,8 +2,8 @@
 
 From the model with all causes each is taken out in turn. While the one that is missed least makes no relevant
 difference, it is dropped. So is one without which blocks that were left out are predicted better: it was
-accepted before the others, and does harm beside them. A single cause stays: it has proved itself against
-the baseline.
+accepted before the others, and does harm beside them. A single cause has proved itself against the baseline,
+and goes only if it does harm.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ def stage(state: State) -> State:
 
 def _eliminated(state: State) -> tuple[Fitted, dict[str, Fitted]]:
     current = state.current
-    while len(current.terms) > 1:
-        without = [current.without(term) for term in current.terms]
-        spare = _spare(state, current, without)
+    while current.terms:
+        single = len(current.terms) == 1
+        without = [state.baseline] if single else [current.without(term) for term in current.terms]
+        spare = _harmful(state, current, without) if single else _spare(state, current, without)
         if spare is None:
             return current, {t.cause.id: one for t, one in zip(current.terms, without, strict=True)}
         current = spare
-    return current, {term.cause.id: state.baseline for term in current.terms}
+    return current, {}
 
 
 def _spare(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
@@ -39,5 +40,10 @@ def _spare(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted |
     weakest = min(without, key=lambda fitted: fitted.squares)
     if weakest.squares - current.squares < state.floor.relevant:
         return weakest
+    return _harmful(state, current, without)
+
+
+def _harmful(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
+    """The one of the models with one cause less that predicts best, if better than with all of them."""
     best = min(without, key=state.held_out.error)
     return best if state.held_out.gain(best, current, state.floor) < 0 else None  # NaN: it cannot be told

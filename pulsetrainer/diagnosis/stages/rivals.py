@@ -25,6 +25,8 @@ from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
+WORSE = "predicts worse"
+
 
 def stage(state: State) -> State:
     """Return the state with a finding for every cause that was tried."""
@@ -56,7 +58,7 @@ def _finding(state: State, term: Term) -> Finding:
 def _doubts(state: State, term: Term, gain: float) -> Iterator[str]:
     """Yield what speaks against a cause that was found: it is told, but with these words beside it."""
     if gain < 0:
-        yield "predicts worse"
+        yield WORSE
     cause, known = term.cause, state.estimates[term.cause.id]
     strengths = known[: cause.strengths]
     if strengths and all(one.lower <= 0 <= one.upper for one in strengths):
