@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.stages import screened
 from pulsetrainer.diagnosis.state import State
@@ -40,7 +41,8 @@ def _spare(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted |
     weakest = min(without, key=lambda fitted: fitted.squares)
     if weakest.squares - current.squares < state.floor.relevant:
         return weakest
-    return _harmful(state, current, without)
+    # a learned curve can do what a listed cause does: that is then no better, and may yet be true
+    return None if Unlisted.id in current.names else _harmful(state, current, without)
 
 
 def _harmful(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:

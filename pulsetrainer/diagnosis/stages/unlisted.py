@@ -10,7 +10,8 @@ repeats (`repetition`). The next one is sought in what is left, up to three.
 
 Where the listed causes found leave more than half unexplained, the search begins without them: they may have
 been taken for what they are not. They are then asked for again, beside the curve; and every cause, listed or
-not, must be missed when it is taken out.
+not, must be missed when it is taken out. But a curve that only takes the place of listed causes which explain
+nearly all is a better formula for them, and no dependence of its own.
 """
 
 from __future__ import annotations
@@ -46,7 +47,15 @@ def stage(state: State) -> State:
         return begun
     if begun.unexplained:
         state = search.stage(state)
-    return elimination.stage(state)
+    state = elimination.stage(state)
+    replaced = set(begun.current.names) - set(state.current.names)
+    return begun if replaced and _explain_most(begun) else state
+
+
+def _explain_most(state: State) -> bool:
+    """Whether the listed causes explain nearly all that can be: what replaces them is a better formula."""
+    explained = state.baseline.squares - state.current.squares
+    return explained > LIMITS.nearly_all * (state.baseline.squares - state.floor.squares)
 
 
 def _more_is_left(state: State) -> bool:
