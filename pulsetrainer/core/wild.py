@@ -33,6 +33,7 @@ _STEPS = 4.0  # such steps a turn may be away from the median of its neighbours
 _TURN = 1.0  # such steps a turn may be away from the path of its neighbours
 _USUAL = 1.0  # times the median step of a prediction: larger ones are jumps
 _SIDE = 3  # samples whose path is continued
+_OF_FOURTH = 1.0 / (0.6745 * 70.0**0.5)  # standard deviation of noise, of the median fourth difference
 _SIGMAS = 8.0  # a peak of noise with exponential tails is higher once in 100 000 samples
 _BOTH = 2.5  # times the steps near by: a stroke of one sample makes two, up and down
 _HELD = 0.2  # of all steps are zero: the samples are those of a coarse converter ...
@@ -145,12 +146,16 @@ def _peaks(values: FloatArray, motion: FloatArray) -> BoolArray:
     step = np.abs(np.diff(values))
     held = np.mean(step == 0) > _HELD and np.any(step > 0)
     flicker = _FLICKER * float(np.median(step[step > 0])) if held else 0.0
-    noise = _SIGMAS * white(values)
     before2, before, here, after, after2 = np.lib.stride_tricks.sliding_window_view(values, 5).T
+    # noise may go with the level: fourth differences, which hold no motion, tell it near by
+    rough = np.abs(before2 - 4.0 * before + 6.0 * here - 4.0 * after + after2)
+    near_by = scipy.ndimage.median_filter(rough, size=_AROUND, mode="mirror") * _OF_FOURTH
+    noise = _SIGMAS * np.maximum(white(values), near_by)
     around = np.stack((before, after, 2.0 * before - before2, 2.0 * after - after2))
     beyond = np.maximum(here - around.max(axis=0), around.min(axis=0) - here)
     both = np.abs(here - before) + np.abs(here - after)
-    found = (beyond > max(noise, flicker, _NEAR * _body(values))) & (both > noise + _BOTH * motion[2:-2])
+    least = max(flicker, _NEAR * _body(values))
+    found = (beyond > np.maximum(noise, least)) & (both > noise + _BOTH * motion[2:-2])
     found = _exceptions(found)
     # beside a wild sample a turn looks like one too: it is looked at again without
     found &= both >= scipy.ndimage.maximum_filter1d(np.where(found, both, 0.0), 5)

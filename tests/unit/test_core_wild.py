@@ -234,3 +234,12 @@ def test_a_record_in_which_all_samples_are_wild_is_refused():
     model = pt.identify(run, levels=8)
     with pytest.raises(DataError):
         pt.diagnose(nothing, model, quick=True)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_noise_that_goes_with_the_level_is_not_wild(seed):
+    """What is quiet elsewhere tells nothing of a loud place: none of 5000 samples is called wild."""
+    rng = np.random.default_rng(seed)
+    print(f"seed {seed}")
+    level = 0.5 - 0.5 * np.cos(np.arange(5000) * 2 * np.pi / 700)
+    assert wild.isolated(level + 0.03 * level * rng.standard_normal(level.size)).sum() == 0
