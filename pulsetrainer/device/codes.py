@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Self
 
 MAGIC = 0x52545031  # "1PTR" on the wire: tells our firmware from whatever else sits behind a port
 PROTOCOL_MAJOR = 2
@@ -33,6 +34,18 @@ HEAT_LIMIT_A2 = 1.25**2
 HEAT_TAU_S = 2**20 / TICK_RATE_HZ  # the coil's heat decays by a factor of e in this time
 
 
+class Told(IntEnum):
+    """Numbers of the wire, each with what it means in words."""
+
+    text: str
+
+    def __new__(cls, number: int, text: str) -> Self:  # noqa: D102 - how an enum takes a second value
+        member = int.__new__(cls, number)
+        member._value_ = number
+        member.text = text
+        return member
+
+
 class State(IntEnum):
     """What the device is doing; the output is off in all but RUNNING and RAMPING."""
 
@@ -43,88 +56,47 @@ class State(IntEnum):
     FAULT = 4
 
 
-class Fault(IntEnum):
+class Fault(Told):
     """Why the device latched a fault. OUTPUT_NOT_OFF is the gravest: nothing in the device can switch off."""
 
-    NONE = 0
-    HEARTBEAT = 1
-    OVER_CURRENT = 2
-    OVER_FORCE = 3
-    UNDERRUN = 4
-    COIL_HEAT = 5
-    ON_TIME = 6
-    FORCE_RAIL = 8
-    CURRENT_FROZEN = 9
-    FORCE_FROZEN = 10
-    NO_CURRENT = 11
-    NO_FORCE = 12
-    TICK_OVERRUN = 13
-    WAVE_CRC = 14
-    STRAY_CURRENT = 15
-    CURRENT_IMPLAUSIBLE = 16
-    FORCE_IMPLAUSIBLE = 17
-    FORCE_ZERO = 18
-    COMPARATOR = 19
-    OUTPUT_NOT_OFF = 20
-    TICK_LOST = 21
-    CONVERTER = 22
+    NONE = 0, ""
+    HEARTBEAT = 1, "the device heard nothing from the host for its heartbeat time and switched off"
+    OVER_CURRENT = 2, "coil current above its hard limit"
+    OVER_FORCE = 3, "force above its limit"
+    UNDERRUN = 4, "the reference did not arrive in time (buffer underrun)"
+    COIL_HEAT = 5, "the coil's heat model (I2t) reached its limit"
+    ON_TIME = 6, "longest permitted on-time reached"
+    FORCE_RAIL = 8, "force sensor at the end of its range"
+    CURRENT_FROZEN = 9, "current reading frozen while the reference moved"
+    FORCE_FROZEN = 10, "force reading frozen while the current moved"
+    NO_CURRENT = 11, "full drive, but the current does not follow"
+    NO_FORCE = 12, "full current, but no force follows"
+    TICK_OVERRUN = 13, "the control interrupt missed its tick"
+    WAVE_CRC = 14, "the uploaded reference does not match its checksum"
+    STRAY_CURRENT = 15, "current flows although the reference is zero"
+    CURRENT_IMPLAUSIBLE = 16, "the current reading does not fit the voltage on the coil"
+    FORCE_IMPLAUSIBLE = 17, "the force reading does not fit the current"
+    FORCE_ZERO = 18, "the force sensor does not read zero before the play"
+    COMPARATOR = 19, "the hardware's own over-current limit was reached"
+    OUTPUT_NOT_OFF = 20, "current is still read although the output was switched off: CUT THE SUPPLY NOW"
+    TICK_LOST = 21, "the control interrupt stayed away; a timer of its own switched off"
+    CONVERTER = 22, "a sensor's converter gave no new reading"
 
 
-FAULT_TEXT: dict[Fault, str] = {
-    Fault.NONE: "",
-    Fault.HEARTBEAT: "the device heard nothing from the host for its heartbeat time and switched off",
-    Fault.OVER_CURRENT: "coil current above its hard limit",
-    Fault.OVER_FORCE: "force above its limit",
-    Fault.UNDERRUN: "the reference did not arrive in time (buffer underrun)",
-    Fault.COIL_HEAT: "the coil's heat model (I2t) reached its limit",
-    Fault.ON_TIME: "longest permitted on-time reached",
-    Fault.FORCE_RAIL: "force sensor at the end of its range",
-    Fault.CURRENT_FROZEN: "current reading frozen while the reference moved",
-    Fault.FORCE_FROZEN: "force reading frozen while the current moved",
-    Fault.NO_CURRENT: "full drive, but the current does not follow",
-    Fault.NO_FORCE: "full current, but no force follows",
-    Fault.TICK_OVERRUN: "the control interrupt missed its tick",
-    Fault.WAVE_CRC: "the uploaded reference does not match its checksum",
-    Fault.STRAY_CURRENT: "current flows although the reference is zero",
-    Fault.CURRENT_IMPLAUSIBLE: "the current reading does not fit the voltage on the coil",
-    Fault.FORCE_IMPLAUSIBLE: "the force reading does not fit the current",
-    Fault.FORCE_ZERO: "the force sensor does not read zero before the play",
-    Fault.COMPARATOR: "the hardware's own over-current limit was reached",
-    Fault.OUTPUT_NOT_OFF: "current is still read although the output was switched off: CUT THE SUPPLY NOW",
-    Fault.TICK_LOST: "the control interrupt stayed away; a timer of its own switched off",
-    Fault.CONVERTER: "a sensor's converter gave no new reading",
-}
-
-
-class NakCode(IntEnum):
+class NakCode(Told):
     """Why a command was refused."""
 
-    UNKNOWN = 1
-    LENGTH = 2
-    STATE = 3
-    RANGE = 4
-    OFFSET = 5
-    CREDIT = 6
-    VERSION = 7
-    NONCE = 8
-    CRC = 9
-    FAULT = 10
-    PARAM = 11
-
-
-NAK_TEXT: dict[NakCode, str] = {
-    NakCode.UNKNOWN: "it does not know this command",
-    NakCode.LENGTH: "the command has the wrong length",
-    NakCode.STATE: "not possible in its present state",
-    NakCode.RANGE: "a value is outside its limits",
-    NakCode.OFFSET: "samples out of order",
-    NakCode.CREDIT: "more samples than it has room for",
-    NakCode.VERSION: "no handshake with a protocol it speaks",
-    NakCode.NONCE: "the device has restarted since the handshake",
-    NakCode.CRC: "the reference does not match its checksum",
-    NakCode.FAULT: "a latched fault has to be cleared first",
-    NakCode.PARAM: "it has no such parameter",
-}
+    UNKNOWN = 1, "it does not know this command"
+    LENGTH = 2, "the command has the wrong length"
+    STATE = 3, "not possible in its present state"
+    RANGE = 4, "a value is outside its limits"
+    OFFSET = 5, "samples out of order"
+    CREDIT = 6, "more samples than it has room for"
+    VERSION = 7, "no handshake with a protocol it speaks"
+    NONCE = 8, "the device has restarted since the handshake"
+    CRC = 9, "the reference does not match its checksum"
+    FAULT = 10, "a latched fault has to be cleared first"
+    PARAM = 11, "it has no such parameter"
 
 
 class ResetCause(IntEnum):

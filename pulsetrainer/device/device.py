@@ -171,7 +171,7 @@ class Device:
             else:
                 self._session.request(m.Stop())
 
-    def _ask(self, command: m.Message) -> m.Message:
+    def _ask(self, command: m.Message) -> Any:
         """Ask while nothing is played: one thread talks to the device at a time."""
         with self._turn:
             if self._player is not None:
@@ -182,12 +182,8 @@ class Device:
             return self._session.request(command)
 
     def _status(self) -> m.StatusReply:
-        reply = self._ask(m.Status())
-        if not isinstance(reply, m.StatusReply):
-            raise DeviceError(
-                "the device answered Status with something else", hint="flash the firmware again"
-            )
-        return reply
+        status: m.StatusReply = self._ask(m.Status())
+        return status
 
     def set_parameter(self, name: str, value: int) -> int:
         """Set a parameter of the firmware in device units and return what the device now holds.
@@ -203,8 +199,8 @@ class Device:
                 f"{name}={value} is outside {row.minimum}..{row.maximum} {row.unit}",
                 hint="a limit can only be lowered below the one compiled into the firmware",
             )
-        reply = self._ask(m.SetParam(row.id, value))
-        if not isinstance(reply, m.ParamReply) or reply.value != value:
+        reply: m.ParamReply = self._ask(m.SetParam(row.id, value))
+        if reply.value != value:
             raise DeviceError(f"the device did not take {name}={value}", hint="flash the firmware again")
         if name in _GREETED:  # a new greeting would restore the defaults
             limit: dict[str, Any] = {_GREETED[name]: value}

@@ -1,7 +1,7 @@
 """The wire's messages: with codes the one source from which ``firmware/core/protocol.h`` is made.
 
 A message is a frozen dataclass; the annotation of each field is its place on the wire (little-endian,
-no padding), so ``pack`` and ``parse`` mirror each other by construction. Messages marked ``tail`` end
+no padding), so ``pack`` and ``parse`` mirror each other by construction. Messages with an ``item`` end
 in a counted array of equal items. ``firmware/protocol_header.py`` prints the same tables as C.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Annotated, Any, ClassVar, Self, get_type_hints
+from typing import Annotated, Any, ClassVar, Self, dataclass_transform, get_type_hints
 
 U8 = Annotated[int, "B"]
 U16 = Annotated[int, "H"]
@@ -20,14 +20,21 @@ I32 = Annotated[int, "i"]
 Text16 = Annotated[bytes, "16s"]
 
 
+@dataclass_transform(frozen_default=True)
 class Message:
-    """A payload with a type id; subclasses are frozen dataclasses annotated with wire types."""
+    """A payload with a type id; each subclass is a frozen dataclass of wire types.
 
-    __slots__ = ()
+    ``item``: bytes of one item of the array at its end, which holds ``least`` to ``most``; 0: there is none.
+    """
+
     TYPE: ClassVar[int]
-    ITEM: ClassVar[int] = 0  # bytes of one item of the trailing array, 0: there is none
-    MIN_ITEMS: ClassVar[int] = 1
-    MAX_ITEMS: ClassVar[int] = 0
+    ITEM: ClassVar[int]
+    MIN_ITEMS: ClassVar[int]
+    MAX_ITEMS: ClassVar[int]
+
+    def __init_subclass__(cls, *, code: int, item: int = 0, least: int = 1, most: int = 0) -> None:
+        cls.TYPE, cls.ITEM, cls.MIN_ITEMS, cls.MAX_ITEMS = code, item, least, most
+        dataclass(frozen=True)(cls)
 
     @classmethod
     @cache
@@ -69,137 +76,102 @@ class Message:
 # --- host to device ------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Hello(Message):
+class Hello(Message, code=0x01):
     """Who are you? Stops whatever an earlier host left running and restores every parameter's default."""
 
-    TYPE: ClassVar[int] = 0x01
     magic: U32
     major: U8
     minor: U8
 
 
-@dataclass(frozen=True, slots=True)
-class Status(Message):
+class Status(Message, code=0x02):
     """Ask for the full state with the snapshot of the first fault."""
 
-    TYPE: ClassVar[int] = 0x02
 
-
-@dataclass(frozen=True, slots=True)
-class Heartbeat(Message):
+class Heartbeat(Message, code=0x03):
     """The host is alive; a sign of life only if ``counter`` is larger than any since the greeting."""
 
-    TYPE: ClassVar[int] = 0x03
     counter: U32
 
 
-@dataclass(frozen=True, slots=True)
-class GetParam(Message):
+class GetParam(Message, code=0x04):
     """Read a parameter."""
 
-    TYPE: ClassVar[int] = 0x04
     id: U8
 
 
-@dataclass(frozen=True, slots=True)
-class SetParam(Message):
+class SetParam(Message, code=0x05):
     """Set a parameter; refused unless idle."""
 
-    TYPE: ClassVar[int] = 0x05
     id: U8
     value: I32
 
 
-@dataclass(frozen=True, slots=True)
-class WaveBegin(Message):
+class WaveBegin(Message, code=0x06):
     """Announce a reference: samples in all, ticks per sample, CRC-32 of all its int16 bytes."""
 
-    TYPE: ClassVar[int] = 0x06
     total: U32
     ticks_per_sample: U16
     crc32: U32
 
 
-@dataclass(frozen=True, slots=True)
-class WaveData(Message):
+class WaveData(Message, code=0x07, item=2, most=61):
     """Samples of the reference [100 uA, int16] from ``offset`` on."""
 
-    TYPE: ClassVar[int] = 0x07
-    ITEM: ClassVar[int] = 2
-    MAX_ITEMS: ClassVar[int] = 61
     offset: U32
     count: U8
     items: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class WaveCommit(Message):
+class WaveCommit(Message, code=0x08):
     """The first ``count`` samples are there and have this CRC-32: the device may be armed."""
 
-    TYPE: ClassVar[int] = 0x08
     count: U32
     crc32: U32
 
 
-@dataclass(frozen=True, slots=True)
-class Arm(Message):
+class Arm(Message, code=0x09):
     """Permit START; ``nonce`` proves that this is the device that answered HELLO, not restarted."""
 
-    TYPE: ClassVar[int] = 0x09
     nonce: U32
 
 
-@dataclass(frozen=True, slots=True)
-class Start(Message):
+class Start(Message, code=0x0A):
     """Play."""
 
-    TYPE: ClassVar[int] = 0x0A
 
-
-@dataclass(frozen=True, slots=True)
-class Stop(Message):
+class Stop(Message, code=0x0B):
     """Ramp to zero, switch off, disarm; always accepted."""
 
-    TYPE: ClassVar[int] = 0x0B
 
-
-@dataclass(frozen=True, slots=True)
-class ClearFault(Message):
+class ClearFault(Message, code=0x0C):
     """Forget just this latched fault and this worst one (see ``StatusReply``); refused if others are."""
 
-    TYPE: ClassVar[int] = 0x0C
     fault: U8
     worst: U8
 
 
-@dataclass(frozen=True, slots=True)
-class Stream(Message):
+class Stream(Message, code=0x0D):
     """Telemetry at every ``decimation``-th tick."""
 
-    TYPE: ClassVar[int] = 0x0D
     decimation: U16
 
 
-@dataclass(frozen=True, slots=True)
-class CoilHeat(Message):
+class CoilHeat(Message, code=0x0E):
     """Tell the device how hot its coil is, in units of ``codes.HEAT_UNIT``.
 
     A lower value than the device's own is taken only while that is assumed (``STATUS_HEAT_ASSUMED``).
     """
 
-    TYPE: ClassVar[int] = 0x0E
     heat: U16
 
 
-@dataclass(frozen=True, slots=True)
-class WaveCheck(Message):
+class WaveCheck(Message, code=0x0F):
     """The first ``count`` samples of the running wave have this CRC-32; ``end``: no more will come.
 
     A wrong CRC ramps down; ``end`` is for a wave that was begun with ``codes.WAVE_OPEN`` samples.
     """
 
-    TYPE: ClassVar[int] = 0x0F
     count: U32
     crc32: U32
     end: U8
@@ -208,14 +180,12 @@ class WaveCheck(Message):
 # --- device to host ------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class HelloReply(Message):
+class HelloReply(Message, code=0x81):
     """Who the device is and what it will do at most.
 
     This layout and that of ``Hello`` are the same in all versions: else two could not tell each other apart.
     """
 
-    TYPE: ClassVar[int] = 0x81
     magic: U32
     major: U8
     minor: U8
@@ -238,14 +208,12 @@ class HelloReply(Message):
     serial: Text16
 
 
-@dataclass(frozen=True, slots=True)
-class StatusReply(Message):
+class StatusReply(Message, code=0x82):
     """The full state; ``fault`` is the first cause, ``fault_*`` its snapshot, ``worst`` the gravest since.
 
     ``current`` and ``force`` are the readings of now, in every state; ``flags`` are ``codes.STATUS_*``.
     """
 
-    TYPE: ClassVar[int] = 0x82
     state: U8
     fault: U8
     session: U8
@@ -267,11 +235,9 @@ class StatusReply(Message):
     heat: U16
 
 
-@dataclass(frozen=True, slots=True)
-class Ack(Message):
+class Ack(Message, code=0x83):
     """Done: free samples of the buffer, and where the device stands."""
 
-    TYPE: ClassVar[int] = 0x83
     credit: U16
     state: U8
     fault: U8
@@ -280,39 +246,31 @@ class Ack(Message):
     produced: U32
 
 
-@dataclass(frozen=True, slots=True)
-class Nak(Message):
+class Nak(Message, code=0x84):
     """Refused, and why."""
 
-    TYPE: ClassVar[int] = 0x84
     code: U8
     command: U8
     state: U8
     fault: U8
 
 
-@dataclass(frozen=True, slots=True)
-class ParamReply(Message):
+class ParamReply(Message, code=0x85):
     """The value of a parameter and the range the device accepts."""
 
-    TYPE: ClassVar[int] = 0x85
     id: U8
     value: I32
     minimum: I32
     maximum: I32
 
 
-@dataclass(frozen=True, slots=True)
-class Telemetry(Message):
+class Telemetry(Message, code=0x90, item=6, least=0, most=19):
     """Samples of (reference, current, force), the first one at ``first_tick`` of the session.
 
-    ``dropped`` counts the samples lost on the device since the session began; it saturates.
+    ``dropped`` counts the samples lost on the device since the session began; it saturates. The last
+    block may have no samples.
     """
 
-    TYPE: ClassVar[int] = 0x90
-    ITEM: ClassVar[int] = 6
-    MIN_ITEMS: ClassVar[int] = 0  # the LAST block may have nothing left to say
-    MAX_ITEMS: ClassVar[int] = 19
     session: U8
     flags: U8
     first_tick: U32
@@ -321,16 +279,11 @@ class Telemetry(Message):
     items: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class TelemetryDuty(Telemetry):
+class TelemetryDuty(Telemetry, code=0x91, item=8, least=0, most=14):
     """Samples of (reference, current, force, duty): what a host of protocol 2.2 or later gets.
 
     The duty is that of the tick that ends with the sample, in counts of ``codes.DUTY_FULL``.
     """
-
-    TYPE: ClassVar[int] = 0x91
-    ITEM: ClassVar[int] = 8
-    MAX_ITEMS: ClassVar[int] = 14
 
 
 COMMANDS: tuple[type[Message], ...] = (

@@ -156,24 +156,15 @@ class Player:
         """Ask; once the play is to be stopped nothing but STOP is still waited for."""
         self._tick_at_send = self._tick
         urgent = isinstance(command, m.Stop)
-        reply = self._session.request(command, None if urgent else self._stop.is_set)
-        if not isinstance(reply, m.Ack):
-            raise DeviceError(
-                f"the device answered {type(command).__name__} with {type(reply).__name__}",
-                hint="flash the firmware that came with this program",
-            )
+        reply: m.Ack = self._session.request(command, None if urgent else self._stop.is_set)
         self._ack = reply
         if reply.session == self._play_session:
             self._tick = max(self._tick, reply.tick)
         return reply
 
     def _status(self) -> m.StatusReply:
-        reply = self._session.request(m.Status())
-        if not isinstance(reply, m.StatusReply):
-            raise DeviceError(
-                "the device answered Status with something else", hint="flash the firmware again"
-            )
-        return reply
+        status: m.StatusReply = self._session.request(m.Status())
+        return status
 
     # --- the steps of a play ---------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pulsetrainer.device.codes import (
     FIRMWARE_MAJOR,
@@ -38,6 +38,7 @@ _HELLO_S = 3.0
 _HELLO_TRY_S = 0.2
 _GREETING_AT_LEAST = 9  # bytes: magic, protocol and firmware version, which no version moves
 _TELEMETRY = {kind.TYPE: kind for kind in (Telemetry, TelemetryDuty)}
+_ABOVE_0 = ("tick_rate_Hz", "wave_buffer", "heartbeat_ms", "current_limit", "force_trip", "on_time_s")
 _NAMES = {c.TYPE: c.__name__ for c in COMMANDS}
 
 
@@ -137,8 +138,10 @@ class Session:
                 return None
             self.receive()
 
-    def request(self, command: Message, abandon: Callable[[], bool] | None = None) -> Message:
-        """Return the reply to ``command``; commands are idempotent, so a lost one is simply sent again.
+    def request(self, command: Message, abandon: Callable[[], bool] | None = None) -> Any:
+        """Return the reply to ``command``, of the kind that answers it: see ``messages.answers``.
+
+        Commands are idempotent, so a lost one is simply sent again.
 
         Raises
         ------
@@ -200,14 +203,7 @@ class Session:
         )
 
     def _check_sense(self, reply: HelloReply) -> None:
-        for name in (
-            "tick_rate_Hz",
-            "wave_buffer",
-            "heartbeat_ms",
-            "current_limit",
-            "force_trip",
-            "on_time_s",
-        ):
+        for name in _ABOVE_0:
             if getattr(reply, name) <= 0:
                 raise DeviceError(
                     f"the device on {self._port} says {name} = {getattr(reply, name)} in its greeting; "
@@ -227,11 +223,10 @@ class Session:
             if _generation(theirs) == _generation(ours):
                 return
             said = f"is of another generation than this program's firmware {_dotted(ours)}"
-        older = "device" if theirs < ours else "program"
-        remedy = {
-            "device": "flash the firmware that came with this program (make -C firmware)",
-            "program": "update this program: pip install --upgrade pulsetrainer",
-        }[older]
+        if theirs < ours:
+            older, remedy = "device", "flash the firmware that came with this program (make -C firmware)"
+        else:
+            older, remedy = "program", "update this program: pip install --upgrade pulsetrainer"
         raise DeviceError(f"{name} {said}: the {older} is older", hint=remedy)
 
 

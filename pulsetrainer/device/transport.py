@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from typing import Any, Protocol
 
 import serial
@@ -67,35 +68,32 @@ class SerialTransport:
         except Exception as error:
             raise cannot_open(port, error) from error
 
-    def _lost(self, error: Exception) -> PortLostError:
-        return PortLostError(
-            f"the port {self._port} is gone: {error or type(error).__name__}",
-            hint="the device switches its output off by itself; check cable and power, then open it again",
-        )
+    @contextlib.contextmanager
+    def _present(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            raise PortLostError(
+                f"the port {self._port} is gone: {error or type(error).__name__}",
+                hint="the device switches its output off by itself; check cable and power, "
+                "then open it again",
+            ) from error
 
     def read(self) -> bytes:
         """Return what has arrived, waiting at most 10 ms for the first byte."""
-        try:
+        with self._present():
             first: bytes = self._serial.read(1)
-            if not first:
-                return b""
-            return first + bytes(self._serial.read(self._serial.in_waiting))
-        except Exception as error:
-            raise self._lost(error) from error
+            return first + bytes(self._serial.read(self._serial.in_waiting)) if first else b""
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
-        try:
+        with self._present():
             self._serial.write(data)
-        except Exception as error:
-            raise self._lost(error) from error
 
     def discard(self) -> None:
         """Forget what has arrived."""
-        try:
+        with self._present():
             self._serial.reset_input_buffer()
-        except Exception as error:
-            raise self._lost(error) from error
 
     def close(self) -> None:
         """Give the port back; one that has gone needs nothing more."""

@@ -36,12 +36,12 @@ def _told(number: int, known: Mapping[int, str], kind: str) -> str:
 
 def fault_text(number: int) -> str:
     """Return a fault in words; empty for none."""
-    return _told(number, {int(fault): text for fault, text in codes.FAULT_TEXT.items()}, "fault")
+    return _told(number, {int(one): one.text for one in codes.Fault}, "fault")
 
 
 def refusal_text(number: int) -> str:
     """Return why a command was refused."""
-    return _told(number, {int(code): text for code, text in codes.NAK_TEXT.items()}, "refusal")
+    return _told(number, {int(one): one.text for one in codes.NakCode}, "refusal")
 
 
 def _names(numbers: type[IntEnum]) -> dict[int, str]:
