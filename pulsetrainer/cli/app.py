@@ -4,33 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 
-from pulsetrainer.cli import (
-    capture,
-    check,
-    compare,
-    correct,
-    diagnose,
-    doctor,
-    evaluate,
-    export,
-    extend,
-    guard,
-    identify,
-    import_,
-    invert,
-    play,
-    plot,
-    ports,
-    refine,
-    session,
-    settings,
-    show,
-    tune,
-)
+from pulsetrainer.cli import guard, settings
 from pulsetrainer.cli.naming import Command
 from pulsetrainer.files import settings as setting_files
 from pulsetrainer.version import __version__
@@ -45,25 +24,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-app.command("capture", cls=Command)(capture.capture)
-app.command("import", cls=Command)(import_.import_)
-app.command("identify", cls=Command)(identify.identify)
-app.command("invert", cls=Command)(invert.invert)
-app.command("play", cls=Command)(play.play)
-app.command("evaluate", cls=Command)(evaluate.evaluate)
-app.command("compare", cls=Command)(compare.compare)
-app.command("diagnose", cls=Command)(diagnose.diagnose)
-app.command("extend", cls=Command)(extend.extend)
-app.command("correct", cls=Command)(correct.correct)
-app.command("export", cls=Command)(export.export)
-app.command("session", cls=Command)(session.session)
-app.command("refine", cls=Command)(refine.refine)
-app.command("check", cls=Command)(check.check)
-app.command("tune", cls=Command)(tune.tune)
-app.command("show", cls=Command)(show.show)
-app.command("plot", cls=Command)(plot.plot)
-app.command("ports", cls=Command)(ports.ports)
-app.command("doctor", cls=Command)(doctor.doctor)
+# one module each, with a function of its name, in the order of the help; `import` is a word of Python's
+_COMMANDS = (
+    "capture", "import_", "identify", "invert", "play", "evaluate", "compare", "diagnose", "extend",
+    "correct", "export", "session", "refine", "check", "tune", "show", "plot", "ports", "doctor",
+)  # fmt: skip
+for _name in _COMMANDS:
+    _module = import_module(f"pulsetrainer.cli.{_name}")
+    app.command(_name.rstrip("_"), cls=Command)(getattr(_module, _name))
 
 
 def _version(wanted: bool) -> None:

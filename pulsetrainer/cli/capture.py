@@ -62,11 +62,9 @@ def capture(
     """
     from pulsetrainer.files.input_file import check_resumable
     from pulsetrainer.files.signal_table import read_signal, signal_file
-    from pulsetrainer.simulation.options import check_port
     from pulsetrainer.steps.asked import EXCITATIONS
 
     table = signal_file(signal, EXCITATIONS)
-    check_port(port)
     job = Job(context, outputs=() if resume else (out,), overwrite=overwrite, as_json=json)
     if resume:
         check_resumable(out)

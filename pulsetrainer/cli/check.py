@@ -35,9 +35,7 @@ def check(
     Example: pulsetrainer check model.h5 --update -o updated.h5
     """
     from pulsetrainer.errors import UsageError
-    from pulsetrainer.simulation.options import check_port
 
-    check_port(port)
     if update != (out is not None):
         raise UsageError(
             "--update writes a model and -o names its file: the one needs the other",

@@ -34,12 +34,12 @@ _NOT_PARAMETERS = {"json", "overwrite", "port", "dry_run", "resume", "out", "htm
 class Job:
     """What every command does besides its one verb.
 
-    Making it checks the outputs and, by their first bytes, the inputs: before anything heavy is loaded.
+    Making it checks port, outputs and, by their first bytes, inputs: before anything heavy is loaded.
 
     Raises
     ------
     UsageError
-        An output exists and ``overwrite`` is not set, or it cannot be written.
+        The port makes no sense, or an output exists and ``overwrite`` is not set, or it cannot be written.
     DataError
         An input is not there or cannot be what it should be.
     """
@@ -60,6 +60,10 @@ class Job:
         self.overwrite = overwrite
         self._artefacts: list[Path] = []  # loaded, in their order
         self._tables: list[Path] = []
+        if context.params.get("port"):
+            from pulsetrainer.simulation.options import check_port
+
+            check_port(context.params["port"])
         for path in outputs:
             if path is not None:
                 check_output(path, overwrite)

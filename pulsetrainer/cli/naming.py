@@ -64,10 +64,6 @@ class Command(TyperCommand):
             raise
 
 
-def _tables_in(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.glob("*.csv"))
-
-
 def _given_as(context: typer.Context, path: Path) -> Any:
     """Return the parameter that a file was given as."""
     for parameter in context.command.params:
@@ -89,7 +85,8 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     typed = option or f"argument {word}"
     error.message = error.message.replace(f"{error.path} ", f"{error.path} ({typed}) ", 1)
     if isinstance(error, AbsentError) and name in _TABLES:
-        near = difflib.get_close_matches(error.path.name, _tables_in(folder), n=1, cutoff=_NEAR)
+        tables = sorted(path.name for path in folder.glob("*.csv"))
+        near = difflib.get_close_matches(error.path.name, tables, n=1, cutoff=_NEAR)
         error.hint = (f"did you mean {error.path.with_name(near[0])}? " if near else "") + _TABLES[name]
         return
     if isinstance(error, ExistsError) or kinds is None or not folder.is_dir():

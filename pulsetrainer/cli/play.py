@@ -51,9 +51,6 @@ def play(
 
     Example: pulsetrainer play drive.h5 -o played.h5
     """
-    from pulsetrainer.simulation.options import check_port
-
-    check_port(port)
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.artefacts import Playback, Waveform
     from pulsetrainer.device.limits import Limits

@@ -31,9 +31,6 @@ def refine(
 
     Example: pulsetrainer refine drive.h5 -o refined.h5
     """
-    from pulsetrainer.simulation.options import check_port
-
-    check_port(port)
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.artefacts import Waveform
     from pulsetrainer.device.limits import Limits

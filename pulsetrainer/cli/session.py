@@ -85,11 +85,9 @@ def session(
     Example: pulsetrainer session --model extended.h5 -o session.h5 --pulses normal,bifid --minutes 2
     """
     from pulsetrainer.files.pulses import pulse_file
-    from pulsetrainer.simulation.options import check_port
 
     names = [name for name in (part.strip() for part in pulses.split(",")) if name]
     tables = [pulse_file(name) for name in names]
-    check_port(port)
     job = Job(
         context,
         inputs=(model,),

@@ -53,9 +53,7 @@ def tune(
     Example: pulsetrainer tune -o pulsetrainer.toml
     """
     from pulsetrainer.files.atomic_write import check_output
-    from pulsetrainer.simulation.options import check_port
 
-    check_port(port)
     if out is not None:
         check_output(out, overwrite=True)
     job = Job(context, inputs=drive, as_json=json)

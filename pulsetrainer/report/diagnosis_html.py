@@ -5,54 +5,30 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from markupsafe import Markup
-
 from pulsetrainer.report import diagnosis_figures as figures
 from pulsetrainer.report.diagnosis_text import COLUMNS, ERRORS, answer, parameters, stands
-from pulsetrainer.report.html import environment, indented
-from pulsetrainer.report.render import inline_svg
-from pulsetrainer.report.views import Number, Picture, number
+from pulsetrainer.report.html import page
+from pulsetrainer.report.views import Number, Picture, number, picture
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.figure import Figure
-
     from pulsetrainer.artefacts import Cause, Diagnosis
 
 
-def render_diagnosis(
-    found: Diagnosis, *, title: str, created: str, provenance_json: str, history: Sequence[str] = ()
-) -> str:
-    """Return the report of a diagnosis.
-
-    Parameters
-    ----------
-    found
-        The diagnosis.
-    title, created, provenance_json, history
-        From the header of the artefact.
-
-    """
+def render_diagnosis(found: Diagnosis, **header: Any) -> str:
+    """Return the report of a diagnosis; ``header`` as in ``html.page``."""
     shown = [*found.found, *[one for one in found.causes if not one.found and one.explains_percent > 0]][:12]
-    return (
-        environment()
-        .get_template("diagnosis.html.j2")
-        .render(
-            title=title,
-            created=created,
-            provenance=indented(provenance_json),
-            history=tuple(history),
-            found=found,
-            headline=headline(found),
-            named=[_words(one) for one in found.found],
-            levels=_levels(found),
-            rows=[_row(one, quick=found.quick) for one in shown],
-            columns=COLUMNS,
-            course=_course(found),
-            profiles=[*_dependences(found), *_profiles(found)],
-            ranking=_ranking(found),
-        )
+    return page(
+        "diagnosis.html.j2",
+        **header,
+        found=found,
+        headline=headline(found),
+        named=[_words(one) for one in found.found],
+        levels=_levels(found),
+        rows=[_row(one, quick=found.quick) for one in shown],
+        columns=COLUMNS,
+        course=_course(found),
+        profiles=[*_dependences(found), *_profiles(found)],
+        ranking=_ranking(found),
     )
 
 
@@ -106,31 +82,26 @@ def _row(one: Cause, *, quick: bool) -> dict[str, str | Number]:
     }
 
 
-def _picture(name: str, figure: Figure, title: str, words: str) -> Picture:
-    svg = inline_svg(figure, identifier=name, title=title, description=words)
-    return Picture(Markup(svg), words)  # noqa: S704 - our own XML, its texts are escaped
-
-
 def _course(found: Diagnosis) -> Picture:
     words = (
         "What was measured, and the model fitted anew to it without any cause; below, the error that is left "
         "without the causes found and with them. Each point is a short average."
     )
-    return _picture("course", figures.course(found), "Output and error over time", words)
+    return picture(figures.course(found), "course", "Output and error over time", words)
 
 
 def _dependences(found: Diagnosis) -> list[Picture]:
     return [
-        _picture(f"dependence-{k}", figures.dependence(one), "Learned dependence", one.text)
+        picture(figures.dependence(one), f"dependence-{k}", "Learned dependence", one.text)
         for k, one in enumerate(found.dependences, start=1)
     ]
 
 
 def _profiles(found: Diagnosis) -> list[Picture]:
     return [
-        _picture(
-            f"profile-{one.name}",
+        picture(
             figures.profile(one, extended=found.extended_percent < found.static_percent),
+            f"profile-{one.name}",
             f"Error against {one.name}",
             f"Where the error is, by {figures.axis_of(one)}: rms of the averages in each group.",
         )
@@ -140,4 +111,4 @@ def _profiles(found: Diagnosis) -> list[Picture]:
 
 def _ranking(found: Diagnosis) -> Picture:
     words = "How much of the error beyond noise each cause explains; those that were found in colour."
-    return _picture("ranking", figures.ranking(found), "Ranking of the causes", words)
+    return picture(figures.ranking(found), "ranking", "Ranking of the causes", words)

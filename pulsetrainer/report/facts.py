@@ -181,4 +181,4 @@ def _session(session: Session) -> dict[str, Any]:
 def _temperatures(kelvin: FloatArray | None) -> dict[str, str]:
     if kelvin is None or not kelvin.size:
         return {}
-    return {"coil": f"{kelvin[0]:+.1f} to {kelvin[-1]:+.1f} K against calibration, made up for"}
+    return {"coil": warmth_words(kelvin)}

@@ -7,9 +7,10 @@ Figure numbers are those of Carneiro, Abreu and Restivo, Sensors 2018, 18(5), 16
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
 
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
 from pulsetrainer.errors import DataError
@@ -28,10 +29,9 @@ from pulsetrainer.report.style import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from pulsetrainer.artefacts import WaveformEvaluation
 
-    from pulsetrainer.artefacts import Fit, ModelEvaluation, WaveformEvaluation
-
+P = ParamSpec("P")
 _ROW_IN = 4.4  # height of a figure of one column
 
 
@@ -39,52 +39,26 @@ def _sheet(width_in: float = COLUMN_IN, height_in: float = _ROW_IN) -> Figure:
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
-@styled
-def preisach_density(model: Model) -> Figure:
-    """Return the density over the half-plane of switching levels (Carneiro 2018, fig. 7)."""
-    figure = _sheet()
-    panels.density(figure, model)
-    return figure
+def _alone(
+    panel: Callable[Concatenate[FigureBase, P], None], height_in: float = _ROW_IN
+) -> Callable[P, Figure]:
+    """Return what draws a figure of one panel."""
+
+    @styled
+    def draw(*shown: P.args, **options: P.kwargs) -> Figure:
+        figure = _sheet(height_in=height_in)
+        panel(figure, *shown, **options)
+        return figure
+
+    return draw
 
 
-@styled
-def identification(fit: Fit, input_quantity: str = "input", output_quantity: str = "output") -> Figure:
-    """Return system and model on the identification signal, and the residual (fig. 8)."""
-    figure = _sheet(height_in=5.4)
-    panels.fit(figure, fit, input_quantity, output_quantity)
-    return figure
-
-
-@styled
-def tracking(played: WaveformEvaluation) -> Figure:
-    """Return target and output with and without compensation, the errors below (fig. 9)."""
-    figure = _sheet()
-    panels.tracking(figure, played)
-    return figure
-
-
-@styled
-def methods(played: Sequence[WaveformEvaluation]) -> Figure:
-    """Return one beat of a pulse by all its methods, overlaid, and the error of each."""
-    figure = _sheet(height_in=5.4)
-    panels.methods(figure, played)
-    return figure
-
-
-@styled
-def loops(played: WaveformEvaluation) -> Figure:
-    """Return force against target for both drives (fig. 10)."""
-    figure = _sheet()
-    panels.loops(figure, [played])
-    return figure
-
-
-@styled
-def prediction(model: ModelEvaluation, reach: float | None = None) -> Figure:
-    """Return a measured run, a model's prediction of it, and the residual, to be drawn up to ``reach``."""
-    figure = _sheet()
-    panels.prediction(figure, model, reach)
-    return figure
+preisach_density = _alone(panels.density)  # fig. 7
+identification = _alone(panels.fit, height_in=5.4)  # fig. 8
+tracking = _alone(panels.tracking)  # fig. 9
+methods = _alone(panels.methods, height_in=5.4)
+loops = _alone(panels.loops)  # fig. 10
+prediction = _alone(panels.prediction)
 
 
 @styled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from functools import lru_cache
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -18,27 +18,36 @@ if TYPE_CHECKING:
     from pulsetrainer.artefacts import Evaluation
 
 
-def render_evaluation(
-    evaluation: Evaluation,
+def page(
+    template: str,
     *,
     title: str,
     created: str,
     provenance_json: str,
-    published: views.Published = PUBLISHED,
     history: Sequence[str] = (),
+    **content: Any,
 ) -> str:
-    """Return the report of an evaluation as one self-contained HTML page.
+    """Return one self-contained HTML page with its content and what the header of an artefact says of it."""
+    return (
+        environment()
+        .get_template(template)
+        .render(
+            title=title,
+            created=created,
+            provenance=indented(provenance_json),
+            history=tuple(history),
+            **content,
+        )
+    )
 
-    Parameters
-    ----------
-    evaluation
-        Of played waveforms, or of models on a held-out run.
-    title, created, provenance_json, history
-        From the header of the artefact: a line for a person, ISO 8601, a JSON object, a line per command.
-    published
-        Figures of a published device by waveform, to stand beside: ``mean_error_reduction_percent``,
-        ``scaled.max_abs_error_percent`` and so on.
 
+def render_evaluation(
+    evaluation: Evaluation, *, published: views.Published = PUBLISHED, **header: Any
+) -> str:
+    """Return the report of an evaluation; ``header`` as in ``page``.
+
+    Beside its figures stand those of a ``published`` device by waveform: ``mean_error_reduction_percent``,
+    ``scaled.max_abs_error_percent`` and so on.
     """
     played = [(one, f"waveform-{k}") for k, one in enumerate(evaluation.waveforms, start=1)]
     several = len({(one.name, one.inversion) for one in evaluation.waveforms}) > 1
@@ -46,23 +55,17 @@ def render_evaluation(
     last = f" of {views.titled(evaluation.waveforms[-1])}" if several else ""
     if len(evaluation.models) > 1:
         last = f" {PurePath(evaluation.models[-1].name).stem}"
-    return (
-        environment()
-        .get_template("evaluation.html.j2")
-        .render(
-            title=title,
-            created=created,
-            provenance=indented(provenance_json),
-            history=tuple(history),
-            readouts=[views.readout(one, identifier) for one, identifier in played],
-            overview=views.overview(played, published),
-            compared=any(one.name in published for one, _ in played),
-            warning=evaluation.model.fit.warning if evaluation.model and evaluation.model.fit else "",
-            beats=views.beats(evaluation.waveforms),
-            model=None if evaluation.model is None else views.model_section(evaluation.model, last),
-            waveforms=[views.waveform_section(one, identifier) for one, identifier in played],
-            prediction=views.prediction_section(evaluation.models) if evaluation.models else None,
-        )
+    return page(
+        "evaluation.html.j2",
+        **header,
+        readouts=[views.readout(one, identifier) for one, identifier in played],
+        overview=views.overview(played, published),
+        compared=any(one.name in published for one, _ in played),
+        warning=evaluation.model.fit.warning if evaluation.model and evaluation.model.fit else "",
+        beats=views.beats(evaluation.waveforms),
+        model=None if evaluation.model is None else views.model_section(evaluation.model, last),
+        waveforms=[views.waveform_section(one, identifier) for one, identifier in played],
+        prediction=views.prediction_section(evaluation.models) if evaluation.models else None,
     )
 
 

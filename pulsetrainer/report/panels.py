@@ -178,7 +178,9 @@ def _facts(model: Model, ends: str) -> str:
     return "\n".join(lines)
 
 
-def fit(panel: FigureBase, record: Fit, input_quantity: str, output_quantity: str) -> None:
+def fit(
+    panel: FigureBase, record: Fit, input_quantity: str = "input", output_quantity: str = "output"
+) -> None:
     """Draw output over input, measured and modelled, and the residual over time below."""
     loop, below = panel.subplots(2, 1, height_ratios=(2.4, 1.0))
     orbit(loop, record.input, record.output, **GROUND, label="measured")

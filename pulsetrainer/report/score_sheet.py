@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from markupsafe import Markup
+from typing import TYPE_CHECKING, Any
 
 from pulsetrainer.report import session_figures
-from pulsetrainer.report.html import environment, indented
-from pulsetrainer.report.render import inline_svg
-from pulsetrainer.report.views import Number, Picture, number
+from pulsetrainer.report.html import page
+from pulsetrainer.report.views import Number, number, picture
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.figure import Figure
-
     from pulsetrainer.artefacts import Quiz, Score, Session
 
 _FIGURES = (
@@ -30,50 +23,24 @@ _FIGURES = (
 )
 
 
-def render_session(
-    session: Session,
-    score: Score | None,
-    *,
-    title: str,
-    created: str,
-    provenance_json: str,
-    history: Sequence[str] = (),
-) -> str:
-    """Return the score sheet of a session.
-
-    Parameters
-    ----------
-    session
-        With or without a quiz.
-    score
-        Of the quiz; None where there was none.
-    title, created, provenance_json, history
-        From the header of the artefact.
-
-    """
-    return (
-        environment()
-        .get_template("session.html.j2")
-        .render(
-            title=title,
-            created=created,
-            provenance=indented(provenance_json),
-            history=tuple(history),
-            session=session,
-            beats=session.beats.start_s.size,
-            rows=[
-                (words, unit, number(getattr(session, name), name, form))
-                for name, words, unit, form in _FIGURES
-            ],
-            course=_picture(
-                "course",
-                session_figures.course(session),
-                "What was pressed",
-                f"Target and measured force for some seconds, and the errors of all "
-                f"{session.beats.start_s.size} beats.",
-            ),
-            quiz=None if session.quiz is None or score is None else _quiz(session.quiz, score),
-        )
+def render_session(session: Session, score: Score | None, **header: Any) -> str:
+    """Return the score sheet of a session, with the score of its quiz; ``header`` as in ``html.page``."""
+    beats = session.beats.start_s.size
+    return page(
+        "session.html.j2",
+        **header,
+        session=session,
+        beats=beats,
+        rows=[
+            (words, unit, number(getattr(session, name), name, form)) for name, words, unit, form in _FIGURES
+        ],
+        course=picture(
+            session_figures.course(session),
+            "course",
+            "What was pressed",
+            f"Target and measured force for some seconds, and the errors of all {beats} beats.",
+        ),
+        quiz=None if session.quiz is None or score is None else _quiz(session.quiz, score),
     )
 
 
@@ -91,7 +58,7 @@ def _quiz(quiz: Quiz, score: Score) -> dict[str, object]:
     return {
         "learner": quiz.learner,
         "facts": facts,
-        "picture": _picture("confusion", session_figures.confusion(quiz), "Confusion matrix", words),
+        "picture": picture(session_figures.confusion(quiz), "confusion", "Confusion matrix", words),
         "questions": [
             (k, asked, said, number(float(seconds), "", ".1f"))
             for k, (asked, said, seconds) in enumerate(
@@ -99,8 +66,3 @@ def _quiz(quiz: Quiz, score: Score) -> dict[str, object]:
             )
         ],
     }
-
-
-def _picture(name: str, figure: Figure, title: str, words: str) -> Picture:
-    svg = inline_svg(figure, identifier=name, title=title, description=words)
-    return Picture(Markup(svg), words)  # noqa: S704 - our own XML, its texts are escaped

@@ -111,9 +111,10 @@ def _count(value: int, metric: str = "") -> Number:
     return Number(str(value), str(value), metric)
 
 
-def _picture(figure: Figure, identifier: str, title: str, description: str, caption: str) -> Picture:
+def picture(figure: Figure, identifier: str, title: str, description: str, caption: str = "") -> Picture:
+    """Return a figure for the page; the caption is the description where there is no other."""
     svg = inline_svg(figure, identifier=identifier, title=title, description=description)
-    return Picture(Markup(svg), caption)  # noqa: S704 - our own XML, its texts are escaped
+    return Picture(Markup(svg), caption or description)  # noqa: S704 - our own XML, its texts are escaped
 
 
 def _stem(played: WaveformEvaluation) -> str:
@@ -175,7 +176,7 @@ def beats(played: Sequence[WaveformEvaluation]) -> tuple[Picture, ...]:
     for k, name in enumerate(dict.fromkeys(one.name for one in played), start=1):
         several = [one for one in played if one.name == name]
         found.append(
-            _picture(
+            picture(
                 figures.methods(several),
                 f"beat-{k}",
                 f"One beat of {name} before and after",
@@ -209,15 +210,15 @@ def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
             for field, words, unit in DRIVE_METRICS
         ),
         pictures=(
-            _picture(
+            picture(
                 figures.tracking(played),
                 f"{identifier}-tracking",
                 f"Force and error over time: {title}",
                 alternatives.tracking(played),
                 "Force with and without compensation, mean of the repeats; below, the error of each.",
             ),
-            _picture(
-                figures.loops(played),
+            picture(
+                figures.loops([played]),
                 f"{identifier}-loops",
                 f"Force against target: {title}",
                 alternatives.loops(played),
@@ -234,7 +235,7 @@ def _temperature(played: WaveformEvaluation, identifier: str) -> list[Picture]:
     if kelvin is None or not kelvin.size:
         return []
     return [
-        _picture(
+        picture(
             heat_figures.of_playback(kelvin),
             f"{identifier}-temperature",
             f"Temperature of the coil: {titled(played)}",
@@ -255,7 +256,7 @@ def model_section(model: Model, which: str = "") -> Section:
         (label("offset", model.offset_unit), number(model.offset, "model.offset", ".4g")),
     ]
     pictures = [
-        _picture(
+        picture(
             figures.preisach_density(model),
             "model-density",
             "Preisach density",
@@ -271,7 +272,7 @@ def model_section(model: Model, which: str = "") -> Section:
             ("rms of the fit [% of span]", number(model.fit.rms_percent, "model.fit.rms_percent", ".3g")),
         ]
         pictures.append(
-            _picture(
+            picture(
                 figures.identification(model.fit, model.input_quantity, model.output_quantity),
                 "model-fit",
                 "Model and system on the identification signal",
@@ -314,7 +315,7 @@ def prediction_section(models: Sequence[ModelEvaluation]) -> Section:
         )
         rows.append(Row(model.name, shown(model.output_unit), cells))
         pictures.append(
-            _picture(
+            picture(
                 figures.prediction(model, reach),
                 f"prediction-{k}",
                 f"Prediction by {model.name}",

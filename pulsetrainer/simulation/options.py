@@ -205,7 +205,7 @@ def _setting(name: str, text: str) -> float:
     return value
 
 
-def check_port(port: str | None) -> None:
+def check_port(port: str) -> None:
     """Refuse the text of a simulated device's port that makes no sense; others are tried when they open.
 
     Raises
@@ -213,7 +213,7 @@ def check_port(port: str | None) -> None:
     UsageError
         It is not of its form. Names and ranges of the plant's parameters are known to the firmware alone.
     """
-    if port is not None and port.startswith("bench:"):
+    if port.startswith("bench:"):
         parse_bench(port)
-    if port is not None and port.startswith("qemu:"):
+    if port.startswith("qemu:"):
         parse_qemu(port)

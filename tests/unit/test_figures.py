@@ -70,7 +70,7 @@ def test_draw_gives_every_kind_a_figure_with_units(make):
         lambda: figures.identification(examples.fit(300, time=False)),
         lambda: figures.tracking(examples.waveform_evaluation()),
         lambda: figures.methods([examples.waveform_evaluation()] * 5),
-        lambda: figures.loops(examples.waveform_evaluation()),
+        lambda: figures.loops([examples.waveform_evaluation()]),
         lambda: figures.prediction(examples.model_evaluation(time=False)),
     ],
 )
@@ -81,7 +81,7 @@ def test_single_figures_render(make):
 
 def test_pdf_and_svg_carry_no_date():
     """Two files of one figure differ only if the figure does."""
-    figure = figures.loops(examples.waveform_evaluation())
+    figure = figures.loops([examples.waveform_evaluation()])
     assert b"CreationDate" not in encode(figure, "pdf")
     assert b"dc:date" not in encode(figure, "svg")
 
