@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import pulsetrainer.simulation  # noqa: F401 - announces the ports bench: and qemu:
-from pulsetrainer.artefacts import Waveform
+from pulsetrainer.artefacts import Model, Run, Session, Waveform
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device import opening as _device
 from pulsetrainer.device.device import Device
@@ -27,9 +27,6 @@ from pulsetrainer.steps.invert import shape_of
 from pulsetrainer.steps.session import session as _session
 from pulsetrainer.steps.tune import Tuned
 from pulsetrainer.steps.tune import tune as _tune
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Model, Run, Session
 
 
 def load(path: Path | str) -> Any:

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import scipy  # its parts load when they are first used
@@ -19,18 +19,16 @@ import scipy  # its parts load when they are first used
 from pulsetrainer.api import open_device
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.gains import DELIVERED
 from pulsetrainer.device.opening import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
+from pulsetrainer.device.trace import Trace
 from pulsetrainer.diagnosis import gates, wording
 from pulsetrainer.errors import PulsetrainerError
 from pulsetrainer.simulation import build
 from pulsetrainer.version import __version__
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
-    from pulsetrainer.device.trace import Trace
 
 State = Literal["ok", "warning", "problem"]
 

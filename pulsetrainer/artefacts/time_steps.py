@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from pulsetrainer.artefacts.data import FloatArray
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts.run import Run
+from pulsetrainer.artefacts.run import Run
 
 # Steps within this share of the median are even: time stamps are written with few digits.
 EVEN = 0.02

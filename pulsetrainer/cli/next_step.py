@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import shlex
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from pulsetrainer.errors import (
     DamagedFileError,
@@ -14,9 +14,6 @@ from pulsetrainer.errors import (
     PulsetrainerError,
     WrongKindError,
 )
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _TABLES = (".csv", ".tsv", ".txt", ".dat")
 

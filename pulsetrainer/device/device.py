@@ -7,8 +7,11 @@ import logging
 import math
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
+
+from numpy.typing import ArrayLike
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
@@ -30,11 +33,6 @@ from pulsetrainer.device.wording import (
     flows_A,
 )
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike
 
 _LOG = logging.getLogger(__name__)
 _REST_S = 0.5  # for a run that an earlier program left to come to rest

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import threading
 import zlib
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pulsetrainer.device import codes
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _BYTES = 2  # of a sample on the wire
 

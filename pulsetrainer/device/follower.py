@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from pulsetrainer.device import codes
 from pulsetrainer.device.plausibility import ForceWatch
+from pulsetrainer.device.player import Player
 from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pulsetrainer.device.player import Player
 
 INTERRUPTED = "interrupted"
 STOPPED = "stopped"

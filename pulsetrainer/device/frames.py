@@ -8,15 +8,12 @@ each message type no damaged frame is known to pass.
 from __future__ import annotations
 
 from binascii import crc_hqx
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from cobs import cobs
 
 from pulsetrainer.device.codes import MAX_PAYLOAD
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _OVERHEAD = 4  # type, seq, CRC
 _MAX_ENCODED = MAX_PAYLOAD + _OVERHEAD + 1

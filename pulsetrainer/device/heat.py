@@ -14,16 +14,13 @@ import math
 import os
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 import numpy as np
+from numpy.typing import NDArray
 from platformdirs import user_state_path
 
 from pulsetrainer.device.codes import HEAT_LIMIT_A2, HEAT_TAU_S
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _LOG = logging.getLogger(__name__)
 _MOST = 2.0  # more than any current that the device permits can reach

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.device import codes
 from pulsetrainer.device.heat import added, cooled, in_words, wait_s
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
+from pulsetrainer.device.trace import FloatArray
 from pulsetrainer.errors import ArgumentError, DeviceError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from pulsetrainer.device.trace import FloatArray
 
 RAMP_S = 0.11  # the device counts its way back to zero as on-time
 _PARAMETER = {parameter.name: parameter.default for parameter in codes.PARAMETERS}

@@ -5,16 +5,13 @@ from __future__ import annotations
 import logging
 import os
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import Limits
 from pulsetrainer.device.ports import find_device_port
 from pulsetrainer.device.schemes import OpenPort, find_opener, redact
 from pulsetrainer.device.transport import SerialTransport
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _LOG = logging.getLogger(__name__)
 PORT_VARIABLE = "PULSETRAINER_PORT"

@@ -12,14 +12,10 @@ of about two, or an offset below a newton, is the business of `diagnose` and `ch
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    FloatArray = NDArray[np.float64]
+FloatArray = NDArray[np.float64]
 
 WINDOW_S = 5.0  # looked at together: some beats of a slow pulse
 STEP_S = 0.5  # looked at again after so long

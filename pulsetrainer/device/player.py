@@ -10,11 +10,12 @@ from __future__ import annotations
 import contextlib
 import threading
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
+from pulsetrainer.device.feed import Feed
 from pulsetrainer.device.session import AbandonedError, NoAnswerError, RefusedError, Session
 from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.device.wording import (
@@ -27,11 +28,6 @@ from pulsetrainer.device.wording import (
     state_text,
 )
 from pulsetrainer.errors import DeviceError, PulsetrainerError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pulsetrainer.device.feed import Feed
 
 _BEATS = 5  # in the time that the device is patient, by the wall clock and by its own
 _DRAIN_S = 0.3  # for telemetry on its way after the end

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.device import codes
 from pulsetrainer.errors import ArgumentError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 def ticks_per_sample(rate_Hz: float, tick_rate_Hz: float) -> int:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from pulsetrainer.device.codes import (
     FIRMWARE_MAJOR,
@@ -26,13 +27,9 @@ from pulsetrainer.device.messages import (
     answers,
 )
 from pulsetrainer.device.schemes import TIMEOUTS_S
+from pulsetrainer.device.transport import Transport
 from pulsetrainer.device.wording import fault_text, refusal_text
 from pulsetrainer.errors import DeviceError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pulsetrainer.device.transport import Transport
 
 _HELLO_S = 3.0
 _HELLO_TRY_S = 0.2

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, FORCE_UNIT_N
-from pulsetrainer.device.messages import TelemetryDuty
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pulsetrainer.device.messages import Telemetry
+from pulsetrainer.device.messages import Telemetry, TelemetryDuty
 
 FloatArray = NDArray[np.float64]
 Int64Array = NDArray[np.int64]

@@ -13,15 +13,13 @@ import zipfile
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.errors import DataError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 RATE_NAMES = frozenset(["fs", "rate", "rate_hz", "sample_rate", "samplerate", "sampling_rate", "f_s"])
 STEP_NAMES = frozenset(["dt", "dt_s", "ts", "tinterval", "sample_time"])

@@ -7,14 +7,11 @@ import os
 import re
 import secrets
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pulsetrainer.errors import DataError, ExistsError, UsageError
 from pulsetrainer.files.file_lock import Lease, create_locked, sweep
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from pulsetrainer.errors import DataError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _COLUMNS = ("t_s", "rate", "amplitude", "pulse")
 

@@ -12,15 +12,12 @@ from __future__ import annotations
 import csv
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import time_stamps as stamps
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: blanks
 _REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing

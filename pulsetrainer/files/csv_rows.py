@@ -8,17 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
+from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.csv_dialect import MISSING, Dialect, number, readable
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from pulsetrainer.artefacts import FloatArray
 
 PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
 _SPARE = 1.02  # of the room that the first piece lets expect; what is never written to takes no memory

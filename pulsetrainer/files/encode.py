@@ -6,8 +6,9 @@ dimension scales, so that h5py, xarray and netCDF readers see them by name.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -16,9 +17,6 @@ from pulsetrainer.artefacts import beyond_all_quantities
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.provenance import clean
 from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 INDEX_AXIS = "sample"  # the axis of records without time: a dataset "time" always is a time in seconds
 _CHUNK = 16384

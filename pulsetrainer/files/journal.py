@@ -20,8 +20,10 @@ import dataclasses
 import json
 import struct
 import zlib
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, BinaryIO, Self
+from pathlib import Path
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 
@@ -30,10 +32,6 @@ from pulsetrainer.errors import DamagedFileError, DataError
 from pulsetrainer.files.input_file import JOURNAL
 from pulsetrainer.files.provenance import Header, Provenance
 from pulsetrainer.files.session_journal import session_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
 COLUMNS = ("time_s", "reference", "input", "output")
 GOAL, BEAT = b"GOAL", b"BEAT"

@@ -12,9 +12,11 @@ import os
 import re
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
+import h5py
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.run import Coil
@@ -25,13 +27,8 @@ from pulsetrainer.files.encode import Later
 from pulsetrainer.files.file_lock import Lease, create_locked, is_abandoned, sweep
 from pulsetrainer.files.input_file import is_journal
 from pulsetrainer.files.journal import COLUMNS, Journal, Recording
+from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.schema import plan_of
-
-if TYPE_CHECKING:
-    import h5py
-    from numpy.typing import ArrayLike
-
-    from pulsetrainer.files.provenance import Header
 
 _RESERVE_BYTES = 1 << 20  # beside the samples: for the texts and for HDF5's own structures
 _BYTES_PER_SAMPLE = 8 * len(COLUMNS) + 1  # and the seam

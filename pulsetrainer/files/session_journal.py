@@ -7,17 +7,15 @@ far as it is answered, and the other fields of the session as they stand now.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pulsetrainer.artefacts import Beats, FloatArray, Quiz, Session
 from pulsetrainer.errors import DamagedFileError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
 CUT_OFF = "the record ends before the session does: it was cut off, or is still going on"
 _BEAT = (

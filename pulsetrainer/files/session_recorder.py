@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import h5py
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Session
@@ -13,14 +14,10 @@ from pulsetrainer.errors import DataError
 from pulsetrainer.files import journal, store
 from pulsetrainer.files.atomic_write import cannot_write
 from pulsetrainer.files.encode import Later
+from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.recorder import RunRecorder
 from pulsetrainer.files.schema import plan_of
 from pulsetrainer.files.session_journal import CUT_OFF, SessionWriter
-
-if TYPE_CHECKING:
-    import h5py
-
-    from pulsetrainer.files.provenance import Header
 
 _COLUMNS = ("time_s", "reference", "input", "output")  # as a run's
 _COPIED_SAMPLES = 1 << 16  # at a time

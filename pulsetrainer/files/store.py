@@ -7,8 +7,9 @@ The file format: root attributes ``kind``, ``format_version``, ``title``, ``crea
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
@@ -25,9 +26,6 @@ from pulsetrainer.files.provenance import Header, Provenance, clean
 from pulsetrainer.files.schema import TIME, kind_of, plan_of
 from pulsetrainer.files.unfailing_file import UnfailingFile
 from pulsetrainer.version import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
 
 __all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "write"]
 

@@ -15,9 +15,9 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pulsetrainer.artefacts import FloatArray, beyond_all_quantities
 from pulsetrainer.artefacts.units import split_unit, symbol_of
@@ -27,9 +27,6 @@ from pulsetrainer.files.atomic_write import replacing
 from pulsetrainer.files.csv_dialect import Dialect, detect
 from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 _WRITTEN_ROWS = 1 << 14
 

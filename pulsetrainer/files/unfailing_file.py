@@ -7,10 +7,7 @@ kept for the caller, and what HDF5 writes after it is dropped.
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from pathlib import Path
 
 
 class UnfailingFile(io.FileIO):

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pulsetrainer.artefacts import Fit, Model, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.artefacts.units import shown
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from pulsetrainer.artefacts import Fit, Model, ModelEvaluation, WaveformEvaluation
 
 
 def _range(values: NDArray[np.float64], unit: str) -> str:

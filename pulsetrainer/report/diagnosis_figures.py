@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
+from pulsetrainer.artefacts import Dependence, Diagnosis, Profile
 from pulsetrainer.report import panels
 from pulsetrainer.report.diagnosis_text import answer
 from pulsetrainer.report.style import (
@@ -23,9 +22,6 @@ from pulsetrainer.report.style import (
     label,
     styled,
 )
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Dependence, Diagnosis, Profile
 
 _MOST_BARS = 10
 _SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side

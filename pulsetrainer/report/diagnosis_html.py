@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pulsetrainer.artefacts import Cause, Diagnosis
 from pulsetrainer.report import diagnosis_figures as figures
 from pulsetrainer.report.diagnosis_text import COLUMNS, ERRORS, answer, parameters, stands
 from pulsetrainer.report.html import page
 from pulsetrainer.report.views import Number, Picture, number, picture
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Cause, Diagnosis
 
 
 def render_diagnosis(found: Diagnosis, **header: Any) -> str:

@@ -8,11 +8,20 @@ Figure numbers are those of Carneiro, Abreu and Restivo, Sensors 2018, 18(5), 16
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec
+from typing import Any, Concatenate, ParamSpec
 
 from matplotlib.figure import Figure, FigureBase
 
-from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
+from pulsetrainer.artefacts import (
+    Diagnosis,
+    Evaluation,
+    Model,
+    Playback,
+    Run,
+    Session,
+    Waveform,
+    WaveformEvaluation,
+)
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import diagnosis_figures, heat_figures, panels, session_figures
 from pulsetrainer.report.directions import directions
@@ -27,9 +36,6 @@ from pulsetrainer.report.style import (
     label,
     styled,
 )
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import WaveformEvaluation
 
 P = ParamSpec("P")
 _ROW_IN = 4.4  # height of a figure of one column

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.report import panels
 from pulsetrainer.report.style import COLUMN_IN, COMPENSATED, GUIDE, TARGET, styled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from pulsetrainer.core.plane import FloatArray
 
 
 def temperature(axes: Axes, time_s: FloatArray, told_K: FloatArray, true_K: FloatArray | None = None) -> None:

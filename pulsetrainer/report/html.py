@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.artefacts.evaluation import PUBLISHED
 from pulsetrainer.report import views
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pulsetrainer.artefacts import Evaluation
 
 
 def page(

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pulsetrainer.report import figures, render, text
 from pulsetrainer.report.tables import ESCAPE
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 def html(artefact: Any) -> str:

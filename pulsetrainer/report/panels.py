@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import cycle
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
+from matplotlib.figure import FigureBase
 from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
 
+from pulsetrainer.artefacts import (
+    DrivePlayback,
+    Fit,
+    Model,
+    ModelEvaluation,
+    Waveform,
+    WaveformEvaluation,
+)
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.core.metrics import beats
 from pulsetrainer.report.style import (
@@ -31,25 +43,8 @@ from pulsetrainer.report.style import (
 )
 from pulsetrainer.report.thin import extremes, path
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from typing import Any
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
-    from numpy.typing import NDArray
-
-    from pulsetrainer.artefacts import (
-        DrivePlayback,
-        Fit,
-        Model,
-        ModelEvaluation,
-        Waveform,
-        WaveformEvaluation,
-    )
-
-    BoolArray = NDArray[np.bool_]
-    FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
 
 # A density is mostly small, with a ridge: the square root shows both. Lone spikes far beyond the
 # rest (the least squares make some) do not set the scale.

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pulsetrainer.artefacts import Quiz, Score, Session
 from pulsetrainer.report import session_figures
 from pulsetrainer.report.html import page
 from pulsetrainer.report.views import Number, number, picture
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Quiz, Score, Session
 
 _FIGURES = (
     ("mean_abs_error_percent", "mean absolute error", "% of full force", ".2f"),

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from pulsetrainer.artefacts import Quiz, Session
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import heat_figures, panels
 from pulsetrainer.report.style import BLUE, COLUMN_IN, INK, MEASURED, TARGET, VERMILION, label, styled
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Quiz, Session
 
 _SHOWN_S = 6.0
 

@@ -7,15 +7,13 @@ reader lose nothing. The hues are of Okabe and Ito's palette (2008). Each colour
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Final, ParamSpec, TypeVar
+from typing import Any, Final, ParamSpec, TypeVar
 
 from matplotlib import rc_context
 
 from pulsetrainer.artefacts.units import shown
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 P = ParamSpec("P")
 R = TypeVar("R")

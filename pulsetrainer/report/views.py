@@ -7,12 +7,15 @@ A number keeps its full precision in ``value`` and its dotted name in ``metric``
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
+from pulsetrainer.artefacts import Model, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import alternatives, figures, heat_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
@@ -20,14 +23,7 @@ from pulsetrainer.report.panels import largest_residual
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from matplotlib.figure import Figure
-
-    from pulsetrainer.artefacts import Model, ModelEvaluation, WaveformEvaluation
-
-    Published = Mapping[str, Mapping[str, float]]
+Published = Mapping[str, Mapping[str, float]]
 
 FORCE: Final = "% of full force"
 # per drive, in the table of a waveform: field, what it is, its unit in words

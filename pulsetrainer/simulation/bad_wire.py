@@ -7,15 +7,12 @@ byte and direction: equal bytes meet equal damage however the operating system s
 from __future__ import annotations
 
 from collections import Counter, deque
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pulsetrainer.device.transport import Transport
-    from pulsetrainer.simulation.options import Wire
+from pulsetrainer.device.transport import Transport
+from pulsetrainer.simulation.options import Wire
 
 KINDS = ("drop", "flip", "insert", "duplicate", "delay", "cut")
 _LONGEST_INSERT = 8

@@ -7,7 +7,8 @@ import difflib
 import os
 import select
 import subprocess
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.transport import SerialTransport
@@ -15,10 +16,6 @@ from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation.bad_wire import through
 from pulsetrainer.simulation.build import firmware_executable
 from pulsetrainer.simulation.options import BenchOptions, parse_bench
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 BENCH_PORT = "bench:"
 _OWN = ("ideal", "speed", "break", "wire", "wire-seed")

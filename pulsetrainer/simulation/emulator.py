@@ -13,7 +13,7 @@ import struct
 import subprocess
 import tempfile
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from pulsetrainer.device.codes import TICK_RATE_HZ
 from pulsetrainer.device.schemes import OpenPort
@@ -21,12 +21,7 @@ from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.simulation.bad_wire import through
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES, firmware_image
-from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, parse_qemu
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pulsetrainer.simulation.options import QemuOptions
+from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, QemuOptions, parse_qemu
 
 QEMU_PORT = "qemu:"
 # The line loses nothing but is slow, some 10 kB/s and less on a busy computer: a command repeated early
