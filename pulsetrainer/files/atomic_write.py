@@ -74,20 +74,17 @@ def replacing(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     target = Path(path).resolve()  # through a symbolic link, not over it
     for leftover in _leftovers(target):
         sweep(leftover)
-    temporary: Path | None = None
-    lease: Lease | None = None
     try:
         temporary, lease = _claim(target)
-        yield temporary
-        _publish(temporary, target, overwrite=overwrite)
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    finally:
-        if temporary is not None:
+        try:
+            yield temporary
+            _publish(temporary, target, overwrite=overwrite)
+        finally:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
-        if lease is not None:
             lease.end()
+    except OSError as error:
+        raise cannot_write(path, error) from error
 
 
 def _claim(target: Path) -> tuple[Path, Lease]:

@@ -39,18 +39,8 @@ def decode(
 ) -> Any:
     """Read a dataclass from a group.
 
-    Parameters
-    ----------
-    group
-        The group, or the root of a file.
-    cls
-        The dataclass expected there.
-    origin
-        The file, for messages.
-    samples
-        How many samples along the time axis of THIS group are to be trusted; ``None``: all.
-    inherited
-        The length of the time axis of the group above.
+    ``samples`` along the time axis of THIS group are to be trusted; None: all. ``inherited`` is the length of
+    the time axis of the group above.
 
     Raises
     ------
@@ -76,7 +66,6 @@ def decode(
 def _field(
     group: h5py.Group, plan: FieldPlan, origin: Origin, lengths: dict[str, int], *, trusted: int | None
 ) -> Any:
-    """Read one field of any role."""
     is_attribute = plan.role in ("attribute", "list")
     if plan.path not in (group.attrs if is_attribute else group):
         return _absent(group, plan, origin)
@@ -145,7 +134,6 @@ def _array(
 
 
 def _number(dataset: h5py.Dataset, plan: FieldPlan, origin: Origin) -> Any:
-    """Read one number."""
     where = f"dataset {dataset.name!r}"
     _check_type(dataset, plan, origin)
     if dataset.shape != ():
@@ -176,7 +164,6 @@ def _check_size(dataset: h5py.Dataset, shape: list[int], origin: Origin) -> None
 
 
 def _attribute(group: h5py.Group, plan: FieldPlan, origin: Origin) -> Any:
-    """Read one attribute, or the items of a list."""
     value = group.attrs[plan.path]
     place = "" if group.name == "/" else f" of {group.name!r}"
     where = f"the attribute {plan.path!r}{place}"
@@ -186,7 +173,6 @@ def _attribute(group: h5py.Group, plan: FieldPlan, origin: Origin) -> Any:
 
 
 def _item(value: Any, expected: type, where: str, origin: Origin) -> Any:
-    """Return a text or number of the expected type."""
     if expected is str:
         if not isinstance(value, str | bytes):
             raise origin.fault(where, f"is {value!r}, expected a text")

@@ -39,25 +39,10 @@ def values_of(artefact: Any) -> dict[str, Any]:
     return {plan.name: getattr(artefact, plan.name) for plan in plan_of(cls)}
 
 
-def encode(
-    group: h5py.Group,
-    cls: type,
-    values: Mapping[str, Any],
-    *,
-    inherited: Axes | None = None,
-) -> None:
-    """Write the fields of a dataclass into a group.
+def encode(group: h5py.Group, cls: type, values: Mapping[str, Any], *, inherited: Axes | None = None) -> None:
+    """Write the fields of a dataclass into an empty group; ``Later`` stands for an array to be filled in.
 
-    Parameters
-    ----------
-    group
-        An empty group, or the root of a file.
-    cls
-        The dataclass.
-    values
-        Its fields by name; ``Later`` for an array that the caller fills in afterwards.
-    inherited
-        The axis ``time`` of the group above, used where the dataclass has none of its own.
+    ``inherited`` is the axis ``time`` of the group above, used where the dataclass has none of its own.
 
     Raises
     ------
@@ -77,7 +62,6 @@ def encode(
 
 
 def _put(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes) -> None:
-    """Write one field of any role."""
     value = values[plan.name]
     if plan.role == "array":
         _put_array(group, plan, values, axes)
@@ -100,7 +84,6 @@ def _time_of(axes: Axes) -> Axes:
 
 
 def _put_array(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes) -> None:
-    """Write one array and attach its axes."""
     value = values[plan.name]
     is_bool = plan.type is np.bool_
     stored = np.uint8 if is_bool else plan.type
@@ -148,7 +131,6 @@ def _checked(plan: FieldPlan, array: np.ndarray[Any, Any]) -> np.ndarray[Any, An
 
 
 def _storage(array: np.ndarray[Any, Any]) -> dict[str, Any]:
-    """Return how an array lies in the file."""
     if array.nbytes <= _COMPRESS_ABOVE_BYTES:
         return {}
     chunks = (*(1 for _ in array.shape[:-1]), min(array.shape[-1], _CHUNK))
@@ -170,7 +152,6 @@ def _scale(group: h5py.Group, axes: Axes, axis: str, length: int) -> h5py.Datase
 
 
 def _put_number(group: h5py.Group, plan: FieldPlan, value: Any, values: Mapping[str, Any]) -> None:
-    """Write one number with its units."""
     number = np.asarray(plan.type(value))
     if plan.data is not None and plan.data.finite and not np.isfinite(number):
         raise DataError(
@@ -194,7 +175,6 @@ def _describe(dataset: h5py.Dataset, plan: FieldPlan, values: Mapping[str, Any])
 
 
 def _attribute(plan: FieldPlan, value: Any) -> Any:
-    """Return the value as an HDF5 attribute takes it."""
     if plan.type is str:
         return clean(value)
     if plan.type is bool:
@@ -203,7 +183,6 @@ def _attribute(plan: FieldPlan, value: Any) -> Any:
 
 
 def _put_list(group: h5py.Group, plan: FieldPlan, value: Any) -> None:
-    """Write a tuple of texts or numbers as one attribute."""
     items = [_attribute(plan, item) for item in value]
     if plan.type is str:
         items_array = np.array(items, dtype=object)

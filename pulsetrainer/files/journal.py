@@ -34,6 +34,7 @@ from pulsetrainer.files.provenance import Header, Provenance
 from pulsetrainer.files.session_journal import session_of
 
 COLUMNS = ("time_s", "reference", "input", "output")
+PIECE = 1 << 16  # samples at a time, where not all are to be in memory
 GOAL, BEAT = b"GOAL", b"BEAT"
 _HEAD = struct.Struct("<4sQQII")
 _LARGEST = 1 << 32  # bytes of a block; a batch of samples has some thousands
@@ -54,6 +55,11 @@ class Block:
         if self.tag in (b"HEAD", GOAL, BEAT):
             return np.zeros((len(COLUMNS), 0))
         return np.frombuffer(self.content, dtype="<f8").reshape(len(COLUMNS), -1)
+
+    @property
+    def targets(self) -> FloatArray:
+        """Targets (n,) of the samples before; none but in a GOAL."""
+        return np.frombuffer(self.content if self.tag == GOAL else b"", dtype="<f8")
 
 
 class Journal:
@@ -174,8 +180,7 @@ class Recording:
         header, texts = _described(path, heads[-1])
         columns = np.concatenate([block.samples for block in found], axis=1)
         if said := [block.content for block in found if block.tag == BEAT]:
-            goals = [np.frombuffer(block.content, dtype="<f8") for block in found if block.tag == GOAL]
-            session = session_of(path, columns, np.concatenate([np.zeros(0), *goals]), said)
+            session = session_of(path, columns, np.concatenate([block.targets for block in found]), said)
             return cls(header, session, found[-1].end)
         arrays: dict[str, Any] = dict(zip(COLUMNS, columns, strict=True))
         seam, dropped = _seam(found, columns.shape[1]), found[-1].dropped

@@ -98,7 +98,7 @@ class Provenance:
     version: str = __version__
     program: str = PROGRAM
     argv: tuple[str, ...] = ()  # the words after the program's name
-    parameters: Mapping[str, Any] = field(default_factory=dict)  # the effective values
+    parameters: Mapping[str, Any] = field(default_factory=dict)  # effective: defaults and files included
     seed: int | None = None
     inputs: Mapping[str, str] = field(default_factory=dict)  # name as the user gave it: sha256
     libraries: Mapping[str, str] = field(default_factory=dict)
@@ -174,24 +174,8 @@ def make_header(
 ) -> Header:
     """Return the header of a new artefact.
 
-    Parameters
-    ----------
-    title
-        One line for a person.
-    argv
-        The words after the program's name (``sys.argv[1:]``).
-    now
-        The time of making, with its time zone.
-    parameters, seed
-        Effective values, those from defaults and files included.
-    inputs
-        Names as given on the command line, with their sha256: see ``digests``.
-    ancestors
-        Headers of the artefacts this one was made from; their histories are taken over.
-    device
-        Who measured.
-    libraries
-        Versions: see ``library_versions``.
+    The time is that of making, with its time zone; ``ancestors`` are the headers of the artefacts that this
+    one was made from, whose histories are taken over; the rest is as in ``Provenance``.
 
     Raises
     ------

@@ -12,7 +12,7 @@ import os
 import re
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import h5py
 import numpy as np
@@ -26,33 +26,21 @@ from pulsetrainer.files.atomic_write import cannot_write, check_output
 from pulsetrainer.files.encode import Later
 from pulsetrainer.files.file_lock import Lease, create_locked, is_abandoned, sweep
 from pulsetrainer.files.input_file import is_journal
-from pulsetrainer.files.journal import COLUMNS, Journal, Recording
+from pulsetrainer.files.journal import COLUMNS, PIECE, Block, Journal, Recording
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.schema import plan_of
 
 _RESERVE_BYTES = 1 << 20  # beside the samples: for the texts and for HDF5's own structures
 _BYTES_PER_SAMPLE = 8 * len(COLUMNS) + 1  # and the seam
-_COPIED_SAMPLES = 1 << 16  # at a time
 
 
 class RunRecorder:
     """Writes a run batch by batch; use it in a ``with`` block.
 
     A block that ends well finishes the run as complete, one that ends with an exception (Ctrl-C too) keeps
-    what was recorded as ``complete=False``; if nothing was recorded, nothing is left behind.
-
-    Parameters
-    ----------
-    path
-        The final name.
-    header
-        What the artefact says about itself.
-    overwrite
-        Replace an existing file.
-    input_unit, output_unit, input_quantity, output_quantity, signal
-        As in ``Run``.
-    earlier
-        A recording that was cut off, and its file: a journal goes on, an artefact is copied.
+    what was recorded as ``complete=False``; if nothing was recorded, nothing is left behind. Units,
+    quantities and ``signal`` are those of the run. ``earlier`` is a recording that was cut off, with its
+    file: a journal goes on, an artefact is copied.
 
     Raises
     ------
@@ -61,6 +49,10 @@ class RunRecorder:
     DataError
         The disk is full or failed.
     """
+
+    _kind: ClassVar[type] = Run
+    _columns: ClassVar[tuple[str, ...]] = COLUMNS
+    _ends_a_piece: ClassVar[tuple[bytes, ...]] = (b"DATA", b"PART")
 
     def __init__(
         self,
@@ -160,8 +152,8 @@ class RunRecorder:
             self.begin_part()
             if copied:
                 arrays = [getattr(part, name) for name in COLUMNS]
-                for start in range(0, part.input.size, _COPIED_SAMPLES):
-                    self.append(*(array[start : start + _COPIED_SAMPLES] for array in arrays))
+                for start in range(0, part.input.size, PIECE):
+                    self.append(*(array[start : start + PIECE] for array in arrays))
             else:
                 self._samples += part.input.size
         self._last_time = float(run.time_s[-1])
@@ -202,14 +194,7 @@ class RunRecorder:
             )
 
     def finish(self, *, complete: bool = True, dropped_samples: int | None = None) -> Path:
-        """Give the run its final name and return it.
-
-        Parameters
-        ----------
-        complete
-            Whether everything that was asked for was recorded.
-        dropped_samples
-            How many samples were lost on the wire; default: the attribute ``dropped_samples``.
+        """Give the run its final name and return it; ``complete``: all that was asked for was recorded.
 
         Raises
         ------
@@ -244,26 +229,38 @@ class RunRecorder:
 
     def _convert(self) -> None:
         """Write the journal as an artefact, piece by piece."""
+        values = {plan.name: plan.default for plan in plan_of(self._kind)} | self._known_fields()
+        values |= dict.fromkeys(self._columns, Later(self._samples))
+        values |= {"complete": self._complete, "dropped_samples": self.dropped_samples}
+        store.write_fields(
+            self._final, self._kind, values, self._header, overwrite=self._overwrite, fill=self._fill
+        )
+
+    def _known_fields(self) -> dict[str, Any]:
+        """Return the fields of the artefact that are no columns."""
         seam = np.zeros(self._samples, dtype=np.bool_)
         starts = [start for start in self._seams if start < self._samples]
         seam[starts] = True
-        values: dict[str, Any] = dict.fromkeys(COLUMNS, Later(self._samples)) | self._texts
-        values |= {"complete": self._complete, "dropped_samples": self.dropped_samples}
-        values["seam"] = seam if starts else None
-        values |= {"masked": None, "corrected": (), "coil": self.coil}
-        store.write_fields(self._final, Run, values, self._header, overwrite=self._overwrite, fill=self._fill)
+        return {**self._texts, "seam": seam if starts else None, "coil": self.coil}
 
     def _fill(self, file: h5py.File) -> None:
-        paths = {plan.name: plan.path for plan in plan_of(Run)}
-        start, kept = 0, []
+        start, count, kept = 0, 0, list[Block]()
         for block in itertools.chain(journal.blocks(self.partial), [None]):
             if block is not None:
-                kept.append(block.samples)
-            count = sum(samples.shape[1] for samples in kept)
-            if kept and (block is None or count >= _COPIED_SAMPLES):
-                for name, values in zip(COLUMNS, np.concatenate(kept, axis=1), strict=True):
-                    file[paths[name]][start : start + count] = values
-                start, kept = start + count, []
+                kept.append(block)
+                count += block.samples.shape[1]
+            if count and (block is None or (count >= PIECE and block.tag in self._ends_a_piece)):
+                self._copy(file, start, self._rows(kept))
+                start, count, kept = start + count, 0, []
+
+    def _copy(self, file: h5py.File, start: int, rows: FloatArray) -> None:
+        paths = {plan.name: plan.path for plan in plan_of(self._kind)}
+        for name, values in zip(self._columns, rows, strict=True):
+            file[paths[name]][start : start + values.size] = values
+
+    def _rows(self, blocks: list[Block]) -> FloatArray:
+        """Return the columns (c, n) in some blocks."""
+        return np.concatenate([block.samples for block in blocks], axis=1)
 
     def __enter__(self) -> Self:
         return self

@@ -47,12 +47,10 @@ def _heading(quantity: str, unit: str) -> str:
 
 
 def _text(artefact: Any, text: str) -> str:
-    """A unit or a quantity, which may be that of another field."""
     return str(getattr(artefact, text[1:])) if text.startswith("@") else text
 
 
 def _column(artefact: Any, plan: FieldPlan, values: FloatArray, before: str = "") -> tuple[str, FloatArray]:
-    """Heading and numbers of a field."""
     assert plan.data is not None
     quantity = TIME if plan.is_time_axis else _text(artefact, plan.data.quantity)
     heading = _heading(before + quantity, _text(artefact, plan.data.units))
@@ -60,7 +58,6 @@ def _column(artefact: Any, plan: FieldPlan, values: FloatArray, before: str = ""
 
 
 def _along_time(artefact: Any, before: str = "") -> list[tuple[str, FloatArray]]:
-    """Every array of an artefact that lies along time."""
     kind: type = type(artefact)
     return [
         _column(artefact, plan, getattr(artefact, plan.name), "" if plan.is_time_axis else before)

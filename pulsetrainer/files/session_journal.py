@@ -18,9 +18,7 @@ from pulsetrainer.artefacts import Beats, FloatArray, Quiz, Session
 from pulsetrainer.errors import DamagedFileError
 
 CUT_OFF = "the record ends before the session does: it was cut off, or is still going on"
-_BEAT = (
-    "start_s", "interval_s", "pulse", "amplitude", "gain", "late", "mean_error", "max_error",
-)  # fmt: skip
+_BEAT = ("start_s", "interval_s", "pulse", "amplitude", "gain", "late", "mean_error", "max_error")
 _WINDOW = ("temperature_s", "temperature_K")
 
 
@@ -47,17 +45,10 @@ def _array(values: FloatArray | None) -> FloatArray:
 
 
 def session_of(path: Path, columns: FloatArray, target: FloatArray, blocks: Sequence[bytes]) -> Session:
-    """Return the session in a journal, not complete.
+    """Return the session in a journal, not complete, from what ``SessionWriter`` gave.
 
-    Parameters
-    ----------
-    path
-        Of the journal.
-    columns, target
-        Time, reference, input and output (4, n), and the targets (m,) of the first m samples: the others were
-        cut off.
-    blocks
-        What ``SessionWriter`` gave, at least one.
+    ``columns`` are time, reference, input and output (4, n), ``target`` (m,) is that of the first m samples:
+    the others were cut off.
 
     Raises
     ------

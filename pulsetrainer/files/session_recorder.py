@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from typing import Any
 
-import h5py
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Session
 from pulsetrainer.errors import DataError
-from pulsetrainer.files import journal, store
 from pulsetrainer.files.atomic_write import cannot_write
-from pulsetrainer.files.encode import Later
+from pulsetrainer.files.journal import BEAT, COLUMNS, GOAL, Block
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.recorder import RunRecorder
-from pulsetrainer.files.schema import plan_of
 from pulsetrainer.files.session_journal import CUT_OFF, SessionWriter
-
-_COLUMNS = ("time_s", "reference", "input", "output")  # as a run's
-_COPIED_SAMPLES = 1 << 16  # at a time
 
 
 class SessionRecorder(RunRecorder):
@@ -28,6 +21,10 @@ class SessionRecorder(RunRecorder):
 
     ``judge`` comes before the first samples. Parameters, use and errors are those of ``RunRecorder``.
     """
+
+    _kind = Session
+    _columns = (*COLUMNS, "target")
+    _ends_a_piece = (GOAL,)
 
     def __init__(self, *args: Any, **options: Any) -> None:
         self._fields: Mapping[str, Any] = {}
@@ -51,7 +48,7 @@ class SessionRecorder(RunRecorder):
             As ``append``.
         """
         self.append(time_s, reference, current, force)
-        self._add(journal.GOAL, np.asarray(target, dtype="<f8").tobytes())
+        self._add(GOAL, np.asarray(target, dtype="<f8").tobytes())
 
     def judge(self, fields: Mapping[str, Any]) -> None:
         """Take in what the session amounts to so far: its fields that are no samples.
@@ -61,7 +58,7 @@ class SessionRecorder(RunRecorder):
         DataError
             The disk is full or failed.
         """
-        self._add(journal.BEAT, self._writer.block(fields))
+        self._add(BEAT, self._writer.block(fields))
         self._fields = {**fields, "fault": CUT_OFF}
 
     def keep(self, fields: Mapping[str, Any], header: Header) -> None:
@@ -74,31 +71,11 @@ class SessionRecorder(RunRecorder):
         except OSError as error:
             raise cannot_write(self.partial, error) from error
 
-    def _convert(self) -> None:
-        samples = dict.fromkeys((*_COLUMNS, "target"), Later(self._samples))
-        defaults = {plan.name: plan.default for plan in plan_of(Session)}
-        ending = {"complete": self._complete, "dropped_samples": self.dropped_samples}
-        values = {**defaults, **self._fields, **samples, **ending}
-        store.write_fields(
-            self._final, Session, values, self._header, overwrite=self._overwrite, fill=self._fill_session
-        )
+    def _known_fields(self) -> dict[str, Any]:
+        return dict(self._fields)
 
-    def _fill_session(self, file: h5py.File) -> None:
-        paths = {plan.name: plan.path for plan in plan_of(Session)}
-        start, kept, goals = 0, [np.zeros((len(_COLUMNS), 0))], [np.zeros(0)]
-        for block in itertools.chain(journal.blocks(self.partial), [None]):
-            if block is not None and block.tag == journal.GOAL:
-                goals.append(np.frombuffer(block.content, dtype="<f8"))
-            elif block is not None:
-                kept.append(block.samples)
-            count = sum(part.shape[1] for part in kept)
-            complete = block is None or (block.tag == journal.GOAL and count >= _COPIED_SAMPLES)
-            if not complete or count == 0:
-                continue
-            goal = np.concatenate(goals)
-            if goal.size != count:
-                raise DataError(f"{self.partial} lacks the last targets", hint="it can be read as it is")
-            for name, values in zip(_COLUMNS, np.concatenate(kept, axis=1), strict=True):
-                file[paths[name]][start : start + count] = values
-            file[paths["target"]][start : start + count] = goal
-            start, kept, goals = start + count, kept[:1], goals[:1]
+    def _rows(self, blocks: list[Block]) -> FloatArray:
+        samples, targets = super()._rows(blocks), np.concatenate([block.targets for block in blocks])
+        if targets.size != samples.shape[1]:
+            raise DataError(f"{self.partial} lacks the last targets", hint="it can be read as it is")
+        return np.vstack((samples, targets))

@@ -115,7 +115,6 @@ def _leaves(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
 
 
 def _value(path: Path, key: str, value: Any) -> Any:
-    """Return a value of the type its key asks for."""
     known = {setting.key: setting for setting in SETTINGS}
     if key not in known:
         import difflib  # noqa: PLC0415 - needed by a mistake only

@@ -91,7 +91,6 @@ def _samples(cls: type, values: Mapping[str, Any]) -> int | None:
 
 
 def _write_root(file: h5py.File, cls: type, header: Header, *, samples: int | None) -> None:
-    """Write the attributes that every kind has."""
     texts = {
         "kind": kind_of(cls),
         "title": clean(header.title),

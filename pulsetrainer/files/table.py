@@ -163,11 +163,8 @@ def numbered(names: Sequence[str]) -> tuple[str, ...]:
 def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None = None) -> Table:
     """Read a table of numbers, a text of any size piece by piece.
 
-    Parameters
-    ----------
-    keep
-        Gets the table without its numbers and returns the places of the columns that are to stay in memory;
-        all by default.
+    ``keep`` gets the table without its numbers and returns the places of the columns that are to stay in
+    memory; all by default.
 
     Raises
     ------
@@ -198,7 +195,6 @@ def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None
 
 
 def _head(path: Path, dialect: Dialect) -> Table:
-    """Return the table of a text without its numbers."""
     return Table(
         path,
         dialect.names,
@@ -213,7 +209,6 @@ def _head(path: Path, dialect: Dialect) -> Table:
 
 
 def _only(table: Table, keep: Callable[[Table], Collection[int]] | None) -> Table:
-    """Return a table with no other columns than these."""
     if keep is None:
         return table
     return replace(
@@ -222,7 +217,6 @@ def _only(table: Table, keep: Callable[[Table], Collection[int]] | None) -> Tabl
 
 
 def _of_arrays(path: Path, columns: Columns) -> Table:
-    """Return the table of a file that is no text."""
     names = tuple(columns.values)
     units = {name: symbol_of(columns.units.get(name) or split_unit(name)[1]) for name in names}
     named = {name: unit for name, unit in units.items() if unit}
