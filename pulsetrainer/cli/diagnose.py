@@ -61,7 +61,6 @@ def diagnose(
 
 
 def _commands(found: Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:
-    """Return the commands that do what the verdict asks for."""
     if found.next_command == "extend":
         words = [["extend", out, "--model", model, "-o", "extended.h5"]]
     elif found.next_command == "correct":
@@ -83,7 +82,6 @@ def show_diagnosis(screen: Screen, found: Diagnosis) -> None:
 
 
 def _payload(found: Diagnosis) -> dict[str, Any]:
-    """Return the contract's JSON object."""
     errors = (
         "rms", "rms_percent", "noise_percent", "extended_rms_percent",
         "static_percent", "extended_percent", "floor_percent",

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from pulsetrainer.cli.live import Live, letters, why_not
+from pulsetrainer.cli.live import LETTERS, Live, why_not
 from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.errors import UsageError
 from pulsetrainer.steps.quiz import Blind
@@ -48,10 +48,7 @@ class Hands:
     ) -> Steered:
         """Put screen and keys around who decides, where there is a terminal.
 
-        Raises
-        ------
-        UsageError
-            A quiz is to be answered by key, and there is none.
+        UsageError where a quiz is to be answered by key, and there is none.
         """
         dark = "a result in JSON has no live view" if screen.as_json else why_not()
         if isinstance(chosen, Blind):
@@ -74,7 +71,7 @@ class Hands:
         steering = Steering(quiz, [])
 
         def press(key: str, at_s: float) -> None:
-            choices = letters()[: len(self.names)]
+            choices = LETTERS[: len(self.names)]
             if key in choices:
                 self._answers[:] = [(self.names[choices.index(key)], at_s)]
             elif key == "Q":

@@ -131,7 +131,6 @@ def _show(
 
 
 def _facts(imported: Imported) -> dict[str, Any]:
-    """Return the main figures in the order in which a person would ask."""
     from pulsetrainer.artefacts.units import with_unit
     from pulsetrainer.report.facts import minor_words, run_facts
 

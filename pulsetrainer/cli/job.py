@@ -86,13 +86,7 @@ class Job:
         self.seconds = time.perf_counter() - begun
 
     def open_device(self, port: str | None, limits: Limits | None = None) -> Device:
-        """Open a device with the gains that the file of settings has for it.
-
-        Raises
-        ------
-        UsageError, ArgumentError, DeviceError
-            As ``api.open_device``.
-        """
+        """Open a device, as ``api.open_device``, with the gains that the file of settings has for it."""
         from pulsetrainer.api import open_device
         from pulsetrainer.device.gains import DELIVERED
 
@@ -120,24 +114,12 @@ class Job:
         return None
 
     def load(self, path: Path, kind: type[K]) -> K:
-        """Return the artefact of this kind in an input file.
-
-        Raises
-        ------
-        DataError
-            The file cannot be read, or holds another kind.
-        """
+        """Return the artefact of this kind in an input file; raises as ``store.read``."""
         noun: K = self.load_any(path, kind)
         return noun
 
     def load_any(self, path: Path, *kinds: type) -> Any:
-        """Return the artefact in an input file, of any of these kinds; no kind named: of whatever kind.
-
-        Raises
-        ------
-        DataError
-            As ``load``.
-        """
+        """Return the artefact in an input file, of any of these kinds; no kind named: of whatever kind."""
         from pulsetrainer.files import store
 
         self._artefacts.append(path)

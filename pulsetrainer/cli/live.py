@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import string
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -24,19 +25,14 @@ SMALLEST = (50, 10)  # columns and lines
 _ROWS = 5  # of the trace
 _SHOWN_S = 3.0
 _DRAWN_EACH_S = 0.08
+LETTERS = string.ascii_lowercase  # the keys that answer, in the order of the choices
 
 
 class Live:
     """Shows a session and takes keys, called with each piece of telemetry.
 
-    Parameters
-    ----------
-    press
-        Gets every key, with the time of the session in s.
-    names
-        Of the pulses.
-    blind
-        In a quiz: the choices are shown, and nothing of the pulse.
+    ``press`` gets every key, with the time of the session in s. ``blind``, in a quiz: the choices are shown,
+    and nothing of the pulse.
     """
 
     def __init__(self, press: Callable[[str, float], None], names: Sequence[str], *, blind: bool) -> None:
@@ -64,7 +60,7 @@ class Live:
         from rich.text import Text
 
         if self._blind:
-            choices = "  ".join(f"{letter} {name}" for letter, name in zip(letters(), self._names))  # noqa: B905
+            choices = "  ".join(f"{letter} {name}" for letter, name in zip(LETTERS, self._names))  # noqa: B905
             return Text(f"{self.status()}\n{choices}")
         width = max(os.get_terminal_size(sys.stderr.fileno()).columns - 2, 20)
         force = np.concatenate([force for _, force in self._traces])
@@ -96,11 +92,6 @@ class Live:
                 yield
         finally:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
-
-
-def letters() -> str:
-    """Return the keys that answer, in the order of the choices."""
-    return "abcdefghijklmnopqrstuvwxyz"
 
 
 def why_not() -> str:

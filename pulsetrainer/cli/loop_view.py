@@ -27,10 +27,7 @@ _DRAWN_EACH_S = 0.3  # of the wall clock: a drawing takes 3 ms, so a hundredth o
 class LoopView:
     """Takes samples, and shows the loop that they make with one line of figures below it.
 
-    Parameters
-    ----------
-    current_A, force_N
-        Upper ends of the two axes, which begin at 0; what is beyond them is drawn on the edge.
+    Its axes go from 0 to ``current_A`` and ``force_N``; what is beyond them is drawn on the edge.
     """
 
     def __init__(self, current_A: float, force_N: float = FULL_SCALE_N) -> None:

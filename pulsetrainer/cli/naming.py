@@ -65,7 +65,6 @@ class Command(TyperCommand):
 
 
 def _given_as(context: typer.Context, path: Path) -> Any:
-    """Return the parameter that a file was given as."""
     for parameter in context.command.params:
         value = context.params.get(parameter.name or "")
         given = value if isinstance(value, list | tuple) else (value,)

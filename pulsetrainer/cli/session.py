@@ -152,7 +152,6 @@ def _press(
     seed: int,
     by_key: bool,
 ) -> None:
-    """Press, record, save and say."""
     from pulsetrainer.cli.score import tell
     from pulsetrainer.files.pulses import read_pulse
     from pulsetrainer.files.session_recorder import SessionRecorder

@@ -137,13 +137,7 @@ class Device:
         return tells_duty(self._hello)
 
     def needs_duty(self, what: str) -> None:
-        """Refuse what cannot be done without knowing the duty.
-
-        Raises
-        ------
-        DeviceError
-            The device's firmware is from before it told the duty.
-        """
+        """Raise DeviceError where the firmware is from before it told the duty, which is needed here."""
         if not self.tells_duty:
             raise DeviceError(
                 f"{what} needs the duty of the coil's voltage; the device's firmware {self.info.firmware} "
@@ -218,13 +212,7 @@ class Device:
         self._gains = gains
 
     def lower(self, limits: Limits) -> None:
-        """Put limits in force that are stricter than the device's own.
-
-        Raises
-        ------
-        ArgumentError
-            if a limit is not positive, or above the device's own.
-        """
+        """Put limits in force that are stricter than the device's own; raises as ``Limits.within``."""
         current_A, force_N = limits.within(self.info.current_limit_A, self.info.force_limit_N)
         if limits.current_A is not None:
             self.set_parameter("current_limit", round(current_A / codes.CURRENT_UNIT_A))

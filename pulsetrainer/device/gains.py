@@ -36,13 +36,7 @@ class Gains:
 
     @classmethod
     def of(cls, values: Mapping[str, int]) -> Self:
-        """Return the gains among some values by name.
-
-        Raises
-        ------
-        ArgumentError
-            One is missing or out of its range.
-        """
+        """Return the gains among some values by name; ArgumentError where one is missing or out of range."""
         names = [field.name for field in fields(cls)]
         missing = [name for name in names if name not in values]
         if missing:

@@ -73,13 +73,7 @@ def checked_wire(
 
 
 def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str) -> None:
-    """Refuse a reference (n,) in A that goes beyond the limit in force, and say what would mend it.
-
-    Raises
-    ------
-    ArgumentError
-        It does.
-    """
+    """Raise ArgumentError where a reference (n,) in A goes beyond the limit in force."""
     peak = float(np.max(reference_A, initial=0.0))
     if peak > limit_A + codes.CURRENT_UNIT_A / 2:
         raise ArgumentError(

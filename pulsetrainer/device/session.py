@@ -230,10 +230,7 @@ class Session:
 def _parsed(kind: type[Message], payload: bytes) -> Message:
     """Return the message; a greeting of another major version by its first fields, whatever follows them.
 
-    Raises
-    ------
-    ValueError
-        if the payload has not the length of its kind.
+    ValueError where the payload has not the length of its kind.
     """
     size = kind.layout().size
     if kind is HelloReply and len(payload) >= _GREETING_AT_LEAST and len(payload) != size:

@@ -54,13 +54,7 @@ def _change(
 
 
 def read_answers(path: Path) -> list[str]:
-    """Return the answers of a quiz, one pulse name a line; empty lines do not count.
-
-    Raises
-    ------
-    DataError
-        The file cannot be read.
-    """
+    """Return the answers of a quiz, one pulse name a line, or raise DataError; empty lines do not count."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeError) as error:

@@ -21,13 +21,7 @@ _BLOCK = 1 << 20
 
 
 def append_checksum(path: Path) -> None:
-    """Append its checksum to a file that is complete.
-
-    Raises
-    ------
-    OSError
-        The disk is full or failed.
-    """
+    """Append its checksum to a file that is complete; OSError where the disk is full or failed."""
     crc = _crc(path, path.stat().st_size)
     with path.open("ab") as stream:
         stream.write(_FORMAT % crc)

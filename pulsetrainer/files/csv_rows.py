@@ -102,13 +102,7 @@ class _Reader:
         self.line = self.dialect.first_line
 
     def read(self, text: str) -> FloatArray:
-        """Return the rows (n, columns) of the next piece.
-
-        Raises
-        ------
-        DataError
-            See ``parse``.
-        """
+        """Return the rows (n, columns) of the next piece; raises as ``parse``."""
         found = text.removesuffix("\n").split("\n")
         values = self._at_once(found, range(self.line, self.line + len(found)))
         if values is not None:

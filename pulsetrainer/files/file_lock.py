@@ -49,10 +49,7 @@ class Lease:
 def create_locked(path: Path) -> Lease | None:
     """Create an empty file with a lease on it; None where another process swept it away in between.
 
-    Raises
-    ------
-    OSError
-        It exists already, or cannot be created.
+    OSError where it exists already, or cannot be created.
     """
     path.open("xb").close()
     with contextlib.suppress(FileNotFoundError):

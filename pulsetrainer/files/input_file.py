@@ -44,13 +44,7 @@ def check_artefact(path: Path | str) -> None:
 
 
 def is_journal(path: Path | str) -> bool:
-    """Whether a file is a recording under way, or one that was cut off.
-
-    Raises
-    ------
-    DataError
-        As ``check_file``.
-    """
+    """Whether a file is a recording under way, or one that was cut off; raises as ``check_file``."""
     return _first_bytes(Path(path)) == JOURNAL
 
 
@@ -119,13 +113,7 @@ def _likely_kind(path: Path) -> str:
 
 
 def check_resumable(path: Path) -> None:
-    """Refuse to resume a recording into ``path`` of which nothing is there.
-
-    Raises
-    ------
-    UsageError
-        Neither the output nor what a killed program leaves beside it is there.
-    """
+    """Raise UsageError where of a recording into ``path`` nothing is there, nor beside it, to be resumed."""
     if not path.exists() and not any(path.parent.glob(f"{path.name}.partial*")):
         raise UsageError(
             f"there is nothing to resume: neither {path} nor {path.name}.partial exists",
@@ -139,10 +127,7 @@ _NAME = "{name}"  # in an output: one for each file
 def outputs_of(files: list[Path], out: Path) -> dict[Path, tuple[Path, ...]]:
     """Return the files that are read into each output: all into one, or each into its own.
 
-    Raises
-    ------
-    UsageError
-        Two files would be written to one output.
+    UsageError where two files would be written to one output.
     """
     if _NAME not in str(out):
         return {out: tuple(files)}

@@ -65,10 +65,7 @@ class Block:
 class Journal:
     """A journal that is being written; ``at`` is the end of its last whole block.
 
-    Raises
-    ------
-    OSError
-        The file cannot be opened.
+    Its methods raise OSError where the file cannot be opened, or the disk is full or failed.
     """
 
     def __init__(self, path: Path, at: int = 0) -> None:
@@ -79,23 +76,11 @@ class Journal:
             self._write(JOURNAL)
 
     def describe(self, header: Header, texts: Mapping[str, str]) -> None:
-        """Say what is recorded.
-
-        Raises
-        ------
-        OSError
-            The disk is full or failed.
-        """
+        """Say what is recorded."""
         self.append(b"HEAD", json.dumps({"header": asdict(header), "run": dict(texts)}).encode())
 
     def append(self, tag: bytes, content: bytes, dropped: int = 0) -> None:
-        """Append one block.
-
-        Raises
-        ------
-        OSError
-            The disk is full or failed; the journal is as it was before.
-        """
+        """Append one block; where that fails the journal is as it was before."""
         head = _HEAD.pack(tag, dropped, len(content), zlib.crc32(content), 0)[:-4]
         self._write(head + struct.pack("<I", zlib.crc32(head)) + content)
 

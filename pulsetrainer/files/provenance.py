@@ -122,13 +122,7 @@ class Provenance:
 
     @classmethod
     def from_json(cls, text: str) -> Provenance:
-        """Return the provenance that ``to_json`` wrote.
-
-        Raises
-        ------
-        DataError
-            The text is not such an object.
-        """
+        """Return the provenance that ``to_json`` wrote; DataError where the text is something else."""
         try:
             fields = json.loads(text)
             maps = (fields.get(name, {}) for name in ("parameters", "inputs", "libraries"))
@@ -209,13 +203,7 @@ def library_versions() -> dict[str, str]:
 
 
 def sha256_of(path: Path | str) -> str:
-    """Return the sha256 of a file as hexadecimal text, read in blocks.
-
-    Raises
-    ------
-    DataError
-        The file cannot be read.
-    """
+    """Return the sha256 of a file as hexadecimal text, read in blocks; DataError where it cannot be read."""
     digest = hashlib.sha256()
     try:
         with Path(path).open("rb") as stream:
@@ -227,11 +215,5 @@ def sha256_of(path: Path | str) -> str:
 
 
 def digests(paths: Iterable[Path | str]) -> dict[str, str]:
-    """Return the sha256 of each file under the name the user gave it.
-
-    Raises
-    ------
-    DataError
-        A file cannot be read.
-    """
+    """Return the sha256 of each file under the name the user gave it; raises as ``sha256_of``."""
     return {str(path): sha256_of(path) for path in paths}

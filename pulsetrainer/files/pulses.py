@@ -45,10 +45,7 @@ def pulse_file(name: str) -> Path:
 def read_pulse(name: str) -> Shape:
     """Return a pulse of the library, or out of a table whose first two columns are time and value.
 
-    Raises
-    ------
-    UsageError, DataError
-        As ``pulse_file``; or the table cannot be used.
+    Raises as ``pulse_file``, and DataError where the table cannot be used.
     """
     from pulsetrainer.core.pulses import Shape  # noqa: PLC0415 - so that a mistyped name is answered at once
     from pulsetrainer.files.signal_table import first_two  # noqa: PLC0415

@@ -29,13 +29,7 @@ class Earlier:
     contains_final: bool  # what has the final name is the beginning of this recording
 
     def check_device(self, serial: str) -> None:
-        """Refuse to go on with a recording on another device.
-
-        Raises
-        ------
-        DeviceError
-            It was recorded on the device of another serial number.
-        """
+        """Raise DeviceError where it was recorded on the device of another serial number."""
         recorded = self.header.provenance.device
         if recorded is not None and recorded.serial != serial:
             raise DeviceError(

@@ -22,10 +22,7 @@ Columns = dict[str, FloatArray]
 def series_of(artefact: Any) -> Columns:
     """Return the columns (n,) of an artefact by their headings; a repeated heading gets a number.
 
-    Raises
-    ------
-    DataError
-        The artefact holds no series.
+    DataError where the artefact holds no series.
     """
     if isinstance(artefact, Model):
         found = _cells(artefact)

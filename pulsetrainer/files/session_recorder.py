@@ -40,24 +40,12 @@ class SessionRecorder(RunRecorder):
         force: FloatArray,
         /,
     ) -> None:
-        """Append a batch, arrays (n,) in s, N, A, A and N; when this returns, it survives the program.
-
-        Raises
-        ------
-        ArgumentError, DataError
-            As ``append``.
-        """
+        """Append a batch, arrays (n,) in s, N, A, A and N, as ``append`` does: it survives the program."""
         self.append(time_s, reference, current, force)
         self._add(GOAL, np.asarray(target, dtype="<f8").tobytes())
 
     def judge(self, fields: Mapping[str, Any]) -> None:
-        """Take in what the session amounts to so far: its fields that are no samples.
-
-        Raises
-        ------
-        DataError
-            The disk is full or failed.
-        """
+        """Take in what the session amounts to so far, its fields that are no samples; fails as ``append``."""
         self._add(BEAT, self._writer.block(fields))
         self._fields = {**fields, "fault": CUT_OFF}
 

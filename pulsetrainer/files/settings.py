@@ -53,13 +53,7 @@ SETTINGS = (
 
 
 def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
-    """Return the file of settings that counts, or None.
-
-    Raises
-    ------
-    UsageError
-        A file was named that is not there.
-    """
+    """Return the file of settings that counts, or None; UsageError where one is named that is not there."""
     chosen = named or environment.get(VARIABLE)
     if chosen:
         if not Path(chosen).is_file():
@@ -77,13 +71,7 @@ def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
 
 
 def read_toml(path: Path | str) -> dict[str, Any]:
-    """Return the content of a file of settings.
-
-    Raises
-    ------
-    UsageError
-        The file cannot be read, or is no TOML.
-    """
+    """Return the content of a file of settings; UsageError where it cannot be read, or is no TOML."""
     import tomllib  # noqa: PLC0415 - most benches have no such file
 
     try:

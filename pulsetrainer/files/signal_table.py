@@ -65,13 +65,7 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
 
 
 def first_two(path: Path, what: str, *, names: str) -> tuple[Table, FloatArray, FloatArray]:
-    """Return a table, its first column as seconds (n,), and its second one (n,).
-
-    Raises
-    ------
-    DataError
-        The table cannot be used.
-    """
+    """Return a table, its first column as seconds (n,), and its second one (n,); raises as ``read_table``."""
     from pulsetrainer.files.run_from_table import seconds  # noqa: PLC0415
     from pulsetrainer.files.table import read_table  # noqa: PLC0415
 

@@ -59,13 +59,7 @@ def write_fields(
     overwrite: bool,
     fill: Callable[[h5py.File], None] = lambda _file: None,
 ) -> None:
-    """Write the fields of an artefact by name; ``fill`` writes those that are ``Later``.
-
-    Raises
-    ------
-    UsageError, DataError
-        As ``write``.
-    """
+    """Write the fields of an artefact by name, as ``write``; ``fill`` writes those that are ``Later``."""
     with replacing(path, overwrite=overwrite) as temporary:
         try:
             with UnfailingFile(temporary) as stream:
@@ -118,13 +112,7 @@ def read(path: Path | str, kind: type[K]) -> K:
 
 
 def read_one_of(path: Path | str, *kinds: type) -> Any:
-    """Read an artefact of any of these kinds.
-
-    Raises
-    ------
-    DataError
-        As ``read``.
-    """
+    """Read an artefact of any of these kinds; raises as ``read``."""
     expected = [kind_of(kind) for kind in kinds]
     recording = _recording(path)
     if recording is not None and type(recording.artefact) in kinds:
@@ -153,13 +141,7 @@ def read_any(path: Path | str) -> Any:
 
 
 def read_header(path: Path | str) -> Header:
-    """Read what an artefact says about itself.
-
-    Raises
-    ------
-    DataError
-        As ``read_any``.
-    """
+    """Read what an artefact says about itself; raises as ``read_any``."""
     if recording := _recording(path):
         return recording.header
     with _opened(path) as file:

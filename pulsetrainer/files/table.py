@@ -54,21 +54,12 @@ class Table:
     def column(self, name: str) -> FloatArray:
         """Return a column (rows,) by its name, or by the name without its unit, whatever the case.
 
-        Raises
-        ------
-        DataError
-            There is no such column, or it holds text.
+        Raises as ``index``.
         """
         return self.columns[self.names[self.index(name)]]
 
     def unit(self, name: str) -> str:
-        """Return the unit of a column, empty where the header says none.
-
-        Raises
-        ------
-        DataError
-            There is no such column, or it holds text.
-        """
+        """Return the unit of a column, empty where the header says none; raises as ``index``."""
         return self.units.get(self.names[self.index(name)], "")
 
     def place(self, row: int) -> str:

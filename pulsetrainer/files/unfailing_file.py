@@ -11,26 +11,14 @@ from pathlib import Path
 
 
 class UnfailingFile(io.FileIO):
-    """A new file at ``path``, to write and read; ask ``check`` at the end whether all of it is there.
-
-    Raises
-    ------
-    OSError
-        The file cannot be opened.
-    """
+    """A new file at ``path``, to write and read; ask ``check`` at the end whether all of it is there."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "w+")
         self._error: BaseException | None = None
 
     def check(self) -> None:
-        """Raise what went wrong.
-
-        Raises
-        ------
-        OSError
-            The disk is full or failed.
-        """
+        """Raise what went wrong: OSError where the disk is full or failed."""
         if self._error is not None:
             raise self._error
 

@@ -187,13 +187,7 @@ def evaluation(errors: Evaluation) -> Figure:
 
 
 def draw(artefact: Run | Model | Waveform | Playback | Evaluation | Diagnosis | Session) -> Figure:
-    """Return the figure of an artefact, chosen by its kind.
-
-    Raises
-    ------
-    DataError
-        There is no figure for this kind of artefact.
-    """
+    """Return the figure of an artefact, chosen by its kind; DataError where there is none for this kind."""
     drawing: dict[type, Callable[[Any], Figure]] = {
         Run: run,
         Model: model,

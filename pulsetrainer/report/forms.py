@@ -13,10 +13,7 @@ FORMATS: Final = ("png", "svg", "pdf")
 def figure_form(path: Path, what: str, *more: str) -> str:
     """Return the format that the name of a figure asks for; ``more`` are those that are no figures.
 
-    Raises
-    ------
-    UsageError
-        It is none that can be written.
+    UsageError where it is none of them.
     """
     form = path.suffix.lower().lstrip(".")
     if form not in (*FORMATS, *more):

@@ -32,13 +32,7 @@ _COLOUR: Final = re.compile(r"#[0-9a-f]{6}\b")
 
 
 def encode(figure: Figure, fmt: str) -> bytes:
-    """Return ``figure`` as a file of the format ``fmt``: ``png``, ``svg`` or ``pdf``, on white.
-
-    Raises
-    ------
-    UsageError
-        The format is none of these.
-    """
+    """Return ``figure`` as a file on white; UsageError where the format is not png, svg or pdf."""
     wanted = fmt.lower().lstrip(".")
     if wanted not in FORMATS:
         raise UsageError(

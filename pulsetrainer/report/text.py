@@ -54,7 +54,6 @@ def of(artefact: Any) -> str:
 
 
 def _lines(title: str, rows: Mapping[str, Any]) -> str:
-    """Return names and values, one a line, below a title."""
     width = max(map(len, rows), default=0)
     return "\n".join([title, *(f"  {name:<{width}}  {tables.text(value)}" for name, value in rows.items())])
 

@@ -19,15 +19,8 @@ def extremes(*series: FloatArray, most: int = MOST_POINTS) -> IntArray:
 
     The samples are cut into bins of equal length; of each bin stay the sample where each series is
     least, where it is greatest, and the first that is NaN (so that a gap stays a gap). First and
-    last sample stay. A record that is short enough stays whole.
-
-    Parameters
-    ----------
-    series
-        Arrays of one length n, drawn over time or against each other.
-    most
-        The most points to keep; at least 3 per series and two more.
-
+    last sample stay. A record that is short enough stays whole. The series have one length n; ``most`` is at
+    least 3 for each and two more.
     """
     n = series[0].size
     if n <= most:
@@ -58,15 +51,8 @@ def path(x: FloatArray, y: FloatArray, most: int = 2 * MOST_POINTS) -> IntArray:
     The samples are cut into bins of equal length. Of each stays the sample nearest to the bin's mean, so
     that noise makes no kinks; where the means of x turn back, the one at the tip; and one that lies far off
     its bin, such as a wild sample. The least and the greatest of both series stay, and where the curve
-    begins, ends, and breaks off. A curve that is short enough stays whole.
-
-    Parameters
-    ----------
-    x, y
-        Arrays (n,) drawn against each other in the order of time; NaN is a gap.
-    most
-        The most points to keep, at least 30.
-
+    begins, ends, and breaks off. A curve that is short enough stays whole. ``x`` and ``y`` (n,) are in the
+    order of time, NaN is a gap, and ``most`` is at least 30.
     """
     n = x.size
     lost = np.isnan(x) | np.isnan(y)

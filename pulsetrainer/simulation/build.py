@@ -54,13 +54,7 @@ class _Image:
 
 
 def find_compiler() -> list[str]:
-    """Return the command of a C compiler: $CC, ``cc``, or ziglang from the package index.
-
-    Raises
-    ------
-    DeviceError
-        if there is none.
-    """
+    """Return the command of a C compiler: $CC, ``cc``, or ziglang; DeviceError where there is none."""
     for name in (os.environ.get("CC", ""), "cc", "gcc", "clang"):
         words = name.split()
         if words and shutil.which(words[0]):
@@ -74,7 +68,6 @@ def find_compiler() -> list[str]:
 
 
 def _digest(root: Path, image: _Image) -> str:
-    """Return a hash of sources, headers, compiler and flags."""
     h = hashlib.sha256()
     for path in image.parts(root):
         h.update(f"{path.relative_to(root)}\0{path.stat().st_size}\0".encode())
@@ -107,13 +100,7 @@ def firmware_image() -> Path:
 
 
 def find_arm_compiler() -> list[str]:
-    """Return the command of a C compiler for the Cortex-M4F: ``arm-none-eabi-gcc``, or ziglang.
-
-    Raises
-    ------
-    DeviceError
-        if there is none.
-    """
+    """Return the command of a C compiler for the Cortex-M4F, as ``find_compiler``."""
     if shutil.which("arm-none-eabi-gcc"):
         return ["arm-none-eabi-gcc", *_CORTEX_M4F]
     if importlib.util.find_spec("ziglang") is not None:

@@ -64,13 +64,7 @@ def wire_seed(kind: str, text: str) -> int:
 
 
 def parse_break(text: str) -> tuple[int, float]:
-    """Return what breaks, as its place in ``BREAKS``, and at which second of the play.
-
-    Raises
-    ------
-    UsageError
-        if nothing of that name can break, or the time makes no sense.
-    """
+    """Return what breaks, as its place in ``BREAKS``, and at which second of the play (or UsageError)."""
     what, at, seconds = text.partition("@")
     if what in BREAKS and re.fullmatch(r"\d+(\.\d*)?" if at else "", seconds):
         second = float(seconds or 0)
@@ -104,12 +98,9 @@ class BenchOptions:
 
 
 def parse_bench(port: str) -> BenchOptions:
-    """Return the options in ``bench:?ideal&creep=0.05&speed=real``; names and ranges are checked later.
+    """Return the options in ``bench:?ideal&creep=0.05&speed=real``, or raise UsageError.
 
-    Raises
-    ------
-    UsageError
-        if it is not of that form.
+    Names and ranges of the plant's parameters are known to the firmware alone.
     """
     match = re.fullmatch(r"bench:(?://)?(?:\?(.*))?", port)
     if match is None:
@@ -157,13 +148,7 @@ class QemuOptions:
 
 
 def parse_qemu(port: str) -> QemuOptions:
-    """Return the options in ``qemu:?break=force-high@1&wire=0.0001&wire-seed=3``.
-
-    Raises
-    ------
-    UsageError
-        if it is not of that form: the plant of the emulated device takes few parameters.
-    """
+    """Return the options in ``qemu:?break=force-high@1&wire=0.0001&wire-seed=3``, or raise UsageError."""
     match = re.fullmatch(r"qemu:(?://)?(?:\?(.+))?", port)
     if match is None:
         raise UsageError(
@@ -191,7 +176,6 @@ def parse_qemu(port: str) -> QemuOptions:
 
 
 def _setting(name: str, text: str) -> float:
-    """Return the value of a setting of the emulated device's plant."""
     low, high = QEMU_SETTINGS[name]
     try:
         value = float(text)
@@ -206,13 +190,7 @@ def _setting(name: str, text: str) -> float:
 
 
 def check_port(port: str) -> None:
-    """Refuse the text of a simulated device's port that makes no sense; others are tried when they open.
-
-    Raises
-    ------
-    UsageError
-        It is not of its form. Names and ranges of the plant's parameters are known to the firmware alone.
-    """
+    """Raise UsageError where a simulated device's port makes no sense; others are tried when they open."""
     if port.startswith("bench:"):
         parse_bench(port)
     if port.startswith("qemu:"):

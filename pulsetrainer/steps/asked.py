@@ -10,13 +10,7 @@ EXCITATIONS = ("identification", "diagnostic")
 
 
 def check_beat(beat: str | int | None) -> None:
-    """Refuse what is neither the number of a beat nor the mean; None is no choice.
-
-    Raises
-    ------
-    UsageError
-        It is something else.
-    """
+    """Raise UsageError for what is neither the number of a beat nor the mean; None is no choice."""
     if beat is not None and beat != "mean" and not (str(beat).isdecimal() and int(beat) > 0):
         raise UsageError(
             f"`beat` must be a whole number, 1 for the first beat, or mean, got {beat!r}",
@@ -25,13 +19,7 @@ def check_beat(beat: str | int | None) -> None:
 
 
 def check_force_range(low: float | None, high: float | None) -> None:
-    """Refuse an empty range; None is an end that the model chooses.
-
-    Raises
-    ------
-    UsageError
-        The lower end is not below the upper one.
-    """
+    """Raise UsageError for an empty range; None is an end that the model chooses."""
     if low is not None and high is not None and not high > low:
         raise UsageError(
             f"the force range is empty: `force_min` {low:g} is not below `force_max` {high:g}",
@@ -40,13 +28,7 @@ def check_force_range(low: float | None, high: float | None) -> None:
 
 
 def check_several(evaluations: Sequence[object]) -> None:
-    """Refuse to compare fewer than two.
-
-    Raises
-    ------
-    UsageError
-        There are fewer than two.
-    """
+    """Raise UsageError where there are fewer than two to compare."""
     if len(evaluations) < 2:
         raise UsageError(
             f"compare needs at least two evaluations, got {len(evaluations)}",

@@ -100,18 +100,11 @@ class _Place:
 class Conductor:
     """Makes the current of a session; ``give`` gets every piece of it before it is played.
 
-    Parameters
-    ----------
-    decide
-        Asked for the beat with a number that begins at a time, s. The same beat is asked for twice: to
-        know what comes ahead, and when it is its turn. The second answer counts.
-    heat
-        Of the coil at the start, of the limit.
-    heated
-        Heat (n,) that a current (n,) at a rate gives a cold coil, and the time constant of its cooling, s.
-    loss
-        Share of the force that is lost beyond what the model knows, asked for each piece: the target is
-        raised by it.
+    ``decide`` is asked for the beat with a number that begins at a time, s. The same beat is asked for twice:
+    to know what comes ahead, and when it is its turn; the second answer counts. ``heat`` is that of the coil
+    at the start, of the limit, ``heated`` the heat (n,) that a current (n,) at a rate gives a cold coil.
+    ``loss`` is the share of the force that is lost beyond what the model knows, asked for each piece: the
+    target is raised by it.
     """
 
     def __init__(

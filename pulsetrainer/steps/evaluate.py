@@ -145,7 +145,6 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
 
 
 def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[str]) -> Evaluation:
-    """Return the prediction error of each model on a run."""
     found: list[ModelEvaluation] = []
     notes: list[str] = []
     for title, model in zip(model_names, models, strict=True):
@@ -242,10 +241,7 @@ class Breach:
 def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) -> tuple[Breach, ...]:
     """Return the metrics that are outside their two-sided bounds; names as in ``Evaluation.figures``.
 
-    Raises
-    ------
-    UsageError
-        A bound names a metric that the evaluation does not have.
+    UsageError where a bound names a metric that the evaluation does not have.
     """
     figures = evaluation.figures()
     unknown = [name for name in bounds if name not in figures]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -149,10 +149,16 @@ def identify(
     warning = fit_notes.warning(fitted, measured, form)
     notes += [] if warning else fit_notes.of_rest(fitted)
     progress(1.0)
-    model = _model(fitted, measured, covered, ensemble, cleaned, tuple(notes), warning)
-    model = _with_wild(model, raw[0], wild_ones[0], sum(int(mask.sum()) for mask in masks))
-    assert model.fit is not None
-    return replace(model, fit=replace(model.fit, minor_percent=100.0 * minor_coverage(plane, remembered)))
+    first = wild_ones[0]
+    said = {
+        "notes": tuple(notes),
+        "warning": warning,
+        "minor_percent": 100.0 * minor_coverage(plane, remembered),
+        "masked_samples": sum(int(mask.sum()) for mask in masks),
+        "wild_input": raw[0].input[first] if first.any() else None,
+        "wild_output": raw[0].output[first] if first.any() else None,
+    }
+    return _model(fitted, measured, covered, ensemble, cleaned, said)
 
 
 def _without_wild(
@@ -198,20 +204,7 @@ def _without_wild(
 
 
 def _signals(runs: Sequence[Run]) -> list[tuple[FloatArray, FloatArray]]:
-    """Inputs and outputs of runs."""
     return [(run.input, run.output) for run in runs]
-
-
-def _with_wild(model: Model, run: Run, first: BoolArray, count: int) -> Model:
-    """Return the model with what was left out of its fit: how much, and of the first run what was wild."""
-    assert model.fit is not None
-    fit = replace(
-        model.fit,
-        masked_samples=count,
-        wild_input=run.input[first] if first.any() else None,
-        wild_output=run.output[first] if first.any() else None,
-    )
-    return replace(model, fit=fit)
 
 
 def _levels(runs: Sequence[Run], notes: list[str]) -> int:
@@ -232,7 +225,6 @@ def input_range(run: Run) -> tuple[float, float]:
 
 
 def _check_units(names: Sequence[str], runs: Sequence[Run]) -> None:
-    """Raise DataError unless all runs measure in the same units."""
     if not runs:
         raise DataError("there is no run to identify a model from", hint="give at least one run")
     first = runs[0]
@@ -317,10 +309,9 @@ def _model(
     covered: BoolArray,
     ensemble: uncertainty.Ensemble | None,
     cleaned: Sequence[input_noise.Cleaned],
-    notes: tuple[str, ...],
-    warning: str,
+    said: Mapping[str, Any],
 ) -> Model:
-    """Return the model with its fit."""
+    """Return the model with its fit, of which some fields are ``said``."""
     found, first, record = fitted.identified, runs[0], fitted.records[0]
     inner, operator = found.operator, fitted.operator
     counted = [r.sample_weight > 0 for r in fitted.records]
@@ -379,8 +370,7 @@ def _model(
             offsets=tuple(float(shift) for shift in fitted.offsets),
             spacing="even" if fitted.evenly_spaced else "crowded",
             stiffness=found.stiffness,
-            warning=warning,
             loop=loop_of(operator, errors.rms),
-            notes=notes,
+            **said,
         ),
     )

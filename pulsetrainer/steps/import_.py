@@ -126,7 +126,6 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
 
 
 def _notes_on_time(name: str, report: Report) -> list[str]:
-    """Say what is wrong with the time stamps."""
     notes = []
     if report.gaps:
         filled = ", filled with straight lines" if report.resampled else ""

@@ -153,10 +153,7 @@ def _check_describes(model: Model, name: str, *, despite_warning: bool) -> None:
 def slew_limit(asked: float | None, model: Model) -> float | None:
     """Return the limit that was asked for, else that of our own device for its own models, else none.
 
-    Raises
-    ------
-    ArgumentError
-        The limit is not positive.
+    ArgumentError where the limit is not positive.
     """
     if asked is not None:
         positive(slew=asked)

@@ -47,13 +47,7 @@ class Invertible:
 
 
 def invertible(model: Model, rate_Hz: float) -> Invertible:
-    """Return the part of a model that can be inverted.
-
-    Raises
-    ------
-    DataError
-        A signed model has no range with monotone branches.
-    """
+    """Return the part of a model that can be inverted; DataError where branches of a signed one never are."""
     whole = operator_of(model)
     loop = excitations.conditioning(
         whole.low,

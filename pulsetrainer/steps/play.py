@@ -138,13 +138,13 @@ def play(
         kept[name].append(once.rows)
         progress((number + 1) / (repeats * len(DRIVES)))
     whole = min(len(rows) for rows in kept.values())
-    model = drive.model
+    known = operator_of(drive.model) if drive.model else None
     playback = Playback(
         time_s=drive.time_s,
         waveform=drive,
         compensated=_playback(kept["compensated"][:whole], drive.time_s.size),
         scaled=_playback(kept["scaled"][:whole], drive.time_s.size),
-        input_range=_input_range(model) if model else float(np.ptp(drive.scaled)),
+        input_range=known.high - known.low if known else float(np.ptp(drive.scaled)),
         complete=not fault,
         dropped_samples=dropped,
         fault=fault,
@@ -191,12 +191,6 @@ class _Tracked:
         self._thermometer.add(time_s[there], reference[there], current[there], once.duty[there])
 
 
-def _input_range(model: Model) -> float:
-    """Range of the input over which a model was identified."""
-    operator = operator_of(model)
-    return operator.high - operator.low
-
-
 def _check(drive: Waveform, repeats: int) -> None:
     """Refuse what no device can play."""
     if repeats < 1:
@@ -211,13 +205,7 @@ def _check_peak(drive: Waveform, limit_A: float) -> None:
 
 
 def check_current(drive: Waveform) -> None:
-    """Refuse a drive that is no current.
-
-    Raises
-    ------
-    DataError
-        Its input is not in A.
-    """
+    """Raise DataError where the input of a drive is not in A."""
     if drive.input_unit != "A":
         raise DataError(
             f"the drive {drive.name} is in {drive.input_unit}; the device takes a current in A",

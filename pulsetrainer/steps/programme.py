@@ -24,13 +24,7 @@ class Change:
 
 
 def check_rate(rate: float | None) -> None:
-    """Refuse a rate that no heart has.
-
-    Raises
-    ------
-    UsageError
-        It is outside 20 to 240 beats a minute.
-    """
+    """Raise UsageError for a rate outside 20 to 240 beats a minute."""
     if rate is not None and not SLOWEST_BPM <= rate <= FASTEST_BPM:
         raise UsageError(
             f"a rate of {rate:g} beats a minute is outside {SLOWEST_BPM:g} to {FASTEST_BPM:g}",
@@ -39,13 +33,7 @@ def check_rate(rate: float | None) -> None:
 
 
 def check_amplitude(amplitude: float | None) -> None:
-    """Refuse an amplitude that cannot be pressed.
-
-    Raises
-    ------
-    UsageError
-        It is not above 0, or more than the reach.
-    """
+    """Raise UsageError for an amplitude that is not above 0, or more than the reach."""
     if amplitude is not None and not 0.0 < amplitude <= 100.0:
         raise UsageError(
             f"an amplitude of {amplitude:g} % cannot be pressed: 100 % is all that the model reaches",
@@ -54,13 +42,7 @@ def check_amplitude(amplitude: float | None) -> None:
 
 
 def number_of(name: str, pulses: Sequence[str]) -> int:
-    """Return the place of a pulse in the session's list.
-
-    Raises
-    ------
-    UsageError
-        It is not there.
-    """
+    """Return the place of a pulse in the session's list; UsageError where it is not there."""
     if name in pulses:
         return list(pulses).index(name)
     near = difflib.get_close_matches(name, pulses, n=3, cutoff=0.4) or list(pulses)
@@ -72,19 +54,8 @@ def number_of(name: str, pulses: Sequence[str]) -> int:
 class Programme:
     """Plays the pulses one after the other, each for an equal share of the time, until something changes.
 
-    Parameters
-    ----------
-    pulses
-        Their names.
-    beats, seconds
-        The end: after so many beats, or after so long; None: the other one.
-    changes
-        From the earliest on; a change of the pulse ends the taking of turns.
-
-    Raises
-    ------
-    UsageError
-        A rate, an amplitude or a pulse cannot be played, or there is no end.
+    It ends after so many ``beats`` or ``seconds``, one of the two. A change of the pulse ends the taking of
+    turns. UsageError where a rate, an amplitude or a pulse cannot be played, or there is no end.
     """
 
     def __init__(

@@ -280,13 +280,7 @@ def parts_of(course: Course, at: int, longest_s: float) -> Iterator[Part]:
 
 
 def check_top(signal: excitations.Signal, limit_A: float) -> None:
-    """Refuse a signal that goes beyond the limit in force.
-
-    Raises
-    ------
-    ArgumentError
-        It does.
-    """
+    """Raise ArgumentError for a signal that goes beyond the limit in force."""
     ours = signal.name in EXCITATIONS
     lower = f"give `current_max_A` at most {limit_A:g}" if ours else "scale the table into the range"
     check_peak(signal.value, limit_A, hint=f"{lower}, or raise `limit_current_A` where it was lowered")
@@ -313,10 +307,7 @@ def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:
 def condition(device: Device, high_A: float, rate_Hz: float) -> None:
     """Take the actuator once around its major loop, so that what came before is forgotten.
 
-    Raises
-    ------
-    DeviceError, Interrupted
-        The loop could not be completed.
+    Raises as ``raise_if_stopped`` where the loop could not be completed.
     """
     loop = conditioning_loop(high_A, rate_Hz)
     if loop.size == 0:

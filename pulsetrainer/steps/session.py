@@ -252,10 +252,7 @@ def programme(
 ) -> tuple[Programme | Blind, tuple[float | None, ...]]:
     """Return who decides, and between which rates every pulse shall reach its full amplitude.
 
-    Raises
-    ------
-    UsageError, DataError
-        As ``session``.
+    Raises as ``session``.
     """
     if not names or len(set(names)) < len(names):
         raise UsageError(

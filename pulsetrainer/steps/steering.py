@@ -26,12 +26,7 @@ KEYS = {
 class Steering:
     """Decides as ``programme`` does, but for what was changed by key.
 
-    Parameters
-    ----------
-    programme
-        Who decides otherwise.
-    own_bpm
-        The pulses' own rates, from which faster and slower begin.
+    Faster and slower begin at the rate of the pulse, ``own_bpm``.
     """
 
     programme: Decide
@@ -51,14 +46,16 @@ class Steering:
             return Rest()
         decided = self.programme(number, time_s)
         if isinstance(decided, Play):
-            decided = replace(
-                decided,
-                pulse=decided.pulse if self.pulse is None else self.pulse,
-                amplitude=decided.amplitude if self.amplitude is None else self.amplitude,
-                bpm=decided.bpm if self.rate is None else self.rate,
-            )
-            self._played = decided
+            decided = self._played = self._changed(decided)
         return decided
+
+    def _changed(self, play: Play) -> Play:
+        return replace(
+            play,
+            pulse=play.pulse if self.pulse is None else self.pulse,
+            amplitude=play.amplitude if self.amplitude is None else self.amplitude,
+            bpm=play.bpm if self.rate is None else self.rate,
+        )
 
     def press(self, key: str) -> None:
         """Take in a key; one that means nothing changes nothing."""
@@ -75,9 +72,4 @@ class Steering:
             self.paused = not self.paused
         elif key == "q":
             self.stopped = True
-        self._played = replace(
-            self._played,
-            pulse=self._played.pulse if self.pulse is None else self.pulse,
-            amplitude=self._played.amplitude if self.amplitude is None else self.amplitude,
-            bpm=self._played.bpm if self.rate is None else self.rate,
-        )
+        self._played = self._changed(self._played)

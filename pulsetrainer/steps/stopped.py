@@ -10,13 +10,7 @@ INTERRUPTED = "interrupted"  # the fault of a recording that the user stopped
 
 
 def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> None:
-    """Raise what a play that did not reach its end has to say; ``kept`` is what was recorded until then.
-
-    Raises
-    ------
-    DeviceError, Interrupted
-        ``fault`` is not empty.
-    """
+    """Raise DeviceError or Interrupted for a play that did not reach its end, with what was ``kept``."""
     if not fault:
         return
     if fault == INTERRUPTED:
