@@ -66,7 +66,7 @@ def _along_time(artefact: Any, before: str = "") -> list[tuple[str, FloatArray]]
 def _cells(model: Model) -> list[tuple[str, FloatArray]]:
     """The density of a model, a row a cell: the edges between which its relays switch up and down."""
     up, down = np.tril_indices(model.levels)  # the order of core.plane
-    unit = _edges_unit(model)
+    unit = model.edges_unit
     edges = [
         (_heading(f"switches {way} {end}", unit), model.edges[at])
         for way, at in (("up", up), ("down", down))
@@ -78,12 +78,6 @@ def _cells(model: Model) -> list[tuple[str, FloatArray]]:
         if plan.role == "array" and plan.dims == ("cell",) and getattr(model, plan.name) is not None
     ]
     return edges + fields
-
-
-def _edges_unit(model: Model) -> str:
-    (plan,) = (plan for plan in plan_of(Model) if plan.name == "edges")
-    assert plan.data is not None
-    return _text(model, plan.data.units)
 
 
 def _repeats(played: Playback) -> list[tuple[str, FloatArray]]:

@@ -167,7 +167,9 @@ def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None
     try:
         reader = reader_of(path)
         if reader is not None:
-            return _only(_of_arrays(path, reader(path)), keep)
+            table = _of_arrays(path, reader(path))
+            names = [table.names[k] for k in keep(table)] if keep else table.names
+            return replace(table, columns={name: table.columns[name] for name in names})
         dialect = detect(path)
         dialect = replace(dialect, names=numbered(dialect.names))
         table = _head(path, dialect)
@@ -196,14 +198,6 @@ def _head(path: Path, dialect: Dialect) -> Table:
         ((0, dialect.first_line),),
         dialect.rate_Hz,
         dialect.words,
-    )
-
-
-def _only(table: Table, keep: Callable[[Table], Collection[int]] | None) -> Table:
-    if keep is None:
-        return table
-    return replace(
-        table, columns={name: table.columns[name] for name in (table.names[k] for k in keep(table))}
     )
 
 

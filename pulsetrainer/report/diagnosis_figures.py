@@ -35,7 +35,8 @@ def course(found: Diagnosis) -> Figure:
     panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
     panels.trace(above, found.time_s, found.before, **MODEL, label="model, fitted anew")
     above.set_ylabel(label(panels.quantity_of(found.output_unit), found.output_unit))
-    above.set_title(_verdict(found), wrap=True)
+    causes = ", ".join(one.cause for one in found.found) or found.verdict
+    above.set_title(f"verdict: {causes}", wrap=True)
     panels.headroom(above)
     panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="left without causes")
     if found.extended_percent < found.static_percent:
@@ -46,12 +47,6 @@ def course(found: Diagnosis) -> Figure:
     below.set_xlabel(label("time, runs one after another", "s"))
     panels.headroom(below)
     return figure
-
-
-def _verdict(found: Diagnosis) -> str:
-    """Return the verdict in a line: the causes found, else what was found instead."""
-    causes = [one.cause for one in found.causes if one.found]
-    return f"verdict: {', '.join(causes) or found.verdict}"
 
 
 @styled
