@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from pulsetrainer.core.excitations import Signal
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.device.codes import TICK_RATE_HZ
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.steps.asked import EXCITATIONS
@@ -29,9 +29,6 @@ from pulsetrainer.steps.recording import (
     record,
 )
 from pulsetrainer.steps.stopped import raise_if_stopped
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
 
 
 def capture(

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from pulsetrainer.core import coil as electrical
 from pulsetrainer.core.coil import Coil, Hold
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, Fault
+from pulsetrainer.device.device import Device
+from pulsetrainer.device.trace import Trace
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.loop_gains import OPEN_LOOP
 from pulsetrainer.steps.progress import Progress
 from pulsetrainer.steps.stopped import raise_if_stopped
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
-    from pulsetrainer.device.trace import Trace
 
 RATE_HZ = 1000.0
 # The firmware compares voltage and current over 205 ms; a coil that nobody knows yet must be told sooner.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,19 +14,17 @@ from pulsetrainer.artefacts.session import Beats
 from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.core.temperature import Thermometer
 from pulsetrainer.device.codes import HEAT_TAU_S
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.heat import added
 from pulsetrainer.device.plausibility import judge_against
+from pulsetrainer.device.trace import Block
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach
 from pulsetrainer.steps.recording import PAUSE_S
-
-if TYPE_CHECKING:
-    from pulsetrainer.core.temperature import Thermometer
-    from pulsetrainer.device.device import Device
-    from pulsetrainer.device.trace import Block
 
 _FOLLOW = 0.3  # of a new reading of the loss: a window of a second is noisier than the room
 

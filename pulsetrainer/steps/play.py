@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,21 +13,17 @@ from pulsetrainer.artefacts import DrivePlayback, Model, Playback, Waveform
 from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, IntArray
+from pulsetrainer.core.temperature import Thermometer
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.device.plausibility import judge_against, judge_repeat
+from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.heat import Correction, take_temperature, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pulsetrainer.core.temperature import Thermometer
-    from pulsetrainer.device.device import Device
-    from pulsetrainer.device.trace import Block, Trace
 
 _LOG = logging.getLogger(__name__)
 DRIVES = ("compensated", "scaled")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -24,15 +24,13 @@ from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.temperature import Windows, record_of
 from pulsetrainer.device.codes import MAX_DECIMATION
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import check_peak
+from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.asked import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
-    from pulsetrainer.device.trace import Block
 
 _LOG = logging.getLogger(__name__)
 CONDITIONING_SPEED_A_PER_S = 3.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM, Pulse
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.device.device import Device
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
 from pulsetrainer.steps.conductor import RATE_HZ, Decide, Play, Reach, major_loop
@@ -23,9 +23,6 @@ from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.quiz import Answer, Blind, from_list, order
 from pulsetrainer.steps.stopped import raise_if_stopped
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
 
 LEAD_S = 3.0  # of current that is ready before its time: how long this computer may be busy with other things
 LIVE_LEAD_S = 0.5  # the same where a person changes what comes next

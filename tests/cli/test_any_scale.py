@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -66,10 +67,19 @@ def written(path, table) -> None:
     path.write_text("\n".join([",".join(heads), *rows, ""]))
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(table=tables)
-def test_no_table_ends_in_a_bug(tmp_path_factory, table):
+@pytest.mark.parametrize("examples", [5, pytest.param(25, marks=pytest.mark.slow)])
+def test_no_table_ends_in_a_bug(tmp_path_factory, examples):
     """Import, identify, diagnose and invert: exit 0, or an error of ours with a message, and then no file."""
+
+    @settings(max_examples=examples, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    @given(table=tables)
+    def no_bug(table):
+        _chain_of_commands(tmp_path_factory, table)
+
+    no_bug()
+
+
+def _chain_of_commands(tmp_path_factory, table) -> None:
     folder = tmp_path_factory.mktemp("table")
     written(folder / "a.csv", table)
     for words in (

@@ -72,7 +72,7 @@ def test_show_and_plot_take_every_kind(built_small):
 
 def test_a_pipe_gets_no_bar_and_a_terminal_does(tmp_path):
     """Progress is for people: nothing of it in a pipe, a moving bar on a terminal, none with --json."""
-    words = ["capture", "identification", "--levels", "12", "--speed", "6", "--overwrite", "-o", "run.h5"]
+    words = ["capture", "identification", "--levels", "6", "--speed", "12", "--overwrite", "-o", "run.h5"]
     done = pulsetrainer(tmp_path, *words)
     assert done.err == ""
     assert "\x1b" not in done.out

@@ -136,7 +136,6 @@ def test_what_makes_no_sense_is_told_before_anything_moves(run, tmp_path, words,
     assert not list(tmp_path.glob("s.h5*"))
 
 
-@pytest.mark.realtime
 def test_a_model_of_another_device_is_refused(run, tmp_path):
     """Before the device is touched."""
     rows = "\n".join(f"{k / 100},{np.sin(k / 30)},{2 * np.sin(k / 30)}" for k in range(600))
@@ -301,7 +300,6 @@ def test_keys_change_the_beats_and_stop(tmp_path):
     assert np.diff(beats.start_s).max() > 1.2  # the pause
 
 
-@pytest.mark.realtime
 def test_nothing_gives_a_question_away(tmp_path):
     """Blind: neither screen, nor file names, nor the files, nor the time tell what is asked."""
     words = ("--pulses", "bifid,parvus-et-tardus", "--quiz", 2, "--seed", 7)
@@ -328,7 +326,6 @@ def test_nothing_gives_a_question_away(tmp_path):
     assert np.isfinite(kept.quiz.response_s).all()
 
 
-@pytest.mark.realtime
 def test_a_terminal_that_is_too_small_has_no_view(tmp_path):
     """It is said, and the session goes on without."""
     terminal = Terminal(tmp_path, *SHORT, "--beats", 3, port="bench:", size=(5, 30))

@@ -278,7 +278,6 @@ def test_an_emulator_that_dies_leaves_what_was_recorded():
 
 
 @needs_emulator
-@pytest.mark.realtime
 def test_an_emulator_that_will_not_start_is_quoted(monkeypatch):
     """What the emulator complained about reaches the user."""
     monkeypatch.setattr("pulsetrainer.simulation.emulator._REAL_TIME", "shift=nonsense")

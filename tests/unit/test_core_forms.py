@@ -111,7 +111,9 @@ def held_out(draw, seed):
     return model, float(np.sqrt(np.mean((model.predict(unseen) - wanted) ** 2)) / noise)
 
 
-@pytest.mark.parametrize("draw", [devices.exchanged_plane, devices.stop_sum])
+@pytest.mark.parametrize(
+    "draw", [devices.exchanged_plane, pytest.param(devices.stop_sum, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("seed", [4000, pytest.param(4001, marks=pytest.mark.slow)])
 def test_a_dual_model_predicts_within_the_noise(draw, seed):
     """Held-out error at most 1.3 times the noise."""

@@ -63,8 +63,8 @@ def test_the_best_pass_is_kept():
 
 def test_it_ends_when_only_noise_is_left():
     """A device that is its model needs one pass."""
-    drive = drive_of("Prandtl-Ishlinskii")
-    device = ForeignDevice("Prandtl-Ishlinskii", seed=5)
+    drive = drive_of("Coleman-Hodgdon")
+    device = ForeignDevice("Coleman-Hodgdon", seed=5)
     device.press = lambda current: np.asarray(drive.model.predict(current, 1e-3))
     refined = refine(drive, device, slew=SLEW)
     assert len(refined.passes) == refined.kept == 1
