@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pulsetrainer.artefacts import Model
-from pulsetrainer.core import excitations
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core import beside_hysteresis, excitations
+from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.temperature import COPPER_PER_K
+from pulsetrainer.diagnosis.causes.base import low_pass
 from pulsetrainer.diagnosis.prediction import predict
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.heat import check_same_device, rest_force, thermal_of, thermometer
@@ -34,8 +35,10 @@ _QUANTILE = 1.96
 OFFSET_N = 0.12
 GAIN = 0.015
 TEMPERATURE_K = 5.0
-SHAPE_PERCENT = 0.8
-_SHAPE_OF_FIT = 1.6  # times what the model left of its own record
+SHAPE_PERCENT = 0.3
+_SHAPE_OF_FIT = 2.0  # times what the model left of its own record, without noise
+_LAG_S = 0.02  # lags of this and less are alike at the pace of a check
+_CREEPS_S = (0.3, 1.0, 3.0)
 # Causes that a gain and an offset leave as they are: they scale with the force, or act before it.
 _SCALABLE = frozenset(
     (
@@ -85,7 +88,10 @@ class Checked:
 def check(model: Model, device: Device, *, progress: Progress = silent) -> Checked:
     """Measure for ten seconds and say whether a model is still true of a device.
 
-        y = y_rest + offset + gain (M[u] - y_rest) + what is left
+        y = y_rest + offset + gain (M[u] - y_rest) + a lag + creep + what is left
+
+    Lag and creep are those that the calibration did not take for hysteresis (``core.beside_hysteresis``):
+    they are there on a device that nobody touched, and neither move the offset nor count as another shape.
 
     Raises
     ------
@@ -121,15 +127,14 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     predicted = predict(model, current, 1.0 / RATE_HZ)
     rest = rest_force(model)
     span = float(np.ptp(predicted))
-    found, intervals, left = _fitted(predicted - rest, force - rest)
+    found, intervals, left = _fitted(predicted - rest, _beside(model, current, predicted), force - rest)
     offset, gain = (Estimate(float(v), i) for v, i in zip(found, intervals, strict=True))
     shape = _shape(left, span)
     temperature = _temperature(model, device, trace)
     reasons = _reasons(model, offset, gain, shape, temperature)
     changed = any(reason.startswith("shape") for reason in reasons)
-    error = Error(
-        100.0 * float(np.mean(np.abs(force - predicted))) / span, 100.0 * float(np.mean(np.abs(left))) / span
-    )
+    mended = rest + offset.value + gain.value * (predicted - rest)
+    error = Error(*(100.0 * float(np.mean(np.abs(force - one))) / span for one in (predicted, mended)))
     progress(1.0)
     return Checked(
         serial=device.info.serial,
@@ -207,11 +212,34 @@ def _on_grid(tick: np.ndarray, columns: tuple[FloatArray, ...], samples: int) ->
     return [np.interp(at, tick, values) for values in columns]
 
 
+def _beside(model: Model, current: FloatArray, predicted: FloatArray) -> FloatArray:
+    """What a lag and creeps add to a prediction (n,), each for its unit, (n, k).
+
+    None, k = 0, where the model does not keep the record it was made from.
+    """
+    fit = model.fit
+    if fit is None or fit.time_s is None:
+        return np.empty((current.size, 0))
+    plane = Plane.uniform(float(model.edges[0]), float(model.edges[-1]), beside_hysteresis.LEVELS)
+    dt_s = float(np.median(np.diff(fit.time_s)))
+    then, now = _effects(predict(model, fit.input, dt_s), dt_s), _effects(predicted, 1.0 / RATE_HZ)
+    return beside_hysteresis.missed(plane, fit.input, then, current, now)
+
+
+def _effects(predicted: FloatArray, dt_s: float) -> FloatArray:
+    """A lag of a prediction (n,) and its creeps, (n, k)."""
+    slow = [low_pass(predicted, tau, dt_s) for tau in (_LAG_S, *_CREEPS_S)]
+    return np.stack((predicted - slow[0], *slow[1:]), axis=1)
+
+
 def _fitted(
-    model_N: FloatArray, force_N: FloatArray
+    model_N: FloatArray, beside_N: FloatArray, force_N: FloatArray
 ) -> tuple[FloatArray, list[tuple[float, float]], FloatArray]:
-    """Offset and gain by least squares, their intervals by leaving out blocks, and what is left (n,)."""
-    design = np.stack((np.ones(model_N.size), model_N), axis=1)
+    """Offset and gain by least squares, their intervals by leaving out blocks, and what is left (n,).
+
+    What is ``beside_N`` (n, k) is fitted as well and taken out of what is left.
+    """
+    design = np.column_stack((np.ones(model_N.size), model_N, beside_N))
     edges = np.linspace(0, model_N.size, _BLOCKS + 1).astype(int)
     parts = [slice(a, b) for a, b in pairwise(edges)]
     normal = [(design[p].T @ design[p], design[p].T @ force_N[p]) for p in parts]
@@ -220,9 +248,10 @@ def _fitted(
     without = np.stack([np.linalg.solve(whole[0] - n, whole[1] - r) for n, r in normal])
     spread = np.sqrt((_BLOCKS - 1) / _BLOCKS * np.sum((without - without.mean(axis=0)) ** 2, axis=0))
     intervals = [
-        (float(v - _QUANTILE * s), float(v + _QUANTILE * s)) for v, s in zip(found, spread, strict=True)
+        (float(v - _QUANTILE * s), float(v + _QUANTILE * s))
+        for v, s in zip(found[:2], spread[:2], strict=True)
     ]
-    return np.asarray(found), intervals, np.asarray(force_N - design @ found)
+    return np.asarray(found[:2]), intervals, np.asarray(force_N - design @ found)
 
 
 def _shape(left: FloatArray, span: float) -> Estimate:
@@ -258,13 +287,20 @@ def _temperature(model: Model, device: Device, trace: Trace) -> Estimate | None:
     return Estimate(mean, (mean - _QUANTILE * error, mean + _QUANTILE * error))
 
 
+def _shape_of_fit(model: Model) -> float:
+    """What a model left of its own record, without noise, % of the span."""
+    fit = model.fit
+    if fit is None:
+        return 0.0
+    return _shape(fit.output - fit.predicted, float(np.ptp(fit.predicted))).value
+
+
 def _reasons(
     model: Model, offset: Estimate, gain: Estimate, shape: Estimate, temperature: Estimate | None
 ) -> list[str]:
     """What moved, by more than a device does that nobody touched."""
-    fit = model.fit.rms_percent if model.fit is not None else 0.0
     reasons = []
-    if shape.value > max(SHAPE_PERCENT, _SHAPE_OF_FIT * fit):
+    if shape.value > max(SHAPE_PERCENT, _SHAPE_OF_FIT * _shape_of_fit(model)):
         reasons.append(f"shape: offset and gain leave {shape.value:.1f} % of the span")
     if abs(offset.value) > OFFSET_N and not offset.interval[0] <= 0 <= offset.interval[1]:
         reasons.append(f"offset: the zero moved by {offset.value:+.2f} N")
