@@ -28,6 +28,8 @@ _LEAST_SAMPLES = 50
 _LEAST_WINDOWS = 12
 _TAUS_S = np.geomspace(4.0, 160.0, 24)
 _CLEAR = 8.0  # standard deviations: a rise that is told from none
+# Of the duty, at most what di/dt adds: e is known to a quarter where the current is fast, so this is 1 K.
+_STEEP = 0.015
 _SURE = 0.1  # relative standard deviation of a rise that may set the share of the force
 
 
@@ -205,9 +207,9 @@ class Thermometer:
             own = float(heated(row[None], self._thermal.tau_s, self._own)[0])
             left = math.exp(-row[0] / self._thermal.tau_s)
             self._own = row[8] + (self._own - row[8]) * left
-        if row[1] < _LEAST_SAMPLES:
-            return False
         a, b, e = self._coil.duty_per_A, self._coil.duty_offset, self._coil.duty_s_per_A
+        if row[1] < _LEAST_SAMPLES or abs(e * row[7]) > _STEEP * a * row[6]:
+            return False
         self.rise = float((row[5] - b * row[3] - e * row[7]) / (a * row[6])) - 1.0
         self.extra = self.loss - (self._thermal.coefficient * own if self._thermal else 0.0)
         self.known = True

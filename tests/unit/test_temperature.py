@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -102,6 +104,19 @@ def test_lost_samples_and_no_current_tell_nothing_false():
     meter.add(rest[:2500], *np.zeros((3, 2500)))  # ends the window that was under way
     assert not meter.add(rest[2500:], *np.zeros((3, 2499)))
     assert meter.temperature_K == pytest.approx(before, abs=0.5)
+
+
+def test_a_window_of_one_steep_fall_tells_nothing():
+    """There e counts for kelvins, and it is known to a quarter: the reading before it stays."""
+    meter = Thermometer(replace(COLD, duty_s_per_A=0.75 * COLD.duty_s_per_A), TERM)
+    time_s, reference, current, duty, _, _ = telemetry(20.0, 15.0)
+    meter.add(time_s, reference, current, duty)
+    meter.begin_part()
+    before = meter.temperature_K
+    fall = np.interp(np.arange(2000) * DT_S, [0.0, 0.1], [1.2, 0.0])
+    needed = COLD.duty_offset + COLD.duty_per_A * 1.07 * fall + COLD.duty_s_per_A * np.gradient(fall, DT_S)
+    assert not meter.add(time_s[-1] + DT_S * np.arange(1, 2001), fall, fall, needed)
+    assert meter.temperature_K == before == pytest.approx(15.0, abs=3.0)
 
 
 def test_without_a_clear_rise_half_is_taken():
