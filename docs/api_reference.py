@@ -34,7 +34,7 @@ as the command does, a notebook adds its figure, `.plot()` returns matplotlib ax
 _SECTIONS = ("Parameters", "Raises", "Examples")
 VERBS = (
     "load", "save", "read_table", "open_device", "capture", "identify", "invert", "play", "evaluate", "compare",
-    "diagnose", "extend", "correct", "refine", "session", "tune", "check",
+    "diagnose", "extend", "correct", "refine", "transfer", "session", "tune", "check",
 )  # fmt: skip
 NOUNS = ("Run", "Model", "Waveform", "Playback", "Evaluation", "Diagnosis", "Session")
 

@@ -188,7 +188,7 @@ WORDS = {
     "held_out_gain_percent": "of what can be explained, on blocks that were not fitted; NaN where not measured",
     "input_quantity": "what the input is",
     "input_unit": "unit of the input",
-    "inversion": "continuous, closest-match, extended or refined",
+    "inversion": "continuous, closest-match, extended, refined or transferred",
     "kept": "number of the pass whose drive this is, from 1; 0 for a drive that was not refined",
     "iterations": "of the solver",
     "model": "of a diagnosis: fingerprint of the model",

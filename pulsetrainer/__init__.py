@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from pulsetrainer.steps.identify import identify
     from pulsetrainer.steps.play import play
     from pulsetrainer.steps.refine import refine
+    from pulsetrainer.steps.transfer import transfer
 
 __all__ = [
     "Diagnosis",
@@ -55,6 +56,7 @@ __all__ = [
     "refine",
     "save",
     "session",
+    "transfer",
     "tune",
 ]
 
@@ -66,7 +68,7 @@ _HOME = {
         verb: f"steps.{verb}"
         for verb in (
             *("capture", "check", "compare", "correct", "diagnose", "evaluate"),
-            *("extend", "identify", "play", "refine"),
+            *("extend", "identify", "play", "refine", "transfer"),
         )
     },
 }

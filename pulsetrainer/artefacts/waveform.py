@@ -51,7 +51,7 @@ class Waveform(Shown):
     scored: Annotated[BoolArray, Data("1", "sample counts in the evaluation", "time")]  # (n,) not the lead-in
     name: str
     source: str  # where the shape comes from, in words
-    inversion: str  # "continuous" | "closest-match" | "extended" | "refined"
+    inversion: str  # "continuous" | "closest-match" | "extended" | "refined" | "transferred"
     clipped_samples: int  # targets outside the reachable range
     input_unit: str = "A"
     output_unit: str = "N"

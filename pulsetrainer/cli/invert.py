@@ -52,6 +52,10 @@ def invert(
             "device, none for any other.",
         ),
     ] = None,
+    learnt: Annotated[
+        Path | None,
+        typer.Option(help="Another pulse, refined with this model: what was learnt there is asked for too."),
+    ] = None,
     despite_warning: Annotated[
         bool, typer.Option("--despite-warning", help="Invert a model that does not describe its own record.")
     ] = False,
@@ -62,17 +66,21 @@ def invert(
 
     Both the compensated one and, to compare, the merely scaled one with the same extremes.
 
+    With --learnt it begins from what refining found missing on another pulse.
+
     Example: pulsetrainer invert normal --model model.h5 -o drive.h5
     """
     from pulsetrainer.files.pulses import pulse_file, read_pulse
     from pulsetrainer.steps.asked import check_beat, check_force_range
 
     pulse = pulse_file(waveform)
-    job = Job(context, inputs=(model,), outputs=(out,), overwrite=overwrite, as_json=json)
+    inputs = (model,) if learnt is None else (model, learnt)
+    job = Job(context, inputs=inputs, outputs=(out,), overwrite=overwrite, as_json=json)
     check_beat(beat)
     check_force_range(force_min, force_max)
-    from pulsetrainer.artefacts import Model
+    from pulsetrainer.artefacts import Model, Waveform
     from pulsetrainer.steps.invert import invert as inverse_of
+    from pulsetrainer.steps.transfer import transfer
 
     with job.working(f"inverting {waveform}") as progress:
         source = job.load(model, Model)
@@ -89,6 +97,8 @@ def invert(
             name=str(model),
             progress=progress,
         )
+        if learnt is not None:
+            drive = transfer(drive, job.load(learnt, Waveform), slew=slew_A_per_s)
         if pulse.name == waveform:
             job.uses(pulse)
         job.save(out, drive, f"{drive.name} by {drive.inversion} inversion")

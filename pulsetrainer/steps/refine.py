@@ -96,16 +96,16 @@ def refine(
     limit = slew_limit(slew, _model(drive))
     start = part.whole(drive.compensated)
     smooth = learning.LowPass(learning.BAND_HZ, 1.0 / drive.rate_Hz)
-    beats = _beats(drive)[middle]
+    in_beats = beats(drive)[middle]
     tried: list[_Pressed] = []
 
     def inverse(wanted: FloatArray) -> inversion.Inverse:
-        found = part.inverse(np.where(beats, wanted, start[middle]))
+        found = part.inverse(np.where(in_beats, wanted, start[middle]))
         # the inverse of what a drive gives need not be the drive: branches can be flat
         return found if tried else replace(found, input=drive.compensated[middle])
 
     def respond(current: FloatArray) -> FloatArray:
-        whole = _whole(drive, part, current, limit if tried else None)
+        whole = whole_current(drive, part, current, limit if tried else None)
         pressed = _press(drive, device, whole, tried, smooth)
         tried.append(pressed)
         progress(len(tried) / passes)
@@ -167,7 +167,7 @@ def _model(drive: Waveform) -> Model:
     return drive.model
 
 
-def _beats(drive: Waveform) -> BoolArray:
+def beats(drive: Waveform) -> BoolArray:
     """True (n,) in the beats: at rest there is only noise to learn."""
     scored = np.flatnonzero(drive.scored)
     first = scored[0] - (round(drive.period_s * drive.rate_Hz) if np.isfinite(drive.period_s) else scored[0])
@@ -175,7 +175,7 @@ def _beats(drive: Waveform) -> BoolArray:
     return (at >= first) & (at <= scored[-1])
 
 
-def _whole(drive: Waveform, part: Invertible, current: FloatArray, limit: float | None) -> FloatArray:
+def whole_current(drive: Waveform, part: Invertible, current: FloatArray, limit: float | None) -> FloatArray:
     """Current (n,) of the whole drive: major loop and tail as they were, and what is learnt between."""
     end = drive.time_s.size - part.tail.size
     whole = np.concatenate((drive.compensated[: part.lead.size], current, drive.compensated[end:]))

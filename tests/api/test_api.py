@@ -19,7 +19,7 @@ KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 NOUNS = {"Run", "Model", "Waveform", "Playback", "Evaluation", "Diagnosis", "Session"}
 VERBS = {
     "load", "save", "read_table", "open_device", "capture", "identify", "invert", "play", "evaluate",
-    "compare", "diagnose", "extend", "correct", "refine", "session", "tune", "check",
+    "compare", "diagnose", "extend", "correct", "refine", "transfer", "session", "tune", "check",
 }  # fmt: skip
 
 

@@ -120,6 +120,10 @@ def test_refine(tmp_path):
         refined = pt.refine(pt.load(drive), device, passes=3)
     words = ("refine", drive, "--passes", 3, "--port", "bench:?seed=5")
     same(by_command(tmp_path, *words), stored(refined, tmp_path))
+    pt.save(refined, tmp_path / "refined.h5")
+    other = pt.transfer(pt.invert("bifid", pt.load(KEPT / "model.h5")), pt.load(tmp_path / "refined.h5"))
+    words = ("invert", "bifid", "--model", KEPT / "model.h5", "--learnt", "refined.h5")
+    same(by_command(tmp_path, *words), stored(other, tmp_path))
 
 
 @pytest.mark.slow
