@@ -91,6 +91,8 @@ def capture(
     try:
         if earlier is not None:
             at = samples_played(earlier.run, course)
+        if not resume:
+            job.left_over(out, "an interrupted capture: continue it with --resume, or delete it")
         if dry_run:
             planned = plan(played, levels=levels, condition=condition, repeats=repeats, limits=limits, at=at)
             rows = {
@@ -98,13 +100,13 @@ def capture(
                 "reversals": planned.reversals,
                 "cells switched": f"{planned.coverage_percent:.1f} %",
             }
+            if limit_force_N is not None:
+                rows["force"] = f"known once it is measured; above {limit_force_N:g} N the device stops"
             does = (
                 f"continue {played.name} at {100 * at / course.size:.0f} %" if at else f"play {played.name}"
             )
             job.would(does, planned, port, out, rows)
             return
-        if not resume:
-            job.left_over(out, "an interrupted capture: continue it with --resume, or delete it")
         view = job.view(float(played.value.max()), live=live)
         with job.working(f"capturing {signal}", view) as progress, job.open_device(port, limits) as device:
             payload = _record(

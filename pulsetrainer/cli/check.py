@@ -28,7 +28,9 @@ def check(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Measure for ten seconds whether a model is still true of its device.
+    """Tell in ten seconds whether a model is still true.
+
+    It measures on the device that the model is of, with the force sensor in place.
 
     The verdict is true, shifted (offset, gain, temperature) or changed (the shape: identify again).
 
@@ -58,10 +60,10 @@ def check(
         job.save(
             out, updated(loaded, found), f"{model.name} as {info.serial} is now", device=job.device(info)
         )
-    _show(job, model, out, found)
+    _show(job, model, out, found, info.serial)
 
 
-def _show(job: Job, model: Path, out: Path | None, found: Checked) -> None:
+def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str) -> None:
     job.screen.result(plain(found) | {"output": out})
     rows = {
         "offset": _said(found.offset, "N", 3),
@@ -74,7 +76,7 @@ def _show(job: Job, model: Path, out: Path | None, found: Checked) -> None:
     rows["error"] = f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain"
     for number, reason in enumerate(found.reasons, 1):
         rows[f"reason {number}"] = reason
-    job.screen.facts(f"{model}: {found.verdict}", rows)
+    job.screen.facts(f"{model} on {serial}: {found.verdict}", rows)
     job.wrote(out)
 
 

@@ -48,8 +48,10 @@ class Screen:
         self.width = shutil.get_terminal_size().columns if self.is_terminal else _PIPE_WIDTH
 
     def note(self, text: str) -> None:
-        """Say one line to the person, beside the results."""
-        sys.stderr.write(f"note: {text}\n")
+        """Say one line to the person, beside the results; on a terminal folded between words."""
+        width = shutil.get_terminal_size().columns if sys.stderr.isatty() else None
+        lead = "" if text.startswith("warning: ") else "note: "
+        sys.stderr.write(tables.folded(lead, text, width, indent=2) + "\n")
 
     @contextmanager
     def bar(self, label: str) -> Iterator[Progress]:
@@ -86,7 +88,7 @@ class Screen:
                 self.line("    ", tables.text(value))
             return
         for name, value in zip(names, rows.values(), strict=True):
-            self.line(f"  {name:<{width}}  ", tables.text(value))
+            self.line(f"  {name:<{width}}  " if width else "  ", tables.text(value))
 
     def line(self, lead: str, text: str, *, indent: int | None = None) -> None:
         """Print a line; on a terminal that is too narrow, on several, broken between words below ``lead``."""

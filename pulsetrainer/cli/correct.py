@@ -22,7 +22,9 @@ def correct(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Write the run without the faults of the measurement that were found.
+    """Take the faults of the measurement out of a run.
+
+    Those that a diagnosis has found.
 
     Example: pulsetrainer correct diagnostic.h5 --diagnosis diagnosis.h5 -o corrected.h5
     """

@@ -27,7 +27,9 @@ def diagnose(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Say what a model gets wrong on runs, name the cause, and what to measure next.
+    """Say what a model gets wrong on runs, and why.
+
+    It names the causes, how sure they are, and what to measure next.
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
@@ -55,9 +57,9 @@ def diagnose(
         _payload(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
     )
     show_diagnosis(job.screen, found)
-    for line in commands:
-        job.screen.whole(line)
     job.wrote(out, html)
+    for line in commands:
+        job.screen.whole(f"then: {line}")
 
 
 def _commands(found: Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:

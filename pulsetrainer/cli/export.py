@@ -21,10 +21,10 @@ def export(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Write the series of an artefact as a table, with units in its header.
+    """Write the series of a file as a table.
 
-    A run, a waveform and a diagnosis have a row a sample, a model a row a cell of its density, a playback
-    its repeats and an evaluation its waveforms or models one below another.
+    Its header has the units. A run, a waveform and a diagnosis have a row a sample, a model a row a cell
+    of its density, a playback its repeats and an evaluation its waveforms or models one below another.
 
     Example: pulsetrainer export run.h5 -o run.csv
     """
@@ -38,4 +38,4 @@ def export(
         columns = job.table(out, artefact, file)
     rows = next(iter(columns.values())).size
     job.screen.result({"output": out, "kind": artefact.kind, "columns": list(columns), "rows": rows})
-    job.screen.whole(f"wrote {out}: {artefact.kind}, {rows} rows of {', '.join(columns)}")
+    job.screen.facts(f"wrote {out}: {artefact.kind}, {rows} rows", {"columns": list(columns)})

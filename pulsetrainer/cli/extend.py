@@ -27,7 +27,9 @@ def extend(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Write the model with the causes found, its weights refitted together with them.
+    """Write the model with the causes found.
+
+    Its weights are refitted together with them.
 
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
@@ -69,12 +71,12 @@ def extend(
 
 
 def _left(found: Diagnosis, extended: Model) -> dict[str, str]:
-    """Say what both models leave of the recordings, in the figures that evaluate gives."""
+    """Say what both models leave of the recordings, rms of single samples."""
     assert found.extended is not None
     if not math.isfinite(found.extended_rms_percent) or found.extended.extensions != extended.extensions:
         return {}  # a file of 0.1; or --verify took a cause out
     before, after = found.rms_percent, found.extended_rms_percent
     return {
-        "error before": f"{before:.3f} % of the span, rms of single samples, as evaluate tells it",
+        "error before": f"{before:.3f} % of the span, rms of single samples",
         "error now": f"{after:.3f} %; noise alone is {found.noise_percent:.3f} %",
     }

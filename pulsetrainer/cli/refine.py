@@ -25,9 +25,10 @@ def refine(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Learn a drive on the device itself, with the force sensor in place.
+    """Learn a drive on the device itself.
 
-    Each pass plays the drive and corrects it by the force that was missed; the best is written.
+    The force sensor must be in place. Each pass plays the drive and corrects it by the force that was
+    missed; the best is written.
 
     Example: pulsetrainer refine drive.h5 -o refined.h5
     """

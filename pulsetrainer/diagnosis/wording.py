@@ -35,9 +35,9 @@ TEXTS: Mapping[str, str] = {
         "levels do not account for"
     ),
     "not accepted": (
-        "Noise alone hardly looks like {names} (p = {p:.3f}), which would explain {explains:.0f} % of the "
-        "squared error beyond noise. But once the model is fitted together with it, it is too small to "
-        "matter, or does not predict the parts of the recordings that were left out. So it is not named."
+        "Noise alone hardly looks like {names} (p = {p:.3f}). But once the model is fitted together with it, "
+        "it is too small to matter, or does not predict the parts of the recordings that were left out. So "
+        "it is not named."
     ),
     "not repeated": (
         "What is left can be fitted by a learned dependence, but that did not repeat when whole pieces of "
@@ -74,7 +74,7 @@ PLACES: Mapping[str, str] = {
 WAYS = {-1.0: "falls", 0.0: "rests", 1.0: "rises"}
 PLAIN = {"input": "input", "output": "output", "in_y": "", "in_u": ""}  # where nothing better is known
 AGAIN = (
-    "Record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
+    "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
     "recording.{command}"
 )
 ADVICE: Mapping[str, str] = {
@@ -84,7 +84,7 @@ ADVICE: Mapping[str, str] = {
         "{there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ by "
         "{here:.2g} %. Then diagnose that recording.{command}"
     ),
-    "lacks": f"This recording has limits: {{names}}. {AGAIN}",
+    "lacks": f"To see what this recording cannot show, {AGAIN}",
     "unknown": (
         "No known cause fits. Repeat the recording to see whether the remaining error repeats; if it does, "
         "vary one thing at a time: temperature, load, amplitude."
@@ -95,7 +95,8 @@ ADVICE: Mapping[str, str] = {
         "{times:.2g} times as long, or with less noise, and diagnose that."
     ),
     "inconclusive": (
-        f"These recordings could not have shown {{names}} of {{matters:.2g}} % of the span. {AGAIN}"
+        "These recordings could not have shown {names} of {matters:.2g} % of the span. "
+        f"To see it, {AGAIN}"
     ),
     "extend": (
         "Extend the model with what was found, then test it on another recording, which was not fitted: "
@@ -123,9 +124,9 @@ DOUBTS: Mapping[str, str] = {
 OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o run.h5."
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``Bench.numbers``
 LACKS: Mapping[str, str] = {
-    "rates": "only one rate of change",
-    "holds": "no holds (a hold is {hold_least} or more at one value)",
-    "length": "few crossings of the range (it is shorter than {short})",
+    "rates": "it has one rate of change only",
+    "holds": "the {input} never rests for {hold_least} or more",
+    "length": "it is shorter than {short}",
 }
 # What to record instead
 MISSING: Mapping[str, str] = {

@@ -26,7 +26,7 @@ def density(model: Model) -> str:
     text = (
         f"Colour map over the half-plane of switching levels, {model.edges_quantity} "
         f"{_range(model.edges, model.edges_unit)}: {n_h} levels, "
-        f"{covered} of {model.weights.size} cells covered."
+        f"{covered} of {model.weights.size} cells switched."
     )
     off_diagonal = np.where((i != j) & model.covered, model.weights, 0.0)
     if off_diagonal.max(initial=0.0) > 0:

@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
-from pulsetrainer.artefacts import Dependence, Diagnosis, Profile
+from pulsetrainer.artefacts import Dependence, Diagnosis, FloatArray, Profile
 from pulsetrainer.report import panels
-from pulsetrainer.report.diagnosis_text import answer
+from pulsetrainer.report.diagnosis_text import answer, explains
 from pulsetrainer.report.style import (
     BLUE,
     COLUMN_IN,
@@ -24,6 +24,7 @@ from pulsetrainer.report.style import (
 )
 
 _MOST_BARS = 10
+_MANY = 1.5  # decades: over fewer, an even scale shows more
 _SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side
 
 
@@ -58,8 +59,9 @@ def profile(one: Profile, *, extended: bool) -> Figure:
     axes.plot(one.at[known], one.before[known], "o-", color=VERMILION, markersize=3, label="without causes")
     if extended:
         axes.plot(one.at[known], one.after[known], "s-", color=BLUE, markersize=3, label="with them")
-    if one.name in ("rate", "frequency"):
-        axes.set_xscale("log" if one.name == "frequency" else "symlog")
+    if one.name == "frequency" or (one.name == "rate" and _decades(one.at) > _MANY):
+        moving = float(np.abs(one.at[one.at != 0]).min(initial=np.inf))
+        axes.set_xscale("log") if one.name == "frequency" else axes.set_xscale("symlog", linthresh=moving)
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))  # powers of ten would need mathtext
         axes.xaxis.set_minor_formatter(NullFormatter())
     if one.name == "direction":
@@ -70,6 +72,12 @@ def profile(one: Profile, *, extended: bool) -> Figure:
     axes.set_ylim(bottom=0.0)
     panels.headroom(axes)
     return figure
+
+
+def _decades(at: FloatArray) -> float:
+    """Return over how many decades values other than zero are spread."""
+    sizes = np.abs(at[at != 0])
+    return float(np.log10(sizes.max() / sizes.min())) if sizes.size else 0.0
 
 
 def axis_of(one: Profile) -> str:
@@ -101,7 +109,7 @@ def dependence(one: Dependence) -> Figure:
 @styled
 def ranking(found: Diagnosis) -> Figure:
     """Return how much of the error beyond noise each cause explains, whether it was found, and why not."""
-    shown = [one for one in found.causes if one.found or one.explains_percent > 0][:_MOST_BARS][::-1]
+    shown = [one for one in found.causes if one.found or explains(one, found) > 0][:_MOST_BARS][::-1]
     figure = Figure(figsize=(COLUMN_IN, 1.0 + 0.34 * max(len(shown), 1)), layout="constrained")
     axes = figure.add_subplot()
     share = [max(one.explains_percent, 1e-3) for one in shown]

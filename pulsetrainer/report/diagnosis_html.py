@@ -7,7 +7,7 @@ from typing import Any
 
 from pulsetrainer.artefacts import Cause, Diagnosis
 from pulsetrainer.report import diagnosis_figures as figures
-from pulsetrainer.report.diagnosis_text import COLUMNS, ERRORS, answer, parameters, stands
+from pulsetrainer.report.diagnosis_text import COLUMNS, ERRORS, answer, explains, parameters, stands
 from pulsetrainer.report.html import page
 from pulsetrainer.report.views import Number, Picture, number, picture
 
@@ -22,11 +22,11 @@ def render_diagnosis(found: Diagnosis, **header: Any) -> str:
         headline=headline(found),
         named=[_words(one) for one in found.found],
         levels=_levels(found),
-        rows=[_row(one, quick=found.quick) for one in shown],
+        rows=[_row(one, found) for one in shown],
         columns=COLUMNS,
         course=_course(found),
         profiles=[*_dependences(found), *_profiles(found)],
-        ranking=_ranking(found),
+        ranking=_ranking(found) if any(one.found or explains(one, found) > 0 for one in shown) else None,
     )
 
 
@@ -70,12 +70,12 @@ def _number(value: float, metric: str, digits: str) -> Number:
     return number(value, metric, digits) if math.isfinite(value) else Number("")
 
 
-def _row(one: Cause, *, quick: bool) -> dict[str, str | Number]:
+def _row(one: Cause, found: Diagnosis) -> dict[str, str | Number]:
     gain = one.held_out_gain_percent if one.found else float("nan")
     return {
         "id": one.cause,
-        "found": answer(one, quick=quick),
-        "explains": number(one.explains_percent, f"{one.cause}.explains_percent", ".1f"),
+        "found": answer(one, quick=found.quick),
+        "explains": _number(explains(one, found), f"{one.cause}.explains_percent", ".1f"),
         "gain": _number(gain, f"{one.cause}.held_out_gain_percent", ".1f"),
     }
 

@@ -20,7 +20,7 @@ ERRORS = (
     ("the model as given", "rms_percent", ""),
     ("fitted anew to these recordings", "", "static_percent"),
     ("with the causes found", "extended_rms_percent", "extended_percent"),
-    ("noise alone; of averages: noise and levels", "noise_percent", "floor_percent"),
+    ("noise alone (averages: and levels)", "noise_percent", "floor_percent"),
 )
 COLUMNS = {
     "explains": "share of the squared error beyond noise that goes with this cause in the model",
@@ -52,7 +52,7 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
         yield Facts(f"found: {one.cause}, {one.text}", _said(one))
     yield Table(
         "error that is left, rms, % of the span of the output",
-        ("", "of single samples", "of short averages"),
+        ("left by", "single samples", "short averages"),
         tuple(
             (words, *(_figure(getattr(found, name), ".3f") if name else None for name in fields))
             for words, *fields in ERRORS
@@ -63,7 +63,7 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     yield Table(
         "causes, strongest first",
         ("cause", "found", "explains, %", "gain, %"),
-        tuple(_row(one, quick=found.quick) for one in (*found.found, *others)),
+        tuple(_row(one, found) for one in (*found.found, *others)),
     )
     yield Facts("in this table", COLUMNS)
     yield Facts("evidence", {str(k): text for k, text in enumerate(found.evidence, start=1)})
@@ -83,7 +83,7 @@ def answer(one: Cause, *, quick: bool) -> str:
         return "no"
     if one.p_value > LIMITS.p_max:
         return "no: noise does as much"
-    return "no: another explains more" if quick else "no: too small, or predicts no better"
+    return "no: another explains more" if quick else "no: too small or no better"
 
 
 def parameters(several: Sequence[Parameter]) -> dict[str, str]:
@@ -122,9 +122,16 @@ def _said(one: Cause) -> dict[str, str]:
     }
 
 
-def _row(one: Cause, *, quick: bool) -> tuple[Any, ...]:
-    gain = one.held_out_gain_percent if one.found else float("nan")
-    return (one.cause, answer(one, quick=quick), _figure(one.explains_percent, ".1f"), _figure(gain, ".1f"))
+def explains(one: Cause, found: Diagnosis) -> float:
+    """Return the share of the error beyond noise that a cause explains; NaN where there is no such error."""
+    beyond = not found.static_percent <= found.floor_percent
+    return one.explains_percent if one.found or beyond else math.nan
+
+
+def _row(one: Cause, found: Diagnosis) -> tuple[Any, ...]:
+    gain = one.held_out_gain_percent if one.found else math.nan
+    share = _figure(explains(one, found), ".1f")
+    return (one.cause, answer(one, quick=found.quick), share, _figure(gain, ".1f"))
 
 
 def _figure(value: float, form: str) -> str | None:

@@ -33,6 +33,7 @@ from pulsetrainer.report.style import (
     GRID,
     GROUND,
     GUIDE,
+    INK,
     METHODS,
     MODEL,
     MUTED,
@@ -161,7 +162,7 @@ def _facts(model: Model, ends: str) -> str:
     covered = int(np.count_nonzero(model.covered))
     lines = [
         f"{model.edges.size - 1} levels, {model.weights.size} cells",
-        f"{covered} covered" + (", hatched: not covered" if covered < model.weights.size else ""),
+        f"{covered} switched" + (",\nhatched: not switched" if covered < model.weights.size else ""),
         f"offset {model.offset:.4g} {shown(model.offset_unit)}".rstrip().replace("-", "−"),
     ]
     if model.polarity < 0:
@@ -196,9 +197,10 @@ def fit(
 
 def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> None:
     """Draw a residual between lines at plus and minus its rms."""
-    for y in (-rms, 0.0, rms):
-        axes.axhline(y, **GUIDE)
     trace(axes, x, difference, **ERROR)
+    axes.axhline(0.0, **GUIDE)
+    for y in (-rms, rms):
+        axes.axhline(y, **{**GUIDE, "color": INK, "zorder": 3})
 
 
 def prediction(panel: FigureBase, model: ModelEvaluation, reach: float | None = None) -> None:

@@ -36,7 +36,8 @@ def render_session(session: Session, score: Score | None, **header: Any) -> str:
             session_figures.course(session),
             "course",
             "What was pressed",
-            f"Target and measured force for some seconds, and the errors of all {beats} beats.",
+            f"Target and measured force for {session_figures.SHOWN_S:g} seconds, and the errors of all "
+            f"{beats} beats.",
         ),
         quiz=None if session.quiz is None or score is None else _quiz(session.quiz, score),
     )

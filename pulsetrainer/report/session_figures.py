@@ -11,7 +11,7 @@ from pulsetrainer.errors import DataError
 from pulsetrainer.report import heat_figures, panels
 from pulsetrainer.report.style import BLUE, COLUMN_IN, INK, MEASURED, TARGET, VERMILION, label, styled
 
-_SHOWN_S = 6.0
+SHOWN_S = 6.0
 
 
 @styled
@@ -36,12 +36,12 @@ def course(session: Session) -> Figure:
         above, below, lowest = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 0.8))
         heat_figures.temperature(lowest, warm_s, warm_K)
     middle = session.time_s[session.time_s.size // 2]
-    near = np.abs(session.time_s - middle) <= 0.5 * _SHOWN_S
+    near = np.abs(session.time_s - middle) <= 0.5 * SHOWN_S
     panels.trace(above, session.time_s[near], session.target[near], **TARGET, label="target")
     panels.trace(above, session.time_s[near], session.output[near], **MEASURED, label="measured")
     above.set_ylabel(label("force", session.output_unit))
     above.set_xlabel(label("time", "s"))
-    above.set_title("some seconds" + ("" if session.complete else ", stopped early"))
+    above.set_title(f"{SHOWN_S:g} seconds from the middle" + ("" if session.complete else ", stopped early"))
     panels.headroom(above)
     beats = session.beats
     percent = 100.0 / session.full_force

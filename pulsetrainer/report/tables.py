@@ -64,8 +64,24 @@ def listed(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) ->
                 yield f"    {head:<{width}}  {text(cell)}"
 
 
+# what a person reads where the name of a figure, as JSON has it, is another word
+_WORDS = {
+    "coverage_percent": "cells switched, %",
+    "fit_rms_percent": "fit, rms, % of span",
+    "rate_cv_percent": "variation of the rate, %",
+    "amplitude_cv_percent": "variation of the height, %",
+    "beat_timing_max_ms": "timing, at most, ms",
+    "mean_abs_error_percent": "mean error, % of full force",
+    "max_abs_error_percent": "max error, % of full force",
+    "nrmse": "rms error, of the range",
+    "augmentation_index_error_percent": "error of the augmentation index, %",
+}
+
+
 def label(name: str) -> str:
     """Return the name of a figure as a person writes it, its unit behind a comma."""
+    if name in _WORDS:
+        return _WORDS[name]
     for ending, unit in (("_percent", "%"), ("_Hz", "Hz")):
         if name.endswith(ending):
             name = f"{name.removesuffix(ending)}, {unit}"

@@ -17,6 +17,7 @@ _TITLED = {
 }  # fmt: skip
 _WIDTH = 110  # of a table, unless a screen says otherwise
 _LABEL_WIDTH, _COLUMN_WIDTH = 32, 13
+_ROUNDING = 1e-6
 _FIGURES = (
     ("mean error, scaled", "scaled.mean_abs_error_percent"),
     ("mean error, compensated", "compensated.mean_abs_error_percent"),
@@ -63,14 +64,29 @@ def tables_of(evaluation: Evaluation, width: int = _WIDTH) -> Iterator[Table]:
     if evaluation.waveforms:
         yield from _pulses(evaluation, width)
     if evaluation.models:
-        yield Table(
-            "prediction error on the run",
-            ("model", "rms", "rms %", "max %", "gain %", "offset", "rms % with its own offset"),
-            tuple(
-                (m.name, m.rms, m.rms_percent, m.max_percent, m.gain_percent, m.offset, m.shape_rms_percent)
-                for m in evaluation.models
-            ),
-        )
+        yield _predictions(evaluation)
+
+
+def _predictions(evaluation: Evaluation) -> Table:
+    """How each model predicts the run; an offset far below the error is the rounding of numbers."""
+    unit = evaluation.models[0].output_unit
+    rms, offset = (f"{name}, {unit}" if unit not in ("", "1") else name for name in ("rms", "offset"))
+    return Table(
+        "prediction error on the run, % of its span",
+        ("model", rms, "rms, %", "max, %", "gain, %", offset, "rms without\noffset, %"),
+        tuple(
+            (
+                m.name,
+                m.rms,
+                m.rms_percent,
+                m.max_percent,
+                m.gain_percent,
+                m.offset if abs(m.offset) > _ROUNDING * m.rms else 0.0,
+                m.shape_rms_percent,
+            )
+            for m in evaluation.models
+        ),
+    )
 
 
 def _pulses(evaluation: Evaluation, width: int) -> Iterator[Table]:

@@ -263,7 +263,7 @@ def model_section(model: Model, which: str = "") -> Section:
     ]
     if model.fit is not None:
         facts += [
-            ("covered cells [%]", number(model.fit.coverage_percent, "model.fit.coverage_percent", ".1f")),
+            ("cells switched [%]", number(model.fit.coverage_percent, "model.fit.coverage_percent", ".1f")),
             (label("rms of the fit", model.output_unit), number(model.fit.rms, "model.fit.rms", ".3g")),
             ("rms of the fit [% of span]", number(model.fit.rms_percent, "model.fit.rms_percent", ".3g")),
         ]

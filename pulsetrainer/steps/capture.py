@@ -131,8 +131,8 @@ class Plan:
     """What would be played."""
 
     signal: str
-    samples: int
-    seconds: float  # conditioning loops and what brings the memory back included
+    samples: int  # recorded, what brings the memory back included
+    seconds: float  # conditioning loops included
     rate_Hz: float
     reversals: int
     coverage_percent: float
@@ -162,16 +162,18 @@ def plan(
     check_top(signal, rehearsal.current_A)
     top = float(signal.value.max())
     loop = conditioning_loop(top, signal.rate_Hz) if condition else np.zeros(0)
-    played = 0
+    played = recorded = 0
     for part in parts_of(course, at, ON_TIME_S - RAMP_S):
-        for piece in (loop, part.reference(course)):
+        reference = part.reference(course)
+        for piece in (loop, reference):
             if piece.size:
                 rehearsal.play(piece, signal.rate_Hz)
-            played += piece.size
+        played += loop.size + reference.size
+        recorded += reference.size
     covered = coverage(Plane.uniform(0.0, top, levels), [signal.value]) if top > 0 else np.zeros(1)
     return Plan(
         signal=signal.name,
-        samples=course.size - at,
+        samples=recorded,
         seconds=played / signal.rate_Hz,
         rate_Hz=signal.rate_Hz,
         reversals=course.reversals,

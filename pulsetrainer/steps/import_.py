@@ -131,7 +131,10 @@ def _notes_on_time(name: str, report: Report) -> list[str]:
         filled = ", filled with straight lines" if report.resampled else ""
         plural = "s" if report.gaps > 1 else ""
         longest = with_seconds(report.longest_gap_s or 0.0)
-        notes.append(f"{name} has {report.gaps} gap{plural}, the longest of {longest}{filled}")
+        notes.append(
+            f"{name} has {report.gaps} gap{plural} (more than 1.5 usual time steps), the longest of {longest}"
+            f"{filled}"
+        )
     if (
         report.even is False
         and not report.resampled

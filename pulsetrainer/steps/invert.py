@@ -167,16 +167,17 @@ def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
     error = drive.predicted_max_error_percent
     if not error > EXPECTED:
         return []
+    full = f"full {drive.model.output_quantity if drive.model else 'force'}"
     if limit is not None and slowed > 0:
         unit = with_unit(f"{limit:g}", f"{drive.input_unit}/s")
         why = f"the drive may move at most {unit}, which this pulse exceeds"
     elif drive.clipped_samples:
-        why = "parts of the pulse are out of the model's reach"
+        why = "parts of the pulse are out of the model's reach; `force_min` and `force_max` keep it inside"
     elif drive.inversion == "closest-match":
         why = "the drive takes the steps of the levels"
     else:
         why = "the model's output does not follow the pulse even without a limit"
-    return [f"warning: by the model itself the error will be up to {error:.1f} % of full force: {why}"]
+    return [f"warning: the model itself expects errors of up to {error:.1f} % of {full}: {why}"]
 
 
 def shape_of(drive: Waveform) -> Shape:
@@ -382,9 +383,10 @@ def _tracked(model: Model, part: Invertible, layout: _Layout, notes: list[str]) 
         inverse=part.inverse if model.form == "signed" else None,
         band_Hz=BAND_HZ,
     )
+    left, static = (with_unit(f"{rms:.3g}", model.output_unit) for rms in (found.rms, found.rms_static))
     notes.append(
-        f"by the extended model the rms tracking error is {with_unit(f'{found.rms:.3g}', model.output_unit)} "
-        f"after {found.steps} steps, {found.rms_static:.3g} with the static inverse"
+        f"the extended model expects an rms error of {left} after {found.steps} steps, and of {static} with "
+        "the static inverse"
     )
     if found.steps == 0:
         notes.append("no step improved on the static inverse, which is kept")

@@ -224,7 +224,7 @@ def _note(tried: list[_Pressed], best: int) -> str:
     """Say what was gained, and what is left."""
     first, kept = tried[0].errors, tried[best].errors
     return (
-        f"refined in {len(tried)} passes: the mean error fell from {first.mean_abs_error_percent:.3g} to "
-        f"{kept.mean_abs_error_percent:.3g} % of full force in pass {best + 1}, which is kept; the noise "
-        f"alone gives {kept.noise_percent:.2g} %"
+        f"refined in {len(tried)} passes: the mean error fell from {first.mean_abs_error_percent:.2f} to "
+        f"{kept.mean_abs_error_percent:.2f} % of full force in pass {best + 1}, which is kept; the noise "
+        f"alone gives {kept.noise_percent:.2f} %"
     )

@@ -80,8 +80,11 @@ def test_resumed_after_two_kills_it_is_the_whole_course(tmp_path):
     first = read(tmp_path / "run.h5.partial", Run)
     assert not first.complete
     killed(tmp_path, (*words, "--resume"), first.input.size + rng.randrange(20_000, 100_000))
+    planned = pulsetrainer(tmp_path, *words, "--resume", "--dry-run", "--json").json
+    kept = read(tmp_path / "run.h5.partial", Run).input.size
     done = pulsetrainer(tmp_path, *words, "--resume", "--json")
     assert done.code == 0, done
+    assert done.json["samples"] - kept == planned["samples"]
     assert done.json["parts"] == 3
     assert done.json["complete"] is True
     assert "continuing run.h5.partial" in done.err

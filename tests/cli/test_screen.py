@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import pty
@@ -18,6 +19,7 @@ from store_examples import header
 import pulsetrainer.cli
 from program import PROGRAM
 from program import pulsetrainer as piped
+from pulsetrainer.cli.console import Screen
 from pulsetrainer.files import store
 
 BIN = Path(sys.executable).parent
@@ -74,6 +76,35 @@ def on_terminal(folder: Path, *words: str, **more: str) -> bytes:
     assert program.wait() == 0, said
     os.close(main)
     return said
+
+
+class _Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_note_is_folded_between_words(monkeypatch):
+    """On a terminal; a warning is called one, and no note."""
+    monkeypatch.setenv("COLUMNS", "40")
+    monkeypatch.setattr(sys, "stderr", shown := _Terminal())
+    screen = Screen("identify", as_json=False)
+    text = "the model leaves 0.9 % of the span (rms), 3 times the noise of single samples"
+    screen.note(text)
+    screen.note("warning: the model expects large errors")
+    lines = shown.getvalue().splitlines()
+    assert max(map(len, lines)) <= 40
+    assert " ".join(" ".join(lines[:-1]).split()) == f"note: {text}"
+    assert lines[-1].startswith("warning: ")
+
+
+def test_the_list_of_commands_is_not_cut(tmp_path):
+    """What a command does stands in one line of eighty columns, to its full stop."""
+    done = piped(tmp_path, "--help", env={"COLUMNS": "80"})
+    listed = done.out.split("Commands:")[1].strip().splitlines()
+    assert len(listed) > 15
+    assert all(line.endswith(".") and not line.endswith("...") for line in listed), listed
 
 
 @pytest.fixture

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
+import store_examples
 
 from pulsetrainer.artefacts import Cause, Parameter
 from pulsetrainer.diagnosis.thresholds import LIMITS
-from pulsetrainer.report.diagnosis_text import answer, parameters
+from pulsetrainer.report import tables
+from pulsetrainer.report.diagnosis_text import Table, answer, explains, parameters, sections
 
 NAN = float("nan")
 
@@ -48,3 +52,26 @@ def test_a_learned_curve_is_told_by_its_ends_and_not_value_by_value(count):
     said = parameters([*kept, *[Parameter("tau", 2.0, "s", NAN, NAN), *curve] * count])
     assert list(said) == [*["tau", "tau 2"][:count], "curve"]
     assert said["curve"].startswith("-0.2 to 0.4 N")
+
+
+def test_where_nothing_is_left_no_cause_explains_a_share_of_it():
+    """A share of an error that is no larger than noise would say that a cause was there."""
+    found = store_examples.diagnosis()
+    one = replace(_cause(0.5), explains_percent=100.0)
+    for left, known in ((0.9, False), (1.0, False), (1.1, True)):
+        share = explains(one, replace(found, static_percent=left, floor_percent=1.0))
+        assert (share == 100.0) is known
+    assert explains(replace(one, found=True), replace(found, static_percent=0.9, floor_percent=1.0)) == 100.0
+
+
+def test_its_tables_fit_a_terminal_of_eighty_columns():
+    """With the longest name of a cause and the longest answer; a list of the same is three times as long."""
+    longest = replace(_cause(0.1 * LIMITS.p_max), cause="load-dependence", explains_percent=100.0)
+    found = replace(store_examples.diagnosis(), causes=(replace(longest, found=True), longest))
+    drawn = [
+        tables.ESCAPE.sub("", tables.drawn(part.title, part.columns, part.rows))
+        for part in sections(found)
+        if isinstance(part, Table)
+    ]
+    assert len(drawn) == 2
+    assert max(len(line) for text in drawn for line in text.splitlines()) <= 80

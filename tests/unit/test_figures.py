@@ -126,7 +126,7 @@ def test_density_puts_each_cell_in_its_place():
                 assert field.mask[i, j]
 
 
-def test_density_marks_cells_that_were_not_covered():
+def test_density_marks_cells_that_were_not_switched():
     """A weight that no data speak for is hatched, not coloured."""
     base = examples.model(n_h=4, with_fit=False)
     covered = np.ones(10, dtype=bool)
@@ -140,7 +140,7 @@ def test_density_marks_cells_that_were_not_covered():
     ]
     corners = [len(path.vertices) - 1 for path in hatched[0].get_paths()]
     assert corners == [4, 3]
-    assert "8 covered, hatched: not covered" in figure.axes[0].texts[0].get_text()
+    assert "8 switched,\nhatched: not switched" in figure.axes[0].texts[0].get_text()
 
 
 def test_density_scale_is_not_set_by_the_reversible_diagonal():
