@@ -31,10 +31,7 @@ class Limits:
     def within(self, current_A: float, force_N: float) -> tuple[float, float]:
         """Return what is in force on a device with these limits of its own, A and N.
 
-        Raises
-        ------
-        ArgumentError
-            A limit is not positive, or above the device's own.
+        ArgumentError where a limit is not positive, or above the device's own.
         """
         for what, wanted, own, unit in (
             ("current", self.current_A, current_A, "A"),
@@ -56,10 +53,7 @@ def checked_wire(
 ) -> NDArray[np.int16]:
     """Return a reference (n,) in A as it goes over the wire, if a device with these limits can play it.
 
-    Raises
-    ------
-    ArgumentError
-        A sample is no number or beyond the current, or all of it takes longer than the device stays on.
+    ArgumentError where a sample is no number or beyond the current, or all of it takes too long.
     """
     step = ticks_per_sample(rate_Hz, tick_rate_Hz)
     wire = to_wire(reference_A, limit_A=current_A)

@@ -63,10 +63,7 @@ def register(scheme: str, opener: Opener) -> None:
 def find_opener(port: str) -> Opener | None:
     """Return who opens a port of this text; None for a serial port, and for ``socket://`` and its like.
 
-    Raises
-    ------
-    UsageError
-        if nobody has announced its scheme.
+    UsageError where nobody has announced its scheme.
     """
     match = re.match(r"([a-z][a-z0-9+-]*):(//)?", port)
     if match is None:

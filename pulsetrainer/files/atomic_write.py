@@ -17,12 +17,9 @@ _LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
 
 
 def check_output(path: Path | str, overwrite: bool = False) -> None:
-    """Refuse an output that cannot be written, BEFORE the work that would be lost.
+    """Raise UsageError BEFORE the work that would be lost, where an output cannot be written.
 
-    Raises
-    ------
-    UsageError
-        The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
+    It exists and ``overwrite`` is not set, or its folder is missing or not writable.
     """
     path = Path(path)
     try:

@@ -28,13 +28,7 @@ def append_checksum(path: Path) -> None:
 
 
 def check_checksum(path: Path) -> None:
-    """Raise where the content of a file is not what it was; a file without a checksum passes.
-
-    Raises
-    ------
-    DataError
-        The checksum differs, or the file cannot be read.
-    """
+    """Raise DataError where a file is not what it was; one without a checksum passes."""
     try:
         length = path.stat().st_size - CHECKSUM_LENGTH
         if length < 0:

@@ -18,23 +18,14 @@ _FIRST_TEXT = re.compile(rb"GCOL.{28}([a-z]+)", re.DOTALL)  # our first text att
 
 
 def check_file(path: Path | str) -> None:
-    """Refuse an input that is no file that can be read, with the names that come nearest.
-
-    Raises
-    ------
-    DataError
-        It is absent, a folder, not an ordinary file, or not permitted.
-    """
+    """Raise DataError for an input that is absent, a folder, no ordinary file, or not permitted."""
     _first_bytes(Path(path))
 
 
 def check_artefact(path: Path | str) -> None:
-    """Refuse an input that cannot be an artefact, by its first bytes.
+    """Raise DataError for an input that cannot be an artefact, by its first bytes.
 
-    Raises
-    ------
-    DataError
-        As ``check_file``; or it is empty, and neither an HDF5 file nor a recording that was cut off.
+    As ``check_file``; or it is empty, and neither an HDF5 file nor a recording that was cut off.
     """
     start = _first_bytes(Path(path))
     if not start:

@@ -149,10 +149,7 @@ def _check_distinct(table: Table, **meanings: str | None) -> None:
 def _without_bad_rows(table: Table, *, counted: bool) -> tuple[Table, tuple[str, ...]]:
     """Return a table without the rows in which a number is missing, and a note of how many there were.
 
-    Raises
-    ------
-    UsageError
-        The rows are ``counted`` to tell the time: none may be left out.
+    UsageError where the rows are ``counted`` to tell the time: none may be left out.
     """
     bad = ~np.all([np.isfinite(column) for column in table.columns.values()], axis=0)
     count = int(np.count_nonzero(bad))

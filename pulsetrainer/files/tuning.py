@@ -22,10 +22,7 @@ Found = Mapping[str, float]
 def read_tuned(path: Path | str) -> dict[str, dict[str, Any]]:
     """Return what was found for each device, by its serial number.
 
-    Raises
-    ------
-    UsageError
-        The file cannot be read, or what is there is no table of numbers.
+    UsageError where the file cannot be read, or what is there is no table of numbers.
     """
     tree = read_toml(path)
     table = tree.get(TABLE, {})
@@ -41,13 +38,7 @@ def read_tuned(path: Path | str) -> dict[str, dict[str, Any]]:
 
 
 def check_tuned(path: Path, serial: str, *, overwrite: bool) -> None:
-    """Refuse a file that cannot take a device's entry, before the work that would be lost.
-
-    Raises
-    ------
-    UsageError
-        It cannot be written or read, or has an entry of this device and ``overwrite`` is not set.
-    """
+    """Raise UsageError where a file cannot take a device's entry, before the work that would be lost."""
     check_output(path, overwrite=True)
     if path.exists() and serial in read_tuned(path) and not overwrite:
         raise ExistsError(path, f"{path} already has the gains of the device {serial}")

@@ -157,10 +157,7 @@ def model(identified: Model) -> Figure:
 def evaluation(errors: Evaluation) -> Figure:
     """Return force and loops of every pulse, methods overlaid, then the prediction of every model.
 
-    Raises
-    ------
-    DataError
-        The evaluation holds neither waveforms nor models.
+    DataError where the evaluation holds neither.
     """
     pairs = -(-len(errors.models) // 2)
     pulses: dict[str, list[WaveformEvaluation]] = {}

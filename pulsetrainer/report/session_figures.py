@@ -18,10 +18,7 @@ SHOWN_S = 6.0
 def course(session: Session) -> Figure:
     """Return the middle of a session, target and force, the errors of all its beats, and the coil's heat.
 
-    Raises
-    ------
-    DataError
-        The session was cut off before its first sample.
+    DataError where the session was cut off before its first sample.
     """
     if not session.time_s.size:
         raise DataError(

@@ -183,10 +183,7 @@ def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
 def shape_of(drive: Waveform) -> Shape:
     """Return the pulse of a drive: one scored period of its target.
 
-    Raises
-    ------
-    DataError
-        The drive was made by a version that did not keep the length of its beats.
+    DataError where it was made by a version that did not keep the length of its beats.
     """
     if not np.isfinite(drive.period_s):
         raise DataError(

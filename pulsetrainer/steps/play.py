@@ -42,13 +42,7 @@ class Plan:
 
 
 def plan(drive: Waveform, *, repeats: int = 5, limits: Limits | None = None) -> Plan:
-    """Return what ``play`` would play on a device as it is delivered, with a cold coil.
-
-    Raises
-    ------
-    ArgumentError, DataError, DeviceError
-        As ``play``, as far as the drive and its model tell.
-    """
+    """Return what ``play`` would play on a device as it is delivered, with a cold coil; fails as ``play``."""
     _check(drive, repeats)
     rehearsal = Rehearsal(limits or Limits())
     _check_peak(drive, rehearsal.current_A)

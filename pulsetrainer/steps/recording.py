@@ -257,10 +257,7 @@ class Part:
 def parts_of(course: Course, at: int, longest_s: float) -> Iterator[Part]:
     """Give the parts of a course from sample ``at`` on, each at most ``longest_s`` long.
 
-    Raises
-    ------
-    ArgumentError
-        Bringing the memory back alone takes longer.
+    ArgumentError where bringing the memory back alone takes longer.
     """
     rate_Hz = course.signal.rate_Hz
     longest = int(longest_s * rate_Hz) + 1
@@ -285,13 +282,7 @@ def check_top(signal: excitations.Signal, limit_A: float) -> None:
 
 
 def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:
-    """Ticks of the device from one sample to the next.
-
-    Raises
-    ------
-    ArgumentError
-        The rate does not divide the device's, or is too low for it.
-    """
+    """Ticks of the device from one sample to the next; ArgumentError where the rate does not divide them."""
     slowest = tick_rate_Hz / MAX_DECIMATION
     decimation = round(tick_rate_Hz / rate_Hz) if rate_Hz >= slowest else 0
     if decimation < 1 or not np.isclose(decimation * rate_Hz, tick_rate_Hz):

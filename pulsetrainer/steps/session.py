@@ -45,13 +45,7 @@ class Memory:
 
 
 def check_model(model: Model) -> None:
-    """Refuse a model that no session can be played with.
-
-    Raises
-    ------
-    DataError
-        It is of another device, of another form, or its weights are read as relays.
-    """
+    """Raise DataError for a model of another device or another form, or whose weights are read as relays."""
     if (model.input_unit, model.output_unit) != ("A", "N"):
         raise DataError(
             f"the model is of a device from {model.input_unit} to {model.output_unit}; a session drives a "
