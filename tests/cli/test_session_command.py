@@ -178,16 +178,34 @@ def _recorded(folder: Path) -> int:
     return 0
 
 
-@pytest.mark.realtime
-@pytest.mark.parametrize("after", [200, 2500])
-def test_killed_at_any_moment_the_file_is_readable(tmp_path, after):
-    """It is a session that was cut off: its beats, what was asked and measured; and it has a score sheet."""
-    process = _started(tmp_path, *SHORT, "--minutes", 5)
+@contextlib.contextmanager
+def _sessions(*folders: Path):
+    """Sessions of five minutes, one in each folder, at the same time."""
+    processes = []
     try:
-        _until(lambda: _recorded(tmp_path) >= after)
+        for folder in folders:
+            folder.mkdir()
+            processes.append(_started(folder, *SHORT, "--minutes", 5))
+        yield processes
     finally:
-        process.kill()
-        process.communicate()
+        for process in processes:
+            process.kill()
+            process.communicate()
+
+
+@pytest.mark.realtime
+def test_killed_at_any_moment_the_file_is_readable(tmp_path):
+    """It is a session that was cut off: its beats, what was asked and measured; and it has a score sheet."""
+    killed = {tmp_path / "at once": 200, tmp_path / "later": 2500}
+    with _sessions(*killed) as processes:
+        for process, (folder, after) in zip(processes, killed.items(), strict=True):
+            _until(lambda folder=folder, after=after: _recorded(folder) >= after)
+            process.kill()
+    for folder, after in killed.items():
+        _check_cut_off(folder, after)
+
+
+def _check_cut_off(tmp_path: Path, after: int) -> None:
     kept = read_any(tmp_path / "s.h5.partial")
     assert isinstance(kept, Session)
     assert kept.input.size >= after
@@ -205,21 +223,20 @@ def test_killed_at_any_moment_the_file_is_readable(tmp_path, after):
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_stopped_by_a_signal_nothing_is_lost(tmp_path, number):
+def test_stopped_by_a_signal_nothing_is_lost(tmp_path):
     """The file is whole, holds the beats so far, and the exit code says who stopped it."""
-    process = _started(tmp_path, *SHORT, "--minutes", 5)
-    try:
-        _until(lambda: _recorded(tmp_path) >= 4000)
-        process.send_signal(number)
-        _, err = process.communicate(timeout=60)
-    finally:
-        process.kill()
-    assert process.returncode == 130, err
-    kept = read(tmp_path / "s.h5", Session)
-    assert not kept.complete
-    assert kept.beats.start_s.size >= 2
-    assert not list(tmp_path.glob("*.partial"))
+    stopped = {tmp_path / number.name: number for number in (signal.SIGINT, signal.SIGTERM)}
+    with _sessions(*stopped) as processes:
+        for process, (folder, number) in zip(processes, stopped.items(), strict=True):
+            _until(lambda folder=folder: _recorded(folder) >= 4000)
+            process.send_signal(number)
+            _, err = process.communicate(timeout=60)
+            assert process.returncode == 130, err
+    for folder in stopped:
+        kept = read(folder / "s.h5", Session)
+        assert not kept.complete
+        assert kept.beats.start_s.size >= 2
+        assert not list(folder.glob("*.partial"))
 
 
 def test_a_lost_port_keeps_what_was_pressed(tmp_path):
