@@ -29,7 +29,7 @@ def extend(
 ) -> None:
     """Write the model with the causes found.
 
-    Its weights are refitted together with them.
+    Its static part is identified again beside them.
 
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """

@@ -20,15 +20,14 @@ from pulsetrainer.artefacts import (
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import BoolArray, Plane
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.finding import Estimate, Finding
-from pulsetrainer.diagnosis.fitting import weights_for
-from pulsetrainer.diagnosis.forms import dual_behind
+from pulsetrainer.diagnosis.fitting import Fitted
+from pulsetrainer.diagnosis.forms import static_behind
 from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import predict
 from pulsetrainer.diagnosis.scale import Scale
@@ -48,8 +47,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     of_samples = PERCENT / float(
         np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in problem.records]))
     )
-    rms, extended = _rms_of(state, model), state.current if state.extends else state.baseline
-    better = extended_model(state, model)
+    rms, extended = rms_of(state, model), state.current if state.extends else state.baseline
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
     bench = wording.Bench(
@@ -82,10 +80,10 @@ def diagnosis_of(state: State) -> Diagnosis:
         output=sign * scale.outputs(problem.measured)[thin],
         before=sign * scale.outputs(problem.measured - state.baseline.residual)[thin],
         after=sign * scale.outputs(problem.measured - state.current.residual)[thin],
-        extended=better,
+        extended=state.extended,
         extended_rms_percent=float("nan")
-        if better is None
-        else _rms_of(state, better) * of_samples / scale.span,
+        if state.extended is None
+        else rms_of(state, state.extended) * of_samples / scale.span,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
         held_out_gain_percent=_held_out_gain(state),
@@ -125,7 +123,7 @@ def _words(given: Given) -> Words:
     }
 
 
-def _rms_of(state: State, model: Model) -> float:
+def rms_of(state: State, model: Model) -> float:
     """Rms error of a model, as given or extended, over the single samples with weight."""
     errors = [
         (predict(model, r.input, r.step) * model.polarity - r.output)[r.sample_weight > 0]
@@ -196,25 +194,18 @@ def _profiles(state: State, words: Words) -> tuple[Profile, ...]:
     return (*found, Profile("frequency", "Hz", scale.places(frequency, "Hz"), first, second, unit))
 
 
-def extended_model(state: State, model: Model) -> Model | None:
-    """Return the model on its own levels, its weights refitted together with the causes found.
-
-    Raises
-    ------
-    DataError
-        The levels of the model are not even.
-    """
+def extended_model(state: State, model: Model) -> Model:
+    """Return the model with the causes that repeat, its static part identified again from what they leave."""
     lasting = state.extensions
-    if not lasting:
-        return None
-    operator, covered = (_dual_part if model.form == "dual" else _static_part)(state, model)
     assert state.question.given is not None
+    assert state.repeated is not None
     scale, words = state.scale, _words(state.question.given)
+    found = static_behind(state.repeated, lasting, model, scale).operator
     return Model(
-        edges=operator.plane.edges,
-        weights=operator.weights,
-        offset=operator.offset,
-        covered=covered,
+        edges=found.plane.edges,
+        weights=found.weights,
+        offset=found.offset,
+        covered=coverage(found.plane, _remembered(state.repeated, model, scale)),
         form=model.form,
         weights_unit=model.weights_unit,
         input_unit=model.input_unit,
@@ -222,49 +213,27 @@ def extended_model(state: State, model: Model) -> Model | None:
         input_quantity=model.input_quantity,
         output_quantity=model.output_quantity,
         reading="continuous",
-        polarity=model.polarity,
-        extensions=tuple(
-            Extension(
-                term.cause.id,
-                _parameters(
-                    state, term.cause, (*_constants(term, scale), *state.estimates[term.cause.id]), words
-                ),
-            )
-            for term in lasting
-        ),
+        polarity=found.polarity,
+        extensions=tuple(_extension(state, term, words) for term in lasting),
     )
 
 
-def _static_part(state: State, model: Model) -> tuple[Preisach, BoolArray]:
-    """Return the static operator refitted on the levels of the model, and the cells that were visited."""
-    plane, scale = Plane(model.edges), state.scale
-    if plane.n_h > LIMITS.extended_levels or not _is_even(plane):
-        plane = Plane.uniform(plane.low, plane.high, min(plane.n_h, LIMITS.extended_levels))
-    problem = state.problem.of(state.problem.records, plane.n_h)
-    terms = state.current.terms
-    operator = weights_for(problem, terms, None).simulator.operator
-    seen = [
-        seen_input(terms, record.output, frame)
+def _extension(state: State, term: Term, words: Words) -> Extension:
+    rows = (*_constants(term, state.scale), *state.repeated_estimates[term.cause.id])
+    return Extension(term.cause.id, _parameters(state, term.cause, rows, words))
+
+
+def _remembered(fitted: Fitted, model: Model, scale: Scale) -> list[FloatArray]:
+    """What the static part remembers of each record: the input that it sees; of the dual form the output."""
+    problem = fitted.problem
+    if model.form == "dual":
+        return [model.polarity * scale.outputs(r.output) for r in problem.records]
+    return [
+        scale.inputs(seen_input(fitted.terms, record.output, frame))
         for record, frame in zip(problem.records, problem.frames, strict=True)
     ]
-    weights = operator.weights * scale.span / scale.reach**2
-    offset = model.polarity * (scale.zero + scale.span * operator.offset)
-    static = Preisach(plane, weights, offset, polarity=model.polarity, signed=problem.signed)
-    return static, coverage(problem.plane, seen)
-
-
-def _dual_part(state: State, model: Model) -> tuple[Preisach, BoolArray]:
-    """Return the same of the dual form: the operator from the output to the input."""
-    found = dual_behind(state.current, model, state.scale)
-    outputs = [model.polarity * state.scale.outputs(r.output) for r in state.problem.records]
-    return found, coverage(found.plane, outputs)
 
 
 def _constants(term: Term, scale: Scale) -> list[Estimate]:
     rows = [Estimate(name, value, unit, value, value) for name, value, unit in term.cause.constants()]
     return [scale.estimate(one) for one in rows]
-
-
-def _is_even(plane: Plane) -> bool:
-    steps = np.diff(plane.edges)
-    return bool(np.allclose(steps, steps[0]))

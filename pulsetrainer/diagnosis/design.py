@@ -38,6 +38,7 @@ class Bins:
     record: IntArray  # (count,) record of each bin
     time_s: FloatArray  # (count,) since the start of its record
     width: tuple[int, ...]  # samples a bin has when all have weight, of each record
+    begins_free: bool = True  # decays from the first sample of each record are fitted
 
     def average(self, signals: Sequence[FloatArray]) -> FloatArray:
         """Averages (count,) of one signal per record."""
@@ -66,7 +67,7 @@ class Bins:
     def _starts(self) -> FloatArray:
         """The offset and the decays themselves (count, k)."""
         columns = [np.ones(self.count)]
-        for k in np.unique(self.record):
+        for k in np.unique(self.record) if self.begins_free else ():
             own = self.record == k
             since = self.time_s - self.time_s[own][0]
             longest = float(since[own][-1]) / LIMITS.start_share

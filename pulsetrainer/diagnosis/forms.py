@@ -6,23 +6,30 @@ change is a signed operator beside it, small enough that the two are the same to
 
     y = P^-1[u] + Q[u]
 
-Once the causes are known, P itself is fitted again, to what the hysteresis alone would have given.
+Once the causes are known, the static part of every form is identified again, from what the hysteresis alone
+would have given.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
 import numpy as np
 
 from pulsetrainer.artefacts import Model
+from pulsetrainer.core import input_noise
 from pulsetrainer.core.fit import fit
-from pulsetrainer.core.identification import Smoothing
-from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.identification import Identified
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.extended import seen_input
+from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.diagnosis.problem import Static
 from pulsetrainer.diagnosis.scale import Scale
+
+if TYPE_CHECKING:
+    from pulsetrainer.core.forms import Form
 
 
 def base_of(model: Model, scale: Scale) -> Static | None:
@@ -39,27 +46,27 @@ def base_of(model: Model, scale: Scale) -> Static | None:
     return base
 
 
-def dual_behind(found: Fitted, model: Model, scale: Scale) -> Preisach:
-    """Return P of y = P^-1[u], fitted to what the causes of a fit leave of its records.
+def static_behind(found: Fitted, lasting: Sequence[Term], model: Model, scale: Scale) -> Identified:
+    """Return the static part of a model in the form of ``model``, fitted to what causes leave of the records.
 
-    It is in the units of the record and of the polarity of the model.
+    It is identified as any model is, with its own levels, smoothing and polarity, in the units of the record.
+    What the causes that are not ``lasting`` did to the records is taken out but for its mean: where the zero
+    will be on another day nobody knows, and its mean is the best guess.
     """
     problem, terms = found.problem, found.terms
     signals, kept = [], []
-    for record, frame, inner, shown in zip(
+    for record, frame, inner, shown, kept_by in zip(
         problem.records,
         problem.frames,
         found.simulator.inner(terms),
         found.simulator.full(terms),
+        found.simulator.full(lasting),
         strict=True,
     ):
-        u = scale.inputs(seen_input(terms, record.output, frame))
-        y = model.polarity * scale.outputs(record.output - (shown - inner))
+        u = input_noise.clean(scale.inputs(seen_input(terms, record.output, frame))).input
+        passing = float(np.mean(shown - kept_by))
+        y = model.polarity * scale.outputs(record.output - (shown - inner) + passing)
         signals.append((u, y))
         kept.append(record.sample_weight > 0)
-    operator = operator_of(model)
-    smoothing: Smoothing = model.fit.smoothing if model.fit else "auto"
-    fitted = fit(
-        signals, operator.low, operator.high, model.levels, smoothing=smoothing, form="dual", kept=kept
-    )
-    return fitted.identified.operator
+    operator, form = operator_of(model), cast("Form", model.form)
+    return fit(signals, operator.low, operator.high, model.levels, form=form, kept=kept).identified

@@ -36,12 +36,13 @@ class _Curve:
 def learned(state: State, words: Mapping[str, str]) -> tuple[Dependence, ...]:
     """Return the dependences in the model of a diagnosis, each with its text, curve and parameters."""
     term = next((one for one in state.extensions if isinstance(one.cause, Unlisted)), None)
-    if term is None or term.cause.id not in state.estimates:
+    if term is None:
         return ()
     assert isinstance(term.cause, Unlisted)
+    assert state.repeated is not None
     bank, rows, found = (
-        Bank(state.current, state.held_out, Unlisted.order),
-        state.estimates[term.cause.id],
+        Bank(state.repeated, state.held_out, Unlisted.order),
+        state.repeated_estimates[term.cause.id],
         [],
     )
     for k, part in enumerate(term.cause.parts):

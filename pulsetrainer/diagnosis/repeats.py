@@ -8,13 +8,20 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def repeats(held_out: HeldOut, before: Fitted, after: Fitted) -> bool:
-    """Tell whether ``after`` predicts whole pieces of the time better than ``before``.
+    """Tell whether ``after`` predicts whole pieces of the time better than ``before``."""
+    return repeated(held_out, before, after) >= LIMITS.repeated
 
-    The gain on pieces that were left out must be a good share of that of the fit, and on no piece may the
-    error rise. A record too short to leave pieces out does not tell, and what is not told does not repeat.
+
+def repeated(held_out: HeldOut, before: Fitted, after: Fitted) -> float:
+    """Return the share of the gain of the fit that is found on whole pieces of the time that were left out.
+
+    It is 0 where the error rises on any piece. A record too short to leave pieces out does not tell, and what
+    is not told does not repeat.
     """
     first, second = held_out.pieces(before, LIMITS.pieces), held_out.pieces(after, LIMITS.pieces)
     if min(first.size, second.size) < LIMITS.pieces:
-        return False
+        return 0.0
     gains, fit = first - second, before.squares - after.squares
-    return bool(gains.sum() >= LIMITS.repeated * fit and gains.min() >= -LIMITS.piece_worse * fit)
+    if gains.min() < -LIMITS.piece_worse * fit:
+        return 0.0
+    return float(gains.sum() / fit) if fit > 0 else 0.0

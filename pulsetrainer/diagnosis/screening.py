@@ -54,12 +54,15 @@ class Sight:
     noise: float  # standard deviation along what is left
     critical: float  # of these, that the test asks for
 
-    def least(self, relevant: float) -> float:
-        """Norm of the smallest effect that nine records of ten show, given the relevant fall of squares."""
+    def least(self, relevant: float, there: float = 0.0) -> float:
+        """Norm of the smallest effect that nine records of ten show, given the relevant fall of squares.
+
+        What looks like the cause already, a gain of ``there``, may be the error of the levels against it.
+        """
         sure = LIMITS.nine_of_ten * self.noise
         tested = self.critical * self.noise + sure
         matters = sure + float(np.sqrt(sure**2 + relevant))
-        return max(tested, matters) / self.share
+        return (max(tested, matters) + float(np.sqrt(max(there, 0.0)))) / self.share
 
 
 @dataclass(frozen=True)

@@ -81,10 +81,12 @@ class State:
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # of every cause, strongest first
     limits: Mapping[str, float] = field(default_factory=dict)  # smallest effects that would show, of the span
+    extended: Model | None = None  # with those causes
     verdict: str = "none"
     evidence: tuple[Evidence, ...] = ()
     advice: Evidence = field(default_factory=lambda: Evidence("none"))
-    once: frozenset[str] = frozenset()  # ids of causes that fit, but do not repeat
+    repeated: Fitted | None = None  # the model with the causes that repeat, once that was asked
+    repeated_estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)  # as ``estimates``
     extends: bool = True  # False: what was found is no fault of the model as given
 
     @property
@@ -141,9 +143,9 @@ class State:
     @property
     def extensions(self) -> list[Term]:
         """Causes that go into the model: properties of the device, not of the record."""
-        if not self.extends or self.unexplained:
+        if not self.extends or self.unexplained or self.repeated is None:
             return []
-        return [term for term in self.current.terms if term.cause.lasting and term.cause.id not in self.once]
+        return [term for term in self.repeated.terms if term.cause.lasting]
 
     @property
     def correctable(self) -> list[str]:

@@ -119,6 +119,7 @@ class Thresholds:
     repeated: float = 0.5  # of what the fit gains: a smaller gain on the pieces is chance
     piece_worse: float = 0.1  # of that gain: no piece may be predicted worse by more
     piece_told: float = 0.02  # weight of a piece that is left out: enough where the others tell nothing
+    begin_share: float = 0.2  # of a record: what went on before it has decayed by then
     slow_share: float = 0.4  # of what is left: so much that may be slow noise is sought in the bank too
 
     # Unlisted
@@ -201,7 +202,6 @@ class Thresholds:
     inverse_patience: int = 3  # rounds without gain that end it
     feedback_passes: int = 6  # each multiplies the error of a fed back output by some per cent
     feedback_settled: float = 1e-9  # of the span: passes end when they change less
-    extended_levels: int = 64  # at most: the joint refit holds dense rows
     trace_samples: int = 6000  # kept for the figures
     experiment_Hz: float = 200.0  # sample rate of the experiments tried on paper
 

@@ -59,6 +59,10 @@ TEXTS: Mapping[str, str] = {
         "The model as given predicts these recordings better than any extension that was tried, so none is "
         "proposed."
     ),
+    "no gain": (
+        "Extended by {names}, the model would predict these recordings no better than as it was given "
+        "({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it."
+    ),
     "overshadowed": (
         "The change accounts for {share:.2f} % of the squared error. Adding {names} would only reduce the "
         "remainder, {left:.2g} % of the span: too little to be named."
@@ -101,6 +105,10 @@ ADVICE: Mapping[str, str] = {
     "extend": (
         "Extend the model with what was found, then test it on another recording, which was not fitted: "
         "pulsetrainer evaluate."
+    ),
+    "again": (
+        "What was found does not repeat within these recordings, so nothing is added to the model. Record "
+        "again, and diagnose both recordings together."
     ),
     "correct": (
         "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "

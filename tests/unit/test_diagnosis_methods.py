@@ -77,6 +77,7 @@ def test_the_smallest_effect_that_shows_is_tested_and_matters(relevant, least):
     """Four standard deviations of 2 and nine in ten more, or a fall of squares; half of it is left."""
     sight = screening.Sight(share=0.5, noise=2.0, critical=4.0)
     assert sight.least(relevant) == pytest.approx(least / 0.5)
+    assert sight.least(relevant, there=9.0) == pytest.approx((least + 3.0) / 0.5)  # it may be undone by that
 
 
 @pytest.mark.parametrize("surprise", [-3.0, -9.0])
@@ -531,6 +532,8 @@ def test_every_kind_of_evidence_and_advice_has_words():
             "rest",
             "matters",
             "times",
+            "extended",
+            "given",
         ],
         1.25,
     )

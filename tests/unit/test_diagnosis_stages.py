@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pulsetrainer.diagnosis import fitting, residual, velocity, wording
+from pulsetrainer.diagnosis import design, fitting, residual, velocity, wording
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.congruency import Contrast
@@ -25,21 +25,24 @@ from pulsetrainer.diagnosis.stages import (
     acceptance,
     account,
     advice,
+    begin,
     elimination,
     equal_loops,
     exchange,
+    extension,
     first_look,
     given_model,
     joint_fit,
     jumps,
     parameters,
+    repetition,
     restart,
     rivals,
     screened,
     search,
     verdict,
 )
-from pulsetrainer.diagnosis.state import Question, State
+from pulsetrainer.diagnosis.state import Given, Question, State
 
 CAUSE = library()
 NUMBER = count()
@@ -163,6 +166,8 @@ def test_significant_is_rare_by_chance_and_matters(p, gain, is_so):
 def test_only_what_lasts_extends_a_model():
     """A property of the device, and not of the record; nothing that was withdrawn."""
     state = _state(_fit(500.0, "creep", "step"))
+    assert state.extensions == []  # whether it repeats was not asked yet
+    state = replace(state, repeated=state.current)
     assert [term.cause.id for term in state.extensions] == ["creep"]
     assert replace(state, extends=False).extensions == []
 
@@ -794,7 +799,8 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
     [
         ({"verdict": "none"}, "none"),
         ({"verdict": "unknown"}, "unknown"),
-        ({"verdict": "creep"}, "extend"),
+        ({"verdict": "creep", "extended": "a model"}, "extend"),
+        ({"verdict": "creep"}, "again"),
         ({"verdict": "out-of-range"}, "repair"),
         ({"verdict": "step", "findings": (_finding("step", 20.0),)}, "correct"),
         ({"verdict": "step", "findings": (_finding("step", 20.0),), "lacks": ("rates",)}, "correct"),
@@ -822,6 +828,91 @@ def test_a_quick_look_makes_no_experiment():
     state = _state(_fit(1.0), findings=(TIED,))
     said = advice.stage(replace(state, question=replace(state.question, quick=True))).advice
     assert (said.kind, said.names) == ("tied, quick", ("field-lag", "delay"))
+
+
+# --- what goes into the model
+def _asked_again(monkeypatch, shares):
+    """Repetition of creep, heat and a lag, where the shares that repeat depend on what is in the model."""
+
+    def refitted(problem, terms, near, **_):
+        return Fit(500.0, tuple(terms))
+
+    def repeated(held_out, without, fitted):
+        (name,) = set(fitted.names) - set(without.names)
+        return shares[fitted.names][name]
+
+    monkeypatch.setattr(fitting, "refit", refitted)
+    monkeypatch.setattr(repetition, "refit", refitted)
+    monkeypatch.setattr(repetition, "repeated", repeated)
+    names = ("creep", "thermal-drift", "output-lag", "step")
+    findings = tuple(_finding(name, 20.0) for name in names)
+    return repetition.stage(_state(_fit(500.0, *names), findings=findings))
+
+
+def test_what_repeats_least_goes_first(monkeypatch):
+    """The others are asked again without it, and one that had only leant on it stays; a step is not asked."""
+    all_four = ("creep", "thermal-drift", "output-lag", "step")
+    shares = {
+        all_four: {"creep": 0.4, "thermal-drift": 0.1, "output-lag": 0.9},
+        ("creep", "output-lag", "step"): {"creep": 0.5, "output-lag": 0.9},
+    }
+    state = _asked_again(monkeypatch, shares)
+    assert state.repeated.names == ("creep", "output-lag", "step")
+    doubted = [one.cause.id for one in state.findings if repetition.DOUBT in one.doubts]
+    assert doubted == ["thermal-drift"]
+
+
+def test_where_all_repeat_the_model_is_that_of_the_search(monkeypatch):
+    """Not refitted."""
+    all_four = ("creep", "thermal-drift", "output-lag", "step")
+    shares = {all_four: {"creep": 0.5, "thermal-drift": 0.7, "output-lag": 0.9}}
+    state = _asked_again(monkeypatch, shares)
+    assert state.repeated is state.current
+
+
+@dataclass(frozen=True)
+class Averaged:
+    """What the begin asks of a problem."""
+
+    bins: design.Bins
+    measured: np.ndarray
+
+
+@pytest.mark.parametrize(("rise", "late", "at_rest"), [(8.9, 1.0, True), (9.1, 1.0, False), (9.1, 0.5, True)])
+def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, late, at_rest):
+    """Relevantly more is left from rest, and what is left later is no less."""
+    bins = design.Bins((np.arange(10),), 10, np.zeros(10, dtype=int), np.arange(10.0), (1,))
+    problem = Averaged(bins, np.zeros(10))
+    wave = np.resize([1.0, -1.0], 10)
+    wave[:2] = 50.0  # the first fifth does not count
+    kept = replace(_fit(500.0, "creep"), problem=problem)
+    object.__setattr__(kept, "simulated", wave)
+
+    def from_rest(problem, terms, near):
+        assert not problem.bins.begins_free
+        found = replace(kept, squares=500.0 + rise, problem=problem)
+        object.__setattr__(found, "simulated", late * wave)
+        return found
+
+    monkeypatch.setattr(begin, "refit", from_rest)
+    monkeypatch.setattr(begin, "estimates_of", lambda *_: {"creep": ()})
+    state = _state(kept, repeated=kept, problem=problem, estimates={"creep": ("known",)})
+    found = begin.stage(state)
+    assert (found.repeated is not kept) is at_rest
+    assert found.repeated_estimates == ({"creep": ()} if at_rest else {"creep": ("known",)})
+
+
+@pytest.mark.parametrize(("after", "better"), [(0.99, True), (1.0, False)])
+def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, better):
+    """Else nothing is added, and that is said."""
+    monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
+    monkeypatch.setattr(extension, "rms_of", lambda state, model: after if model == "extended" else 1.0)
+    state = _state(_fit(500.0, "creep"))
+    state = replace(state, repeated=state.current, question=replace(state.question, given=Given("given")))
+    found = extension.stage(state)
+    assert found.extended == ("extended" if better else None)
+    assert [one.kind for one in found.evidence] == ([] if better else ["no gain"])
+    assert bool(found.extensions) is better
 
 
 # --- the model as given

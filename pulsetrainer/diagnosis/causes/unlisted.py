@@ -57,7 +57,7 @@ def _above(frame: Frame) -> FloatArray:
 
 def _since(event: FloatArray, frame: Frame, name: str) -> FloatArray:
     """Time (n,) since the last sample with an event (n,)."""
-    start = float(remembered(frame.past, f"{name} since", np.zeros(1))[0])
+    start = float(remembered(frame.past, f"{name} since", np.full(1, np.inf))[0])
     place = np.arange(event.size)
     last = np.maximum.accumulate(np.where(event, place, -1))
     since = np.where(last >= 0, (place - last) * frame.dt_s, start + (place + 1) * frame.dt_s)
@@ -85,7 +85,9 @@ def _turns(frame: Frame) -> tuple[FloatArray, FloatArray]:
         return frame.kept["turns"], frame.kept["turned"]
     width = _BACK * frame.reach
     first = frame.input[0]
-    turn, extreme, way = remembered(frame.past, "unlisted turn", np.asarray([first, first, 1.0])).tolist()
+    # as the memory begins: the input came down through all of its range, and then to the first sample
+    before = [frame.low, first, 1.0] if first > frame.low + width else [frame.low + frame.reach, first, -1.0]
+    turn, extreme, way = remembered(frame.past, "unlisted turn", np.asarray(before)).tolist()
     turns, new = [], []
     for value in frame.input.tolist():
         back = (extreme - value) * way

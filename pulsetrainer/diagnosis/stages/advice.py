@@ -56,7 +56,9 @@ def _after_verdict(state: State) -> Evidence:
         return Evidence("correct", names=tuple(state.correctable))
     if state.lacks:
         return Evidence("lacks", names=state.lacks)
-    return Evidence("extend" if library()[state.verdict].lasting else "repair")
+    if not library()[state.verdict].lasting:
+        return Evidence("repair")
+    return Evidence("extend" if state.extended is not None or state.question.quick else "again")
 
 
 def _to_see_more(state: State) -> Evidence:

@@ -5,32 +5,42 @@ each cause that belongs to the device whole pieces, a fifth of the time each, ar
 with the cause the errors must fall by at least half of what they fall by in the fit, and on no piece may they
 rise. A cause that does not do that fits, but does not repeat: it is told with these words, and is not added
 to the model; nor is one that predicts blocks worse (`rivals`). What equal loops show was tested by itself.
+
+That which repeats least goes first; the others are then refitted without it and asked again, since they had
+been fitted beside it.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.repeats import repeats
+from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.repeats import repeated
 from pulsetrainer.diagnosis.stages.rivals import WORSE
 from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 DOUBT = "does not repeat"
 
 
 def stage(state: State) -> State:
-    """Return the state with the causes that do not repeat."""
-    worse = {one.cause.id for one in state.findings if WORSE in one.doubts}
-    once = frozenset(
-        term.cause.id
-        for term in state.current.terms
-        if term.cause.lasting
-        and not term.cause.by_contrast
-        and (
-            term.cause.id in worse or not repeats(state.held_out, state.without[term.cause.id], state.current)
-        )
-    )
+    """Return the state with the causes that do not repeat, and the model without them."""
+    kept = state.current
+    told = {one.cause.id for one in state.findings if WORSE in one.doubts and one.cause.lasting}
+    once = told or _weakest(state, kept)
+    while once:
+        told |= once
+        kept = refit(state.problem, [t for t in kept.terms if t.cause.id not in once], kept)
+        once = _weakest(state, kept)
     findings = tuple(
-        replace(one, doubts=(*one.doubts, DOUBT)) if one.cause.id in once else one for one in state.findings
+        replace(one, doubts=(*one.doubts, DOUBT)) if one.cause.id in told else one for one in state.findings
     )
-    return replace(state, findings=findings, once=once)
+    return replace(state, findings=findings, repeated=kept)
+
+
+def _weakest(state: State, fitted: Fitted) -> set[str]:
+    """Id of the cause of a fit that repeats least, if not enough."""
+    asked = [one for one in fitted.terms if one.cause.lasting and not one.cause.by_contrast]
+    shares = {one.cause.id: repeated(state.held_out, fitted.without(one), fitted) for one in asked}
+    least = min(shares, key=shares.__getitem__, default="")
+    return {least} if least and shares[least] < LIMITS.repeated else set()

@@ -7,7 +7,8 @@ that score as much, so that it holds for the search as a whole and not for one c
 of at most 0.01.
 
 From the same null follows how small an effect of each cause would have shown: large enough that the test
-finds it in nine of ten records, and that what the weights leave of it matters.
+finds it in nine of ten records, that what the weights leave of it matters, and that neither is undone by what
+looks like the cause already.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ def stage(state: State) -> State:
     scores = screen(state.current, state.question.rng)
     norm = state.floor.span * float(np.sqrt(state.floor.count))
     limits = {
-        one.cause.id: one.sight.least(state.floor.relevant) / norm
+        one.cause.id: one.sight.least(state.floor.relevant, one.gain) / norm
         for one in scores.scores
         if one.sight is not None
     }

@@ -1,0 +1,42 @@
+"""Begin: the model that goes on is fitted to the begin of the records too, where it can be.
+
+What a device did before a record decays in it, so that the search fits the begin of each record freely
+(``design``). But a free begin hides how a slow cause begins, and a model that is used elsewhere has none: it
+begins from rest. So the causes that repeat are refitted without it. That is the model where it leaves no
+relevantly larger error, or a smaller one, begin and all, after the first fifth of each record; else something
+was going on before the records, and the begin stays free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.intervals import estimates_of
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
+
+
+def stage(state: State) -> State:
+    """Return the state with the model of the causes that repeat as it goes on, and its parameters."""
+    kept = state.repeated
+    assert kept is not None
+    if kept.terms:
+        at_rest = replace(state.problem, bins=replace(state.problem.bins, begins_free=False))
+        trial = refit(at_rest, kept.terms, None)
+        if trial.squares - kept.squares < state.floor.relevant or _late(trial) < _late(kept):
+            kept = trial
+    if kept is state.current:
+        return replace(state, repeated_estimates=state.estimates)
+    known = estimates_of(kept, state.scores, state.held_out, state.floor)
+    told = {name: tuple(state.scale.estimate(one) for one in rows) for name, rows in known.items()}
+    return replace(state, repeated=kept, repeated_estimates={**told, **state.by_contrast})
+
+
+def _late(fitted: Fitted) -> float:
+    """Variance of what a fit leaves after the begin of each record, as the model goes on: from rest."""
+    bins, left = fitted.problem.bins, fitted.problem.measured - fitted.simulated
+    ends = np.asarray([bins.time_s[bins.record == k].max(initial=0.0) for k in range(len(bins.number))])
+    return float(np.var(left[bins.time_s > LIMITS.begin_share * ends[bins.record]]))

@@ -1,0 +1,30 @@
+"""Extension: the model with the causes that repeat, as it will be used.
+
+The search judges a model on averages, with a free offset and begin. What is used is a model on levels of its
+own, from rest. It is made here, and must predict the very records better than the model as given; else
+nothing is added to that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pulsetrainer.diagnosis.answered import extended_model, rms_of
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import PERCENT
+
+
+def stage(state: State) -> State:
+    """Return the state with the extended model, where there is one that predicts better."""
+    if state.question.given is None or not state.extensions:
+        return state
+    given = state.question.given.model
+    extended = extended_model(state, given)
+    before, after = rms_of(state, given), rms_of(state, extended)
+    if after < before:
+        return replace(state, extended=extended)
+    figures = {"given": PERCENT * before / state.scale.span, "extended": PERCENT * after / state.scale.span}
+    names = tuple(term.cause.id for term in state.extensions)
+    said = Evidence("no gain", figures=figures, names=names)
+    return replace(state, repeated=None, evidence=(*state.evidence, said))
