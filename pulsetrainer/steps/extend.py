@@ -19,8 +19,8 @@ def extend(
 ) -> Model:
     """Extend a model by the causes that a diagnosis of it found.
 
-    Its static part is identified again, from what the causes leave of the runs that were diagnosed. What was added
-    is in ``extensions`` of the new model; what it gains on blocks that were not fitted is in
+    Its static part is identified again, from what the causes leave of the runs that were diagnosed. What was
+    added is in ``extensions`` of the new model; what it gains on blocks that were not fitted is in
     ``held_out_gain_percent`` of the diagnosis.
 
     Parameters
