@@ -45,7 +45,7 @@ def course(found: Diagnosis) -> Figure:
         panels.trace(below, found.time_s, left, **MODEL, label="with the causes found")
     below.axhline(0.0, **GUIDE)
     below.set_ylabel(label("measured − model", found.output_unit))
-    below.set_xlabel(label("time, runs one after another", "s"))
+    below.set_xlabel(label("time, recordings one after another", "s"))
     panels.headroom(below)
     return figure
 

@@ -34,9 +34,9 @@ def headline(found: Diagnosis) -> str:
     """Return the verdict as one sentence for a technician."""
     if found.verdict == "none":
         limits = ", but they could not have shown everything: see what they lack" if found.lacks else ""
-        return f"These runs show nothing wrong with the model{limits}."
+        return f"These recordings show nothing wrong with the model{limits}."
     if found.verdict == "inconclusive":
-        return "Nothing was found, but these runs could not have shown everything that is common."
+        return "Nothing was found, but these recordings could not have shown everything that is common."
     if found.verdict == "unknown":
         return "Something is wrong that no known cause explains."
     cause = next(one for one in found.causes if one.cause == found.verdict)

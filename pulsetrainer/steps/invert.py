@@ -172,7 +172,10 @@ def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
         unit = with_unit(f"{limit:g}", f"{drive.input_unit}/s")
         why = f"the drive may move at most {unit}, which this pulse exceeds"
     elif drive.clipped_samples:
-        why = "parts of the pulse are out of the model's reach; `force_min` and `force_max` keep it inside"
+        why = (
+            "parts of the pulse are out of the model's reach; a smaller one (`force_min`, `force_max`) or a "
+            "slower one is not"
+        )
     elif drive.inversion == "closest-match":
         why = "the drive takes the steps of the levels"
     else:
