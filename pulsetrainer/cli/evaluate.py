@@ -35,13 +35,7 @@ def evaluate(
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
-    job = Job(
-        context,
-        inputs=(*inputs, *model),
-        outputs=(out, html),
-        overwrite=overwrite,
-        as_json=json,
-    )
+    job = Job(context, inputs=(*inputs, *model), outputs=(out, html), overwrite=overwrite, as_json=json)
     from pulsetrainer.files.bounds import read_bounds
 
     limits = read_bounds(bounds) if bounds else {}

@@ -15,6 +15,10 @@ from pulsetrainer.cli.options import AsJson, Out, Overwrite
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import Diagnosis, Model
 
+_FIGURES = (
+    "rms_percent", "extended_rms_percent", "static_percent", "extended_percent", "held_out_gain_percent",
+)  # fmt: skip
+
 
 def extend(
     context: typer.Context,
@@ -55,14 +59,7 @@ def extend(
             "added": added,
             "extensions": extended.extensions,
             "levels": extended.levels,
-            **picked(
-                found,
-                "rms_percent",
-                "extended_rms_percent",
-                "static_percent",
-                "extended_percent",
-                "held_out_gain_percent",
-            ),
+            **picked(found, *_FIGURES),
         }
     )
     job.screen.facts(f"{out}: extended model of {extended.levels} levels", _left(found, extended))

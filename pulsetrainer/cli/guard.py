@@ -120,10 +120,7 @@ def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
 def _outside_of(error: Exception) -> PulsetrainerError | None:
     """Return what lies outside the program: no memory, nowhere to write the results to."""
     if isinstance(error, MemoryError):
-        return DataError(
-            "there is not enough memory for this",
-            hint="use fewer levels, or a shorter record",
-        )
+        return DataError("there is not enough memory for this", hint="use fewer levels, or a shorter record")
     if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
         name = str(error.filename)
         return DataError(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting
 
@@ -118,16 +119,12 @@ def _show(job: Job, out: Path, drive: Waveform) -> None:
     job.screen.result(
         {
             "output": out,
-            "name": drive.name,
-            "inversion": drive.inversion,
+            **picked(drive, "name", "inversion"),
             "samples": drive.time_s.size,
             "seconds": seconds,
             "force_range": force,
             "current_range": current,
-            "clipped_samples": drive.clipped_samples,
-            "predicted_max_error_percent": drive.predicted_max_error_percent,
-            "input_unit": drive.input_unit,
-            "output_unit": drive.output_unit,
+            **picked(drive, "clipped_samples", "predicted_max_error_percent", "input_unit", "output_unit"),
         }
     )
     job.screen.facts(

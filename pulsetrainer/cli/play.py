@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import (
     AsJson,
@@ -124,16 +125,12 @@ def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
     job.screen.result(
         {
             "output": out,
-            "name": drive.name,
-            "inversion": drive.inversion,
+            **picked(drive, "name", "inversion"),
             "repeats": repeats,
             "samples": drive.time_s.size,
             "seconds": seconds,
-            "dropped_samples": played.dropped_samples,
-            "complete": played.complete,
-            "temperature_K": played.temperature_K,
-            "serial": info.serial,
-            "firmware": info.firmware,
+            **picked(played, "dropped_samples", "complete", "temperature_K"),
+            **picked(info, "serial", "firmware"),
         }
     )
     job.screen.facts(

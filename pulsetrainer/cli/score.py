@@ -90,7 +90,6 @@ def tell(
 
 
 def _quizzed(quiz: Quiz | None) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return what JSON and the screen say of a quiz."""
     from pulsetrainer.steps.quiz import score
 
     if quiz is None:

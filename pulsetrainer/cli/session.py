@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -109,7 +110,8 @@ def session(
 
     loaded = job.load(model, Model)
     check_model(loaded)
-    seed = _drawn(quiz) if seed is None else seed
+    if seed is None:  # in a quiz one that nobody can look up; the file tells it when all is answered
+        seed = secrets.randbelow(_MOST_SEED) if quiz else 0
     hands = Hands([Path(name).stem if name.lower().endswith(".csv") else name for name in names])
     chosen, rates = programme(
         hands.names,
@@ -130,13 +132,6 @@ def session(
     limits = Limits(limit_current_A, limit_force_N)
     by_key = answers is None
     _press(job, (out, html), loaded, names, chosen, asked, hands, (port, limits), seed=seed, by_key=by_key)
-
-
-def _drawn(quiz: int) -> int:
-    """Return a seed: in a quiz one that nobody can look up; the file tells it when all is answered."""
-    import secrets
-
-    return secrets.randbelow(_MOST_SEED) if quiz else 0
 
 
 def _press(
