@@ -16,6 +16,7 @@ from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
 from pulsetrainer.steps.refine import beats, check, whole_current
 
+_GENERAL = 0.7  # of the mean square of what was learnt: less says more of one pulse than of the device
 _TAUS_S = (0.03, 0.1, 0.3, 1.0, 3.0)  # of what creeps: from a tenth of a beat to a few beats
 
 
@@ -40,16 +41,16 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
     Raises
     ------
     DataError
-        ``refined`` was not refined, or another model, method or rate made it.
+        ``refined`` was not refined, or another model, method or rate made it, or what was learnt belongs to
+        that pulse alone.
 
     Examples
     --------
     >>> import pulsetrainer as pt
-    >>> drive = pt.load("tests/data/files-0.1/drive.h5")
+    >>> model = pt.load("tests/data/files-0.1/model.h5")
     >>> with pt.open_device("bench:") as device:
-    ...     refined = pt.refine(drive, device, passes=2)
-    >>> other = pt.invert("bifid", drive.model, periods=2)
-    >>> pt.transfer(other, refined).inversion
+    ...     refined = pt.refine(pt.invert("normal", model, periods=2), device, passes=2)
+    >>> pt.transfer(pt.invert("bifid", model, periods=2), refined).inversion
     'transferred'
     """
     model = check_transfer(drive, refined)
@@ -59,6 +60,7 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
     columns = _columns(refined, smooth)[there]
     missing = (part.whole(refined.compensated) - refined.target)[there]
     share, *_ = np.linalg.lstsq(columns, missing, rcond=None)
+    _check_general(refined, missing, columns @ share)
     faded = smooth(beats(drive).astype(np.float64))  # a step would put a kink into the current
     added = faded * (_columns(drive, smooth) @ share)
     current, clipped = _current(drive, part, drive.target + added, slew)
@@ -101,6 +103,20 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
             hint="refine this drive itself",
         )
     return drive.model
+
+
+def _check_general(refined: Waveform, missing: FloatArray, general: FloatArray) -> None:
+    """Refuse what was learnt (n,) where too little of it goes with what any pulse has (n,)."""
+    noise = 0.01 * refined.passes[refined.kept - 1].noise_percent * refined.full_force
+    if metrics.root_mean_square(missing) <= noise:
+        return
+    told = 1.0 - float(np.sum((missing - general) ** 2) / np.sum(missing**2))
+    if told < _GENERAL:
+        raise DataError(
+            f"what was learnt on {refined.name} belongs to that pulse: {100 * told:.0f} % of it go "
+            f"with any pulse, and {100 * _GENERAL:.0f} % are needed",
+            hint="refine the other drive itself, or identify a better model first",
+        )
 
 
 def _columns(drive: Waveform, smooth: learning.LowPass) -> FloatArray:

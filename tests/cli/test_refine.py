@@ -52,3 +52,32 @@ def test_what_cannot_be_refined_writes_nothing(tmp_path, words, code):
     done = pulsetrainer(tmp_path, "refine", KEPT / words[0], *words[1:], "-o", "refined.h5")
     assert done.code == code, done.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_was_learnt_is_asked_for_in_another_pulse(tmp_path):
+    """A refined drive gives its share: the error of another pulse, noise included, falls by a third."""
+    port, model = ("--port", "bench:?seed=5"), ("--model", KEPT / "model.h5")
+    jobs = (
+        ("invert", "normal", *model, "-o", "normal.h5"),
+        ("refine", "normal.h5", "-o", "refined.h5", *port),
+        ("invert", "bifid", *model, "-o", "before.h5"),
+        ("invert", "bifid", *model, "--learnt", "refined.h5", "-o", "after.h5"),
+    )
+    for words in jobs:
+        done = pulsetrainer(tmp_path, *words)
+        assert done.code == 0, done.err
+    errors = []
+    for name in ("before", "after"):
+        assert pulsetrainer(tmp_path, "play", f"{name}.h5", "-o", f"{name}-played.h5", *port).code == 0
+        played = pt.load(tmp_path / f"{name}-played.h5")
+        errors.append(pt.evaluate(played).waveforms[0].compensated.mean_abs_error_percent)
+    assert pt.load(tmp_path / "after.h5").inversion == "transferred"
+    assert errors[1] < errors[0] / 1.5
+
+
+def test_a_drive_that_was_not_refined_has_nothing_to_give(tmp_path):
+    """Exit 3, nothing written."""
+    words = ("invert", "bifid", "--model", KEPT / "model.h5", "--learnt", KEPT / "drive.h5")
+    done = pulsetrainer(tmp_path, *words, "-o", "bifid.h5", "--json")
+    assert (done.code, done.json["error"]["kind"]) == (3, "data")
+    assert list(tmp_path.iterdir()) == []

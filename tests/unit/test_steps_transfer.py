@@ -48,6 +48,17 @@ def test_a_device_that_is_its_model_has_nothing_to_carry_over():
     assert np.abs(carried.compensated - other.compensated).max() < 0.01 * np.ptp(other.compensated)
 
 
+def test_what_belongs_to_one_pulse_stays_there():
+    """A correction that comes and goes at no pace of the pulse's is refused: another pulse it would harm."""
+    drive = drive_of("Coleman-Hodgdon")
+    refined = refine(drive, ForeignDevice("Coleman-Hodgdon", seed=3), passes=2, slew=SLEW)
+    odd = 0.02 * np.sin(2 * np.pi * 11.3 * drive.time_s) * drive.scored
+    wrong = replace(refined, compensated=np.clip(drive.compensated + odd, 0.0, 1.5))
+    with pytest.raises(DataError) as caught:
+        transfer(drive_of("Coleman-Hodgdon", "bifid"), wrong, slew=SLEW)
+    assert caught.value.hint
+
+
 def test_what_cannot_be_carried_over_is_refused():
     """A drive that was not refined, another model or rate, another method."""
     drive, other = drive_of("Bouc-Wen"), drive_of("Bouc-Wen", "bifid")
