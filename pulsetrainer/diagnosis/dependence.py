@@ -68,11 +68,20 @@ class Bank:
     def columns(self, kind: int, tau: float) -> tuple[Part, FloatArray] | None:
         """Curves (count, KNOTS - 1) over one state; None where it does not vary."""
         z = self.state(kind, tau)
-        low, high = (float(one) for one in np.quantile(z, LIMITS.state_ends))
+        low, high = self._ends(z)
         if not high > low:
             return None
         part = Part(kind, low, high)
         return part, part.columns(z)
+
+    def _ends(self, z: FloatArray) -> tuple[float, float]:
+        """Ends of the curve over a state (count,): how far it comes on two pieces at least.
+
+        What is beyond was seen once, such as the begin of a record, and nothing can show that it repeats.
+        """
+        pieces = [z[self.piece == k] for k in range(LIMITS.pieces)]
+        reached = np.sort([np.quantile(one, LIMITS.state_ends) for one in pieces if one.size], axis=0)
+        return float(reached[1, 0]), float(reached[-2, 1])
 
     def curve(self, free: FloatArray) -> FloatArray:
         """Ridge fit (KNOTS - 1,) of projected columns to the residual."""
@@ -111,7 +120,7 @@ def best_dependence(
     like = noise_in(bank.residual, free_of_both, problem.bins, problem.measured, rng)
     noise = bank.project(_drawn(like, LIMITS.bank_draws, rng))
     largest = np.max(_falls(seen, noise, bank.piece), axis=0)
-    part, values = _refined(bank, part.state, tau, fastest)
+    part, values = _refined(bank, part.state, tau, fastest, slowest)
     return Dependence(part, values, max(scores), p_value(max(scores), largest))
 
 
@@ -126,8 +135,8 @@ def _drawn(noise: Noise, draws: int, rng: np.random.Generator) -> FloatArray:
     return np.asarray((drawn * noise.scale).T)
 
 
-def _refined(bank: Bank, kind: int, tau: float, fastest: float) -> tuple[Part, Values]:
-    """Return the time constant near ``tau``, from ``fastest``, that fits best, and its curve."""
+def _refined(bank: Bank, kind: int, tau: float, fastest: float, slowest: float) -> tuple[Part, Values]:
+    """Return the time constant near ``tau``, from fastest to slowest, that fits best, and its curve."""
 
     def left(log_tau: float) -> float:
         made = bank.columns(kind, float(np.exp(log_tau)))
@@ -136,7 +145,7 @@ def _refined(bank: Bank, kind: int, tau: float, fastest: float) -> tuple[Part, V
         free = bank.project(made[1])
         return float(np.sum((bank.residual - free @ bank.curve(free)) ** 2))
 
-    near = (np.log(max(tau / LIMITS.state_ratio, fastest)), np.log(tau * LIMITS.state_ratio))
+    near = np.log((max(tau / LIMITS.state_ratio, fastest), min(tau * LIMITS.state_ratio, slowest)))
     best = optimize.minimize_scalar(
         left, bounds=near, method="bounded", options={"xatol": LIMITS.state_settled}
     )

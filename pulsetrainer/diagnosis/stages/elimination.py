@@ -1,8 +1,8 @@
 """Backward elimination: no cause that the others have made superfluous.
 
 From the model with all causes each is taken out in turn. While the one that is missed least makes no relevant
-difference, it is dropped. So is one without which blocks that were left out are predicted better: it was
-accepted before the others, and does harm beside them. A single cause has proved itself against the baseline,
+difference, it is dropped. So is one without which time that was left out is predicted better: it was accepted
+before the others, and does harm beside them. A single cause has proved itself against the baseline,
 and goes only if it does harm.
 """
 
@@ -11,10 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.stages import screened
 from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
@@ -46,6 +49,12 @@ def _spare(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted |
 
 
 def _harmful(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
-    """The one of the models with one cause less that predicts best, if better than with all of them."""
+    """The one of the models with one cause less that predicts best, if better than with all of them.
+
+    Both blocks that alternate and whole pieces of the time must say so.
+    """
     best = min(without, key=state.held_out.error)
-    return best if state.held_out.gain(best, current, state.floor) < 0 else None  # NaN: it cannot be told
+    if not state.held_out.gain(best, current, state.floor) < 0:  # NaN: it cannot be told
+        return None
+    fewer, more = (np.sum(state.held_out.pieces(one, LIMITS.pieces)) for one in (best, current))
+    return best if fewer <= more else None
