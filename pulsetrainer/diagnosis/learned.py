@@ -72,8 +72,9 @@ def _curve(
     z = bank.state(part.state, tau)
     low, high = (float(one) for one in np.quantile(z, LIMITS.curve_bulk))
     places = np.linspace(max(low, part.low), min(high, part.high), LIMITS.curve_places)
-    value = part.columns(places) @ np.asarray(knots) - float(np.mean(part.columns(z) @ np.asarray(knots)))
-    half = np.abs(part.columns(places)) @ np.asarray([0.5 * (one.upper - one.lower) for one in rows[1:]])
+    apart = part.columns(places) - part.columns(z).mean(axis=0)
+    value = apart @ np.asarray(knots)
+    half = np.abs(apart) @ np.asarray([0.5 * (one.upper - one.lower) for one in rows[1:]])
     at = places * scale.of_unit(part.kind.unit)
     if part.kind.saturates:
         at = -tau * scale.second * np.log1p(-np.minimum(places, 1.0 - LIMITS.same_value))

@@ -2,7 +2,8 @@
 
 What the static model leaves and what it would leave if nothing were wrong; for each cause found, what its
 gate saw or its p-value and share; what is left with all of them; where the rest is largest, when nothing
-explains it; which cause screening took for significant, where nothing was found; what the records lack.
+explains it and it is more than noise; which cause screening took for significant, where nothing was found;
+what the records lack.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ def stage(state: State) -> State:
             said.append(Evidence("not whole", figures={"rest": percent * rest}, names=state.current.names))
     if state.verdict in ("none", "inconclusive") and state.limits:
         said.append(Evidence("would have shown", figures={k: PERCENT * v for k, v in state.limits.items()}))
-    if state.verdict in ("none", "inconclusive", "unknown"):
+    if state.verdict in ("none", "inconclusive", "unknown") and state.current.squares > state.floor.squares:
         said += _largest(state)
     if state.verdict in ("none", "inconclusive") and not state.question.quick:
         said += _not_accepted(state)
