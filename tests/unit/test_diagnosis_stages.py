@@ -84,10 +84,14 @@ def _score(name: str, gain: float, p: float = 0.005, basis=None) -> Score:
 
 
 class HeldOut:
-    """Gains that are told."""
+    """Gains that are told, and errors on whole pieces, by the number of causes."""
 
-    def __init__(self, gain: float = 1.0) -> None:
-        self.told = gain
+    def __init__(self, gain: float = 1.0, pieces: tuple[float, ...] = ()) -> None:
+        self.told, self.of_pieces = gain, pieces
+
+    def pieces(self, fitted, count):
+        """As told for so many causes, the same on each piece."""
+        return np.full(count, self.of_pieces[len(fitted.terms)])
 
     def gain(self, before, after, floor):
         """Return what was told."""
@@ -393,14 +397,21 @@ def test_a_cause_that_is_not_missed_is_dropped(monkeypatch, without, kept):
 
 
 @pytest.mark.parametrize(
-    ("gain", "kept"), [(-0.01, ()), (0.0, ("creep", "step")), (np.nan, ("creep", "step"))]
+    ("gain", "pieces", "kept"),
+    [
+        (-0.01, (1.0, 1.0, 1.0), ()),
+        (0.0, (1.0, 2.0, 3.0), ("creep", "step")),
+        (np.nan, (1.0, 2.0, 3.0), ("creep", "step")),
+        (-0.01, (1.0, 2.0, 1.9), ("creep", "step")),  # whole pieces are predicted better with it
+        (-0.01, (2.1, 2.0, 3.0), ("step",)),
+    ],
 )
-def test_a_cause_that_predicts_worse_is_dropped(monkeypatch, gain, kept):
-    """However much its fit explains, and the last one too; not where too few blocks tell."""
+def test_a_cause_that_predicts_worse_is_dropped(monkeypatch, gain, pieces, kept):
+    """However much its fit explains, and the last one too; not where blocks are few or pieces deny it."""
     _refitting(monkeypatch, fitting, squares={frozenset({"step"}): 440.0, frozenset({"creep"}): 450.0})
     monkeypatch.setattr(screened, "stage", lambda state: state)
     state = _state(_fit(400.0, "creep", "step"), p_values={"creep": 0.006, "step": 0.007})
-    after = elimination.stage(replace(state, held_out=HeldOut(gain)))
+    after = elimination.stage(replace(state, held_out=HeldOut(gain, pieces)))
     assert after.current.names == kept
 
 
@@ -762,11 +773,14 @@ def test_the_account_says_what_is_left_before_and_after(monkeypatch):
     assert (extended.kind, extended.figures) == ("extended", {"left": pytest.approx(2.0)})
 
 
-@pytest.mark.parametrize(("left", "said"), [((1.0, 1.51), True), ((1.0, 1.5), False)])
+@pytest.mark.parametrize(
+    ("left", "squares", "said"),
+    [((1.0, 1.51), 101.0, True), ((1.0, 1.5), 101.0, False), ((1.0, 1.51), 100.0, False)],
+)
 @pytest.mark.parametrize("name", ["none", "unknown"])
-def test_where_the_rest_is_largest_is_said_if_it_stands_out(monkeypatch, left, said, name):
-    """By half, and only where nothing was named."""
-    found = _accounted(monkeypatch, left=left, extended=True, verdict=name)
+def test_where_the_rest_is_largest_is_said_if_it_stands_out(monkeypatch, left, squares, said, name):
+    """By half, and only where nothing was named and more is left than the floor of 100."""
+    found = _accounted(monkeypatch, left=left, squares=squares, extended=True, verdict=name)
     largest = [one for one in found if one.kind == "largest"]
     assert bool(largest) is said
     if said:
