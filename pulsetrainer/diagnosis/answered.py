@@ -20,13 +20,11 @@ from pulsetrainer.artefacts import (
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
-from pulsetrainer.diagnosis.extended import Term, seen_input
+from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
-from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.forms import static_behind
 from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import predict
@@ -200,12 +198,14 @@ def extended_model(state: State, model: Model) -> Model:
     assert state.question.given is not None
     assert state.repeated is not None
     scale, words = state.scale, _words(state.question.given)
-    found = static_behind(state.repeated, lasting, model, scale).operator
+    behind = static_behind(state.repeated, lasting, model, scale)
+    found = behind.identified.operator
+    remembered = [one.output if model.form == "dual" else one.input for one in behind.records]
     return Model(
         edges=found.plane.edges,
         weights=found.weights,
         offset=found.offset,
-        covered=coverage(found.plane, _remembered(state.repeated, model, scale)),
+        covered=coverage(found.plane, remembered),
         form=model.form,
         weights_unit=model.weights_unit,
         input_unit=model.input_unit,
@@ -221,17 +221,6 @@ def extended_model(state: State, model: Model) -> Model:
 def _extension(state: State, term: Term, words: Words) -> Extension:
     rows = (*_constants(term, state.scale), *state.repeated_estimates[term.cause.id])
     return Extension(term.cause.id, _parameters(state, term.cause, rows, words))
-
-
-def _remembered(fitted: Fitted, model: Model, scale: Scale) -> list[FloatArray]:
-    """What the static part remembers of each record: the input that it sees; of the dual form the output."""
-    problem = fitted.problem
-    if model.form == "dual":
-        return [model.polarity * scale.outputs(r.output) for r in problem.records]
-    return [
-        scale.inputs(seen_input(fitted.terms, record.output, frame))
-        for record, frame in zip(problem.records, problem.frames, strict=True)
-    ]
 
 
 def _constants(term: Term, scale: Scale) -> list[Estimate]:

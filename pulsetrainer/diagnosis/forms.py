@@ -19,8 +19,8 @@ import numpy as np
 
 from pulsetrainer.artefacts import Model
 from pulsetrainer.core import input_noise
+from pulsetrainer.core.fit import Fitted as StaticFit
 from pulsetrainer.core.fit import fit
-from pulsetrainer.core.identification import Identified
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.fitting import Fitted
@@ -46,7 +46,7 @@ def base_of(model: Model, scale: Scale) -> Static | None:
     return base
 
 
-def static_behind(found: Fitted, lasting: Sequence[Term], model: Model, scale: Scale) -> Identified:
+def static_behind(found: Fitted, lasting: Sequence[Term], model: Model, scale: Scale) -> StaticFit:
     """Return the static part of a model in the form of ``model``, fitted to what causes leave of the records.
 
     It is identified as any model is, with its own levels, smoothing and polarity, in the units of the record.
@@ -69,4 +69,4 @@ def static_behind(found: Fitted, lasting: Sequence[Term], model: Model, scale: S
         signals.append((u, y))
         kept.append(record.sample_weight > 0)
     operator, form = operator_of(model), cast("Form", model.form)
-    return fit(signals, operator.low, operator.high, model.levels, form=form, kept=kept).identified
+    return fit(signals, operator.low, operator.high, model.levels, form=form, kept=kept)

@@ -884,6 +884,15 @@ def test_where_all_repeat_the_model_is_that_of_the_search(monkeypatch):
     assert state.repeated is state.current
 
 
+def test_what_equal_loops_show_is_not_asked_again(monkeypatch):
+    """It was tested by itself: blocks that are predicted worse take a creep out, and not this."""
+    monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
+    names = ("creep", "load-dependence")
+    findings = tuple(_finding(name, 20.0, doubts=(rivals.WORSE,)) for name in names)
+    state = repetition.stage(_state(_fit(500.0, *names), findings=findings))
+    assert state.repeated.names == ("load-dependence",)
+
+
 @dataclass(frozen=True)
 class Averaged:
     """What the begin asks of a problem."""

@@ -26,7 +26,8 @@ DOUBT = "does not repeat"
 def stage(state: State) -> State:
     """Return the state with the causes that do not repeat, and the model without them."""
     kept = state.current
-    told = {one.cause.id for one in state.findings if WORSE in one.doubts and one.cause.lasting}
+    asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
+    told = {one.cause.id for one in asked if WORSE in one.doubts}
     once = told or _weakest(state, kept)
     while once:
         told |= once
