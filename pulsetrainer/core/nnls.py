@@ -15,7 +15,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
 
-from pulsetrainer.core.plane import FloatArray, finite_vector
+from pulsetrainer.core.plane import FloatArray, IntArray, finite_vector
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
 # A pivot below this share of the largest diagonal entry is rounding noise of the sums that made G.
@@ -27,6 +27,7 @@ _ROUNDING = 1e-14
 # Added to the diagonal where the data leave so much open that no end was found: the solution then violates
 # the optimality conditions by about a hundredth of this.
 _LAST_RIDGE = 1e-10
+Factor = tuple[FloatArray, bool]
 _ACTIVE_SETS = 30  # times the number of variables
 # Systems after which the exchanges leave the rest to the active set of scipy.
 _SYSTEMS = 200
@@ -69,36 +70,81 @@ def solve(
     ConvergenceError
         No method settled: the matrix is not positive semidefinite.
     """
-    rhs = finite_vector("rhs", rhs)
-    if gram.shape != (rhs.size, rhs.size) or not np.all(np.isfinite(gram)):
-        raise ArgumentError(
-            f"gram must be finite, of shape {(rhs.size, rhs.size)} like rhs, got {gram.shape}",
-            hint="sum gram and rhs over the same finite samples",
-        )
-    if passive is not None and passive.shape != rhs.shape:
-        raise ArgumentError(
-            f"passive must have shape {rhs.shape}, got {passive.shape}", hint="one guess for each variable"
-        )
-    try:
-        return _exchange(_Problem(gram, rhs), rhs, passive, max_iterations)
-    except ConvergenceError:
-        pass
-    try:
-        return _active_set(gram, rhs, max_iterations)
-    except RuntimeError:
-        # a record of one branch only: no cell is better than its neighbours
-        ridge = _LAST_RIDGE * float(np.diagonal(gram).max(initial=0.0))
-        return _exchange(
-            _Problem(gram + ridge * np.diag(np.diagonal(gram) > 0), rhs), rhs, passive, max_iterations
-        )
+    return Gram(gram).solve(rhs, passive=passive, max_iterations=max_iterations)
 
 
-def _exchange(
-    problem: _Problem, rhs: FloatArray, passive: NDArray[np.bool_] | None, max_iterations: int
-) -> NonNegative:
+class Gram:
+    """A matrix G (q, q) for many right sides; the factor of the last set of positive variables is kept."""
+
+    def __init__(self, matrix: FloatArray) -> None:
+        q = len(matrix)
+        if matrix.shape != (q, q) or not np.all(np.isfinite(matrix)):
+            raise ArgumentError(
+                f"gram must be finite, of shape {(q, q)} like rhs, got {matrix.shape}",
+                hint="sum gram and rhs over the same finite samples",
+            )
+        self.matrix, self.size = matrix, np.abs(matrix)
+        diagonal = np.diagonal(matrix)
+        self.scale = float(diagonal.max(initial=0.0))
+        self.usable = diagonal > SMALLEST_DIAGONAL * self.scale
+        self._factored: tuple[IntArray, Factor] | None = None
+
+    def solve(
+        self, rhs: FloatArray, *, passive: NDArray[np.bool_] | None = None, max_iterations: int = _SYSTEMS
+    ) -> NonNegative:
+        """Return the non-negative minimiser: see ``solve``."""
+        rhs = finite_vector("rhs", rhs)
+        if self.matrix.shape != (rhs.size, rhs.size):
+            raise ArgumentError(
+                f"gram must be finite, of shape {(rhs.size, rhs.size)} like rhs, got {self.matrix.shape}",
+                hint="sum gram and rhs over the same finite samples",
+            )
+        if passive is not None and passive.shape != rhs.shape:
+            raise ArgumentError(
+                f"passive must have shape {rhs.shape}, got {passive.shape}",
+                hint="one guess for each variable",
+            )
+        try:
+            return _exchange(_Problem(self, rhs), passive, max_iterations)
+        except ConvergenceError:
+            pass
+        try:
+            return _active_set(self.matrix, rhs, max_iterations)
+        except RuntimeError:
+            # a record of one branch only: no cell is better than its neighbours
+            ridge = _LAST_RIDGE * float(np.diagonal(self.matrix).max(initial=0.0))
+            raised = Gram(self.matrix + ridge * np.diag(np.diagonal(self.matrix) > 0))
+            return _exchange(_Problem(raised, rhs), passive, max_iterations)
+
+    def minimise(self, rhs: FloatArray, free: NDArray[np.bool_]) -> FloatArray:
+        """Minimiser (q,) over the free variables (q,), of either sign, the others zero."""
+        x = np.zeros(rhs.size)
+        index = np.flatnonzero(free)
+        if index.size:
+            x[index] = scipy.linalg.cho_solve(self._factor(index), rhs[index], check_finite=False)
+        return x
+
+    def _factor(self, index: IntArray) -> Factor:
+        if self._factored is None or not np.array_equal(self._factored[0], index):
+            ridge = _RELATIVE_RIDGE * self.scale
+            while True:
+                block = self.matrix[np.ix_(index, index)]
+                block[np.diag_indices_from(block)] += ridge
+                try:
+                    factor = scipy.linalg.cho_factor(block, lower=True, check_finite=False)
+                except scipy.linalg.LinAlgError:
+                    ridge *= 10.0  # cells the data cannot tell apart: share their mass
+                    continue
+                break
+            self._factored = index, factor
+        return self._factored[1]
+
+
+def _exchange(problem: _Problem, passive: NDArray[np.bool_] | None, max_iterations: int) -> NonNegative:
     """Exchange all variables on the wrong side at once, until there are none."""
-    free = np.zeros(rhs.size, dtype=bool) if passive is None else passive & problem.usable
-    fewest, patience = rhs.size + 1, _PATIENCE
+    q = problem.rhs.size
+    free = np.zeros(q, dtype=bool) if passive is None else passive & problem.usable
+    fewest, patience = q + 1, _PATIENCE
     for iteration in range(1, max_iterations + 1):
         x = problem.minimise_over(free)
         wrong = np.where(free, problem.negative(x), problem.usable & problem.descends(x))
@@ -128,22 +174,19 @@ def _active_set(gram: FloatArray, rhs: FloatArray, used: int) -> NonNegative:
 class _Problem:
     """The quadratic, with the signs of its variables and gradients judged against rounding."""
 
-    def __init__(self, gram: FloatArray, rhs: FloatArray) -> None:
-        self.gram, self.rhs, self.size = gram, rhs, np.abs(gram)
-        diagonal = np.diagonal(gram)
-        self.scale = float(diagonal.max(initial=0.0))
-        self.usable = diagonal > SMALLEST_DIAGONAL * self.scale
+    def __init__(self, gram: Gram, rhs: FloatArray) -> None:
+        self.gram, self.rhs, self.usable = gram, rhs, gram.usable
 
     def minimise_over(self, free: NDArray[np.bool_]) -> FloatArray:
-        return _solve_free(self.gram, self.rhs, free, self.scale)
+        return self.gram.minimise(self.rhs, free)
 
     def gradient(self, x: FloatArray) -> FloatArray:
-        return self.gram @ x - self.rhs
+        return self.gram.matrix @ x - self.rhs
 
     def is_lower(self, there: FloatArray, here: FloatArray) -> bool:
         """Whether the quadratic is lower there than here; not as a difference of two large numbers."""
         step = there - here
-        change = float(step @ (self.gradient(here) + 0.5 * (self.gram @ step)))
+        change = float(step @ (self.gradient(here) + 0.5 * (self.gram.matrix @ step)))
         return change < -_ROUNDING * float(np.abs(self.rhs) @ here)
 
     def negative(self, x: FloatArray) -> NDArray[np.bool_]:
@@ -151,7 +194,7 @@ class _Problem:
 
     def descends(self, x: FloatArray) -> NDArray[np.bool_]:
         """Where the gradient is negative by more than the rounding of the sums it came from."""
-        return self.gradient(x) < -_ROUNDING * (self.size @ np.abs(x) + np.abs(self.rhs))
+        return self.gradient(x) < -_ROUNDING * (self.gram.size @ np.abs(x) + np.abs(self.rhs))
 
 
 def _descend(problem: _Problem, x: FloatArray, used: int, max_iterations: int) -> NonNegative:
@@ -196,29 +239,8 @@ def _unsettled(max_iterations: int) -> ConvergenceError:
 
 def solve_signed(gram: FloatArray, rhs: FloatArray) -> FloatArray:
     """Return the minimiser (q,) of x' G x / 2 - f' x, of either sign; zero where the data never were."""
-    diagonal = np.diagonal(gram)
-    scale = float(diagonal.max(initial=0.0))
-    return _solve_free(gram, rhs, diagonal > SMALLEST_DIAGONAL * scale, scale)
-
-
-def _solve_free(gram: FloatArray, rhs: FloatArray, free: NDArray[np.bool_], scale: float) -> FloatArray:
-    """Unconstrained minimiser over the free variables, the others zero."""
-    x = np.zeros(rhs.size)
-    index = np.flatnonzero(free)
-    if index.size == 0:
-        return x
-    block = gram[np.ix_(index, index)]
-    ridge = _RELATIVE_RIDGE * scale
-    while True:
-        block[np.diag_indices_from(block)] += ridge
-        try:
-            factor = scipy.linalg.cho_factor(block, lower=True, check_finite=False)
-        except scipy.linalg.LinAlgError:
-            block = gram[np.ix_(index, index)]
-            ridge *= 10.0  # cells the data cannot tell apart: share their mass
-            continue
-        x[index] = scipy.linalg.cho_solve(factor, rhs[index], check_finite=False)
-        return x
+    whole = Gram(gram)
+    return whole.minimise(rhs, whole.usable)
 
 
 def kkt_violation(gram: FloatArray, rhs: FloatArray, x: FloatArray) -> float:

@@ -1,8 +1,13 @@
-"""The fit's view of the data: dense design rows of short averages, and everything projected off them.
+"""The fit's view of the data: design rows of short averages, and everything projected off them.
 
 Rows are made at the full sample rate, so that no tip of a fast loop is lost, and then averaged over
 bins of a few milliseconds together with the output: some 20 000 rows whatever the record's length. With
 S the smoothing of ``core.smoothing``, the fitted part of any signal c is D (D'D + S)^-1 D'c.
+
+D is never made. With A from the masses of the cells to the Everett function at the nodes, F the orthonormal
+columns of offset and start, and B the rows in node space, which have some seven entries each,
+
+    D = B A - F F'B A.
 
 What the device did before a record began goes on decaying in it: a finger that was pressed relaxes for
 seconds. No record tells how much, so a few exponential decays from its first sample are fitted freely, as the
@@ -27,6 +32,8 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import penalty
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
+
+_ALL = slice(None)
 
 
 @dataclass(frozen=True)
@@ -166,12 +173,11 @@ def bins_of(records: Sequence[Record]) -> Bins:
 
 @dataclass
 class Design:
-    """Design rows for given inputs, with their normal matrix and the fit."""
+    """Design rows D for given inputs, without offset and start, with their normal matrix and the fit."""
 
     plane: Plane
     bins: Bins
-    matrix: FloatArray  # (count, n_q) without offset and start
-    taken: FloatArray  # (k, n_q) coordinates of offset and start
+    nodes: sparse.csr_array | FloatArray  # B (count, n_q) in node space; not sparse where causes filter it
     smoothing: float
 
     @classmethod
@@ -181,7 +187,7 @@ class Design:
         bins: Bins,
         paths: Sequence[Followed],
         smoothing: float,
-        shown: Callable[[FloatArray], FloatArray] = lambda columns: columns,
+        shown: Callable[[FloatArray], FloatArray] | None = None,
     ) -> Design:
         """Average the rows of the inputs that the hysteresis sees, one per record; ``shown`` filters them."""
         packed = sparse.csr_array((bins.count, plane.n_q))
@@ -194,32 +200,61 @@ class Design:
             anchor = path.trace.anchor[inside]
             of_nodes = sparse.csr_array((share, (where, anchor)), shape=(bins.count, base.shape[0]))
             packed = packed + of_samples @ own + of_nodes @ base
-        matrix = shown(packed @ plane.adjoint(np.eye(plane.n_q)))
-        taken = bins.free.T @ matrix
-        for begin in range(0, bins.count, LIMITS.rows_at_once):
-            part = slice(begin, begin + LIMITS.rows_at_once)
-            matrix[part] -= bins.free[part] @ taken
-        return cls(plane, bins, matrix, taken, smoothing)
+        return cls(plane, bins, packed if shown is None else shown(packed.toarray()), smoothing)
+
+    @cached_property
+    def taken(self) -> FloatArray:
+        """Coordinates F'B A (k, n_q) of offset and start."""
+        return self.plane.adjoint((self.nodes.T @ self.bins.free).T)
+
+    def output(self, masses: FloatArray) -> FloatArray:
+        """Averaged outputs B A m (count, ...) of masses (n_q, ...); all rise from 0."""
+        return np.asarray(self.nodes @ self.plane.everett_nodes(masses.T).T)
+
+    def across(self, columns: FloatArray, own: slice | NDArray[np.bool_] = _ALL) -> FloatArray:
+        """Products D'c (n_q, m) with columns (count, m), over all rows or ``own`` of them."""
+        of_starts = self.bins.free[own].T @ columns[own]
+        return self.plane.adjoint((self.nodes[own].T @ columns[own]).T).T - self.taken.T @ of_starts
+
+    @cached_property
+    def squares(self) -> FloatArray:
+        """Products D'D (n_q, n_q); zero for cells that only offset and start see."""
+        found = self.squares_of(_ALL)
+        still = np.diagonal(found) <= LIMITS.rounding * np.sum(self.taken**2, axis=0)
+        found[still], found[:, still] = 0.0, 0.0
+        return found
+
+    def squares_of(self, own: slice | NDArray[np.bool_]) -> FloatArray:
+        """Products D'D (n_q, n_q) over ``own`` rows."""
+        nodes, free = self.nodes[own], self.bins.free[own]
+        product = nodes.T @ nodes
+        dense = product if isinstance(product, np.ndarray) else product.toarray()
+        mixed = self.plane.adjoint((nodes.T @ free).T).T @ self.taken
+        whole = self.plane.adjoint(self.plane.adjoint(dense).T)
+        return whole - mixed - mixed.T + self.taken.T @ (free.T @ free) @ self.taken
 
     @cached_property
     def gram(self) -> FloatArray:
         """D'D + S, (n_q, n_q)."""
-        return self.matrix.T @ self.matrix + self.smooth
+        return self.squares + self.smooth
+
+    @cached_property
+    def _solver(self) -> nnls.Gram:
+        return nnls.Gram(self.gram)
 
     @cached_property
     def smooth(self) -> FloatArray:
         """S, (n_q, n_q)."""
-        diagonal = np.einsum("ij,ij->j", self.matrix, self.matrix)
-        return np.asarray(penalty(self.plane, diagonal, self.smoothing).toarray())
+        return np.asarray(penalty(self.plane, np.diagonal(self.squares), self.smoothing).toarray())
 
     def fit(
         self, y: FloatArray, passive: NDArray[np.bool_] | None = None, *, signed: bool = False
     ) -> nnls.NonNegative:
         """Masses for binned outputs (count,), non-negative unless ``signed``."""
-        rhs = self.matrix.T @ self.bins.settled(y)
+        rhs = self.across(self.bins.settled(y))
         if not signed:
-            return nnls.solve(self.gram, rhs, passive=passive)
-        masses = nnls.solve_signed(self.gram, rhs)
+            return self._solver.solve(rhs, passive=passive)
+        masses = self._solver.minimise(rhs, self._solver.usable)
         return nnls.NonNegative(masses, masses != 0, 1)
 
     def offset(self, y: FloatArray, masses: FloatArray) -> float:
@@ -227,11 +262,9 @@ class Design:
         along = self.bins.free.T @ y - self.taken @ masses
         return self.bins.constant(along) + float(masses.sum())
 
-    def output(self, operator: Preisach) -> FloatArray:
+    def shown(self, operator: Preisach) -> FloatArray:
         """Averaged output (count,) of an operator on the inputs of the rows."""
-        masses = operator.masses
-        level = operator.offset - float(masses.sum())
-        return self.matrix @ masses + self.bins.free @ (self.taken @ masses) + level
+        return self.output(operator.masses) + operator.offset - float(operator.masses.sum())
 
     def projector(self, passive: NDArray[np.bool_]) -> Projector:
         """What the positive cells can fit."""
@@ -274,9 +307,10 @@ class Projector:
 
     def __call__(self, columns: FloatArray) -> FloatArray:
         """Columns (count, k) without their fitted part."""
-        settled, rows = self.design.bins.settled(columns), self.design.matrix
-        # all rows twice: to copy those of the positive cells takes longer
-        masses = np.zeros((rows.shape[1], columns.shape[1]))
-        masses[self.cells] = linalg.cho_solve(self.factor, (rows.T @ settled)[self.cells], check_finite=False)
-        settled -= rows @ masses
-        return settled
+        bins, design = self.design.bins, self.design
+        settled = bins.settled(columns)
+        masses = np.zeros((design.plane.n_q, columns.shape[1]))
+        masses[self.cells] = linalg.cho_solve(
+            self.factor, design.across(settled)[self.cells], check_finite=False
+        )
+        return settled - bins.settled(design.output(masses))

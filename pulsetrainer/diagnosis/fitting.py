@@ -40,6 +40,7 @@ class Fitted:
     residual: FloatArray  # (count,) measured less simulated, without offset and start
     squares: float
     _without: dict[str, Fitted] = field(default_factory=dict, init=False, repr=False)
+    _changes: dict[Term, FloatArray] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def problem(self) -> Problem:
@@ -67,6 +68,12 @@ class Fitted:
             others = [other for other in self.terms if other.cause is not term.cause]
             self._without[term.cause.id] = refit(self.problem, others, self, rounds=LIMITS.without_rounds)
         return self._without[term.cause.id]
+
+    def change(self, term: Term) -> FloatArray:
+        """Change of the averaged output (count,) when one more cause is put in; made once for all who ask."""
+        if term not in self._changes:
+            self._changes[term] = self.simulator(in_order((*self.terms, term))) - self.simulated
+        return self._changes[term]
 
     @cached_property
     def slopes(self) -> FloatArray:
@@ -154,7 +161,7 @@ def weights_for(
     simulator = None if near is None else near.simulator
     added = np.zeros(problem.bins.count)
     if simulator is not None:
-        added = simulator(terms) - design.output(simulator.operator)
+        added = simulator(terms) - design.shown(simulator.operator)
     elif problem.base is not None:
         added = _none(problem)(terms)
     for _ in range(LIMITS.passes):
@@ -165,7 +172,7 @@ def weights_for(
         simulator = Simulator(problem, _operator(problem, found.x, offset))
         simulated = simulator(terms)
         residual = problem.bins.settled(problem.measured - simulated)
-        before, added = added, simulated - design.output(simulator.operator)
+        before, added = added, simulated - design.shown(simulator.operator)
         if np.linalg.norm(problem.bins.settled(added - before)) < LIMITS.passes_settled * np.linalg.norm(
             residual
         ):
@@ -195,10 +202,10 @@ def _rows(problem: Problem, terms: Sequence[Term]) -> Design:
         return shown_output(through, columns, replace(problem.frames[k], dt_s=dt_s))
 
     def shown(columns: FloatArray) -> FloatArray:
-        steps = [record.step for record in problem.records]
-        return problem.bins.filtered(columns, one, steps) if through else columns
+        return problem.bins.filtered(columns, one, [record.step for record in problem.records])
 
-    return Design.build(problem.plane, problem.bins, problem.paths(before), problem.smoothing, shown)
+    paths = problem.paths(before)
+    return Design.build(problem.plane, problem.bins, paths, problem.smoothing, shown if through else None)
 
 
 def _difference(quantity: Quantity, value: float) -> float:

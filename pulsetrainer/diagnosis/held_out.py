@@ -14,7 +14,6 @@ from scipy import linalg
 
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.smoothing import blocks
-from pulsetrainer.diagnosis.design import Design
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.problem import Problem
@@ -29,7 +28,6 @@ class HeldOut:
     def __init__(self, problem: Problem) -> None:
         self.count = problem.bins.count
         self.block = _blocks_of(problem)
-        self._grams: tuple[Design | None, FloatArray] = None, np.empty(0)
         self._errors: list[tuple[Fitted, float]] = []
 
     def error(self, fitted: Fitted) -> float:
@@ -80,11 +78,18 @@ class HeldOut:
         size, starts = free.size + more.shape[1], design.bins.free.shape[1]
         if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | ~test.any(axis=0)):
             return
-        # of each fold, and of all: what is left when it is taken off is what the fold is predicted from
-        grams = _of_folds(self._block_grams(design)[:, free[:, None], free], fold_of)
         beside = np.hstack((more, fitted.residual[:, None]))
-        across = _of_folds(self._products(beside, design.matrix), fold_of)
-        among = _of_folds(self._products(beside, more), fold_of)
+        # of each fold: what is left when it is taken off all is what the fold is predicted from
+        block = np.ix_(free, free)
+        parts = [
+            (design.squares_of(own)[block], design.across(beside, own).T[:, free], beside[own].T @ more[own])
+            for own in test.T[1:]
+        ]
+        total = (design.squares[block], design.across(beside).T[:, free], beside.T @ more)
+        parts = [
+            tuple(all_ - sum(some) for all_, some in zip(total, zip(*parts, strict=True), strict=True)),
+            *parts,
+        ]
         masses = (fitted.simulator.operator.weights * design.plane.areas)[free]
         smooth, pull = np.zeros((size, size)), np.zeros(size)  # pull: of the smoothing at the joint fit
         smooth[: free.size, : free.size] = design.smooth[np.ix_(free, free)]
@@ -95,43 +100,24 @@ class HeldOut:
         share = 1.0 - (1.0 - told) / folds
         changes = np.empty((folds, size))
         for fold in range(folds):
-            gram, cross, own = (total - (1.0 - told) * parts[fold] for parts, total in (grams, across, among))
+            gram, cross, own = (
+                whole - (1.0 - told) * part for whole, part in zip(total, parts[fold], strict=True)
+            )
             normal = share * smooth
             normal[: free.size, : free.size] += gram
-            normal[free.size :, : free.size] += cross[:-1, free]
+            normal[free.size :, : free.size] += cross[:-1]
             normal[free.size :, free.size :] += own[:-1]
             normal[np.diag_indices(size)] *= 1.0 + LIMITS.ridge_held_out
             normal[np.diag_indices(size)] += TINY
-            rhs = np.concatenate((cross[-1, free], own[-1])) - share * pull
+            rhs = np.concatenate((cross[-1], own[-1])) - share * pull
             factor = linalg.cho_factor(normal, lower=True, check_finite=False, overwrite_a=True)
             changes[fold] = linalg.cho_solve(factor, rhs, check_finite=False)
         moved = np.zeros((design.plane.n_q, folds))
         moved[free] = changes[:, : free.size].T
-        told_all = design.matrix @ moved + more @ changes[:, free.size :].T
+        told_all = design.bins.settled(design.output(moved)) + more @ changes[:, free.size :].T
         for fold in range(folds):
             error = (fitted.residual - told_all[:, fold])[test[:, fold]]
             yield error, changes[fold, free.size : free.size + extra.shape[1]]
-
-    def _block_grams(self, design: Design) -> FloatArray:
-        """D'D of every block (blocks, n_q, n_q): made once for each design."""
-        if self._grams[0] is not design:
-            self._grams = design, self._products(design.matrix, design.matrix)
-        return self._grams[1]
-
-    def _products(self, left: FloatArray, right: FloatArray) -> FloatArray:
-        """Products L'R of the rows of every block (blocks, l, r)."""
-        found = np.zeros((LIMITS.blocks, left.shape[1], right.shape[1]))
-        ends = np.flatnonzero(np.diff(self.block, append=-1)) + 1
-        for begin, end in zip([0, *ends[:-1].tolist()], ends.tolist(), strict=True):
-            found[self.block[begin]] += left[begin:end].T @ right[begin:end]
-        return found
-
-
-def _of_folds(parts: FloatArray, fold_of: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Sums (folds, ...) over the blocks of each fold, and over all of them, of what blocks have."""
-    mine = (np.arange(fold_of.max() + 1)[:, None] == fold_of).astype(np.float64)
-    own = np.tensordot(mine, parts, axes=1)
-    return own, own.sum(axis=0)
 
 
 def _fold_of(folds: int, *, whole: bool) -> IntArray:

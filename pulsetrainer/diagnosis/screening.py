@@ -27,7 +27,7 @@ from scipy import linalg, stats
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
-from pulsetrainer.diagnosis.extended import Term, in_order
+from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.noise import Noise, noise_in
 from pulsetrainer.diagnosis.problem import Problem
@@ -129,7 +129,7 @@ def screen(fitted: Fitted, rng: np.random.Generator) -> Screen:
     """Score every cause that is not in the model yet, with the chance that noise scores as much."""
     project, problem = fitted.projector, fitted.problem
     residual = project(fitted.residual[:, None])[:, 0]
-    blocks = _blocks(problem, fitted)
+    blocks = _blocks(problem, fitted, fitted)
     if not blocks:
         return Screen()
     noise = noise_in(residual, _less(project, blocks), problem.bins, problem.measured, rng)
@@ -138,11 +138,15 @@ def screen(fitted: Fitted, rng: np.random.Generator) -> Screen:
     return Screen(_scores(fitted, blocks, residual, known, _sights(blocks, covariance, critical)), noise)
 
 
-def ranked(fitted: Fitted) -> tuple[Score, ...]:
-    """Scores of every cause that is not in the model yet, best first; made once for all who ask."""
+def ranked(fitted: Fitted, whole: Fitted) -> tuple[Score, ...]:
+    """Scores of every cause that is not in the model yet, best first; made once for all who ask.
+
+    What a cause changes is taken from the ``whole`` model, of which ``fitted`` lacks a cause: a second one
+    changes that by a small share of a small share, and the scores only choose what is refitted.
+    """
     if fitted not in _RANKED:
         residual = fitted.projector(fitted.residual[:, None])[:, 0]
-        blocks = _blocks(fitted.problem, fitted)
+        blocks = _blocks(fitted.problem, fitted, whole)
         _RANKED[fitted] = _scores(fitted, blocks, residual, np.ones(len(blocks)), {})
     return _RANKED[fitted]
 
@@ -261,8 +265,11 @@ def p_value(observed: float, drawn: FloatArray) -> float:
     return (1.0 + float(np.count_nonzero(drawn >= observed))) / (1.0 + drawn.size)
 
 
-def _blocks(problem: Problem, fitted: Fitted) -> list[_Block]:
-    """All blocks of columns, weights and the causes already in the model projected off."""
+def _blocks(problem: Problem, fitted: Fitted, changed: Fitted) -> list[_Block]:
+    """All blocks of columns, weights and the causes already in the model projected off.
+
+    A column is what a cause changes in ``changed``.
+    """
     project = fitted.projector
     own = project(fitted.slopes)
     known = linalg.orth(own) if own.shape[1] else own
@@ -271,19 +278,13 @@ def _blocks(problem: Problem, fitted: Fitted) -> list[_Block]:
     tried: list[tuple[Cause, list[Values]]] = [
         (cause, values)
         for cause in library().values()
-        if cause.stage != "record" and cause.id not in fitted.names and (timed or not cause.needs_time)
+        if cause.stage != "record" and cause.id not in changed.names and (timed or not cause.needs_time)
         for values in cause.starts(problem.frames, parts)
     ]
     if not tried:
         return []
     # all at once: the projection is bound by reading the rows
-    columns = np.asarray(
-        [
-            fitted.simulator(in_order((*fitted.terms, Term(cause, one)))) - fitted.simulated
-            for cause, values in tried
-            for one in values
-        ]
-    ).T
+    columns = np.asarray([changed.change(Term(cause, one)) for cause, values in tried for one in values]).T
     free = project(columns)
     free -= known @ (known.T @ free)
     size, whole_size = np.linalg.norm(free, axis=0), np.linalg.norm(columns, axis=0)

@@ -46,10 +46,10 @@ class Thresholds:
     coarse_levels: int = 22  # of the plane that shows how the discretisation error falls with the cell
     smoothing: float = 0.035  # of the density, share of the range: holds the fit at the levels above
     near_end: float = 0.01  # of the range: the outputs at its two ends are averaged over so much
-    rows_at_once: int = 2000  # rows worked on in one piece: what fits the cache
     shown_kept: int = 12  # outputs kept of what chains begin with, at the full rate
     followed_kept: int = 10  # inputs kept as they were followed through the plane: some 10 MB each
     ridge: float = 1e-10  # of the largest diagonal entry: keeps the factor of the positive cells regular
+    rounding: float = 1e-12  # of a sum of squares: what a difference of two such leaves, and no variation
     ridge_held_out: float = 1e-9  # relative: the same where blocks are left out
     ridge_steps: float = 1e-9  # relative: the same for the step of the parameters
 

@@ -202,7 +202,8 @@ def test_errors_of_folds_are_those_of_as_many_fits(whole):
     blocks = np.arange(LIMITS.blocks)
     fold_of = (blocks * folds // LIMITS.blocks if whole else blocks % folds)[held_out.block]
     design, free = fitted.design, np.flatnonzero(fitted.passive)
-    columns = np.hstack((design.matrix[:, free], design.bins.settled(fitted.slopes), design.bins.free))
+    rows = design.bins.settled(design.output(np.eye(design.plane.n_q)))
+    columns = np.hstack((rows[:, free], design.bins.settled(fitted.slopes), design.bins.free))
     starts = design.bins.free.shape[1]
     smooth = np.zeros((columns.shape[1], columns.shape[1]))
     smooth[: free.size, : free.size] = design.smooth[np.ix_(free, free)]

@@ -351,7 +351,7 @@ def _exchanged(monkeypatch, squares: dict[str, float]):
     asked = _refitting(monkeypatch, exchange, acceptance, fitting, squares=fits)
     names = ("output-lag", "rate-widening", "delay", "accommodation", "step")
 
-    def ranked(fitted):
+    def ranked(fitted, whole):
         return tuple(_score(name, 1.0) for name in names if name not in fitted.names)
 
     monkeypatch.setattr(exchange, "ranked", ranked)
@@ -517,7 +517,7 @@ def _rivals(
 ):
     fits = {frozenset({one}): squares for one in scores}
     asked = _refitting(monkeypatch, rivals, squares=fits)
-    monkeypatch.setattr(rivals, "ranked", lambda _fitted: tuple(_score(one, gain) for one in scores))
+    monkeypatch.setattr(rivals, "ranked", lambda *_fits: tuple(_score(one, gain) for one in scores))
     without = {name: _fit(current + 400.0)}
     state = _state(_fit(current, name), without=without, lacks=lacks)
     found = rivals.rivals(state, state.current.terms[0])
@@ -546,7 +546,7 @@ def test_a_rival_of_a_large_gain_may_be_a_little_worse(monkeypatch):
     for squares, found in ((50.9, ("delay",)), (51.1, ())):
         fits = {frozenset({"delay"}): squares}
         _refitting(monkeypatch, rivals, squares=fits)
-        monkeypatch.setattr(rivals, "ranked", lambda _fitted: (_score("delay", 6000.0),))
+        monkeypatch.setattr(rivals, "ranked", lambda *_fits: (_score("delay", 6000.0),))
         state = _state(_fit(1.0, "field-lag"), without={"field-lag": _fit(10_001.0)})
         assert rivals.rivals(state, state.current.terms[0]) == found
 

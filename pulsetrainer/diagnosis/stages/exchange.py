@@ -34,7 +34,7 @@ def _exchanged(state: State, cause: Cause) -> State:
     without = current.without(next(term for term in current.terms if term.cause is cause))
     trials = [
         refit(problem, (*without.terms, Term(score.cause, score.start)), without, goal=current.squares)
-        for score in ranked(without)
+        for score in ranked(without, current)
         if score.cause.id in kin
     ]
     best = min((current, *trials), key=lambda fitted: fitted.squares)

@@ -78,7 +78,7 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
         LIMITS.rival_noise * fitted.squares / floor.count,
     )
     found = []
-    others = [score for score in ranked(without) if score.cause.id not in fitted.names]
+    others = [score for score in ranked(without, fitted) if score.cause.id not in fitted.names]
     for score in others[: LIMITS.closest]:
         if score.gain < LIMITS.rival_screened * gain:
             continue
