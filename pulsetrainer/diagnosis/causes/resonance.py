@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy import signal
@@ -42,13 +43,18 @@ class Resonance(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        turn = 2.0 * np.pi * values[0]
-        oscillator = (np.asarray([turn**2]), np.asarray([1.0, 2.0 * values[1] * turn, turn**2]))
-        # exact for an output that is straight between samples
-        b, a, _ = signal.cont2discrete(oscillator, frame.dt_s, method="foh")
-        b = b.ravel()
+        b, a = _filter(*values, frame.dt_s)
         at_first = np.multiply.outer(signal.lfilter_zi(b, a), y[0])
         state = remembered(frame.past, self.id, at_first)
         moved, state = signal.lfilter(b, a, y, axis=0, zi=state)
         remember(frame.past, self.id, state)
         return np.asarray(moved)
+
+
+@lru_cache(maxsize=128)
+def _filter(frequency: float, damping: float, dt_s: float) -> tuple[FloatArray, FloatArray]:
+    """Coefficients of the oscillator, exact for an output that is straight between samples."""
+    turn = 2.0 * np.pi * frequency
+    oscillator = (np.asarray([turn**2]), np.asarray([1.0, 2.0 * damping * turn, turn**2]))
+    b, a, _ = signal.cont2discrete(oscillator, dt_s, method="foh")
+    return b.ravel(), a
