@@ -68,6 +68,7 @@ def test_a_clean_input_is_left_alone(kind):
     cleaned = input_noise.clean(u)
     assert cleaned.input is u
     assert (cleaned.removed, cleaned.kept) == (0, turning_points(u).size - 1)
+    assert input_noise.estimate(u[:16]) == pytest.approx(0.0, abs=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +78,7 @@ def test_a_clean_input_is_left_alone(kind):
             -1, 1, 500
         ),  # every sample a reversal: motion, as far as anyone can tell
         np.sin(np.arange(200.0)),  # six samples a period
-        np.asarray([0.0, 1.0, 0.2, 0.9]),
+        np.linspace(0.0, 1.0, 15),  # one sample too few
     ],
 )
 def test_coarse_records_cannot_tell_noise_from_motion(u):
@@ -101,12 +102,16 @@ def test_no_lag_and_no_lost_amplitude():
 
 
 def test_real_turns_alternate_and_exceed_the_band():
-    """Every kept swing is larger than the dead-band."""
-    u = np.cumsum(np.random.default_rng(6).normal(size=5000))
+    """Every kept swing exceeds the dead-band, from first extreme to first extreme, and holds no other."""
+    u = np.round(np.cumsum(np.random.default_rng(6).normal(size=5000)), 1)
     turns = input_noise.real_turns(u, 5.0)
     swings = np.diff(u[turns])
     assert np.all(np.abs(swings) > 5.0)
     assert np.all(swings[1:] * swings[:-1] < 0)
+    for begin, end, swing in zip(turns, turns[1:], swings, strict=False):
+        way = np.sign(swing) * u[begin : end + 1]
+        assert (way.argmin(), way.argmax()) == (0, end - begin)
+        assert np.max(np.maximum.accumulate(way) - way) <= 5.0
 
 
 def test_bad_input_is_named():

@@ -141,6 +141,28 @@ def test_a_flat_error_has_its_smoothing_in_the_middle():
     assert smoothing._mean_length(clear, 1000.0) == pytest.approx(0.05)
     assert smoothing._mean_length(clear, 1.0) != pytest.approx(0.05, rel=0.1)
     assert smoothing._mean_length([(0.0, 0.0), (0.1, 1.0)], 10.0) == 0.0
+    assert smoothing._mean_length([(0.0, 1.0), (0.1, 1.0)], 10.0) == pytest.approx(np.sqrt(0.00625 * 0.1))
+
+
+class Error:
+    """Stands for the error on held-out blocks: 1 up to ``best``, then growing with s."""
+
+    def __init__(self, best, *, signed):
+        self.best, self.signed, self.errors = best, signed, {}
+
+    def __call__(self, s):
+        """Error at s."""
+        return self.errors.setdefault(s, max(1.0, s / self.best))
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_the_grid_goes_from_a_small_cell_to_a_fifth_of_the_range(signed):
+    """In steps of the root of 2 up to 0.2 or 1.5 times the least error; none at all below, for one sign."""
+    fine = 0.2 / 2.0 ** (np.arange(9, -1, -1) / 2.0)
+    expected = fine[1:] if signed else [0.0, *fine]
+    assert [s for s, _ in smoothing._tried(Error(1.0, signed=signed))] == pytest.approx(expected)
+    least = smoothing._tried(Error(0.05, signed=signed))
+    assert least[-1] == (pytest.approx(0.1), pytest.approx(2.0))  # the first that is hopeless
 
 
 @pytest.mark.parametrize("away", [1e4, 1e6])

@@ -82,14 +82,17 @@ def test_coarse_steps_are_not_wild():
     assert not found.wild.any()
 
 
-def test_a_reversal_curve_that_saturates_for_one_sample_is_real():
-    """A short excursion of the input that the output's memory shows is kept."""
+@pytest.mark.parametrize("far", [0.0, 10.0])
+def test_a_reversal_curve_that_saturates_for_one_sample_is_real(far):
+    """A short excursion of the input that the output's memory shows is kept, also beside wild outputs."""
     device, _, _, _ = clean(100)
     back = np.linspace(0.0, 0.95, 30)
     u = np.concatenate([np.concatenate(([1.0], np.linspace(b, b + 0.3, 20))) for b in 0.7 * back])
     u = np.concatenate(([0.0], u))
     assert wild.isolated(u).any()
-    (found,) = wild.tame([(u, device(u))])
+    y = device(u)
+    y[5::21] += far * np.ptp(y)
+    (found,) = wild.tame([(u, y)])
     np.testing.assert_array_equal(found.input, u)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,33 @@ def test_a_first_stroke_apart_does_not_count(down, noisy):
     u, y = _record(cycled=True, down=down)
     assert known_from(u, 0.0, 5.0, y) == 0
     assert first_stroke_words(u, y, 0.0, 5.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("first", "later", "left_out"),
+    [
+        ((0.031, 0.0), 3, True),  # shares of the output's span, of the first stroke and of two later ones
+        ((0.029, 0.0), 3, False),
+        ((0.06, 0.0145), 3, True),  # four times as far apart as these
+        ((0.06, 0.0155), 3, False),
+        ((0.031, 0.0), 2, True),
+        ((0.09, 0.0), 1, False),  # which of two is the odd one?
+    ],
+)
+def test_how_far_apart_a_first_stroke_lies(first, later, left_out):
+    """By the rms of twenty places from two hundredths of the range on; too short a stroke is not compared."""
+    tops = (5.0, 0.0, *(later * (5.0, 0.0)), 0.9, 0.0)
+    u = np.concatenate([[0.0], *(np.linspace(a, b, 501)[1:] for a, b in pairwise((0.0, *tops)))])
+    places = np.linspace(0.1, 5.0, 20)
+    apart, unlike = np.array(first) / np.sqrt(np.mean((places > 2.5) & (places < 4.8)))
+    shares = np.zeros(len(tops))
+    shares[[0, 2]] = -apart, unlike
+    if later > 1:
+        shares[4] = -unlike
+    stroke = np.maximum(np.arange(u.size) - 1, 0) // 500
+    y = u + 5.0 * shares[stroke] * ((u > 2.5) & (u < 4.8))
+    y[stroke == len(tops) - 2] += 3.0
+    assert known_from(u, 0.0, 5.0, y) == (495 if left_out else 0)  # within a hundredth of the other end
 
 
 def test_it_neither_spoils_the_fit_nor_is_it_a_cause():
