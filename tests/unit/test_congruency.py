@@ -76,6 +76,10 @@ def test_no_weights_make_equal_loops_differ(seed, n_h):
     output = _operator(n_h, weights)(u)
     loops = congruency.loops_of([Record(u, output, dt_s=DT)], 0.0, HIGH)
     assert len(loops) == 6
+    counts = np.ones(u.size)
+    counts[[loops[1].turn, loops[4].end - 1]] = 0.0  # a loop counts as a whole
+    weighted = congruency.loops_of([Record(u, output, counts, dt_s=DT)], 0.0, HIGH)
+    assert [one.begin for one in weighted] == [loops[k].begin for k in (0, 2, 3, 5)]
     assert np.ptp([output[loop.begin] for loop in loops]) > 0 or n_h < 6
     assert np.abs(congruency.contrasts(loops, [output])).max() < 1e-9 * np.ptp(output)
 

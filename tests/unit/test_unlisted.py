@@ -62,16 +62,21 @@ U = np.concatenate(
 @pytest.mark.parametrize(
     ("name", "at", "expected"),
     [
+        ("input", [149], [1.0]),
+        ("output", [149], [2.0]),
+        ("input squared", [149], [1.0]),
         ("turn", [40, 170, 199], [0.0, 1.0, 0.4]),
         ("way", [149, 179, 199], [1.0, 0.54, 0.45]),
         ("input change", [49, 149], [None, 0.0]),
+        ("output change", [149], [0.0]),
         ("input rate", [149, 178], [0.0, 0.6 / 29 / DT_S]),
+        ("output rate", [149, 178], [0.0, 1.2 / 29 / DT_S]),
         ("output squared", [149], [4.0]),
     ],
 )
 def test_what_a_state_is(name, at, expected):
     """Told by a ramp, a rest and a turn, with a time constant far below them."""
-    frame = Frame(DT_S, U, 1.0, 1.0, ends=(3.0, 5.0), zero=3.0)
+    frame = Frame(DT_S, U - 2.0, 1.0, 1.0, low=-2.0, ends=(3.0, 5.0), zero=3.0)
     z = STATES[NAMES[name]].at(3.0 + 2.0 * U, 0.02, frame, "x")
     for k, value in zip(at, expected, strict=True):
         if value is not None:
@@ -128,6 +133,17 @@ def test_a_dip_over_the_average_current_is_found_and_said(dipping):
     assert np.ptp(curve.value) == pytest.approx(0.5, rel=0.25)
     assert np.all(curve.half > 0)
     assert (curve.unit, curve.output_unit) == ("A", "N")
+
+
+def test_what_is_left_is_the_error_of_its_models(dipping):
+    """By definition, over single samples, in percent of the span: as given, and extended."""
+    model, found = dipping
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    y = _run(u, _dip(u)).output
+    for one, percent in ((model, found.rms_percent), (found.extended, found.extended_rms_percent)):
+        left = one.predict(u, dt_s=DT_S) - y
+        assert percent == pytest.approx(100.0 * np.sqrt(np.mean(left**2)) / np.ptp(y))
+    assert found.rms == pytest.approx(0.01 * found.rms_percent * np.ptp(y))
 
 
 def test_it_is_a_term_of_the_model_like_any_other(dipping, tmp_path):
