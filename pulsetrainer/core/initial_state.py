@@ -81,7 +81,7 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
     if apart <= max(_APART * float(np.ptp(outputs)), _TIMES * alike):
         return 0
     back = np.flatnonzero((at_end | (away >= reach - NEAR * reach))[leaves[0] + 1 :])
-    return int(leaves[0] + 1 + back[0]) if back.size else 0
+    return int(leaves[0] + 1 + back[0])  # where the second stroke begins at the latest
 
 
 def _at_end(away: FloatArray, near: float) -> NDArray[np.bool_]:

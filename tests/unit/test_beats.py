@@ -97,6 +97,16 @@ def test_a_record_from_peak_to_peak_has_its_outer_feet():
     assert 0.4 < t[found.feet[0]] < 0.6
 
 
+@pytest.mark.parametrize("beats", [1, 2, 4, 5])
+@pytest.mark.parametrize("drift", [-0.03, 0.0, 0.03])
+def test_a_record_from_foot_to_foot_has_all_its_beats(beats, drift):
+    """Its outer feet are as near to the middle one as a tenth of the height, not to the lowest of all."""
+    t = np.arange(0.0, beats * 0.8 + 1e-9, 0.005)
+    pulse = np.sin(np.pi * t / 0.8) ** 2
+    found = find_beats(Shape("drifting", t, pulse + drift * t / 0.8))
+    assert t[found.feet] == pytest.approx(0.8 * np.arange(beats + 1), abs=0.02)
+
+
 def test_a_drifting_record_repeats_without_a_jump():
     """What one foot lies above the other is taken out as a straight line."""
     record = _recorded("fingerbp_AAC3_3")
