@@ -173,6 +173,24 @@ def test_a_turn_keeps_its_extreme(at, off, motion):
         np.testing.assert_allclose(wild.through_turns(sign * bad, found), sign * u, atol=1e-4)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("before", "after", "expected"),
+    [
+        ((0.8, 0.9, 1.0), (1.0, 0.9, 0.8), (1.1, 1.1)),  # a turn
+        ((0.8, 0.9, 1.0), (0.85, 0.75, 0.65), (1.05, 0.95)),  # the nearer of the two paths
+        ((1.0, 1.0, 1.0), (0.7, 0.6, 0.5), (0.9, 0.8)),  # a rest before it
+        ((0.8, 0.9, 1.0), (0.7, 0.5, 0.6), (0.9, 0.8)),  # no path behind it
+        ((0.9, 1.0), (1.0, 0.9, 0.8), (1.0, 1.0)),  # too near to the begin
+    ],
+)
+def test_a_path_is_continued_where_both_sides_move_to_one_extreme(before, after, expected, sign):
+    """Else the samples lie on the line between their neighbours."""
+    values = sign * np.array([*before, 9.0, 9.0, *after])
+    found = wild.through_turns(values, np.abs(values) > 5.0)
+    assert sign * found[len(before) : -len(after)] == pytest.approx(np.array(expected))
+
+
 def test_a_stroke_of_one_sample_is_no_peak():
     """Down for one sample between two turns, no faster than elsewhere."""
     u = np.concatenate((np.linspace(0.0, 1.0, 101), [0.99], np.linspace(1.0, 0.0, 101)))
