@@ -457,8 +457,10 @@ def _waves(strokes: int, periods: float, samples: int, amplitude: float = 0.3) -
 
 
 def test_the_power_of_a_line_adds_up_over_the_strokes():
-    """A cosine of amplitude A has n A^2 / 4 in each stroke of n samples, whatever its phase."""
+    """A cosine of amplitude A has n A^2 / 4 in each stroke of n samples; shorter strokes add none."""
     power, squares, used = (one[0] for one in stick_slip._lines(_waves(8, 10.0, 500), np.asarray([1.0])))
+    more = stick_slip._lines([*_waves(8, 10.0, 500), *_waves(3, 2.0, 50)], np.asarray([1.0]))
+    assert [one[0] for one in more] == pytest.approx([power, squares, used], rel=1e-12)
     assert used == 8
     assert np.sqrt(squares) == pytest.approx(0.3, rel=0.01)
     assert power == pytest.approx(8 * 500 * 0.09 / 4, rel=0.02)  # narrow bins of the output take a little
