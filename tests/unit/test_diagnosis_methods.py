@@ -20,7 +20,7 @@ from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_f
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.problem import problem_for
-from pulsetrainer.diagnosis.raw import evenly
+from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import p_value
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -122,6 +122,20 @@ def test_the_error_of_the_levels_falls_with_the_cell(monkeypatch, coarse, error)
     monkeypatch.setattr(floor, "weights_for", lambda *_: SimpleNamespace(squares=coarse))
     fitted = SimpleNamespace(terms=(), squares=100.0)
     assert Floor(100, 1.0, 1.0, 1.0).at("coarse", fitted).discretisation == pytest.approx(error)
+
+
+@pytest.mark.parametrize("jump", [0.0, 0.4])
+def test_steps_and_jumps_do_not_average_out(jump):
+    """A twelfth of their squares, in the unit of the problem; the noise of single samples does."""
+    u = 0.5 - 0.5 * np.cos(np.arange(2000) / 100.0)
+    y = 5.0 * np.round(u, 1)
+    problem = problem_for([Record(u, y / 5.0, dt_s=0.01)], 0.0, 1.0)
+    fired = [Firing("stick-slip", "x", value, "{y}") for value in (0.3 * jump, jump) if jump]
+    found = floor.floor_of([Record(u, y, dt_s=0.01)], [*fired, Firing("step", "x", 9.0, "{y}")], problem, 5.0)
+    assert found.held == pytest.approx((0.1**2 + (jump / 5.0) ** 2) / 12.0)
+    assert found.white == pytest.approx(np.sqrt(found.sampled + found.held))
+    assert found.sampled == pytest.approx(found.single**2 * np.mean(1.0 / problem.bins.sizes))
+    assert (found.count, found.span) == (problem.bins.count, pytest.approx(1.0))
 
 
 # --- the joint refit
