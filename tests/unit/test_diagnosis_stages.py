@@ -40,6 +40,7 @@ from pulsetrainer.diagnosis.stages import (
     rivals,
     screened,
     search,
+    unlisted,
     verdict,
 )
 from pulsetrainer.diagnosis.state import Given, Question, State
@@ -430,6 +431,45 @@ def test_small_sticking_is_sought_where_something_is_left(monkeypatch, left, fir
     assert len(after.firings) == found
     if found and not firings:
         assert after.firings == ((0, FIRED),)
+
+
+@pytest.mark.parametrize(
+    ("left", "p_value", "gain", "fall", "again", "learned", "said"),
+    [
+        (500.0, 0.009, 4.6, 48.1, True, True, ()),  # 8 % of what listed causes explain
+        (500.0, 0.009, 4.6, 48.1, False, False, ("not repeated",)),
+        (500.0, 0.009, 4.6, 47.9, False, False, ()),
+        (500.0, 0.011, 4.6, 48.1, False, False, ()),  # chance
+        (500.0, 0.009, 4.4, 48.1, False, False, ()),  # half of what matters
+        (109.1, 0.009, 4.6, 80.0, True, True, ()),
+        (109.0, 0.009, 4.6, 80.0, True, False, ()),  # nothing is left
+        (
+            1099.0,
+            0.009,
+            4.6,
+            8.1,
+            True,
+            True,
+            (),
+        ),  # nothing else was explained: sought in the baseline of 1100
+        (1099.0, 0.009, 4.6, 7.9, True, False, ()),
+    ],
+)
+def test_a_dependence_in_no_list_is_learned_where_it_repeats(
+    monkeypatch, left, p_value, gain, fall, again, learned, said
+):
+    """Sought where more is left than noise; one that does not predict other pieces of the record is said."""
+    term = Term(unlisted.Unlisted([part := unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
+    best = SimpleNamespace(p_value=p_value, gain=gain, part=part, values=term.values)
+    monkeypatch.setattr(unlisted, "best_dependence", lambda *_: best)
+    monkeypatch.setattr(unlisted, "refit", lambda *_, **__: Fit(left - fall, (term,)))
+    monkeypatch.setattr(unlisted, "repeats", lambda *_: again)
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+    after = unlisted.stage(_state(_fit(left)))
+    assert after.current.names == (("unlisted",) if learned else ())
+    assert after.p_values == ({"unlisted": p_value} if learned else {})
+    assert tuple(one.kind for one in after.evidence) == said
 
 
 @pytest.mark.parametrize("again", [None, FIRED])

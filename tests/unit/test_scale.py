@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.unlisted import STATES
 from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
 
@@ -77,13 +78,14 @@ def test_records_without_time_count_samples():
 def test_every_unit_of_the_library_is_known():
     """And is what it says."""
     scale = Scale(reach=4.0, span=3.0, second=25.0)
-    for cause in library().values():
-        for quantity in cause.parameters:
-            assert scale.of_unit(quantity.unit) > 0
-    assert scale.of_unit("{y} s/{u}") == pytest.approx(3.0 * 25.0 / 4.0)
-    assert scale.of_unit("({u} s)^0.5") == pytest.approx(10.0)
-    assert scale.of_unit("1/({u})^2") == pytest.approx(1 / 16)
-    assert scale.of_unit("Hz") == pytest.approx(0.04)
+    known = {
+        "1": 1.0, "{u}": 4.0, "{y}": 3.0, "s": 25.0, "Hz": 1 / 25, "1/s": 1 / 25, "{y}/s": 3 / 25,
+        "{u}/{y}": 4 / 3, "{y} s/{u}": 3 * 25 / 4, "1/({u})^2": 1 / 16, "({u})^2": 16.0, "({y})^2": 9.0,
+        "{u}/s": 4 / 25, "({u} s)^0.5": 10.0,
+    }  # fmt: skip
+    of_causes = {quantity.unit for cause in library().values() for quantity in cause.parameters}
+    assert of_causes | {state.unit for state in STATES} <= set(known)
+    assert {unit: scale.of_unit(unit) for unit in known} == pytest.approx(known)
     assert scale.estimate(Estimate("tau", 2.0, "s", 1.0, 3.0)) == Estimate("tau", 50.0, "s", 25.0, 75.0)
 
 
