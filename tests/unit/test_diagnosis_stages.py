@@ -451,7 +451,7 @@ def test_small_sticking_is_sought_where_something_is_left(monkeypatch, left, fir
             True,
             True,
             (),
-        ),  # nothing else was explained: sought in the baseline of 1100
+        ),  # nothing else was explained
         (1099.0, 0.009, 4.6, 7.9, True, False, ()),
     ],
 )
