@@ -178,7 +178,7 @@ NOTES = {
     "false reversals": ("false reversals",),
     "cells never switched": ("never switched", "% of the plane"),
     "follows the velocity": ("velocity of u", "wrong model"),
-    "leaves much": ("% of the span", "the noise of single samples", "pulsetrainer diagnose"),
+    "leaves much": ("% of the span", "the noise from sample to sample", "pulsetrainer diagnose"),
     "zeros differ": ("shifted against each other",),
     "no time": ("no time",),
     "beats found": ("6 whole beats", "0.644 to 0.653 s"),

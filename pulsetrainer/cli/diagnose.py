@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -47,12 +48,12 @@ def diagnose(
             progress=progress,
         )
         header = job.save(out, found, f"Diagnosis of {', '.join(path.stem for path in runs)}")
+        commands = _commands(found, runs, model, out)
         if html is not None:
             from pulsetrainer.report.diagnosis_html import render_diagnosis
 
-            job.page(html, render_diagnosis, found, header)
+            job.page(html, partial(render_diagnosis, commands=commands), found, header)
     job.notes(found.notes)
-    commands = _commands(found, runs, model, out)
     job.screen.result(
         _payload(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
     )
@@ -63,12 +64,11 @@ def diagnose(
 
 
 def _commands(found: Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:
+    words: list[list[object]] = []
     if found.next_command == "extend":
-        words = [["extend", out, "--model", model, "-o", "extended.h5"]]
-    elif found.next_command == "correct":
-        words = [["correct", run, "--diagnosis", out, "-o", f"{run.stem}-corrected.h5"] for run in runs]
-    else:
-        words = []
+        words.append(["extend", out, "--model", model, "-o", "extended.h5"])
+    if found.next_command and found.correctable:
+        words += [["correct", run, "--diagnosis", out, "-o", f"{run.stem}-corrected.h5"] for run in runs]
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
 
 

@@ -62,9 +62,26 @@ def extend(
             **picked(found, *_FIGURES),
         }
     )
-    job.screen.facts(f"{out}: extended model of {extended.levels} levels", _left(found, extended))
+    rows = _left(found, extended) | _apart(found, extended)
+    job.screen.facts(f"{out}: extended model of {extended.levels} levels", rows)
     for one in extended.extensions:
         job.screen.facts(f"with {one.cause}", parameters(one.parameters))
+
+
+def _apart(found: Diagnosis, extended: Model) -> dict[str, str]:
+    """Say how the extended model differs from what the diagnosis told."""
+    added = {one.cause: [p.value for p in one.parameters] for one in extended.extensions}
+    rows = {
+        f"left out {one.cause}": "comes from the measurement: pulsetrainer correct"
+        if one.cause in found.correctable
+        else "; ".join(one.doubts) or "does not last"
+        for one in found.found
+        if one.cause not in added
+    }
+    told = {one.cause: [p.value for p in one.parameters] for one in found.found}
+    if any(len(told[name]) == len(now) and told[name] != now for name, now in added.items() if name in told):
+        rows["parameters"] = "fitted again as the model is used: from rest"
+    return rows
 
 
 def _left(found: Diagnosis, extended: Model) -> dict[str, str]:

@@ -28,7 +28,9 @@ from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.forms import static_behind
 from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import predict
+from pulsetrainer.diagnosis.raw import evenly, noise_of
 from pulsetrainer.diagnosis.scale import Scale
+from pulsetrainer.diagnosis.stages.raw_data import masked_by
 from pulsetrainer.diagnosis.state import Given, State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -63,7 +65,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         quick=state.question.quick,
         rms=rms,
         rms_percent=rms * of_samples / scale.span,
-        noise_percent=state.floor.noise * of_samples,
+        noise_percent=_noise_of(state) * of_samples,
         static_percent=state.baseline.rms * percent,
         extended_percent=extended.rms * percent,
         floor_percent=state.floor.rms * percent,
@@ -122,12 +124,23 @@ def _words(given: Given) -> Words:
 
 
 def rms_of(state: State, model: Model) -> float:
-    """Rms error of a model, as given or extended, over the single samples with weight."""
-    errors = [
-        (predict(model, r.input, r.step) * model.polarity - r.output)[r.sample_weight > 0]
-        for r in map(state.scale.restored, state.problem.records)
-    ]
+    """Rms error of a model, as given or extended, over the single samples with weight, as measured."""
+    question, errors = state.question, []
+    for k, own in enumerate(question.records):
+        masked = masked_by(own, [firing for record, firing in state.firings if record == k])
+        stamps = question.stamps[k] if question.stamps else None
+        even = evenly(masked, stamps)
+        said = predict(model, even.input, even.step) * model.polarity
+        if stamps is not None:
+            said = np.interp(stamps, np.arange(said.size) * even.step, said)
+        errors.append((said - own.output)[masked.sample_weight > 0])
     return root_mean_square(np.concatenate(errors))
+
+
+def _noise_of(state: State) -> float:
+    """White noise of single samples as measured, of the span of the problem."""
+    own = [noise_of(r.output, r.sample_weight) ** 2 for r in state.question.records]
+    return max(state.floor.noise, float(np.sqrt(np.mean(own))) / state.scale.span)
 
 
 def _unit(text: str, words: Words) -> str:

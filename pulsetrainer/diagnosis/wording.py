@@ -26,6 +26,10 @@ TEXTS: Mapping[str, str] = {
         "noise alone looks like it with a probability of {p:.3f}. It accounts for {explains:.1f} % of the "
         "squared error beyond noise. What gives it away: {signature}."
     ),
+    "tested, small": (
+        "noise alone looks like it with a probability of {p:.3f}. What it explains is smaller than noise and "
+        "levels together. What gives it away: {signature}."
+    ),
     "extended": "With these causes in the model, {left:.3f} % of the span remains (rms of short averages).",
     "would have shown": (
         "The smallest effects that these recordings would have shown, rms, % of the span: {limits}"
@@ -105,6 +109,11 @@ ADVICE: Mapping[str, str] = {
     "extend": (
         "Extend the model with what was found, then test it on another recording, which was not fitted: "
         "pulsetrainer evaluate."
+    ),
+    "extend, correct": (
+        "Extend the model with what was found, then test it on another recording, which was not fitted: "
+        "pulsetrainer evaluate. From the measurement: {names}; pulsetrainer correct takes that out of the "
+        "recording."
     ),
     "again": (
         "What was found does not repeat within these recordings, so nothing is added to the model. Record "

@@ -3,22 +3,32 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from pulsetrainer.artefacts import Cause, Diagnosis
 from pulsetrainer.report import diagnosis_figures as figures
-from pulsetrainer.report.diagnosis_text import COLUMNS, ERRORS, answer, explains, parameters, stands
+from pulsetrainer.report.diagnosis_text import (
+    COLUMNS,
+    ERRORS,
+    answer,
+    explains,
+    in_doubt,
+    parameters,
+    stands,
+)
 from pulsetrainer.report.html import page
 from pulsetrainer.report.views import Number, Picture, number, picture
 
 
-def render_diagnosis(found: Diagnosis, **header: Any) -> str:
-    """Return the report of a diagnosis; ``header`` as in ``html.page``."""
+def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header: Any) -> str:
+    """Return the report of a diagnosis, with the commands that come next; ``header`` as in ``html.page``."""
     shown = [*found.found, *[one for one in found.causes if not one.found and one.explains_percent > 0]][:12]
     return page(
         "diagnosis.html.j2",
         **header,
         found=found,
+        commands=commands,
         headline=headline(found),
         named=[_words(one) for one in found.found],
         levels=_levels(found),
@@ -41,14 +51,14 @@ def headline(found: Diagnosis) -> str:
         return "Something is wrong that no known cause explains."
     cause = next(one for one in found.causes if one.cause == found.verdict)
     also = [one.text for one in found.found if one.cause != found.verdict]
-    words = f"{cause.text[:1].upper()}{cause.text[1:]}"
+    words = f"In doubt: {cause.text}" if in_doubt(found) else f"{cause.text[:1].upper()}{cause.text[1:]}"
     tied = f" (could equally be {' or '.join(cause.confounded_with)})" if cause.confounded_with else ""
     rest = "" if found.left.whole else ". That explains only a part: something else is left"
     return f"{words}{tied}{'; in addition, ' + '; '.join(also) if also else ''}{rest}."
 
 
 def _words(one: Cause) -> dict[str, Any]:
-    doubt = f" In doubt: {'; '.join(one.doubts)}." if one.doubts else ""
+    doubt = f". In doubt: {'; '.join(one.doubts)}" if one.doubts else ""
     return {
         "id": one.cause,
         "text": f"{one.text[:1].upper()}{one.text[1:]}{doubt}",

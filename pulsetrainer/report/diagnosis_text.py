@@ -23,7 +23,8 @@ ERRORS = (
     ("noise alone (averages: and levels)", "noise_percent", "floor_percent"),
 )
 COLUMNS = {
-    "explains": "share of the squared error beyond noise that goes with this cause in the model",
+    "explains": "share of the squared error beyond noise that goes with this cause in the model; shares of "
+    "causes that look alike overlap",
     "gain": "the same share, on parts of the recordings that were left out of the fit",
 }
 
@@ -47,7 +48,8 @@ class Table:
 
 def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     """Yield what there is to say, in the order in which a person would ask."""
-    yield Facts(f"verdict: {found.verdict}" + (" (quick screen)" if found.quick else ""), {})
+    how = ("quick screen",) * found.quick + ("in doubt",) * in_doubt(found)
+    yield Facts(f"verdict: {found.verdict}" + (f" ({', '.join(how)})" if how else ""), {})
     for one in found.found:
         yield Facts(f"found: {one.cause}, {one.text}", _said(one))
     yield Table(
@@ -68,6 +70,11 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     yield Facts("in this table", COLUMNS)
     yield Facts("evidence", {str(k): text for k, text in enumerate(found.evidence, start=1)})
     yield Facts("next", {"": found.next_experiment})
+
+
+def in_doubt(found: Diagnosis) -> bool:
+    """Tell whether something speaks against the cause that the verdict names."""
+    return any(one.cause == found.verdict and bool(one.doubts) for one in found.found)
 
 
 def stands(found: Diagnosis, fields: Sequence[str]) -> bool:
@@ -123,9 +130,10 @@ def _said(one: Cause) -> dict[str, str]:
 
 
 def explains(one: Cause, found: Diagnosis) -> float:
-    """Return the share of the error beyond noise that a cause explains; NaN where there is no such error."""
+    """Return the share of the error that a cause explains; NaN where none is beyond noise."""
     beyond = not found.static_percent <= found.floor_percent
-    return one.explains_percent if one.found or beyond else math.nan
+    untested = one.found and one.p_value is None  # of the model as given, or read off the raw data
+    return one.explains_percent if beyond or untested else math.nan
 
 
 def _row(one: Cause, found: Diagnosis) -> tuple[Any, ...]:

@@ -52,7 +52,7 @@ def of_rest(fitted: Fitted) -> list[str]:
     if share <= MUCH or left <= MANY * noise:
         return []
     times = f"{left / noise:.0f} times" if left < _UNCOUNTED * noise else "far more than"
-    found = f"the model leaves {100 * share:.1f} % of the span (rms), {times} the noise of single samples"
+    found = f"the model leaves {100 * share:.1f} % of the span (rms), {times} the noise from sample to sample"
     return [f"{found}: pulsetrainer diagnose tells what it misses"]
 
 

@@ -90,7 +90,7 @@ def test_a_note_is_folded_between_words(monkeypatch):
     monkeypatch.setenv("COLUMNS", "40")
     monkeypatch.setattr(sys, "stderr", shown := _Terminal())
     screen = Screen("identify", as_json=False)
-    text = "the model leaves 0.9 % of the span (rms), 3 times the noise of single samples"
+    text = "the model leaves 0.9 % of the span (rms), 3 times the noise from sample to sample"
     screen.note(text)
     screen.note("warning: the model expects large errors")
     lines = shown.getvalue().splitlines()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -61,7 +62,9 @@ def test_where_nothing_is_left_no_cause_explains_a_share_of_it():
     for left, known in ((0.9, False), (1.0, False), (1.1, True)):
         share = explains(one, replace(found, static_percent=left, floor_percent=1.0))
         assert (share == 100.0) is known
-    assert explains(replace(one, found=True), replace(found, static_percent=0.9, floor_percent=1.0)) == 100.0
+    small = replace(found, static_percent=0.9, floor_percent=1.0)
+    assert math.isnan(explains(replace(one, found=True), small))
+    assert explains(replace(one, found=True, p_value=None), small) == 100.0  # a change of condition
 
 
 def test_its_tables_fit_a_terminal_of_eighty_columns():

@@ -1,4 +1,4 @@
-"""the output rings after a sudden change: y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f."""
+"""the output follows like a damped oscillator: y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, r
 _TRIED_Hz = (3.0, 80.0, 20)  # from, to, how many
 _TRIED_DAMPING = (0.07, 0.25)  # rings long, rings short
 _FASTEST = 0.2  # of the sample rate: faster ringing is not sampled
+_KEPT = 128  # filters: the grid above and those of some fits
 
 
 class Resonance(Cause):
     """A second-order oscillator driven by the output."""
 
     id = "resonance"
-    title = "the {output} rings after a sudden change"
+    title = "the {output} follows like a damped oscillator: it rings or overshoots"
     formula = "y'' + 2 zeta w y' + w^2 y = w^2 P[u], w = 2 pi f"
     signature = "a decaying oscillation of one frequency after every stop, whatever the rate before it"
     excitation = "fast stops"
@@ -51,7 +52,7 @@ class Resonance(Cause):
         return np.asarray(moved)
 
 
-@lru_cache(maxsize=128)
+@lru_cache(maxsize=_KEPT)
 def _filter(frequency: float, damping: float, dt_s: float) -> tuple[FloatArray, FloatArray]:
     """Coefficients of the oscillator, exact for an output that is straight between samples."""
     turn = 2.0 * np.pi * frequency

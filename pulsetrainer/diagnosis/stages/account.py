@@ -25,7 +25,8 @@ def stage(state: State) -> State:
     percent = PERCENT / float(np.ptp(state.problem.measured))
     levels = {"left": percent * state.baseline.rms, "floor": percent * state.floor.rms}
     said = [Evidence("static", figures=levels)]
-    said += [_of(finding) for finding in state.findings if finding.found]
+    beyond = state.baseline.squares > state.floor.squares
+    said += [_of(finding, beyond=beyond) for finding in state.findings if finding.found]
     said += [
         Evidence("background", finding.cause.id, {one.name: one.value for one in finding.parameters})
         for finding in state.findings
@@ -49,13 +50,13 @@ def stage(state: State) -> State:
     return replace(state, evidence=(*state.evidence, *said))
 
 
-def _of(finding: Finding) -> Evidence:
-    """What speaks for one cause."""
+def _of(finding: Finding, *, beyond: bool) -> Evidence:
+    """What speaks for one cause; its share of the error only where there is one ``beyond`` noise."""
     if finding.seen is not None:
         return finding.seen
     assert finding.p_value is not None
     figures = {"p": finding.p_value, "explains": finding.explains_percent}
-    return Evidence("tested", finding.cause.id, figures)
+    return Evidence("tested" if beyond else "tested, small", finding.cause.id, figures)
 
 
 def _not_accepted(state: State) -> Iterator[Evidence]:

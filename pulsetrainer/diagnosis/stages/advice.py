@@ -58,6 +58,8 @@ def _after_verdict(state: State) -> Evidence:
         return Evidence("lacks", names=state.lacks)
     if not library()[state.verdict].lasting:
         return Evidence("repair")
+    if state.extended is not None and state.correctable:
+        return Evidence("extend, correct", names=tuple(state.correctable))
     return Evidence("extend" if state.extended is not None or state.question.quick else "again")
 
 
