@@ -59,7 +59,7 @@ def best_experiment(state: State, names: Sequence[str]) -> Experiment:
         u = plane.low + (plane.high - plane.low) * shares
         y = state.current.simulator.static(u)
         record = Record(u, y, dt_s=1.0 / (faster * LIMITS.experiment_Hz))
-        problem = state.problem.of([record], plane.n_h)
+        problem = state.problem.of([record])
         found.append(Experiment(name, _smallest_distance(state, problem, terms, others), here, faster))
     return max(found, key=lambda one: one.distance)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -45,10 +45,15 @@ class Problem:
         self._followed.move_to_end(terms)
         return self._followed[terms]
 
-    def of(self, records: Sequence[Record], levels: int) -> Problem:
-        """Return the same of other records, or on another number of levels."""
+    def of(self, records: Sequence[Record]) -> Problem:
+        """Return the same of other records."""
         plane = self.plane
-        return problem_for(records, plane.low, plane.high, levels, signed=self.signed, base=self.base)
+        return problem_for(records, plane.low, plane.high, plane.n_h, signed=self.signed, base=self.base)
+
+    def coarser(self, levels: int) -> Problem:
+        """Return the same on fewer levels."""
+        plane = Plane.uniform(self.plane.low, self.plane.high, levels)
+        return replace(self, plane=plane, _followed=OrderedDict())
 
 
 def problem_for(

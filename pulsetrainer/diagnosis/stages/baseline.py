@@ -34,7 +34,7 @@ def stage(masked: Masked) -> State:
     signed = given is not None and given.model.form != "direct"
     base = None if given is None else base_of(given.model, masked.scale)
     problem = problem_for(records, 0.0, 1.0, signed=signed, base=base)
-    coarse = problem.of(records, LIMITS.coarse_levels)
+    coarse = problem.coarser(LIMITS.coarse_levels)
     fitted = weights_for(problem, (), None)
     fired = [firing for _, firing in firings]
     floor = floor_of(masked.question.records, fired, problem, masked.scale.span)
