@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
@@ -24,7 +25,7 @@ _TIMES = 4.0  # ... if these run nearer to each other by this factor
 _LEFT = 2.0  # times ``NEAR``: so far away the end is left, for noise crosses a single limit again and again
 _COMPARED = 0.2  # of the range: shorter strokes are not compared ...
 _PLACES = 20  # ... nor those of fewer samples; and at so many places
-_STROKES = 3  # of two nobody knows which is the odd one
+_FEWEST = 2  # strokes that should be alike: one alone says nothing of how alike
 
 
 def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray | None = None) -> int:
@@ -36,15 +37,17 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
 
     A device that begins at an end may never have come there: then its first stroke is another than all later
     ones from that end, which wiping-out makes alike (Mayergoyz 2003, section 1.2). With the ``outputs`` (n,)
-    this is seen, and the memory is known from where it next reaches an end.
+    this is seen, and the memory is known from where it next reaches an end. The same goes for an end of the
+    input's own range, where what lies beyond may be switched by the first stroke alone.
     """
     near = NEAR * (high - low)
     ends = np.flatnonzero((inputs <= low + near) | (inputs >= high - near))
+    begin = int(ends[0]) if ends.size else first_extreme(inputs)[0]
+    if outputs is None or (ends.size and begin > 0):
+        return begin
     if not ends.size:
-        return first_extreme(inputs)[0]
-    if outputs is None or ends[0] > 0:
-        return int(ends[0])
-    return _past_a_first_stroke(inputs, outputs, low, high)
+        low, high = float(inputs.min()), float(inputs.max())
+    return begin + _past_a_first_stroke(inputs[begin:], outputs[begin:], low, high)
 
 
 def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> str:
@@ -59,29 +62,54 @@ def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high
 
 
 def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> int:
-    """First sample that counts of a record that begins at an end: 0, or the next end after a stroke apart."""
+    """First sample that counts of a record that begins at an end: 0, or the next end after a stroke apart.
+
+    How far apart strokes lie that should be alike is read off the later ones from the same end; where there
+    is but one, off those from the other end.
+    """
     reach = high - low
-    away = inputs - low if inputs[0] <= low + NEAR * reach else high - inputs
+    away, back = inputs - low, high - inputs
+    if away[0] > NEAR * reach:
+        away, back = back, away
+    all_strokes = _strokes(away, outputs, reach)
+    first, later = all_strokes[:1], [one for one in all_strokes[1:] if _told(one, reach)]
+    others = [one for one in _strokes(back, outputs, reach) if _told(one, reach)]
+    known = later if len(later) > 1 else others
+    if not (first and _told(first[0], reach) and later and len(known) >= _FEWEST):
+        return 0
+    own, *usual = _side_by_side(first + later, reach)
+    apart = root_mean_square(own - np.median(usual, axis=0))
+    beside = _side_by_side(known, reach)
+    alike = max(root_mean_square(one - np.median(beside, axis=0)) for one in beside)
+    if apart <= max(_APART * float(np.ptp(outputs)), _TIMES * alike):
+        return 0
+    at_end = _at_end(away, NEAR * reach)
+    left = int(np.flatnonzero(at_end[:-1] & ~at_end[1:])[0])
+    ends = np.flatnonzero((at_end | (back <= NEAR * reach))[left + 1 :])
+    return left + 1 + int(ends[0])  # where the second stroke begins at the latest
+
+
+def _strokes(away: FloatArray, outputs: FloatArray, reach: float) -> list[tuple[FloatArray, FloatArray]]:
+    """Strokes of an input that lies so far ``away`` (n,) from an end, from each time that it leaves it."""
     at_end = _at_end(away, NEAR * reach)
     leaves = np.flatnonzero(at_end[:-1] & ~at_end[1:])
-    strokes = [
+    return [
         _stroke(away[at:until], outputs[at:until], reach)
         for at, until in pairwise([*leaves.tolist(), away.size])
     ]
-    told = [way.size >= _PLACES and float(way[-1]) >= _COMPARED * reach for way, _ in strokes]
-    if sum(told) < _STROKES or not told[0]:
-        return 0
-    strokes = [one for one, enough in zip(strokes, told, strict=True) if enough]
+
+
+def _told(stroke: tuple[FloatArray, FloatArray], reach: float) -> bool:
+    """Whether a stroke is long enough to be compared."""
+    way, _ = stroke
+    return way.size >= _PLACES and float(way[-1]) >= _COMPARED * reach
+
+
+def _side_by_side(strokes: Sequence[tuple[FloatArray, FloatArray]], reach: float) -> FloatArray:
+    """Outputs (k, places) of strokes at the same places, as far as the shortest goes."""
     top = min(float(way[-1]) for way, _ in strokes)
     places = np.linspace(_LEFT * NEAR * reach, top, _PLACES)
-    first, *later = (np.interp(places, way, y) for way, y in strokes)
-    usual = np.median(later, axis=0)
-    apart = float(np.sqrt(np.mean((first - usual) ** 2)))
-    alike = max(float(np.sqrt(np.mean((one - usual) ** 2))) for one in later)
-    if apart <= max(_APART * float(np.ptp(outputs)), _TIMES * alike):
-        return 0
-    back = np.flatnonzero((at_end | (away >= reach - NEAR * reach))[leaves[0] + 1 :])
-    return int(leaves[0] + 1 + back[0])  # where the second stroke begins at the latest
+    return np.stack([np.interp(places, way, y) for way, y in strokes])
 
 
 def _at_end(away: FloatArray, near: float) -> NDArray[np.bool_]:
@@ -140,27 +168,27 @@ def record_of(inputs: FloatArray, outputs: FloatArray, low: float, high: float) 
     return Record(inputs, outputs, counts, start_of(inputs, low, high))
 
 
-def estimated_start(
-    operator: Preisach | Dual, records: Sequence[tuple[FloatArray, FloatArray]]
-) -> tuple[State | None, str]:
-    """Return the state from which records, pairs of input and output (n,), are followed, and its name.
+def estimated_start(operator: Preisach | Dual, records: Sequence[Record]) -> tuple[State | None, str]:
+    """Return the state from which records are followed, whatever ``start`` they have, and its name.
 
     Records that never reach an end of the operator's range leave open what came before them. Tried are both
     saturations and the demagnetised state; the one with the least sum of squared errors is taken.
     """
     low, high = operator.low, operator.high
-    if any(reaches_an_end(u, low, high) for u, _ in records):
+    if any(reaches_an_end(r.input, low, high) for r in records):
         return None, "known"
     states = {
         "negative saturation": negative_saturation(low),
         "demagnetised": demagnetised(low, high),
         "positive saturation": positive_saturation(low, high),
     }
-    left = {
-        name: sum(
-            float(np.sum((operator(u, state) - y)[known_from(u, low, high) :] ** 2)) for u, y in records
-        )
-        for name, state in states.items()
-    }
+    left = {name: sum(_squares(operator, r, state) for r in records) for name, state in states.items()}
     best = min(left, key=left.__getitem__)
     return states[best], f"{best}, estimated"
+
+
+def _squares(operator: Preisach | Dual, record: Record, state: State) -> float:
+    """Weighted sum of squared errors of the samples that count, from a state."""
+    counts = record.sample_weight > 0
+    left = operator(record.input, state)[counts] - record.output[counts]
+    return float(record.sample_weight[counts] @ left**2)

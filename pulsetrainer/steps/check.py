@@ -10,6 +10,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Model
 from pulsetrainer.core import beside_hysteresis, excitations
+from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.temperature import COPPER_PER_K
 from pulsetrainer.diagnosis.causes.base import low_pass
@@ -220,7 +221,8 @@ def _beside(model: Model, current: FloatArray, predicted: FloatArray) -> FloatAr
     fit = model.fit
     if fit is None or fit.time_s is None:
         return np.empty((current.size, 0))
-    plane = Plane.uniform(float(model.edges[0]), float(model.edges[-1]), beside_hysteresis.LEVELS)
+    # a coarse model could take no more for hysteresis than its own levels hold
+    plane = thinned(Plane(model.edges), beside_hysteresis.LEVELS)
     dt_s = float(np.median(np.diff(fit.time_s)))
     then, now = _effects(predict(model, fit.input, dt_s), dt_s), _effects(predicted, 1.0 / RATE_HZ)
     return beside_hysteresis.missed(plane, fit.input, then, current, now)

@@ -20,6 +20,7 @@ from pulsetrainer.artefacts import (
 from pulsetrainer.core import metrics
 from pulsetrainer.core.initial_state import estimated_start, first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.one_thread import one_thread
@@ -177,7 +178,10 @@ def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> Mod
     low, high = operator.low, operator.high
     parts = run.parts(SHORTEST_PART)
     known = [_known(part, low, high) for part in parts]
-    start, state = estimated_start(operator, [(part.input, part.output) for part in parts])
+    records = [
+        Record(part.input, part.output, k.astype(np.float64)) for part, k in zip(parts, known, strict=True)
+    ]
+    start, state = estimated_start(operator, records)
     predicted = np.concatenate(
         [predict(model, part.input, run.dt_s, start)[k] for part, k in zip(parts, known, strict=True)]
     )

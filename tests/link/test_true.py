@@ -75,6 +75,18 @@ def test_another_density_is_changed_and_not_updated(model, seed):
         updated(model, found)
 
 
+def test_a_coarse_and_fast_calibration_stays_true():
+    """12 levels at 4 A/s, five times as fast as delivered; another device is still told."""
+    with pt.open_device("bench:?seed=4") as device:
+        run = pt.capture("identification", device, levels=12, speed_A_per_s=4.0)
+    coarse = pt.identify(run, levels=12)
+    verdicts = []
+    for port in ("bench:?seed=4&noise-seed=3", "bench:?seed=104"):
+        with pt.open_device(port) as device:
+            verdicts.append(pt.check(coarse, device).verdict)
+    assert verdicts == ["true", "changed"]
+
+
 def test_what_an_offset_and_a_gain_do_not_mend_is_refused(model):
     """Causes in newtons, and another form."""
     sticking = Extension("stick-slip", (Parameter("jump", 0.3, "N", 0.2, 0.4),))

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pulsetrainer.core import input_noise
-from pulsetrainer.core.initial_state import start_of
+from pulsetrainer.core.initial_state import estimated_start, reaches_an_end, start_of
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import velocity
@@ -31,7 +31,7 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.condition_change import Change, against_model, left_by
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Estimate, Finding
-from pulsetrainer.diagnosis.prediction import predict
+from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.diagnosis.state import Given, State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -87,6 +87,11 @@ def _judged(state: State, given: Given) -> _Judged:
         )
         for r in records
     ]
+    if not any(reaches_an_end(one.input, question.low, question.high) for one in core):
+        # a wrong guess of what came before would look like another zero
+        turned = [replace(one, output=model.polarity * one.output) for one in core]
+        before, _ = estimated_start(operator_of(model), turned)
+        core = [replace(one, start=before) for one in core]
     steps = [r.dt_s for r in records]
     # records have polarity 1: what the model says is turned alike
     said = [
