@@ -20,8 +20,10 @@ over n_h instead: what is smoothed away is narrower there too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 import scipy  # its parts load when they are first used
@@ -31,12 +33,13 @@ from pulsetrainer.core import nnls
 from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NodeSums, NormalEquations, normal_equations, parted_sums
-from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.memory import Trace
+from pulsetrainer.core.operator import Preisach, follow
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError
 
-# Blocks are dealt out to this many folds in turn, so that each fold is spread over the whole record.
+# Blocks are dealt out to this many folds, so that each fold is spread over the whole record.
 FOLDS = 5
 BLOCKS = 40
 # A block left out leaves a hole in the data, and a long one asks how well the fit bridges holes that the
@@ -46,7 +49,8 @@ _MOST_BLOCKS = 200
 _APART = 2.0  # correlation times of the residual a block lasts at least
 _PILOT = 0.0177  # s of the fit whose residual is looked at
 # From far below a cell of any plane that fits in memory to a fifth of the range.
-_GRID = 0.0125 * 2.0 ** (np.arange(-1, 9) / 2.0)
+_STEP = 2.0**0.5
+_GRID = 0.0125 * _STEP ** np.arange(-1, 9)
 _MIDDLE = 4  # of the grid, where the search begins
 _HOPELESS = 1.5  # times the least error so far: smoother ones are not tried
 # The choice is made on at most this many levels: s does not depend on them, the time does, as n_h^6.
@@ -186,6 +190,15 @@ def blocks(inputs: FloatArray, low: float, high: float, count: int = BLOCKS) -> 
     return np.searchsorted(cuts, np.arange(n), side="right").astype(np.int64)
 
 
+def dealt(block: IntArray) -> IntArray:
+    """Fold (n,) of each sample in a ``block`` (n,): each fold once in ``FOLDS`` blocks, in a drawn order.
+
+    Dealt in turn, a fold would meet one place of every curve, where a curve is as long as ``FOLDS`` blocks.
+    """
+    in_turn = np.tile(np.arange(FOLDS), (int(block.max()) // FOLDS + 1, 1))
+    return np.random.default_rng(0).permuted(in_turn, axis=1).ravel()[block]
+
+
 def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed: bool = False) -> Choice:
     """Choose s by the error on held-out blocks of the records, for weights >= 0 or of either sign.
 
@@ -196,7 +209,10 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
 
         exp(-(n / tau) (e(s)^2 / e_min^2 - 1) / 2)
 
-    as likelihoods of n samples whose errors remember themselves for tau.
+    as likelihoods of n samples whose errors remember themselves for tau. They are too sure where few blocks
+    decide. So s is no smaller than a step of the grid below the largest whose squared error is above the
+    least by no more than a standard error of their difference from block to block (Breiman, Friedman, Olshen,
+    Stone, Classification and Regression Trees, 1984, section 3.4.3).
 
     Raises
     ------
@@ -206,21 +222,23 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
     coarse = thinned(plane, CHOICE_LEVELS)
     memory = _memory_of_residual(records, coarse, reading, signed=signed)
     counts = [int(np.clip(r.input.size / (_APART * memory), BLOCKS, _MOST_BLOCKS)) for r in records]
-    folds = [
-        blocks(r.input, plane.low, plane.high, count) % FOLDS
+    cuts = [
+        _Cut(r, follow(coarse, r.input, r.start, reading), blocks(r.input, plane.low, plane.high, count))
         for r, count in zip(records, counts, strict=True)
     ]
-    sums = parted_sums(coarse, records, reading, folds, FOLDS)
-    held_out = [part for part in sums if part.weight_sum > 0]
+    sums = parted_sums(coarse, records, reading, [cut.fold for cut in cuts], FOLDS)
+    held_out = {fold: part for fold, part in enumerate(sums) if part.weight_sum > 0}
     if len(held_out) < 2:
         raise ArgumentError(
             f"smoothing='auto' needs at least {2 * FOLDS} samples to hold some out, "
             f"got {sum(r.input.size for r in records)}",
             hint="give smoothing as a number",
         )
-    error = _HeldOut(held_out, signed=signed)
+    error = _HeldOut(held_out, reading, signed=signed)
     tried = _tried(error)
-    return Choice(_mean_length(tried, error.whole.weight_sum / memory), tried)
+    likely = _mean_length(tried, error.whole.weight_sum / memory)
+    alike = _longest_alike(tried, lambda s: np.concatenate([cut.squares(error.operators(s)) for cut in cuts]))
+    return Choice(max(likely, alike / _STEP), tried)
 
 
 def _memory_of_residual(records: Sequence[Record], plane: Plane, reading: Reading, *, signed: bool) -> float:
@@ -232,35 +250,70 @@ def _memory_of_residual(records: Sequence[Record], plane: Plane, reading: Readin
     return correlation_time([(r.output - operator(r.input, r.start))[r.sample_weight > 0] for r in records])
 
 
+@dataclass(frozen=True, slots=True)
+class _Cut:
+    """A record cut into blocks."""
+
+    record: Record
+    path: Trace
+    block: IntArray  # (n,) number of each sample's block
+
+    @property
+    def fold(self) -> IntArray:
+        """Fold (n,) of each sample."""
+        return dealt(self.block)
+
+    def squares(self, operators: Mapping[int, Preisach]) -> FloatArray:
+        """Sum of squared errors of each block, by the operator of the fold that it was left out of."""
+        left, folds = np.zeros(self.block.size), self.fold
+        for fold, operator in operators.items():
+            here = folds == fold
+            left[here] = (operator.traced(self.path) - self.record.output)[here]
+        counted = np.where(self.record.sample_weight > 0, left, 0.0)
+        return np.bincount(self.block, self.record.sample_weight * counted**2).astype(np.float64)
+
+
 class _HeldOut:
     """The error on held-out blocks as a function of s."""
 
-    def __init__(self, sums: Sequence[NodeSums], *, signed: bool = False) -> None:
+    def __init__(self, sums: Mapping[int, NodeSums], reading: Reading, *, signed: bool = False) -> None:
+        self.reading: Reading = reading
         self.signed = signed
-        self.parts = [part.dense() for part in sums]
-        whole = sum(sums[1:], start=sums[0])
+        self.parts = {fold: part.dense() for fold, part in sums.items()}
+        whole = reduce(add, sums.values())
         self.whole = whole.dense()
         gram, _ = self.whole.centred()
         self.unit = penalty(self.whole.plane, np.diagonal(gram).copy(), 1.0).toarray()
-        self.passive: list[NDArray[np.bool_] | None] = [None] * len(self.parts)
+        self.passive: dict[int, NDArray[np.bool_]] = {}
         self.errors: dict[float, float] = {}
+        self.fits: dict[float, dict[int, tuple[FloatArray, float]]] = {}
 
     def __call__(self, smoothing: float) -> float:
         if smoothing not in self.errors:
-            total = sum(self._error(k, smoothing) for k in range(len(self.parts)))
+            fits = self.fits[smoothing] = {fold: self._fit(fold, smoothing) for fold in self.parts}
+            total = sum(part.sum_of_squares(*fits[fold]) for fold, part in self.parts.items())
             self.errors[smoothing] = float(np.sqrt(max(total, 0.0) / self.whole.weight_sum))
         return self.errors[smoothing]
 
-    def _error(self, k: int, smoothing: float) -> float:
-        rest = self.whole - self.parts[k]
+    def operators(self, smoothing: float) -> dict[int, Preisach]:
+        """Operator that was fitted without each fold."""
+        plane = self.whole.plane
+        return {
+            fold: Preisach(plane, masses / plane.areas, offset, self.reading, signed=self.signed)
+            for fold, (masses, offset) in self.fits[smoothing].items()
+        }
+
+    def _fit(self, fold: int, smoothing: float) -> tuple[FloatArray, float]:
+        """Masses (n_q,) and offset that were fitted without a fold."""
+        rest = self.whole - self.parts[fold]
         gram, rhs = rest.centred()
         gram += self.unit * (smoothing**8 * rest.weight_sum / self.whole.weight_sum)
         if self.signed:
             masses = nnls.solve_signed(gram, rhs)
         else:
-            found = nnls.solve(gram, rhs, passive=self.passive[k])
-            masses, self.passive[k] = found.x, found.passive
-        return self.parts[k].sum_of_squares(masses, rest.offset(masses))
+            found = nnls.solve(gram, rhs, passive=self.passive.get(fold))
+            masses, self.passive[fold] = found.x, found.passive
+        return masses, rest.offset(masses)
 
 
 def _tried(error: _HeldOut) -> tuple[tuple[float, float], ...]:
@@ -281,5 +334,30 @@ def _mean_length(tried: Sequence[tuple[float, float]], samples: float) -> float:
     if least <= 0:
         return float(length[np.argmin(error)])
     weight = np.exp(-0.5 * samples * ((error / least) ** 2 - 1.0))
-    logarithm = np.log(np.maximum(length, _GRID[0] / np.sqrt(2.0)))
-    return float(np.exp(weight @ logarithm / weight.sum()))
+    return float(np.exp(weight @ _logarithm(length) / weight.sum()))
+
+
+def _longest_alike(tried: Sequence[tuple[float, float]], squares: Callable[[float], FloatArray]) -> float:
+    """Largest length whose error is the least but for chance, between those tried; see ``choose``.
+
+    Parameters
+    ----------
+    squares
+        Returns the sum of squared errors of each block at a length.
+    """
+    length, error = np.asarray(tried).T
+    best = int(np.argmin(error))
+    least = squares(tried[best][0])
+    more = [squares(s) - least for s, _ in tried[best:]]
+    excess = np.asarray([float(d.sum() - np.sqrt(d.size) * d.std(ddof=1)) for d in more])
+    place = _logarithm(length[best:])
+    last = int(np.flatnonzero(excess <= 0)[-1])
+    if last + 1 < excess.size:
+        share = excess[last] / (excess[last] - excess[last + 1])
+        return float(np.exp(place[last] + share * (place[last + 1] - place[last])))
+    return float(np.exp(place[last]))
+
+
+def _logarithm(length: FloatArray) -> FloatArray:
+    """Logarithm of lengths (k,), of which none is a step below the grid."""
+    return np.log(np.maximum(length, _GRID[0] / _STEP))

@@ -193,6 +193,36 @@ def test_blocks_are_cut_where_the_memory_is_wiped_out():
     assert np.array_equal(smoothing.blocks(u[:3], 0.0, 1.0, 7), [0, 0, 0])
 
 
+def test_folds_meet_every_place_of_a_curve():
+    """Each fold once in five blocks; of curves as long as five blocks no fold has one place alone."""
+    fold = smoothing.dealt(np.arange(200)).reshape(-1, 5)
+    assert np.array_equal(np.sort(fold, axis=1), np.tile(np.arange(5), (40, 1)))
+    for place in fold.T:
+        assert np.bincount(place).max() <= 20
+    assert smoothing.dealt(np.array([0, 0, 1, 7, 7])).max() < 5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_difference_that_is_chance_does_not_choose(seed):
+    """Of errors that are alike but for noise from block to block the longest length, else the best."""
+    rng = np.random.default_rng(seed)
+    common = rng.uniform(0.5, 2.0, 100)
+    squares = {
+        0.01: common + 0.2,
+        0.02: common,
+        0.04: common + 0.1 * rng.choice([-1.0, 1.0], 100) + 0.001,
+        0.08: common + 0.1,
+    }
+    tried = [(s, float(np.sqrt(block.sum()))) for s, block in squares.items()]
+    length = smoothing._longest_alike(tried, squares.__getitem__)
+    best = min(tried, key=lambda one: one[1])[0]
+    assert 0.02 <= best <= 0.04
+    assert best <= length < 0.08
+    noise = squares[0.04] - squares[0.02]
+    if noise.sum() <= np.sqrt(noise.size) * noise.std(ddof=1):
+        assert length >= 0.04
+
+
 @given(st.integers(0, 2**32 - 1), st.integers(12, 200), st.integers(2, 8))
 def test_cuts_are_the_nearest_ends_one_by_one(seed, n, count):
     """As a person would place them: cut by cut, looking at every sample that is at an end."""
