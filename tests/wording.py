@@ -61,11 +61,14 @@ MESSAGES = {
     "no such figure": Message("png, svg or pdf", "model.png", "{file}", got="h5"),
     # --- tables ------------------------------------------------------------------------------------------
     "no such column": Message("no column", "current_A", "{file}", "force_N", "t_s, current_A"),
-    "not finite": Message("not finite", "remove", "{file}", got="{value} in column {column}, line {line}"),
+    "not finite": Message("lack a number", "remove", "{file}", got="{value} in column {column}, line {line}"),
+    "separator of thousands": Message(
+        "not a number", "separator of thousands", got="{cell!r} in column {column}, line {line}"
+    ),
     "not a number": Message("not a number", "line", "{file}", got="'abc' in column current_A, line 3"),
     "time goes back": Message("does not increase", "sort", "{file}, column t_s", got="line 4: 1 s after 2 s"),
     "time repeats": Message(
-        "does not increase", "drop the repeated rows", "{file}, column t_s", got="line 4: 0.1 s after 0.1 s"
+        "does not increase", "more digits", "{file}, column t_s", got="line 4: 0.1 s after 0.1 s"
     ),
     "no numbers": Message("no numbers", "another column", "{file}", "column t_s"),
     "nearest column": Message("no column '{asked}'", "{near}", expected="{has}"),
@@ -181,6 +184,8 @@ NOTES = {
     "leaves much": ("% of the span", "the noise from sample to sample", "pulsetrainer diagnose"),
     "zeros differ": ("shifted against each other",),
     "no time": ("no time",),
+    "changed": ("(limit 0.", "next", "identify again", "temperature"),
+    "taken as seconds": ("says no unit that is known", "seconds", "[min]"),
     "beats found": ("6 whole beats", "0.644 to 0.653 s"),
 }
 

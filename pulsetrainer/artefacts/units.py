@@ -14,33 +14,48 @@ import re
 from pulsetrainer.errors import DataError
 
 _PREFIXES = ("da", *"YZEPTGMkhdcmunpfazyµμ")
-_PREFIXED_SYMBOLS = "A V N T m g s Pa Hz W J K C F H S rad bar ohm Ohm Ω Wb L l eV Oe G emu gf cd mol"
+_PREFIXED_SYMBOLS = """
+    A V N T m g s Pa Hz W J K C F H S rad bar ohm Ohm Ω Wb L l eV Oe G emu gf cd mol Nm Nmm Vs Ah Wh VA
+"""
 _BARE_SYMBOLS = """
     1 % percent ppm ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev atm
     counts count ct LSB digit digits steps step px a.u. arb au norm dB
 """
-# what may stand behind the last underscore of a heading: there most letters and short words are a name's
+# what may stand behind the last underscore of a heading, where most letters and short words are a name's, or,
+# of two letters and more, may be all of it
 _SUFFIXES = """
     s ms us µs min h A mA uA kA V mV kV N mN kN Nm mNm T mT m mm um µm nm Pa kPa MPa bar mbar mmHg
-    deg rad C °C degC K Hz kHz W g kg A/m kA/m m/s mm/s rad/s N/A % percent
+    deg rad C °C degC K Hz kHz W g kg % percent
+    A/m kA/m m/s mm/s cm/s km/h rad/s deg/s N/A N/m N/mm kN/mm V/s A/s N/s mV/V
 """
 _PREFIXED, _BARE = frozenset(_PREFIXED_SYMBOLS.split()), frozenset(_BARE_SYMBOLS.split())
 _BEHIND_A_NAME = frozenset(_SUFFIXES.split())
-# as oscilloscopes spell them
+# as oscilloscopes and people spell them
 _SPELLED = {
-    **dict.fromkeys(["second", "seconds", "sec"], "s"),
-    **dict.fromkeys(["volt", "volts"], "V"),
-    **dict.fromkeys(["amp", "amps", "ampere", "amperes"], "A"),
-    **dict.fromkeys(["newton", "newtons"], "N"),
-    **dict.fromkeys(["ohm", "ohms"], "ohm"),
+    word: unit
+    for unit, words in {
+        "s": "second seconds sec secs sekunde sekunden",
+        "ms": "millisecond milliseconds msec",
+        "us": "microsecond microseconds usec",
+        "min": "min mins minute minutes minuten",
+        "h": "hour hours hr hrs stunde stunden",
+        "V": "volt volts",
+        "A": "amp amps ampere amperes",
+        "N": "newton newtons",
+        "T": "tesla",
+        "ohm": "ohm ohms",
+    }.items()
+    for word in words.split()
 }
-SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0, "h": 3600.0}
+_NO_UNIT_ALONE = frozenset(["min", "second"])  # the least, the next one
+SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "d": 86400.0, "ns": 1e-9}
+SECONDS |= dict.fromkeys(["us", "µs", "μs"], 1e-6)
 
 _EXPONENT = re.compile(r"(?:\^|\*\*)?(?P<exponent>[-+]?\d)$|(?P<raised>[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹])$")
 _SEPARATOR = re.compile(r"\s*[*·/×]\s*|\s+|(?<=[A-Za-zΩµ])\.(?=[A-Za-zΩµ])")
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*$")
-_DIVIDED = re.compile(r"^(?P<name>.*\S)\s+/\s+(?P<unit>\S+)\s*$")
-_SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,6})$")
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*/?\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*$")
+_MARK = re.compile(r"\s*[/,]\s*|\s+in\s+")
+_SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,12})$")
 _POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -95,14 +110,33 @@ def symbol_of(text: str) -> str:
 
 
 def split_unit(heading: str) -> tuple[str, str]:
-    """Return name and unit of a column heading; no unit where it says none."""
-    for pattern in (_BRACKETED, _DIVIDED):
-        if (found := pattern.match(heading)) and found["name"]:
-            return found["name"].strip(), found["unit"].strip()
-    suffixed = _SUFFIXED.match(heading)
-    if suffixed and suffixed["unit"] in _BEHIND_A_NAME:
-        return suffixed["name"], suffixed["unit"]
+    """Return name and unit of a column heading; no unit where it says none.
+
+    What stands in brackets at its end is a unit, known or not. Behind a slash, a comma or the word "in" it
+    is one if it is known: ``B/T`` is, ``A/B`` and ``H/V ratio`` are names.
+    """
+    if (found := _BRACKETED.match(heading)) and found["name"]:
+        return found["name"].strip(), found["unit"].strip()
+    found = _SUFFIXED.match(heading)
+    if found and found["unit"] != "second" and _stands_alone(found["unit"]):
+        return found["name"], found["unit"]
+    if len(heading) > 1 and heading.lower() not in _NO_UNIT_ALONE and _stands_alone(heading):
+        return heading, heading
+    for mark in _MARK.finditer(heading):
+        name, unit = heading[: mark.start()], heading[mark.end() :].strip()
+        if name and name[-1] not in "/," and unit != "1" and is_unit(symbol_of(unit)):
+            return name, unit
     return heading, ""
+
+
+def _stands_alone(text: str) -> bool:
+    return text in _BEHIND_A_NAME or (len(text) > 3 and symbol_of(text) in _BEHIND_A_NAME)
+
+
+def claimed_unit(heading: str) -> str:
+    """Return what stands where a heading that says no known unit would say one, empty where nothing does."""
+    mark = _MARK.search(heading.strip())
+    return "" if mark is None else heading.strip()[mark.end() :]
 
 
 def shown(unit: str) -> str:

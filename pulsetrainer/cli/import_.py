@@ -143,7 +143,8 @@ def _facts(imported: Imported) -> dict[str, Any]:
     shown["loop"] = f"{direction} (correlation {report.correlation:+.2f})"
     shown["coverage_percent"] = report.coverage_percent
     shown["told apart by minor loops"] = minor_words(report.minor_percent)
-    stamps = {True: "even", False: "uneven", None: "none: only the order counts"}[report.even]
+    even = f"even but for the gap{'s' if report.gaps > 1 else ''}" if report.gaps else "even"
+    stamps = {True: even, False: "uneven", None: "none: only the order counts"}[report.even]
     shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps
     for name in ("signal", "complete", "dropped_samples"):  # the title; of a device, not of a file
         shown.pop(name, None)

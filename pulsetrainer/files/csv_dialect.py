@@ -2,9 +2,9 @@
 
 Every rule is explicit: the delimiter is the one that makes most cells numbers; a comma is a decimal sign
 only where something else separates; the first line is a header if it has text where the next one has a
-number; a column that starts with text is a column of text; what an instrument writes about itself above the
-table is a comment. Times of day and ISO 8601 time stamps are numbers: seconds. The rows themselves are read
-by ``csv_rows``.
+number; a column that starts with text is a column of text; text behind numbers is a remark, no heading;
+what an instrument writes about itself above the table is a comment. Times of day and ISO 8601 time stamps
+are numbers: seconds. The rows themselves are read by ``csv_rows``.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ _TABLE = 10  # rows of one kind make a table of what stands below a text
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
 _FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,' \u00a0\u202f])\d{3}(\1\d{3})*([.,]\d+)?")
 MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
@@ -44,6 +45,7 @@ class Dialect:
     comments: tuple[str, ...]  # above the first row
     first_line: int  # of the first row
     text_columns: frozenset[int]
+    stamped: frozenset[int]  # columns of times of day or time stamps
     remarks: tuple[str, ...] = _REMARKS  # what a line that is no row begins with
     rate_Hz: float | None = None  # where the heading says a step
     day_first: bool | None = None  # in dates with slashes
@@ -90,6 +92,25 @@ def number(cell: str, *, day_first: bool | None = None) -> float | None:
         if _FORTRAN.fullmatch(cell):
             return float(re.sub("[dD]", "e", cell))
         return stamps.seconds(cell, day_first=day_first)
+
+
+def has_thousands(cell: str) -> bool:
+    """Whether a cell that is no number would be one without its separators of thousands: ``1.021,0``."""
+    return _THOUSANDS.fullmatch(cell) is not None
+
+
+def _is_text(cell: str) -> bool:
+    return number(cell) is None and not has_thousands(cell)
+
+
+def _is_number(cell: str) -> bool:
+    """Whether a number stands in a cell: not text, not nothing."""
+    return cell.lower() not in MISSING and not _is_text(cell)
+
+
+def column_words(name: str) -> str:
+    """Return ``column current_A``, or ``column3`` where no heading names it."""
+    return name if re.fullmatch(r"column\d+", name) else f"column {name}"
 
 
 def detect(path: Path) -> Dialect:
@@ -183,23 +204,38 @@ def _above(rows: list[list[str]]) -> int:
     The table is the rows at the end of the sample that are of one kind, ten or more. Rows of numbers above,
     or headings of another count, are in error, and 0 is returned.
     """
-    kinds = [[number(cell) is None for cell in row] for row in rows]
+    kinds = [[_is_text(cell) for cell in row] for row in rows]
     width = len(rows[-1])
     start = len(rows)
-    while (
-        start
-        and len(rows[start - 1]) == width
-        and not any(here and not last for here, last in zip(kinds[start - 1], kinds[-1], strict=True))
-    ):
+    while start and _is_row(rows[start - 1], rows[-1]):
         start -= 1
     if len(rows) - start < _TABLE or not all(any(kind) for kind in kinds[:start]):
         return 0
     named = width - (not rows[-1][-1])  # a delimiter at the end makes no column
     head = start
-    while head > max(start - 2, 0) and len(kinds[head - 1]) >= named and all(kinds[head - 1][:named]):
+    while head > max(start - 2, 0) and len(kinds[head - 1]) >= named:
+        if not (all(kinds[head - 1][:named]) or (head == start and _is_heading(rows[head - 1]))):
+            break
         head -= 1
     misfit = 0 < head == start and len(kinds[head - 1]) > 1 and all(kinds[head - 1])
     return 0 if misfit else head
+
+
+def _is_row(row: list[str], last: list[str]) -> bool:
+    """Whether a line is a row as the last one is: text in it stands above text or nothing, or is a remark.
+
+    A remark is in the minority and behind a number; where the others have none, theirs may lack a cell.
+    """
+    text = [_is_text(cell) for cell in row]
+    if len(row) != len(last):
+        return len(row) > len(last) and not any(text[: len(last)]) and all(text[len(last) :])
+    remarks = not text[0] and 2 * sum(text) < len(text)
+    return remarks or not any(here and _is_number(below) for here, below in zip(text, last, strict=True))
+
+
+def _is_heading(row: list[str]) -> bool:
+    """Whether a line has text and no number; a remark has no unit."""
+    return any(map(_is_text, row)) and not any(map(_is_number, row))
 
 
 def _with_header(
@@ -213,8 +249,8 @@ def _with_header(
     rows = [split(line, delimiter) for _, line in lines]
     decimal_comma = any(_COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row)
     rate = _cut_settings(rows)
-    text = [[number(cell) is None for cell in row] for row in rows]
-    heads = _heading_lines(text)
+    text = [[_is_text(cell) for cell in row] for row in rows]
+    heads = _heading_lines(text, rows)
     if heads == len(rows):
         raise DataError(f"{path} has no rows below its header", hint="export the recording again")
     first = rows[heads]
@@ -241,6 +277,7 @@ def _with_header(
         comments,
         lines[heads][0],
         frozenset(k for k, is_text in enumerate(text[heads][: len(first)]) if is_text),
+        frozenset(k for k, cell in enumerate(first) if stamps.seconds(cell) is not None),
         rate_Hz=rate,
         day_first=stamps.day_first(_columns(rows[heads:], delimiter, _last_lines(path, encoding))),
     )
@@ -281,12 +318,12 @@ def _cut_settings(rows: list[list[str]]) -> float | None:
     return 1.0 / step if step else None
 
 
-def _heading_lines(text: list[list[bool]]) -> int:
+def _heading_lines(text: list[list[bool]], rows: list[list[str]]) -> int:
     """Return how many lines stand above the first row: names, and units below; ``text``: cell is text."""
-    second = text[1] if len(text) > 1 else []
-    if not (all(text[0]) or any(a and not b for a, b in zip(text[0], second, strict=False))):
+    below = rows[1] if len(rows) > 1 else []
+    if not (all(text[0]) or any(a and _is_number(b) for a, b in zip(text[0], below, strict=False))):
         return 0
-    return 2 if len(text) > 2 and all(second) and not all(text[2]) else 1
+    return 2 if len(text) > 2 and _is_heading(below) and not all(text[2]) else 1
 
 
 def _without_end(names: list[str], first: list[str]) -> tuple[list[str], list[str]]:

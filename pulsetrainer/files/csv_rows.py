@@ -14,7 +14,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.csv_dialect import MISSING, Dialect, number, readable
+from pulsetrainer.files.csv_dialect import MISSING, Dialect, column_words, has_thousands, number, readable
 
 PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
 _SPARE = 1.02  # of the room that the first piece lets expect; what is never written to takes no memory
@@ -166,6 +166,8 @@ class _Reader:
         values = np.full((len(lines), len(dialect.names)), np.nan)
         for row, (count, line) in enumerate(zip(places, lines, strict=True)):
             cells = dialect.split(line)
+            if dialect.text_columns.issuperset(range(len(cells), len(dialect.names))):
+                cells += [""] * (len(dialect.names) - len(cells))  # no remark
             if len(cells) != len(dialect.names):
                 raise DataError(
                     f"{self.path} has {len(cells)} columns in line {count}, expected {len(dialect.names)}: "
@@ -181,7 +183,9 @@ class _Reader:
                 if value is None:
                     raise DataError(
                         f"{self.path} has {self._place(cell, k, count)}: not a number",
-                        hint="correct or remove that line",
+                        hint="export it without the separator of thousands"
+                        if has_thousands(cell)
+                        else "correct or remove that line",
                     )
                 values[row, k] = value
             self._look_for_signs(count, cells)
@@ -206,4 +210,4 @@ class _Reader:
             )
 
     def _place(self, cell: str, column: int, line: int) -> str:
-        return f"{readable(cell)!r} in column {self.dialect.names[column]}, line {line}"
+        return f"{readable(cell)!r} in {column_words(self.dialect.names[column])}, line {line}"

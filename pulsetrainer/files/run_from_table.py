@@ -14,14 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import FloatArray, Run
-from pulsetrainer.artefacts.units import SECONDS, check_unit, split_unit
+from pulsetrainer.artefacts.units import SECONDS, check_unit, claimed_unit, split_unit, symbol_of
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.csv_dialect import column_words
 from pulsetrainer.files.table import Table, read_table
 from pulsetrainer.files.timing import check_timing
 
 _TIME_NAMES = frozenset(
     ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
 )
+_LEAVE_OUT = "leave them out with `skip_bad_rows`"
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
 _BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
@@ -72,7 +74,7 @@ def run_from_table(
     notes: tuple[str, ...] = ()
     if skip_bad_rows:
         table, notes = _without_bad_rows(table, counted=rate_Hz is not None)
-    columns = {name: np.ascontiguousarray(table.check_finite(name)) for name in wanted}
+    columns = {name: np.ascontiguousarray(table.check_finite(name, remedy=_LEAVE_OUT)) for name in wanted}
     rows = table.rows
     if rows < 2:
         raise DataError(
@@ -82,7 +84,8 @@ def run_from_table(
     if rate_Hz is not None:
         time_s = np.arange(rows) / rate_Hz
     elif time is not None:
-        time_s = seconds(table, time)
+        time_s, more = seconds(table, time, of_record=True), _note_on_unit(table, time)
+        notes += more
         _check_distinct(table, input=input, output=output, reference=reference, time=time)
     elif not no_time:
         time_s, more = _own_time(table, [table.index(name) for name in wanted])
@@ -116,7 +119,7 @@ def _time_words(
     column = table.names[
         table.index(time) if time is not None else _free(table, {table.index(name) for name in wanted})[0]
     ]
-    return f"time from {split_unit(column)[0]} [{table.unit(column) or 's'}]"
+    return f"time from {split_unit(column)[0]} [{_unit_of_time(table, column) or 's'}]"
 
 
 def _read_as(table: Table, time: str, meanings: Mapping[str, tuple[str, str]]) -> dict[str, str]:
@@ -220,7 +223,29 @@ def _own_time(table: Table, used: Collection[int]) -> tuple[FloatArray | None, t
             f"have an order only (if it is in seconds, give `time` {name})"
         )
         return None, (note,)
-    return seconds(table, name), ()
+    return seconds(table, name, of_record=True), _note_on_unit(table, name)
+
+
+def _note_on_unit(table: Table, name: str) -> tuple[str, ...]:
+    """Return a note where the heading of a time says a unit that nobody knows."""
+    if _unit_of_time(table, name) or not _unknown_unit(table, name):
+        return ()
+    heading = table.names[table.index(name)]
+    said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
+    return (f"{said} (write the unit in brackets, such as 't [min]')",)
+
+
+def _unit_of_time(table: Table, name: str) -> str:
+    """Return the unit of a column of time, empty where the header says none; ``min`` may be all of it."""
+    alone = symbol_of(table.names[table.index(name)])
+    return table.unit(name) or (alone if alone in SECONDS else "")
+
+
+def _unknown_unit(table: Table, name: str) -> str:
+    """Return what the heading of a time says in the place of a unit, empty where it is a name alone."""
+    heading = table.names[table.index(name)]
+    bare, _, behind = heading.rpartition("_")
+    return claimed_unit(heading) or (behind if bare.lower() in _TIME_NAMES else "")
 
 
 def _just_counts(values: FloatArray) -> bool:
@@ -233,32 +258,39 @@ def _just_counts(values: FloatArray) -> bool:
     )
 
 
-def seconds(table: Table, name: str) -> FloatArray:
+def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
     """Return a column as strictly increasing seconds (n,).
+
+    Rows of a record may be left out, and its time is in seconds where its unit is not known.
 
     Raises
     ------
     DataError
         Its unit is none of time, a value is not finite, or it does not increase: the line is named.
     """
-    unit = table.unit(name)
+    unit = _unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
     if unit not in SECONDS:
         raise DataError(
-            f"the time column {name} of {table.path} is in {unit!r}, expected s, ms, us, min or h",
+            f"the time {column_words(name)} of {table.path} is in {unit!r}, expected s, ms, us, ns, min, h "
+            "or d",
             hint="convert it to seconds, choose another `time` column, or give a `rate_Hz`",
         )
-    time_s = table.check_finite(name)
-    if SECONDS[unit] != 1.0:
-        time_s = time_s * SECONDS[unit]
+    stamps = table.check_finite(name, remedy=_LEAVE_OUT) if of_record else table.check_finite(name)
+    time_s = stamps if SECONDS[unit] == 1.0 else stamps * SECONDS[unit]
     back = np.flatnonzero(time_s[1:] <= time_s[:-1])
     if back.size:
         row = int(back[0]) + 1
-        same = time_s[row] == time_s[row - 1]
+        this, before = (f"{stamps[k]:.15g} {unit or 's'}" for k in (row, row - 1))
+        if this != before:
+            hint = "sort the rows, choose another `time` column, give a `rate_Hz`, or cut the file into parts"
+        elif all(column[row] == column[row - 1] for column in table.columns.values()):
+            hint = "drop the repeated rows, or give a `rate_Hz` instead of the time"
+        else:
+            hint = "its stamps are rounded too coarsely, or repeated: write them with more digits, or give a "
+            hint += "`rate_Hz` instead of the time"
         raise DataError(
-            f"the time in {table.path}, column {name}, does not increase at {table.place(row)}: "
-            f"{time_s[row]:g} s after {time_s[row - 1]:g} s ({back.size} such rows)",
-            hint="drop the repeated rows, or give a `rate_Hz` instead of the time"
-            if same
-            else "sort the rows, choose another `time` column, give a `rate_Hz`, or cut the file into parts",
+            f"the time in {table.path}, {column_words(name)}, does not increase at {table.place(row)}: "
+            f"{this} after {before} ({back.size} such rows)",
+            hint=hint,
         )
     return time_s

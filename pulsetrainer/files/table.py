@@ -2,7 +2,7 @@
 
 What a text is taken for is decided in ``csv_dialect``, by explicit rules, and its rows are read by
 ``csv_rows``; what is no text is read by ``array_files``. Units are what a header says: ``current_A``,
-``Force (N)``, ``time [ms]``, ``Kraft / N``, or a line of units below it.
+``Force (N)``, ``time [ms]``, ``Kraft / N``, ``B/T``, ``t in min``, or a line of units below it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from pulsetrainer.artefacts.units import split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
-from pulsetrainer.files.csv_dialect import Dialect, detect
+from pulsetrainer.files.csv_dialect import Dialect, column_words, detect
 from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
 
@@ -71,8 +71,8 @@ class Table:
         first_row, line = self.shifts[bisect_right(self.shifts, row, key=lambda shift: shift[0]) - 1]
         return line + row - first_row
 
-    def check_finite(self, name: str) -> FloatArray:
-        """Return a column in which every value is finite.
+    def check_finite(self, name: str, *, remedy: str = "export the recording again") -> FloatArray:
+        """Return a column in which every value is finite; ``remedy`` is what may be done but removing rows.
 
         Raises
         ------
@@ -83,17 +83,19 @@ class Table:
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size == values.size:
             raise DataError(
-                f"{self.path} has no numbers in column {name}: all {values.size} rows are NaN or empty",
+                f"{self.path} has no numbers in {column_words(name)}: all {values.size} rows lack one",
                 hint=f"name another column; it has {', '.join(self.names)}",
             )
         if bad.size:
+            missing = "a blank cell or NaN" if self.shifts else "NaN"
+            value = missing if np.isnan(values[bad[0]]) else values[bad[0]]
             raise DataError(
-                f"{self.path} has {values[bad[0]]} in column {name}, {self.place(int(bad[0]))} "
-                f"({bad.size} of {values.size} rows are not finite)",
-                hint="remove those rows, as `skip_bad_rows` of import does, or export the recording again",
+                f"{self.path} has {value} in {column_words(name)}, {self.place(int(bad[0]))} "
+                f"({bad.size} of {values.size} rows lack a number)",
+                hint=f"remove those rows, or {remedy}",
             )
         if said := beyond_all_quantities(values):
-            raise DataError(f"{self.path}, column {name}, {said}", hint="correct or remove those rows")
+            raise DataError(f"{self.path}, {column_words(name)}, {said}", hint="correct or remove those rows")
         return values
 
     def index(self, name: str) -> int:
@@ -119,7 +121,7 @@ class Table:
             )
         if self.names[k] in self.text_names:
             raise DataError(
-                f"{self.path} has text, not numbers, in column {self.names[k]}, as in {self.place(0)}",
+                f"{self.path} has text, not numbers, in {column_words(self.names[k])}, as in {self.place(0)}",
                 hint="name another column; times may be numbers, 12:34:56.7, 2024-05-01T12:34:56 or "
                 "01.05.2024 12:34:56",
             )
@@ -144,8 +146,9 @@ def numbered(names: Sequence[str]) -> tuple[str, ...]:
     found: list[str] = []
     for k, name in enumerate(names):
         if names.count(name) > 1:
-            bare = split_unit(name)[0]
-            found.append(f"{bare}#{names[: k + 1].count(name)}{name.removeprefix(bare)}")
+            bare, unit = split_unit(name)
+            behind = f" [{unit}]" if bare == unit else name.removeprefix(bare)
+            found.append(f"{bare}#{names[: k + 1].count(name)}{behind}")
         else:
             found.append(name)
     return tuple(found)
@@ -209,9 +212,10 @@ def _of_arrays(path: Path, columns: Columns) -> Table:
 
 
 def _units(dialect: Dialect) -> dict[str, str]:
-    """Return the unit of each column that has one, in its heading or in the line below."""
+    """Return the unit of each column that has one: in its heading, in the line below, or of time stamps."""
     pairs = zip(dialect.names, dialect.units, strict=True)
     units = {name: symbol_of(split_unit(name)[1] or below) for name, below in pairs}
+    units |= {dialect.names[k]: "s" for k in dialect.stamped}
     return {name: unit for name, unit in units.items() if unit}
 
 

@@ -15,7 +15,7 @@ from pulsetrainer.files.csv_dialect import detect
 from pulsetrainer.files.csv_rows import PIECE, parse
 from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.table import read_table, write_table
-from wording import raises
+from wording import raises, tells
 
 
 def read_run(path, **columns):
@@ -126,6 +126,14 @@ def test_write_and_read(tmp_path):
         ("Kraft / N", "Kraft", "N"),
         ("coil_current", "coil_current", ""),
         ("H_A/m", "H", "A/m"),
+        ("H/A/m", "H", "A/m"),
+        ("kA/m", "kA/m", "kA/m"),
+        ("current_amps", "current", "A"),
+        ("M / Nm", "M", "Nm"),
+        ("H/V ratio", "H/V ratio", ""),
+        ("A / B", "A / B", ""),
+        ("N", "N", ""),
+        ("min", "min", ""),
         ("(N)", "(N)", ""),
         ("x", "x", ""),
         ("Temperatur °C (°C)", "Temperatur °C", "°C"),
@@ -138,11 +146,37 @@ def test_units_in_headings(table, heading, name, unit):
     assert read.unit(name.upper()) == unit
 
 
-def test_a_line_of_units_below_the_header(table):
-    """Oscilloscopes put the units on a line of their own."""
-    read = table("Time,Ch 1\n(ms),(V)\n0,1\n1,2\n")
+@pytest.mark.parametrize("remark", ["", ",Remark"])
+@pytest.mark.parametrize("rows", [2, 30])
+def test_a_line_of_units_below_the_header(table, rows, remark):
+    """Oscilloscopes put the units on a line of their own; a remark has none."""
+    blank = remark and ","
+    text = "".join(f"{k},{k % 7}{blank}\n" for k in range(rows))
+    read = table(f"Time,Ch 1{remark}\n(ms),(V){blank}\n{text}")
     assert read.units == {"Time": "ms", "Ch 1": "V"}
-    assert read.line_of(0) == 3
+    assert (read.line_of(0), read.rows) == (3, rows)
+
+
+@pytest.mark.parametrize(
+    ("header", "first", "other"),
+    [
+        ("t_s,u_V,y_N,note\n", "begin", ","),
+        ("t_s,u_V,y_N,note\n", "begin", ",0"),
+        ("t_s,u_V,y_N,note\n", "begin", ",ok"),
+        ("t_s,u_V,y_N,note\n", "begin", ""),
+        ("t_s,u_V,y_N,note,who\n", "begin,me", ",,"),
+        ("rig 7,,,\nt_s,u_V,y_N,note\n", "begin", ","),
+        ("", "begin", ","),
+    ],
+)
+def test_a_remark_in_the_first_row_makes_no_heading_of_it(table, header, first, other):
+    """The row counts, and so do the names above it; a remark may be all that is there of its column."""
+    rows = "".join(f"{k / 100},{k % 7},{k % 5}{other}\n" for k in range(1, 30))
+    read = table(f"{header}0.00,0.5,0.25,{first}\n{rows}")
+    assert read.names[:2] == (("t_s", "u_V") if header else ("column1", "column2"))
+    run = read_run(read.path, input=read.names[1], output=read.names[2])
+    np.testing.assert_array_equal(run.time_s[:2], [0, 0.01])
+    np.testing.assert_array_equal(run.input[:2], [0.5, 1])
 
 
 @pytest.mark.parametrize(
@@ -240,7 +274,7 @@ def test_a_header_of_another_count_is_still_an_error(table):
 )
 def test_times_of_day_and_time_stamps_are_seconds(table, cells, seconds):
     """Loggers write them; a decimal comma elsewhere is no second decimal sign."""
-    path = table(f"when;u;y\n{cells[0]};0,5;1\n{cells[1]};1,5;1\n").path
+    path = table(f"when (UTC);u;y\n{cells[0]};0,5;1\n{cells[1]};1,5;1\n").path
     np.testing.assert_array_equal(read_run(path, **COLUMNS).time_s, seconds)
     read = table("when;u;y\n2024-02-30T12:00:00;1;2\n25;1;2\n")
     assert read.text_names == {"when"}
@@ -310,7 +344,7 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
     """A missing value is no error by itself; a column that must be whole names line, column and how many."""
     read = table(f"# c\nt,u,y\n0,1,2\n\n1,{missing},3\n2,3,4\n")
     assert np.isnan(read.column("u")[1])
-    with raises(DataError, "not finite", file="t.csv", value="nan", column="u", line="5 (1 of 3 rows"):
+    with raises(DataError, "not finite", file="t.csv", value="NaN", column="u", line="5 (1 of 3 rows"):
         read.check_finite("u")
     with raises(DataError, "names it", named="line 5"):
         read_run(read.path, **COLUMNS)
@@ -333,7 +367,6 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
         ),
         ("t;u\n0;1.5\n1;2,5\n", ["mixes decimal signs", "line 2", "line 3"]),
         ("dear reader\nthis is\nno table\n", ["no column of numbers", "line"]),
-        ("t;u\n0;234,5\n1;2.345,6\n", ["'2.345,6'", "column u", "line 3"]),
         (b"\x89HDF\r\n\x1a\n\0\0", ["is not a text file"]),
         (b"\x00\x01\x02", ["is not a text file"]),
         (b"\xff\xfe1", ["is not a text file"]),
@@ -342,6 +375,16 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
 def test_what_is_wrong_is_named(table, text, words):
     """Text among numbers, ragged rows, two decimal signs, no table at all: line, column, next step."""
     _refused(table, text, *words)
+
+
+@pytest.mark.parametrize("rows", [2, 30])
+@pytest.mark.parametrize("cell", ["1.021,0", "1,021.0", "-12.345.678", "1'021.5", "1\u00a0021,5"])
+@pytest.mark.parametrize("place", [0, 1])
+def test_separators_of_thousands_are_told_as_such(table, cell, rows, place):
+    """From the first row on, or later: none of them makes a heading or a column of text."""
+    text = "".join(f"{k};{cell if k >= place else 7};{cell if k >= place else 9}\n" for k in range(rows))
+    with raises(DataError, "separator of thousands", cell=cell, column="u", line=str(place + 2)):
+        table(f"t;u;y\n{text}")
 
 
 def test_a_late_decimal_comma_is_found(table):
@@ -441,6 +484,43 @@ def test_a_run_with_units_of_any_bench(table):
     assert run.signal == "t.csv"
 
 
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "t/min",
+        "Zeit/min",
+        "t / min",
+        "t in min",
+        "Time, min",
+        "min",
+        "Minutes",
+        "t(min)",
+        "t_min",
+        "t [mins]",
+    ],
+)
+@pytest.mark.parametrize("named", [True, False])
+def test_time_in_minutes_however_the_heading_says_it(table, heading, named):
+    """Whether the column is named or is the first one."""
+    text = f"{heading};u;y\n0;1;2\n2;3;4\n"
+    found = run_from_table(table(text).path, **COLUMNS, time=heading if named else None)
+    np.testing.assert_array_equal(found.run.time_s, [0, 120])
+    assert not found.notes
+    assert "[min" in found.read_as["columns"]
+
+
+@pytest.mark.parametrize(
+    ("heading", "told"), [("t/xyz", True), ("t_xyz", True), ("A/B", True), ("t", False), ("x", False)]
+)
+def test_a_time_of_an_unknown_unit_is_said_to_be_taken_as_seconds(table, heading, told):
+    """A name alone says nothing else."""
+    found = run_from_table(table(f"{heading};u;y\n0;1;2\n2;3;4\n").path, **COLUMNS)
+    np.testing.assert_array_equal(found.run.time_s, [0, 2])
+    assert bool(found.notes) == told
+    for note in found.notes:
+        tells(note, "taken as seconds")
+
+
 def test_units_given_win(table):
     """What the user says about units is right; without any the unit is 1."""
     read = table("t,u_V,y\n0,1,2\n1,2,3\n")
@@ -480,6 +560,22 @@ def test_time_that_does_not_increase_names_the_line(table):
 
 
 @pytest.mark.parametrize(
+    ("rows", "after", "todo"),
+    [
+        ("0.1003,1,2\n0.1003,3,4\n", "0.1003 min after 0.1003 min", "more digits"),
+        ("0.1003,1,2\n0.1003,1,2\n", "0.1003 min after 0.1003 min", "drop the repeated rows"),
+        ("1714564800.25,1,2\n1714564800.125,3,4\n", "1714564800.125 min after 1714564800.25 min", "sort"),
+    ],
+)
+def test_time_that_does_not_increase_is_told_as_the_file_has_it(table, rows, after, todo):
+    """In its own unit and to its last digit, with what may be the reason."""
+    path = table(f"t_min,u,y\n0,1,2\n{rows}").path
+    with raises(DataError, "time stands", place="column t_min", line="4", stamp=after) as caught:
+        read_run(path, **COLUMNS)
+    assert todo in caught.value.hint
+
+
+@pytest.mark.parametrize(
     ("row", "said"),
     [
         ("1e6;0,5;abc", "'abc' in column y, line {line}: not a number"),
@@ -487,7 +583,7 @@ def test_time_that_does_not_increase_names_the_line(table):
         ("1e6;0.5;1", "mixes decimal signs: '0.5' in column u, line {line}, but '0,5' in column u, line 2"),
         ("{last};0,5;1", "does not increase at line {line}"),
         ("3;0,5;1", "does not increase at line {line}"),
-        ("1e6;;1", "nan in column u, line {line}"),
+        ("1e6;;1", "NaN in column u, line {line}"),
         ("1e6;inf;1", "inf in column u, line {line}"),
     ],
 )

@@ -125,7 +125,7 @@ def test_rows_and_columns_are_named(tmp_path):
     bad[7] = np.nan
     np.savez(tmp_path / "r.npz", current=bad, force=Y)
     table = read_table(tmp_path / "r.npz")
-    with raises(DataError, "names it", named="nan in column current, row 8"):
+    with raises(DataError, "names it", named="has NaN in column current, row 8"):
         table.check_finite("current")
     with raises(DataError, "nearest column", asked="curent", has="force", near="current"):
         table.column("curent")

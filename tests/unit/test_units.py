@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pint
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from pulsetrainer.artefacts.units import check_unit, is_unit, with_seconds
+from pulsetrainer.artefacts.units import check_unit, is_unit, split_unit, symbol_of, with_seconds
 from pulsetrainer.errors import DataError
 from wording import raises
 
@@ -27,10 +29,47 @@ SI += [
     "s^-1",
     "kohm",
     "MΩ",
+    "N*mm",
+    "Wh",
 ]
 REGISTRY = pint.UnitRegistry()  # half a second to make
-OTHER = ["kOhm", "MOhm", "1", "%", "°C", "mmHg", "a.u.", "LSB", "counts", "µm", "emu", "Oe", "psi"]
+OTHER = [
+    "kOhm",
+    "MOhm",
+    "1",
+    "%",
+    "°C",
+    "mmHg",
+    "a.u.",
+    "LSB",
+    "counts",
+    "µm",
+    "emu",
+    "Oe",
+    "psi",
+    "Nm",
+    "mVs",
+]
 NONE = ["measured", "Newtons per mm", "xyz", "", "??", "m//s", "3", "N N N x", "A/", "force"]
+
+
+QUANTITIES = [
+    "t",
+    "Zeit",
+    "I",
+    "B",
+    "H",
+    "F",
+    "s",
+    "T",
+    "u",
+    "dT",
+    "Strom",
+    "force_2",
+    "x/y",
+    "A/B",
+    "coil I",
+]
 
 
 @pytest.mark.parametrize("text", SI + OTHER)
@@ -44,6 +83,23 @@ def test_pint_knows_them_too(text):
     """An independent reader of units agrees."""
     plain = text.replace("·", "*").replace("²", "^2").replace("nA m", "nA*m").replace("A m", "A*m")
     REGISTRY.Unit(plain.removeprefix("1/") if plain.startswith("1/") else plain)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    name=st.sampled_from(QUANTITIES),
+    written=st.sampled_from(
+        ["{}/{}", "{} / {}", "{}/({})", "{} / ({})", "{} [{}]", "{}({})", "{} in {}", "{}, {}", "{},{}"]
+    ),
+    unit=st.sampled_from(SI + OTHER + ["min", "h", "minutes", "Volt"]) | st.sampled_from(NONE),
+)
+def test_a_heading_is_a_quantity_and_a_unit_however_they_are_parted(name, written, unit):
+    """Only brackets make a unit of what is none: behind anything else the heading is a name."""
+    heading = written.format(name, unit)
+    if is_unit(symbol_of(unit)) or written[-1] in ")]":
+        assert split_unit(heading) == (name, unit)
+    else:
+        assert split_unit(heading) == (heading, "")
 
 
 @pytest.mark.parametrize("text", NONE)
