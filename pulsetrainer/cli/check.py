@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -47,7 +48,7 @@ def check(
     from pulsetrainer.artefacts import Model
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.steps.check import check as measure
-    from pulsetrainer.steps.check import check_updatable, updated
+    from pulsetrainer.steps.check import check_updatable, hindrance, updated
 
     loaded = job.load(model, Model)
     if update:
@@ -60,22 +61,29 @@ def check(
         job.save(
             out, updated(loaded, found), f"{model.name} as {info.serial} is now", device=job.device(info)
         )
-    _show(job, model, out, found, info.serial)
+    _show(job, model, out, found, info.serial, updatable=not hindrance(loaded))
 
 
-def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str) -> None:
+def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, *, updatable: bool) -> None:
     job.screen.result(plain(found) | {"output": out})
     rows = {
         "offset": _said(found.offset, "N", 3),
         "gain": _said(found.gain, "", 4),
         "shape": _said(found.shape_percent, "% of the span", 2),
     }
-    if found.temperature_K is not None:
-        rows["temperature"] = _said(found.temperature_K, "K against calibration", 1)
+    rows["temperature"] = (
+        _said(found.temperature_K, "K against calibration", 1)
+        if found.temperature_K is not None
+        else f"not known: {found.temperature_unknown}"
+    )
     error = found.error_percent
     rows["error"] = f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain"
     for number, reason in enumerate(found.reasons, 1):
         rows[f"reason {number}"] = reason
+    if found.verdict == "shifted" and updatable and out is None:
+        rows["next"] = f"pulsetrainer check {shlex.quote(str(model))} --update -o updated.h5"
+    elif found.verdict == "changed" or (found.verdict == "shifted" and not updatable):
+        rows["next"] = "identify again: pulsetrainer capture identification, then pulsetrainer identify"
     job.screen.facts(f"{model} on {serial}: {found.verdict}", rows)
     job.wrote(out)
 

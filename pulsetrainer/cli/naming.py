@@ -29,8 +29,14 @@ _HOLDS = {
 
 # (command, kind of file): what to do instead of making one in the usual way
 _WANTED = {
-    ("diagnose", "run"): "to make one: pulsetrainer capture diagnostic -o run.h5, or import your own table",
-    ("evaluate", "run"): "to make one: pulsetrainer capture diagnostic -o run.h5, or import your own table",
+    (
+        "diagnose",
+        "run",
+    ): "to make one: pulsetrainer capture diagnostic -o diagnostic.h5, or import your own table",
+    (
+        "evaluate",
+        "run",
+    ): "to make one: pulsetrainer capture diagnostic -o diagnostic.h5, or import your own table",
     ("correct", "run"): "give the run that was diagnosed: pulsetrainer show DIAGNOSIS.h5 says which",
 }
 

@@ -166,7 +166,7 @@ def bins_of(records: Sequence[Record]) -> Bins:
     if count < LIMITS.least_rows:
         raise DataError(
             f"only {count} short averages can be made of this data, too few to tell causes apart",
-            hint="record longer: pulsetrainer capture diagnostic -o run.h5",
+            hint="record longer: pulsetrainer capture diagnostic -o diagnostic.h5",
         )
     return Bins(tuple(numbers), count, np.concatenate(record), np.concatenate(time), tuple(widths))
 

@@ -79,7 +79,7 @@ def problem_for(
         what = "output" if np.ptp(measured) == 0 else "input"
         raise DataError(
             f"the {what} does not vary, so it shows no cause",
-            hint="record a signal that sweeps the range: pulsetrainer capture diagnostic -o run.h5",
+            hint="record a signal that sweeps the range: pulsetrainer capture diagnostic -o diagnostic.h5",
         )
     span, reach = float(np.ptp(measured)), high - low
     ends = _ends(records, low, high)

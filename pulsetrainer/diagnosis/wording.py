@@ -138,7 +138,7 @@ DOUBTS: Mapping[str, str] = {
     "spans zero": "its strength may be nothing, as the interval spans zero",
     "at bound": "a parameter is at the end of the range that was searched",
 }
-OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o run.h5."
+OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o diagnostic.h5."
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``Bench.numbers``
 LACKS: Mapping[str, str] = {
     "rates": "it has one rate of change only",

@@ -81,6 +81,7 @@ class Checked:
     gain: Estimate  # of the force, 1 as at calibration
     shape_percent: Estimate  # rms of what offset and gain leave, without noise, of the span
     temperature_K: Estimate | None  # of the copper against calibration; None where it cannot be told
+    temperature_unknown: str  # why it cannot be told, empty where it can
     error_percent: Error
     seconds: float
     reasons: tuple[str, ...] = ()
@@ -131,7 +132,7 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     found, intervals, left = _fitted(predicted - rest, _beside(model, current, predicted), force - rest)
     offset, gain = (Estimate(float(v), i) for v, i in zip(found, intervals, strict=True))
     shape = _shape(left, span)
-    temperature = _temperature(model, device, trace)
+    temperature, unknown = _temperature(model, device, trace)
     reasons = _reasons(model, offset, gain, shape, temperature)
     changed = any(reason.startswith("shape") for reason in reasons)
     mended = rest + offset.value + gain.value * (predicted - rest)
@@ -144,6 +145,7 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
         gain=gain,
         shape_percent=shape,
         temperature_K=temperature,
+        temperature_unknown=unknown,
         error_percent=error,
         seconds=reference.size / RATE_HZ,
         reasons=tuple(reasons),
@@ -199,12 +201,18 @@ def check_updatable(model: Model) -> None:
     DataError
         It has another form than direct, or causes that do not scale with the force.
     """
-    hindered = [one.cause for one in model.extensions if one.cause not in _SCALABLE]
-    if model.form != "direct" or hindered:
-        what = f"the causes {', '.join(hindered)}" if hindered else f"the form {model.form}"
+    if what := hindrance(model):
         raise DataError(
             f"a model with {what} is not mended by an offset and a gain", hint="identify it again"
         )
+
+
+def hindrance(model: Model) -> str:
+    """Return what of a model an offset and a gain do not mend, empty where they mend it."""
+    hindered = [one.cause for one in model.extensions if one.cause not in _SCALABLE]
+    if model.form == "direct" and not hindered:
+        return ""
+    return f"the causes {', '.join(hindered)}" if hindered else f"the form {model.form}"
 
 
 def _on_grid(tick: np.ndarray, columns: tuple[FloatArray, ...], samples: int) -> list[FloatArray]:
@@ -271,10 +279,12 @@ def _shape(left: FloatArray, span: float) -> Estimate:
     return Estimate(value, (low, high))
 
 
-def _temperature(model: Model, device: Device, trace: Trace) -> Estimate | None:
-    """Temperature of the copper, K, in the mean of the windows; None where model or device do not tell."""
-    if model.coil is None or not device.tells_duty:
-        return None
+def _temperature(model: Model, device: Device, trace: Trace) -> tuple[Estimate | None, str]:
+    """Temperature of the copper, K, in the mean of the windows; None where it cannot be told, and why."""
+    if model.coil is None:
+        return None, "the capture of the model was too short, or not in one go, to tell the coil's resistance"
+    if not device.tells_duty:
+        return None, "the device does not tell the duty of its output"
     meter = thermometer(model.coil, thermal_of(model))
     told = []
     for start in range(0, trace.tick.size, 250):
@@ -284,9 +294,9 @@ def _temperature(model: Model, device: Device, trace: Trace) -> Estimate | None:
         ):
             told.append(meter.temperature_K)
     if len(told) < 3:
-        return None
+        return None, "too few seconds of the check tell it"
     mean, error = float(np.mean(told)), float(np.std(told, ddof=1)) / np.sqrt(len(told))
-    return Estimate(mean, (mean - _QUANTILE * error, mean + _QUANTILE * error))
+    return Estimate(mean, (mean - _QUANTILE * error, mean + _QUANTILE * error)), ""
 
 
 def _shape_of_fit(model: Model) -> float:
@@ -302,12 +312,16 @@ def _reasons(
 ) -> list[str]:
     """What moved, by more than a device does that nobody touched."""
     reasons = []
-    if shape.value > max(SHAPE_PERCENT, _SHAPE_OF_FIT * _shape_of_fit(model)):
-        reasons.append(f"shape: offset and gain leave {shape.value:.1f} % of the span")
+    limit = max(SHAPE_PERCENT, _SHAPE_OF_FIT * _shape_of_fit(model))
+    if shape.value > limit:
+        left = f"{shape.value:.2f} % of the span (limit {limit:.2f} %)"
+        reasons.append(f"shape: offset and gain leave {left}")
     if abs(offset.value) > OFFSET_N and not offset.interval[0] <= 0 <= offset.interval[1]:
-        reasons.append(f"offset: the zero moved by {offset.value:+.2f} N")
+        reasons.append(f"offset: the zero moved by {offset.value:+.2f} N (limit {OFFSET_N:g} N)")
     if abs(gain.value - 1.0) > GAIN and not gain.interval[0] <= 1 <= gain.interval[1]:
-        reasons.append(f"gain: the force is {100 * (gain.value - 1.0):+.1f} % of what it was")
+        moved = 100 * (gain.value - 1.0)
+        reasons.append(f"gain: the force is {moved:+.1f} % of what it was (limit {100 * GAIN:g} %)")
     if temperature is not None and abs(temperature.value) > TEMPERATURE_K:
-        reasons.append(f"temperature: the coil is {temperature.value:+.0f} K from calibration")
+        warmer = f"{temperature.value:+.0f} K from calibration (limit {TEMPERATURE_K:g} K)"
+        reasons.append(f"temperature: the coil is {warmer}")
     return reasons

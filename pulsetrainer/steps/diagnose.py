@@ -63,7 +63,9 @@ def diagnose(
     """
     whole = [runs] if isinstance(runs, Run) else list(runs)
     if not whole:
-        raise UsageError("diagnose needs at least one run", hint="pulsetrainer capture diagnostic -o run.h5")
+        raise UsageError(
+            "diagnose needs at least one run", hint="pulsetrainer capture diagnostic -o diagnostic.h5"
+        )
     rng = np.random.default_rng(seed)
     question = question_of(whole, model, rng=rng, quick=quick, progress=progress, names=names)
     return diagnosis_of(procedure.diagnose(question))

@@ -97,7 +97,7 @@ def invert(
     chosen = _method(method, model, name)
     part = invertible(model, rate_Hz)
     if model.form == "signed":
-        notes.append(part.limits(model))
+        notes.append(part.limits(model) + part.around(model))
     forces = _force_range(part, model, force_min, force_max, name)
     if chosen == "extended":
         forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz)

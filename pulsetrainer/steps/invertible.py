@@ -45,6 +45,13 @@ class Invertible:
             f"with the {model.input_quantity} in {with_unit(u, model.input_unit)}"
         )
 
+    def around(self, model: Model) -> str:
+        """Say in words how far the drive goes before and after, empty where that is no further."""
+        if (self.low, self.high) == (self.whole.low, self.whole.high):
+            return ""
+        ends = with_unit(f"{self.whole.low:.4g} .. {self.whole.high:.4g}", model.input_unit)
+        return f"; before and after the pulse the drive goes over all of {ends}, to wipe out what came before"
+
 
 def invertible(model: Model, rate_Hz: float) -> Invertible:
     """Return the part of a model that can be inverted; DataError where branches of a signed one never are."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import pulsetrainer as pt
+from wording import tells
 
 KEYS = {"verdict", "offset", "gain", "shape_percent", "temperature_K", "error_percent"}
 
@@ -43,10 +44,12 @@ def test_the_contract_and_the_update(run, calibrated, tmp_path):
 
 
 def test_another_device_is_not_updated(run, calibrated, tmp_path):
-    """A changed density: exit 3, nothing written; the verdict alone is no error."""
-    words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9", "--json")
-    assert run(*words).json["verdict"] == "changed"
-    refused = run(*words, "--update", "-o", "updated.h5")
+    """A changed density: exit 3, nothing written; the verdict alone is no error. The limit is told."""
+    words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9")
+    shown = run(*words)
+    assert shown.code == 0
+    tells(shown.out, "changed")
+    refused = run(*words, "--json", "--update", "-o", "updated.h5")
     assert (refused.code, refused.json["error"]["kind"]) == (3, "data")
     assert not (tmp_path / "updated.h5").exists()
 

@@ -201,7 +201,9 @@ def test_a_dual_model_is_inverted_exactly(clockwise):
 def test_a_signed_model_is_inverted_within_its_range(butterfly):
     """The range is named, kept, and nothing beyond it is promised."""
     drive = pt.invert("normal", butterfly)
-    assert any("inverse exists" in note for note in drive.notes)
+    note = next(note for note in drive.notes if "inverse exists" in note)
+    for end in (drive.compensated.min(), drive.compensated.max()):
+        assert f"{end:.4g}" in note
     assert drive.predicted_max_error_percent < 5.0
     assert drive.clipped_samples == 0
     with pytest.raises(DataError):
