@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy import linalg, stats
+from scipy import linalg, special, stats
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
@@ -111,15 +111,24 @@ class _Block:
     def surprises(self, along: FloatArray, covariance: FloatArray) -> FloatArray:
         """Logarithms of p (m,) for parts along the basis (k, m), of which noise has a covariance."""
         if self.as_it_is:
-            return np.asarray(stats.norm.logsf(along[0] / np.sqrt(covariance[0, 0])))
+            return np.asarray(special.log_ndtr(-along[0] / np.sqrt(covariance[0, 0])))
         size = np.sum(along * np.linalg.solve(covariance, along), axis=0)
-        surprise = stats.chi2.logsf(size, self.basis.shape[1])
+        surprise = _log_tail(size, self.basis.shape[1])
         if self.choices:
             half = 0.5 * np.maximum(size, TINY)
             return np.asarray(np.minimum(np.log(self.choices) + 0.5 * np.log(half) - half, 0.0))
         if self.one_sided:
             return np.where((self.back @ along)[0] > 0, surprise - np.log(2.0), 0.0)
         return np.asarray(surprise)
+
+
+def _log_tail(square: FloatArray, count: int) -> FloatArray:
+    """Logarithm of the chance (m,) that chi-square of ``count`` squares is larger; the usual ones by hand."""
+    if count == 1:
+        return np.asarray(np.log(2.0) + special.log_ndtr(-np.sqrt(square)))
+    if count == 2:
+        return -0.5 * square
+    return np.asarray(stats.chi2.logsf(square, count))
 
 
 _RANKED: WeakKeyDictionary[Fitted, tuple[Score, ...]] = WeakKeyDictionary()

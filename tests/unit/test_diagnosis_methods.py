@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.record import Record
@@ -22,7 +23,7 @@ from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale
-from pulsetrainer.diagnosis.screening import p_value
+from pulsetrainer.diagnosis.screening import _log_tail, p_value
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 
@@ -36,6 +37,15 @@ FRAME = Frame(1e-3, np.zeros(10_000), 1.0, 1.0)
 def test_a_p_value_counts_the_draws_that_reach_it(observed, p):
     """(1 + k) / (1 + B): never 0, and what equals it has reached it."""
     assert p_value(observed, np.asarray([1.0, 2.0, 3.0, 4.0])) == pytest.approx(p)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+def test_the_tail_of_chi_square_is_that_of_scipy(count):
+    """Where a screen looks, and far out."""
+    square = np.asarray([0.0, 0.3, 4.0, 90.0, 400.0])
+    np.testing.assert_allclose(
+        _log_tail(square, count), stats.chi2.logsf(square, count), rtol=1e-9, atol=1e-12
+    )
 
 
 def _block(cause: str, values, basis, back, *, one_sided=False, as_it_is=False):
