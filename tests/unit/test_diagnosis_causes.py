@@ -216,6 +216,14 @@ def test_what_is_next_to_the_rail_is_left_out_too():
     assert not _fires("saturation", smooth)
 
 
+def test_a_rest_at_the_top_of_coarse_steps_is_no_cut():
+    """Steps that come at uneven times look like noise of two thirds of a step."""
+    rise = np.tile(np.concatenate((np.arange(150), np.arange(150)[::-1])) / 1.7, 10)
+    y = np.round(np.concatenate((rise, np.full(200, 88.0))))
+    assert noise_of(y) > 0.5
+    assert not _fires("saturation", y)
+
+
 def _wild(size: float, number: int) -> np.ndarray:
     y = np.tile([0.0, 1.0, 0.0, -1.0], 500) * 1e-3 + 0.0
     y[100 : 100 + 150 * number : 150] += size
