@@ -57,6 +57,9 @@ class WaveformEvaluation:
     full_force: Annotated[float, Data("@output_unit", "full applied force")]
     noise_percent: Annotated[float, Data("percent", "spread between repeats, of full force")]
     output_unit: str = "N"
+    error_spread_percent: Annotated[
+        float, Data("percent", "standard deviation of the mean error from repeat to repeat, of full force")
+    ] = float("nan")  # of the drive of which it is larger
     # (r,) before each compensated drive, where the heat was tracked
     temperature_K: Annotated[
         FloatArray | None, Data("K", "copper warmer than at calibration", "repeat", path="temperature")

@@ -38,7 +38,8 @@ def compare(
     job = Job(context, inputs=evaluations, outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.artefacts import Evaluation, Session
     from pulsetrainer.files import store
-    from pulsetrainer.report.comparison_text import as_csv, label_of, labels_of
+    from pulsetrainer.report import names
+    from pulsetrainer.report.comparison_text import as_csv, labels_of
     from pulsetrainer.steps.compare import compare as side_by_side
 
     labels = labels_of(evaluations)
@@ -58,13 +59,20 @@ def compare(
         for path, header in zip(evaluations, headers, strict=True)
     ]
     job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})
+    learners = isinstance(loaded[0], Session)
     words = {True: "better", False: "worse", None: ""}
-    job.screen.table(
-        "errors, %, the change from the first to the last",
-        ["", *labels, "change", ""],
-        [
-            [label_of(m.name), *m.values, None if m.change is None else f"{m.change:+.2f}", words[m.better]]
-            for m in metrics
-        ],
-    )
+    rows = []
+    for m in metrics:
+        owner, named = names.split(m.name)
+        change = "-" if m.change is None else f"{round(m.change, 2) or 0.0:+.2f}"
+        verdict = [] if learners else [words[m.better]]
+        rows.append(
+            [f"{owner.removeprefix('session.')}: {named.words}", named.unit, *m.values, change, *verdict]
+        )
+    head = ["", "unit", *labels, *(["difference"] if learners else ["change", ""])]
+    job.screen.table(f"{len(labels)} {loaded[0].kind}s side by side", head, rows)
+    if not learners:
+        job.screen.line(
+            "change: ", "from the first to the last; within the spread between repeats no verdict"
+        )
     job.wrote(out)

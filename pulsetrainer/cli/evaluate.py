@@ -104,7 +104,7 @@ def show_tables(screen: Screen, evaluation: Evaluation) -> None:
     for table in tables_of(evaluation, screen.width):
         screen.table(table.title, table.columns, table.rows)
     if len(evaluation.models) > 1:
-        screen.line("gain: ", "how much less rms error than by the first model")
+        screen.line("improvement: ", "how much less rms error than by the first model")
     if any(w.name in PUBLISHED for w in evaluation.waveforms):
         screen.line("published: ", "the device of Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631")
 

@@ -51,13 +51,13 @@ def identification(fit: Fit) -> str:
 
 
 def methods(played: Sequence[WaveformEvaluation]) -> str:
-    """Say how large the mean error is without compensation, and by each method."""
+    """Say how large the mean error is without compensation, and by each inversion."""
     first = played[0]
     by = ", ".join(f"{one.inversion} {one.compensated.mean_abs_error_percent:.3g} %" for one in played)
     return (
         f"Above: one beat of the target force, {_range(first.target, first.output_unit)}, with the measured "
         f"force of the scaled drive, mean error {first.scaled.mean_abs_error_percent:.3g} %, and of the "
-        f"compensated drive by each method: {by} of full force. Below: the error of each over the beat."
+        f"compensated drive by each inversion: {by} of full force. Below: the error of each over the beat."
     )
 
 
@@ -66,7 +66,7 @@ def tracking(played: WaveformEvaluation) -> str:
     return (
         f"Above: target force, {_range(played.target, played.output_unit)}, over time, "
         f"{_range(played.time_s, 's')}, with the measured force of the scaled and of the compensated drive. "
-        f"Below: their errors; the largest is {played.scaled.max_abs_error_percent:.2f} % of full force for "
+        f"Below: their errors; the max error is {played.scaled.max_abs_error_percent:.2f} % of full force for "
         f"the scaled and {played.compensated.max_abs_error_percent:.2f} % for the compensated drive."
     )
 
@@ -75,7 +75,7 @@ def loops(played: WaveformEvaluation) -> str:
     """Say how wide each loop is."""
     return (
         "Measured force over target force, beside the diagonal where both are equal. "
-        f"The scaled drive makes a loop of {played.scaled.hysteresis_percent:.2f} % of full force squared, "
+        f"The scaled drive makes a loop area of {played.scaled.hysteresis_percent:.2f} % of full force squared, "
         f"the compensated drive one of {played.compensated.hysteresis_percent:.2f} %."
     )
 

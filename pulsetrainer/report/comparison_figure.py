@@ -9,18 +9,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from pulsetrainer.report.names import split
 from pulsetrainer.report.style import BLUE, COLUMN_IN, GREEN, INK, VERMILION, styled
 
 _PANEL_IN = 2.3
-_NAMES = {
-    "mean_error_reduction_percent": "reduction of the mean error, %",
-    "compensated.mean_abs_error_percent": "mean error, % of full force",
-    "compensated.max_abs_error_percent": "max error, % of full force",
-    "rms_percent": "rms error, % of the span",
-    "max_percent": "max error, % of the span",
-    "right_percent": "right answers, %",
-    "response_s": "time to the answer, s",
-}
+_SHOWN = (
+    "mean_error_reduction_percent",
+    "compensated.mean_abs_error_percent",
+    "compensated.max_abs_error_percent",
+    "rms_percent",
+    "max_percent",
+    "right_percent",
+    "response_s",
+)
 _LINES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
 
 
@@ -29,7 +30,7 @@ def draw(labels: Sequence[str], values: Mapping[str, Sequence[float | None]]) ->
     """Return one panel for each of the headline metrics that are there, evaluations from left to right."""
     panels: dict[str, dict[str, Sequence[float | None]]] = {}
     for name, row in values.items():
-        for metric in _NAMES:
+        for metric in _SHOWN:
             if name.endswith(f".{metric}"):
                 panels.setdefault(metric, {})[name.removesuffix(f".{metric}")] = row
     figure = Figure(figsize=(COLUMN_IN, 0.6 + _PANEL_IN * len(panels)), layout="constrained")
@@ -43,7 +44,7 @@ def draw(labels: Sequence[str], values: Mapping[str, Sequence[float | None]]) ->
             axes.plot(
                 place, known, color=next(colours), linestyle=line, marker=marker, markersize=4, label=stem
             )
-        axes.set_title(_NAMES[metric])
+        axes.set_title(str(split(metric)[1]))
         top = max((v for row in rows.values() for v in row if v is not None), default=1.0)
         axes.set_ylim(0.0, 1.1 * top if top > 0 else 1.0)
         axes.yaxis.set_major_locator(MaxNLocator(5))

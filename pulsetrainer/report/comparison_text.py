@@ -25,25 +25,3 @@ def labels_of(files: Sequence[Path]) -> list[str]:
     if len({p[:-1] for p in parts}) == len(parts) and len({p[-1] for p in parts}) == 1:
         return [Path(*p[:-1]).name or str(path) for p, path in zip(parts, files, strict=True)]
     return [str(path) for path in files]
-
-
-_SHORT = {
-    "mean_error_reduction_percent": "reduction",
-    "compensated.mean_abs_error_percent": "mean error",
-    "compensated.max_abs_error_percent": "max error",
-    "rms_percent": "rms error",
-    "max_percent": "max error",
-    "right_percent": "right",
-    "right_from_percent": "right, 95 % from",
-    "right_to_percent": "right, 95 % to",
-    "response_s": "time to the answer, s",
-    "pressed.mean_abs_error_percent": "mean error",
-}
-
-
-def label_of(name: str) -> str:
-    """Return the name of a figure as a person says it."""
-    for metric, short in _SHORT.items():
-        if name.endswith(f".{metric}"):
-            return f"{name.removesuffix(metric)[:-1]}: {short}"
-    return name

@@ -268,7 +268,7 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
 
 
 def _played_title(played: WaveformEvaluation) -> str:
-    return f"{played.name}, {played.inversion} inverse"
+    return f"{played.name}, {played.inversion} inversion"
 
 
 def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
@@ -303,7 +303,7 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     measured = "pressed in the kept pass, mean" if waveform.passes else "predicted by the model"
     trace(above, waveform.time_s, waveform.predicted, **MODEL, label=measured)
     above.set_ylabel(label(quantity_of(waveform.output_unit), waveform.output_unit))
-    above.set_title(f"{waveform.name}, {waveform.inversion} inverse: what is asked for, and the drive")
+    above.set_title(f"{waveform.name}, {waveform.inversion} inversion: what is asked for, and the drive")
     trace(below, waveform.time_s, waveform.scaled, **SCALED, label="scaled")
     trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label=waveform.inversion)
     below.set_ylabel(label(f"drive: {quantity_of(waveform.input_unit)}", waveform.input_unit))

@@ -7,6 +7,8 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from pulsetrainer.report.names import NAMES, split
+
 ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
 _BROAD = 10_000  # as wide as the table needs: figures are never cut
 _NARROWEST = 24  # beside a lead; less, and the lines go on further left
@@ -38,7 +40,7 @@ def drawn(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> 
 
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1))
     for number, name in enumerate(columns):
-        words = number == 0 or any(text(row[number])[:1].isalpha() for row in rows)
+        words = number == 0 or name == "unit" or any(text(row[number])[:1].isalpha() for row in rows)
         table.add_column(Text(name), justify="left" if words else "right", no_wrap=True)
     for row in rows:
         table.add_row(*(Text(text(cell)) for cell in row))
@@ -64,24 +66,11 @@ def listed(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) ->
                 yield f"    {head:<{width}}  {text(cell)}"
 
 
-# what a person reads where the name of a figure, as JSON has it, is another word
-_WORDS = {
-    "coverage_percent": "cells switched, %",
-    "fit_rms_percent": "fit, rms, % of span",
-    "rate_cv_percent": "variation of the rate, %",
-    "amplitude_cv_percent": "variation of the height, %",
-    "beat_timing_max_ms": "timing, at most, ms",
-    "mean_abs_error_percent": "mean error, % of full force",
-    "max_abs_error_percent": "max error, % of full force",
-    "nrmse": "rms error, of the range",
-    "augmentation_index_error_percent": "error of the augmentation index, %",
-}
-
-
 def label(name: str) -> str:
     """Return the name of a figure as a person writes it, its unit behind a comma."""
-    if name in _WORDS:
-        return _WORDS[name]
+    owner, named = split(name)
+    if name.rpartition(".")[2] in NAMES:
+        return (f"{owner}: " if owner else "") + ", ".join(filter(None, named))
     for ending, unit in (("_percent", "%"), ("_Hz", "Hz")):
         if name.endswith(ending):
             name = f"{name.removesuffix(ending)}, {unit}"

@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation
 from pulsetrainer.artefacts.evaluation import PUBLISHED
+from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import tables
 from pulsetrainer.report.diagnosis_text import Facts, Table, sections
 from pulsetrainer.report.facts import facts
+from pulsetrainer.report.names import NAMES, split
 
 _TITLED = {
     "run": "signal", "model": "cells", "waveform": "waveform", "playback": "waveform", "diagnosis": "verdict",
     "session": "pulses",
 }  # fmt: skip
 _WIDTH = 110  # of a table, unless a screen says otherwise
-_LABEL_WIDTH, _COLUMN_WIDTH = 32, 13
+_LABEL_WIDTH, _COLUMN_WIDTH = 50, 13
 _ROUNDING = 1e-6
+_PREDICTION = ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent")
 _FIGURES = (
-    ("mean error, scaled", "scaled.mean_abs_error_percent"),
-    ("mean error, compensated", "compensated.mean_abs_error_percent"),
-    ("reduction of the mean error", "mean_error_reduction_percent"),
-    ("max error, scaled", "scaled.max_abs_error_percent"),
-    ("max error, compensated", "compensated.max_abs_error_percent"),
-    ("loop area, scaled", "scaled.hysteresis_percent"),
-    ("loop area, compensated", "compensated.hysteresis_percent"),
-    ("current tracking, worst", "compensated.current_tracking_max_percent"),
+    "scaled.mean_abs_error_percent",
+    "compensated.mean_abs_error_percent",
+    "mean_error_reduction_percent",
+    "scaled.max_abs_error_percent",
+    "compensated.max_abs_error_percent",
+    "scaled.hysteresis_percent",
+    "compensated.hysteresis_percent",
+    "compensated.current_tracking_max_percent",
 )
 
 
@@ -69,23 +73,14 @@ def tables_of(evaluation: Evaluation, width: int = _WIDTH) -> Iterator[Table]:
 
 def _predictions(evaluation: Evaluation) -> Table:
     """How each model predicts the run; an offset far below the error is the rounding of numbers."""
-    unit = evaluation.models[0].output_unit
-    rms, offset = (f"{name}, {unit}" if unit not in ("", "1") else name for name in ("rms", "offset"))
+    models = evaluation.models
+    fields = [f for f in _PREDICTION if f != "gain_percent" or len(models) > 1]
+    heads = [(NAMES[f].words, NAMES[f].unit or shown(models[0].output_unit)) for f in fields]
+    rounded = [replace(m, offset=m.offset if abs(m.offset) > _ROUNDING * m.rms else 0.0) for m in models]
     return Table(
-        "prediction error on the run, % of its span",
-        ("model", rms, "rms, %", "max, %", "gain, %", offset, "rms without\noffset, %"),
-        tuple(
-            (
-                m.name,
-                m.rms,
-                m.rms_percent,
-                m.max_percent,
-                m.gain_percent,
-                m.offset if abs(m.offset) > _ROUNDING * m.rms else 0.0,
-                m.shape_rms_percent,
-            )
-            for m in evaluation.models
-        ),
+        "prediction of the run",
+        ("model", *(",\n".join(filter(None, head)) for head in heads)),
+        tuple((m.name, *(getattr(m, f) for f in fields)) for m in rounded),
     )
 
 
@@ -100,13 +95,13 @@ def _pulses(evaluation: Evaluation, width: int) -> Iterator[Table]:
         columns.setdefault(w.name, published).append((w.inversion, found))
     needed = _LABEL_WIDTH + _COLUMN_WIDTH * sum(len(group) for group in columns.values())
     for page in [list(columns)] if needed <= width else [[name] for name in columns]:
-        shown = [
+        named = [
             (f"{name}\n{heading}".replace("-", "-\n"), found)
             for name in page
             for heading, found in columns[name]
         ]
         yield Table(
-            "force error, % of full force",
-            ("", *(heading for heading, _ in shown)),
-            tuple((label, *(found.get(metric) for _, found in shown)) for label, metric in _FIGURES),
+            "force errors of the pulses",
+            ("", "unit", *(heading for heading, _ in named)),
+            tuple((*split(metric)[1], *(found.get(metric) for _, found in named)) for metric in _FIGURES),
         )

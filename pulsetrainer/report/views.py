@@ -16,24 +16,17 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Model, ModelEvaluation, WaveformEvaluation
+from pulsetrainer.artefacts.evaluation import METRICS
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import alternatives, figures, heat_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
+from pulsetrainer.report.names import FORCE, NAMES
 from pulsetrainer.report.panels import largest_residual
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
 
 Published = Mapping[str, Mapping[str, float]]
 
-FORCE: Final = "% of full force"
-# per drive, in the table of a waveform: field, what it is, its unit in words
-DRIVE_METRICS: Final = (
-    ("mean_abs_error_percent", "mean absolute error", FORCE),
-    ("max_abs_error_percent", "largest absolute error", FORCE),
-    ("rms_error_percent", "rms error", FORCE),
-    ("hysteresis_percent", "total hysteresis: loop area per beat", "% of full force squared"),
-    ("current_tracking_max_percent", "largest current tracking error", "% of the current range"),
-)
 # the columns of the overview, as dotted names within a waveform
 OVERVIEW: Final = (
     "scaled.mean_abs_error_percent",
@@ -118,8 +111,8 @@ def _stem(played: WaveformEvaluation) -> str:
 
 
 def titled(played: WaveformEvaluation) -> str:
-    """Return a pulse and the method that played it, in words."""
-    return f"{played.name}, {played.inversion} inverse"
+    """Return a pulse and the inversion that made its drive, in words."""
+    return f"{played.name}, {played.inversion} inversion"
 
 
 def _metric(played: WaveformEvaluation, dotted: str) -> Number:
@@ -143,14 +136,14 @@ def readout(played: WaveformEvaluation, link: str) -> Readout:
 
 
 def overview(played: Sequence[tuple[WaveformEvaluation, str]], published: Published) -> tuple[Row, ...]:
-    """Return one row per waveform and inverse, and below those of a waveform the published device.
+    """Return one row per waveform and inversion, and below those of a waveform the published device.
 
     ``played`` holds each evaluation with the identifier of its section.
     """
     rows: list[Row] = []
     for name in dict.fromkeys(one.name for one, _ in played):
         rows += [
-            Row(name, f"{one.inversion} inverse", tuple(_metric(one, dotted) for dotted in OVERVIEW), link)
+            Row(name, f"{one.inversion} inversion", tuple(_metric(one, dotted) for dotted in OVERVIEW), link)
             for one, link in played
             if one.name == name
         ]
@@ -167,7 +160,7 @@ def overview(played: Sequence[tuple[WaveformEvaluation, str]], published: Publis
 
 
 def beats(played: Sequence[WaveformEvaluation]) -> tuple[Picture, ...]:
-    """Return for each pulse one beat before and after, by all methods that played it."""
+    """Return for each pulse one beat before and after, by all inversions that played it."""
     found = []
     for k, name in enumerate(dict.fromkeys(one.name for one in played), start=1):
         several = [one for one in played if one.name == name]
@@ -177,8 +170,8 @@ def beats(played: Sequence[WaveformEvaluation]) -> tuple[Picture, ...]:
                 f"beat-{k}",
                 f"One beat of {name} before and after",
                 alternatives.methods(several),
-                f"One beat of {name}, mean of the repeats: merely scaled, and compensated by each method; "
-                "below, what each method leaves.",
+                f"One beat of {name}, mean of the repeats: merely scaled, and compensated by each inversion; "
+                "below, what each leaves.",
             )
         )
     return tuple(found)
@@ -191,8 +184,8 @@ def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
         identifier,
         title,
         facts=(
-            ("mean error reduced by [%]", _metric(played, "mean_error_reduction_percent")),
-            (f"spread between repeats [{FORCE}]", _metric(played, "noise_percent")),
+            (str(NAMES["mean_error_reduction_percent"]), _metric(played, "mean_error_reduction_percent")),
+            (str(NAMES["noise_percent"]), _metric(played, "noise_percent")),
             (
                 label("full force", played.output_unit),
                 number(played.full_force, f"{stem}.full_force", ".4g"),
@@ -201,9 +194,10 @@ def waveform_section(played: WaveformEvaluation, identifier: str) -> Section:
         ),
         rows=tuple(
             Row(
-                words, unit, tuple(_metric(played, f"{drive}.{field}") for drive in ("scaled", "compensated"))
+                *NAMES[field],
+                tuple(_metric(played, f"{drive}.{field}") for drive in ("scaled", "compensated")),
             )
-            for field, words, unit in DRIVE_METRICS
+            for field in METRICS
         ),
         pictures=(
             picture(
@@ -263,17 +257,17 @@ def model_section(model: Model, which: str = "") -> Section:
     ]
     if model.fit is not None:
         facts += [
-            ("cells switched [%]", number(model.fit.coverage_percent, "model.fit.coverage_percent", ".1f")),
-            (label("rms of the fit", model.output_unit), number(model.fit.rms, "model.fit.rms", ".3g")),
-            ("rms of the fit [% of span]", number(model.fit.rms_percent, "model.fit.rms_percent", ".3g")),
+            (str(NAMES["coverage_percent"]), number(model.fit.coverage_percent, "model.fit.coverage_percent", ".1f")),
+            (label("rms error of the fit", model.output_unit), number(model.fit.rms, "model.fit.rms", ".3g")),
+            (str(NAMES["fit_rms_percent"]), number(model.fit.rms_percent, "model.fit.rms_percent", ".3g")),
         ]
         pictures.append(
             picture(
                 figures.identification(model.fit, model.input_quantity, model.output_quantity),
                 "model-fit",
-                "Model and system on the identification signal",
+                "Measured and model",
                 alternatives.identification(model.fit),
-                "System and model on the identification signal, and what the model leaves over; "
+                "The run that the model was fitted to, measured and as the model has it, and what it leaves; "
                 "the dotted lines are at plus and minus the rms.",
             )
         )
@@ -303,13 +297,14 @@ def prediction_section(models: Sequence[ModelEvaluation]) -> Section:
     reach = largest_residual(models)
     for k, model in enumerate(models, start=1):
         stem = PurePath(model.name).stem
-        cells = (
+        cells = [
             number(model.rms, f"{stem}.rms", ".4g"),
             number(model.rms_percent, f"{stem}.rms_percent", ".3f"),
             number(model.max_percent, f"{stem}.max_percent"),
-            number(model.gain_percent, f"{stem}.gain_percent", ".1f"),
-        )
-        rows.append(Row(model.name, shown(model.output_unit), cells))
+        ]
+        if len(models) > 1:
+            cells.append(number(model.gain_percent, f"{stem}.gain_percent", ".1f"))
+        rows.append(Row(model.name, shown(model.output_unit), tuple(cells)))
         pictures.append(
             picture(
                 figures.prediction(model, reach),

@@ -42,7 +42,7 @@ class Metric:
     name: str
     values: tuple[float | None, ...]
     change: float | None  # last minus first of those that have it
-    better: bool | None  # None: no change, or nothing to compare
+    better: bool | None  # None: no change beyond the spread between repeats, or nothing to compare
 
 
 def compare(
@@ -83,14 +83,19 @@ def compare(
         raise DataError(
             "evaluations and sessions cannot be compared with each other", hint="give one kind or the other"
         )
-    every = [_of_session(one) for one in sessions] or _figures(
-        [one for one in evaluations if isinstance(one, Evaluation)]
-    )
+    tested = [one for one in evaluations if isinstance(one, Evaluation)]
+    every = [_of_session(one) for one in sessions] or _named(tested, [one.figures() for one in tested])
+    spreads = _named(tested, [_spreads(one) for one in tested])
     headlines = tuple(f".{one}" for one in HEADLINES)
     wanted = [
         n for n in dict.fromkeys(n for one in every for n in one) if everything or n.endswith(headlines)
     ]
-    metrics = tuple(_metric(name, tuple(one.get(name) for one in every)) for name in wanted)
+    metrics = tuple(
+        _metric(
+            name, tuple(one.get(name) for one in every), max((s.get(name, 0.0) for s in spreads), default=0.0)
+        )
+        for name in wanted
+    )
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
         listed = ", ".join(names) or "these evaluations"
         raise DataError(
@@ -100,8 +105,22 @@ def compare(
     return metrics
 
 
-def _figures(evaluations: Sequence[Evaluation]) -> list[dict[str, float]]:
-    """Figures of each evaluation by name, alike where they are to be compared.
+def _spreads(one: Evaluation) -> dict[str, float]:
+    """How far each figure goes from one repeat to the next, by its name; of none that is not known."""
+    found = {}
+    for w in one.waveforms:
+        stem, spread = f"{w.name}.{w.inversion}", w.error_spread_percent
+        found[f"{stem}.mean_error_reduction_percent"] = 100.0 * spread / w.scaled.mean_abs_error_percent
+        for drive in ("scaled", "compensated"):
+            found |= dict.fromkeys((f"{stem}.{drive}.{m}_error_percent" for m in ("mean_abs", "rms")), spread)
+            found[f"{stem}.{drive}.max_abs_error_percent"] = w.noise_percent
+            # a beat goes up and down through the full force: twice the error in area
+            found[f"{stem}.{drive}.hysteresis_percent"] = 2.0 * spread
+    return {name: spread for name, spread in found.items() if np.isfinite(spread)}
+
+
+def _named(evaluations: Sequence[Evaluation], every: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+    """Figures of each evaluation under names that are alike where they are to be compared.
 
     Where no evaluation holds a pulse twice its inversion is left out of the name: before and after may
     differ by just that. A single model is "model", whatever its file is called.
@@ -109,17 +128,17 @@ def _figures(evaluations: Sequence[Evaluation]) -> list[dict[str, float]]:
     by_pulse = all(len({w.name for w in one.waveforms}) == len(one.waveforms) for one in evaluations)
     one_model = all(len(one.models) < 2 for one in evaluations)
     found = []
-    for one in evaluations:
+    for one, figures in zip(evaluations, every, strict=True):
         renamed = {f"{w.name}.{w.inversion}.": f"{w.name}." for w in one.waveforms} if by_pulse else {}
         if one_model:
             renamed |= {f"{m.short_name}.": "model." for m in one.models}
-        figures = one.figures()
+        named = figures
         for old, new in renamed.items():
-            figures = {
+            named = {
                 new + name.removeprefix(old) if name.startswith(old) else name: value
-                for name, value in figures.items()
+                for name, value in named.items()
             }
-        found.append(figures)
+        found.append(named)
     return found
 
 
@@ -137,10 +156,10 @@ def _of_session(one: Session) -> dict[str, float]:
     return found
 
 
-def _metric(name: str, values: tuple[float | None, ...]) -> Metric:
+def _metric(name: str, values: tuple[float | None, ...], spread: float) -> Metric:
     there = [v for v in values if v is not None]
     change = there[-1] - there[0] if len(there) > 1 else None
     better = None
-    if change is not None and abs(change) >= _SAME:
+    if change is not None and abs(change) >= max(_SAME, spread):
         better = (change > 0) == name.endswith(_RISING)
     return Metric(name, values, change, better)

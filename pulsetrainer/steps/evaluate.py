@@ -119,9 +119,20 @@ def _of_playback(name: str, playback: Playback) -> WaveformEvaluation:
         * (1.0 - compensated.mean_abs_error_percent / scaled.mean_abs_error_percent),
         full_force=waveform.full_force,
         noise_percent=100.0 * spread / waveform.full_force,
+        error_spread_percent=max(
+            _error_spread(playback, drive) for drive in (playback.scaled, playback.compensated)
+        ),
         output_unit=waveform.output_unit,
         temperature_K=playback.temperature_K,
     )
+
+
+def _error_spread(playback: Playback, drive: DrivePlayback) -> float:
+    """Standard deviation of the mean error from repeat to repeat, % of full force; 0 for one repeat."""
+    waveform = playback.waveform
+    error = np.abs(drive.output - waveform.target)[:, waveform.scored]
+    means = 100.0 * np.nanmean(error, axis=1) / waveform.full_force
+    return float(np.std(means, ddof=1)) if means.size > 1 else 0.0
 
 
 def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
