@@ -185,9 +185,10 @@ class Job:
         from pulsetrainer.files import store
         from pulsetrainer.files.series import series_of
         from pulsetrainer.files.table import write_table
+        from pulsetrainer.report.names import headed
 
         columns = series_of(noun)
-        title = f"{noun.kind}: {store.read_header(source).title}"
+        title = headed(noun.kind, store.read_header(source).title)
         write_table(path, columns, comments=(title,), overwrite=self.overwrite)
         return columns
 

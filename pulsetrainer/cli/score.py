@@ -21,8 +21,9 @@ def sheet(job: Job, html: Path, session: Session, header: Header) -> None:
     from pulsetrainer.report.score_sheet import render_session
     from pulsetrainer.steps.quiz import score
 
+    asked = header.provenance.parameters
     result = None if session.quiz is None else score(session.quiz)
-    job.page(html, partial(render_session, score=result), session, header)
+    job.page(html, partial(render_session, score=result, asked=asked), session, header)
 
 
 def say(job: Job, path: Path, html: Path | None, session: Session) -> None:
@@ -78,9 +79,9 @@ def tell(
         "force": f"{done.reach.low:.2f} .. {done.reach.high:.2f} N at full amplitude",
         "error": f"{done.figures['mean_abs_error_percent']:.2f} % mean, "
         f"{done.figures['max_abs_error_percent']:.2f} % at most, of full force",
-        "timing": f"{done.figures['beat_timing_max_ms']:.2f} ms at most",
-        "variation": f"{done.figures['rate_cv_percent']:.3f} % of rate, "
-        f"{done.figures['amplitude_cv_percent']:.2f} % of height",
+        "timing": f"beats begin within {done.figures['beat_timing_max_ms']:.2g} ms of their time",
+        "as asked": f"rate within {done.figures['rate_cv_percent']:.2g} %, "
+        f"height within {done.figures['amplitude_cv_percent']:.2g} % (standard deviation)",
         "underruns": done.underruns,
     }
     if kelvins:

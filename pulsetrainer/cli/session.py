@@ -160,7 +160,7 @@ def _press(
     steered = hands.steer(job.screen, chosen, shapes, by_key=by_key)
     with job.open_device(*device) as opened:
         info = opened.info
-        header = job.header("a session under way")
+        header = job.header("Session under way")
         with (
             SessionRecorder(out, header, overwrite=job.overwrite, signal="session") as recorder,
             job.working("session") as progress,
@@ -183,7 +183,7 @@ def _press(
             )
             quiz = blind.quiz(out.stem) if blind else None
             job.know("seed", seed)
-            header = job.header(f"session on {info.serial}", device=job.device(info))
+            header = job.header(f"Session on {info.serial}", device=job.device(info))
             recorder.keep(done.fields | {"quiz": quiz}, header)
             recorder.finish(complete=not done.fault, dropped_samples=done.dropped)
     tell(job, out, html, done, quiz, info)

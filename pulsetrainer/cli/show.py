@@ -28,6 +28,7 @@ def show(
     from pulsetrainer.artefacts import Diagnosis, Evaluation
     from pulsetrainer.files import store
     from pulsetrainer.report.facts import facts
+    from pulsetrainer.report.names import headed
 
     with job.working("reading"):
         artefact, header = job.load_any(file), store.read_header(file)
@@ -42,7 +43,7 @@ def show(
             "facts": found,
         }
     )
-    title = f"{file}: {artefact.kind}, {header.title}, {header.created}"
+    title = f"{file}: {headed(artefact.kind, header.title)}, {header.created}"
     if isinstance(artefact, Evaluation):
         job.screen.facts(title, {})
         show_tables(job.screen, artefact)

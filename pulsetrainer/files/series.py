@@ -85,7 +85,7 @@ def _repeats(played: Playback) -> list[tuple[str, FloatArray]]:
     repeats = max(one.output.shape[0] for one in (played.compensated, played.scaled))
     target = _heading("target", played.waveform.output_unit)
     found = [
-        (_heading("repeat", "1"), np.repeat(np.arange(1.0, repeats + 1.0), played.time_s.size)),
+        ("repeat", np.repeat(np.arange(1.0, repeats + 1.0), played.time_s.size)),
         (_heading(TIME, "s"), np.tile(played.time_s, repeats)),
         (target, np.tile(played.waveform.target, repeats)),
     ]
@@ -124,4 +124,4 @@ def _below(parts: Sequence[Sequence[tuple[str, FloatArray]]]) -> list[tuple[str,
         )
         for name in headings
     ]
-    return [(_heading("number", "1"), number), *zip(headings, columns, strict=True)] if named else []
+    return [("number", number), *zip(headings, columns, strict=True)] if named else []

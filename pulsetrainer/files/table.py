@@ -251,6 +251,7 @@ def write_table(
     ):
         out.writelines(f"# {line}\n" for comment in comments for line in comment.splitlines())
         out.write(header.getvalue())
-        rows = zip(*(map(repr, array.tolist()) for array in arrays), strict=True)
+        # a whole number without a point reads back the same
+        rows = zip(*((repr(x).removesuffix(".0") for x in array.tolist()) for array in arrays), strict=True)
         while block := list(islice(rows, _WRITTEN_ROWS)):
             out.write("".join(f"{','.join(row)}\n" for row in block))

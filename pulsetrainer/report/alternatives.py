@@ -66,7 +66,7 @@ def tracking(played: WaveformEvaluation) -> str:
     return (
         f"Above: target force, {_range(played.target, played.output_unit)}, over time, "
         f"{_range(played.time_s, 's')}, with the measured force of the scaled and of the compensated drive. "
-        f"Below: their errors; the max error is {played.scaled.max_abs_error_percent:.2f} % of full force for "
+        f"Below: their errors, at most {played.scaled.max_abs_error_percent:.2f} % of full force for "
         f"the scaled and {played.compensated.max_abs_error_percent:.2f} % for the compensated drive."
     )
 
@@ -75,7 +75,7 @@ def loops(played: WaveformEvaluation) -> str:
     """Say how wide each loop is."""
     return (
         "Measured force over target force, beside the diagonal where both are equal. "
-        f"The scaled drive makes a loop area of {played.scaled.hysteresis_percent:.2f} % of full force squared, "
+        f"The scaled drive makes a loop area of {played.scaled.hysteresis_percent:.2f} % of full force², "
         f"the compensated drive one of {played.compensated.hysteresis_percent:.2f} %."
     )
 

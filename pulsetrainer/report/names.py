@@ -42,6 +42,7 @@ NAMES: Final = {
     "coverage_percent": Named("cells switched", "%"),
     # of a session
     "nrmse": Named("rms error", "of the target's range"),
+    "nrmse_percent": Named("rms error", "% of the target's range"),
     "error_jnd": Named("mean error", "just noticeable differences"),
     "beat_timing_max_ms": Named("max timing error", "ms"),
     "rate_cv_percent": Named("spread of the rate", "% of that asked for"),
@@ -63,3 +64,8 @@ def split(dotted: str) -> tuple[str, Named]:
     if drive in _DRIVES:
         return owner, named._replace(words=f"{named.words}, {drive}")
     return stem, named
+
+
+def headed(kind: str, title: str) -> str:
+    """Return a title that says of which kind the artefact is, once."""
+    return title if title.lower().startswith(kind) else f"{kind}: {title}"

@@ -2,36 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from pulsetrainer.artefacts import Quiz, Score, Session
 from pulsetrainer.report import session_figures
 from pulsetrainer.report.html import page
+from pulsetrainer.report.names import NAMES
 from pulsetrainer.report.views import Number, number, picture
 
 _FIGURES = (
-    ("mean_abs_error_percent", "mean absolute error", "% of full force", ".2f"),
-    ("max_abs_error_percent", "largest absolute error", "% of full force", ".2f"),
-    ("error_jnd", "mean absolute error", "just noticeable differences", ".3f"),
-    ("nrmse", "rms error", "of the range", ".4f"),
-    ("beat_timing_max_ms", "farthest that a beat began from its time", "ms", ".2f"),
-    ("rate_cv_percent", "variation of the rate", "%", ".3f"),
-    ("amplitude_cv_percent", "variation of the height", "%", ".3f"),
-    ("augmentation_index_error_percent", "error of the augmentation index", "%", ".2f"),
+    ("mean_abs_error_percent", ".2f"),
+    ("max_abs_error_percent", ".2f"),
+    ("error_jnd", ".3f"),
+    ("nrmse_percent", ".2f"),
+    ("beat_timing_max_ms", ".2f"),
+    ("rate_cv_percent", ".3f"),
+    ("amplitude_cv_percent", ".2f"),
+    ("augmentation_index_error_percent", ".2f"),
+)
+_RHYTHM = (
+    ("variability", "intervals vary by {:g} % (standard deviation)"),
+    ("respiration", "they swing by {:g} % with the breath"),
+    ("ectopic", "{:g} % of the beats come early"),
 )
 
 
-def render_session(session: Session, score: Score | None, **header: Any) -> str:
-    """Return the score sheet of a session, with the score of its quiz; ``header`` as in ``html.page``."""
+def render_session(
+    session: Session, score: Score | None, asked: Mapping[str, Any] | None = None, **header: Any
+) -> str:
+    """Return the score sheet of a session, with the score of its quiz; ``header`` as in ``html.page``.
+
+    ``asked`` are the options of the session; without them the sheet does not tell the rhythm.
+    """
     beats = session.beats.start_s.size
+    count = np.bincount(session.beats.pulse, minlength=len(session.pulses))
+    value = {name: getattr(session, name, 100.0 * session.nrmse) for name, _ in _FIGURES}
     return page(
         "session.html.j2",
         **header,
         session=session,
-        beats=beats,
-        rows=[
-            (words, unit, number(getattr(session, name), name, form)) for name, words, unit, form in _FIGURES
-        ],
+        pressed=[f"{name}: {number} beats" for name, number in zip(session.pulses, count, strict=True)],
+        rhythm=_rhythm(asked) if asked else None,
+        rows=[(*NAMES[name], number(value[name], name, form)) for name, form in _FIGURES],
         course=picture(
             session_figures.course(session),
             "course",
@@ -43,6 +58,15 @@ def render_session(session: Session, score: Score | None, **header: Any) -> str:
     )
 
 
+def _rhythm(asked: Mapping[str, Any]) -> str:
+    """Say which rhythm was asked for."""
+    given = {name: asked.get(name) for name, _ in _RHYTHM}  # of a file, so anything
+    return (
+        "; ".join(w.format(given[n]) for n, w in _RHYTHM if isinstance(given[n], float) and given[n])
+        or "even"
+    )
+
+
 def _quiz(quiz: Quiz, score: Score) -> dict[str, object]:
     low, high = score.interval
     facts = [
@@ -51,13 +75,16 @@ def _quiz(quiz: Quiz, score: Score) -> dict[str, object]:
         ("95 % interval [%]", Number(f"{100 * low:.0f} to {100 * high:.0f}")),
         ("by guessing [%]", number(100.0 * score.chance, "quiz.chance_percent", ".0f")),
         ("probability of as many by guessing", number(score.p_value, "quiz.p_value", ".2g")),
-        ("median time to the answer [s]", number(score.response_s, "quiz.response_s", ".1f")),
     ]
+    timed = bool(np.isfinite(quiz.response_s).any())
+    if timed:
+        facts.append(("median time to the answer [s]", number(score.response_s, "quiz.response_s", ".1f")))
     words = "What was asked, downwards, and what was answered, across; on the diagonal what is right."
     return {
         "learner": quiz.learner,
         "facts": facts,
-        "picture": picture(session_figures.confusion(quiz), "confusion", "Confusion matrix", words),
+        "timed": timed,
+        "picture": picture(session_figures.confusion(quiz), "confusion", "Answers", words),
         "questions": [
             (k, asked, said, number(float(seconds), "", ".1f"))
             for k, (asked, said, seconds) in enumerate(

@@ -9,9 +9,10 @@ from matplotlib.patches import Rectangle
 from pulsetrainer.artefacts import Quiz, Session
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import heat_figures, panels
-from pulsetrainer.report.style import BLUE, COLUMN_IN, INK, MEASURED, TARGET, VERMILION, label, styled
+from pulsetrainer.report.style import BLUE, COLUMN_IN, COMPENSATED, INK, TARGET, VERMILION, label, styled
 
 SHOWN_S = 6.0
+_UPRIGHT = 30  # letters of all names that stand side by side
 
 
 @styled
@@ -26,24 +27,26 @@ def course(session: Session) -> Figure:
         )
     warm_s, warm_K = session.temperature_s, session.temperature_K
     if warm_s is None or warm_K is None:
-        figure = Figure(figsize=(1.5 * COLUMN_IN, 5.6), layout="constrained")
+        figure = Figure(figsize=(COLUMN_IN, 4.8), layout="constrained")
         above, below = figure.subplots(2, 1, height_ratios=(1.5, 1.0))
     else:
-        figure = Figure(figsize=(1.5 * COLUMN_IN, 7.2), layout="constrained")
+        figure = Figure(figsize=(COLUMN_IN, 6.4), layout="constrained")
         above, below, lowest = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 0.8))
         heat_figures.temperature(lowest, warm_s, warm_K)
     middle = session.time_s[session.time_s.size // 2]
     near = np.abs(session.time_s - middle) <= 0.5 * SHOWN_S
     panels.trace(above, session.time_s[near], session.target[near], **TARGET, label="target")
-    panels.trace(above, session.time_s[near], session.output[near], **MEASURED, label="measured")
+    panels.trace(above, session.time_s[near], session.output[near], **COMPENSATED, label="measured")
     above.set_ylabel(label("force", session.output_unit))
     above.set_xlabel(label("time", "s"))
     above.set_title(f"{SHOWN_S:g} seconds from the middle" + ("" if session.complete else ", stopped early"))
     panels.headroom(above)
     beats = session.beats
     percent = 100.0 / session.full_force
-    below.plot(beats.start_s, percent * beats.max_error, ".", markersize=3, color=INK, label="largest")
-    below.plot(beats.start_s, percent * beats.mean_error, ".", markersize=3, color=VERMILION, label="mean")
+    below.plot(beats.start_s, percent * beats.max_error, ".", markersize=3, color=INK, label="max error")
+    below.plot(
+        beats.start_s, percent * beats.mean_error, ".", markersize=3, color=VERMILION, label="mean error"
+    )
     below.set_ylabel("error [% of full force]")
     below.set_xlabel(label("start of the beat", "s"))
     below.set_ylim(bottom=0.0)
@@ -55,8 +58,8 @@ def course(session: Session) -> Figure:
 def confusion(quiz: Quiz) -> Figure:
     """Return the confusion matrix: what was asked downwards, what was answered across."""
     size = len(quiz.choices)
-    side = min(2.2 + 0.55 * size, 1.5 * COLUMN_IN)
-    figure = Figure(figsize=(side, side), layout="constrained")
+    side = min(2.2 + 0.4 * size, COLUMN_IN)
+    figure = Figure(figsize=(COLUMN_IN, side), layout="constrained")
     axes = figure.subplots()
     count = np.asarray([list(row.values()) for row in quiz.confusion.values()])
     share = count / np.maximum(count.sum(axis=1, keepdims=True), 1)
@@ -66,11 +69,12 @@ def confusion(quiz: Quiz) -> Figure:
             corner = column - 0.5, row - 0.5
             axes.add_patch(Rectangle(corner, 1.0, 1.0, facecolor=colour, alpha=strength, linewidth=0))
             axes.text(column, row, str(value), ha="center", va="center")
-    axes.set_xticks(range(size), quiz.choices, rotation=40, ha="right")
+    axes.set_xticks(range(size), quiz.choices, rotation=0 if sum(map(len, quiz.choices)) < _UPRIGHT else 90)
     axes.set_yticks(range(size), quiz.choices)
     axes.set_xlim(-0.5, size - 0.5)
     axes.set_ylim(size - 0.5, -0.5)
     axes.set_aspect("equal")
+    axes.set_title("Answers: how often")
     axes.set_xlabel("answered")
     axes.set_ylabel("asked")
     axes.grid(visible=False)

@@ -20,7 +20,7 @@ from pulsetrainer.artefacts.evaluation import METRICS
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import alternatives, figures, heat_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
-from pulsetrainer.report.names import FORCE, NAMES
+from pulsetrainer.report.names import NAMES
 from pulsetrainer.report.panels import largest_residual
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
@@ -257,7 +257,10 @@ def model_section(model: Model, which: str = "") -> Section:
     ]
     if model.fit is not None:
         facts += [
-            (str(NAMES["coverage_percent"]), number(model.fit.coverage_percent, "model.fit.coverage_percent", ".1f")),
+            (
+                str(NAMES["coverage_percent"]),
+                number(model.fit.coverage_percent, "model.fit.coverage_percent", ".1f"),
+            ),
             (label("rms error of the fit", model.output_unit), number(model.fit.rms, "model.fit.rms", ".3g")),
             (str(NAMES["fit_rms_percent"]), number(model.fit.rms_percent, "model.fit.rms_percent", ".3g")),
         ]

@@ -82,7 +82,7 @@ def test_models_of_unequal_length_stand_one_below_another():
         return ModelEvaluation("m", 0.0, 0.0, 0.0, 0.0, t, np.ones(n), np.zeros(n))
 
     columns = series_of(Evaluation(models=(of(2, np.arange(2.0)), of(3, None))))
-    np.testing.assert_array_equal(columns["number [1]"], [1, 1, 2, 2, 2])
+    np.testing.assert_array_equal(columns["number"], [1, 1, 2, 2, 2])
     np.testing.assert_array_equal(columns["time [s]"], [0, 1, np.nan, np.nan, np.nan])
     np.testing.assert_array_equal(columns["measured output [N]"], np.ones(5))
 
