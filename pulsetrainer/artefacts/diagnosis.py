@@ -108,6 +108,8 @@ class Diagnosis(Shown):
     extended: Model | None = None  # weights refitted together with the causes found
     input_unit: str = "A"
     output_unit: str = "N"
+    input_quantity: str = ""  # of the model; empty in files of 0.1
+    output_quantity: str = ""
     held_out_gain_percent: float = float("nan")  # of all causes together; NaN where it was not measured
     lacks: tuple[str, ...] = ()  # what the records do not have: rates, holds, length
     notes: tuple[str, ...] = ()  # what a person should know about the records

@@ -86,6 +86,8 @@ def diagnosis_of(state: State) -> Diagnosis:
         else rms_of(state, state.extended) * of_samples / scale.span,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
+        input_quantity=model.input_quantity,
+        output_quantity=model.output_quantity,
         held_out_gain_percent=_held_out_gain(state),
         lacks=state.lacks,
         whole=state.is_whole(extended),

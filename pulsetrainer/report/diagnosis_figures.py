@@ -14,6 +14,7 @@ from pulsetrainer.report.style import (
     BLUE,
     COLUMN_IN,
     ERROR,
+    GREEN,
     GROUND,
     GUIDE,
     MODEL,
@@ -24,6 +25,8 @@ from pulsetrainer.report.style import (
 )
 
 _MOST_BARS = 10
+_WHOLE = 100.0 + 1e-9  # %
+_SHADES = {"yes": BLUE, "in doubt": GREEN, "no": MUTED}
 _MANY = 1.5  # decades: over fewer, an even scale shows more
 _SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side
 
@@ -35,7 +38,7 @@ def course(found: Diagnosis) -> Figure:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.3, 1.0))
     panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
     panels.trace(above, found.time_s, found.before, **MODEL, label="model, fitted anew")
-    above.set_ylabel(label(panels.quantity_of(found.output_unit), found.output_unit))
+    above.set_ylabel(label(found.output_quantity or panels.quantity_of(found.output_unit), found.output_unit))
     causes = ", ".join(one.cause for one in found.found) or found.verdict
     above.set_title(f"verdict: {causes}", wrap=True)
     panels.headroom(above)
@@ -51,7 +54,7 @@ def course(found: Diagnosis) -> Figure:
 
 
 @styled
-def profile(one: Profile, *, extended: bool) -> Figure:
+def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
     """Return the rms error against one quantity, before the extension and, where there is one, after."""
     figure = Figure(figsize=(_SMALL_IN, 2.6), layout="constrained")
     axes = figure.add_subplot()
@@ -67,7 +70,7 @@ def profile(one: Profile, *, extended: bool) -> Figure:
     if one.name == "direction":
         axes.set_xticks([-1, 0, 1], ["falling", "rest", "rising"])
         axes.margins(x=0.08)
-    axes.set_xlabel(axis_of(one))
+    axes.set_xlabel(axis_of(one, input_quantity))
     axes.set_ylabel(label("rms error left", one.output_unit))
     axes.set_ylim(bottom=0.0)
     panels.headroom(axes)
@@ -80,19 +83,20 @@ def _decades(at: FloatArray) -> float:
     return float(np.log10(sizes.max() / sizes.min())) if sizes.size else 0.0
 
 
-def axis_of(one: Profile) -> str:
+def axis_of(one: Profile, input_quantity: str = "") -> str:
     """Return what a profile is drawn over: the quantity, and its unit."""
+    name = input_quantity or panels.quantity_of(one.unit if one.name == "level" else "", "input")
     known = {
-        "rate": label("speed of the input", "input ranges/s"),
-        "direction": "direction of the input",
-        "level": label(panels.quantity_of(one.unit, "input"), one.unit),
+        "rate": label(f"speed of the {name}", "of its range, per s"),
+        "direction": f"direction of the {name}",
+        "level": label(name, one.unit),
         "frequency": label("frequency of the error", one.unit),
     }
     return known.get(one.name, label(one.name, one.unit))
 
 
 @styled
-def dependence(one: Dependence) -> Figure:
+def dependence(one: Dependence, output_quantity: str = "") -> Figure:
     """Return what a learned dependence adds to the output, with its 95 % band."""
     figure = Figure(figsize=(_SMALL_IN, 2.6), layout="constrained")
     axes = figure.add_subplot()
@@ -102,7 +106,9 @@ def dependence(one: Dependence) -> Figure:
     axes.axhline(0.0, **GUIDE)
     axes.set_xlabel(label(one.state, one.unit), wrap=True)
     panels.headroom(axes)
-    axes.set_ylabel(label(f"change of the {panels.quantity_of(one.output_unit)}", one.output_unit))
+    axes.set_ylabel(
+        label(f"change of the {output_quantity or panels.quantity_of(one.output_unit)}", one.output_unit)
+    )
     return figure
 
 
@@ -116,7 +122,7 @@ def ranking(found: Diagnosis) -> Figure:
     axes.barh(
         [one.cause for one in shown],
         share,
-        color=[BLUE if one.found else MUTED for one in shown],
+        color=[_SHADES[answer(one, quick=found.quick).partition(":")[0]] for one in shown],
         height=0.62,
     )
     for k, one in enumerate(shown):
@@ -128,9 +134,14 @@ def ranking(found: Diagnosis) -> Figure:
             va="center",
             fontsize=8.5,
         )
-    axes.set_xlim(0.0, 1.7 * max([*share, 1.0]))
+    axes.set_xlim(
+        0.0, 1.7 * max([*share, 1.0])
+    )  # room for the words beside the bars, but no share over 100 %
+    axes.set_xticks(
+        [tick for tick in axes.get_xticks() if tick <= min(1.2 * max(share, default=0.0), _WHOLE)]
+    )
     axes.set_xlabel("explains [% of the squared error beyond noise]")
     axes.grid(visible=False, axis="y")
-    keys = [Patch(color=BLUE, label="found"), Patch(color=MUTED, label="not found")]
-    figure.legend(handles=keys, loc="outside lower center", ncols=2)
+    keys = [Patch(color=colour, label=f"found: {words}") for words, colour in _SHADES.items()]
+    figure.legend(handles=keys, loc="outside lower center", ncols=len(keys))
     return figure

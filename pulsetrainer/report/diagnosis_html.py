@@ -100,7 +100,9 @@ def _course(found: Diagnosis) -> Picture:
 
 def _dependences(found: Diagnosis) -> list[Picture]:
     return [
-        picture(figures.dependence(one), f"dependence-{k}", "Learned dependence", one.text)
+        picture(
+            figures.dependence(one, found.output_quantity), f"dependence-{k}", "Learned dependence", one.text
+        )
         for k, one in enumerate(found.dependences, start=1)
     ]
 
@@ -108,15 +110,18 @@ def _dependences(found: Diagnosis) -> list[Picture]:
 def _profiles(found: Diagnosis) -> list[Picture]:
     return [
         picture(
-            figures.profile(one, extended=found.extended_percent < found.static_percent),
+            figures.profile(
+                one, found.input_quantity, extended=found.extended_percent < found.static_percent
+            ),
             f"profile-{one.name}",
             f"Error against {one.name}",
-            f"Where the error is, by {figures.axis_of(one)}: rms of the averages in each group.",
+            f"Where the error is, by {figures.axis_of(one, found.input_quantity)}: rms of each group."
+            + (" A speed of 1 goes through the whole range in a second." if one.name == "rate" else ""),
         )
         for one in found.profiles
     ]
 
 
 def _ranking(found: Diagnosis) -> Picture:
-    words = "How much of the error beyond noise each cause explains; those that were found in colour."
+    words = "How much of the error beyond noise each cause explains; found in blue, in doubt in green."
     return picture(figures.ranking(found), "ranking", "Ranking of the causes", words)

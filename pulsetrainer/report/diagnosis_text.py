@@ -25,7 +25,7 @@ ERRORS = (
 COLUMNS = {
     "explains": "share of the squared error beyond noise that goes with this cause in the model; shares of "
     "causes that look alike overlap",
-    "gain": "the same share, on parts of the recordings that were left out of the fit",
+    "held-out share": "the same share, on parts of the recordings that were left out of the fit",
 }
 
 
@@ -64,7 +64,7 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     others = [one for one in found.causes if not one.found][: max(_SHOWN - len(found.found), 0)]
     yield Table(
         "causes, strongest first",
-        ("cause", "found", "explains, %", "gain, %"),
+        ("cause", "found", "explains, %", "held-out\nshare, %"),
         tuple(_row(one, found) for one in (*found.found, *others)),
     )
     yield Facts("in this table", COLUMNS)

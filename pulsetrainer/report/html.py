@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import PurePath
@@ -13,6 +14,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.artefacts.evaluation import PUBLISHED
 from pulsetrainer.report import views
+
+_UNIT = re.compile(r"(?<=\d) (?=%|[A-Za-z]{1,2}\b)")
 
 
 def page(
@@ -69,7 +72,7 @@ def render_evaluation(
 @lru_cache(maxsize=1)
 def environment() -> Environment:
     """Return the template environment of the reports."""
-    return Environment(
+    made = Environment(
         loader=PackageLoader("pulsetrainer.report"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -77,6 +80,13 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
+    made.filters["unbroken"] = unbroken
+    return made
+
+
+def unbroken(text: str) -> str:
+    """Return a text in which no line breaks between a number and its unit."""
+    return _UNIT.sub("\N{NO-BREAK SPACE}", text)
 
 
 def indented(text: str) -> str:

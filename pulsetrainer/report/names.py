@@ -18,7 +18,8 @@ class Named(NamedTuple):
     unit: str = ""
 
     def __str__(self) -> str:
-        return f"{self.words} [{self.unit}]" if self.unit else self.words
+        unit = self.unit.replace(" ", "\N{NO-BREAK SPACE}")  # a unit is not torn
+        return f"{self.words} [{unit}]" if unit else self.words
 
 
 NAMES: Final = {

@@ -81,10 +81,15 @@ def orbit(axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
     axes.plot(x[kept], y[kept], **style)
 
 
-def headroom(axes: Axes, share: float = 0.16) -> None:
-    """Make room above the curves and put the legend there, in one row: it never covers a curve."""
+def room(axes: Axes, share: float = 0.16) -> None:
+    """Make room above the curves."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + share * (high - low))
+
+
+def headroom(axes: Axes, share: float = 0.16) -> None:
+    """Make room above the curves and put the legend there, in one row: it never covers a curve."""
+    room(axes, share)
     axes.legend(loc="upper left", ncols=4, columnspacing=1.2, borderaxespad=0.2)
 
 
@@ -104,7 +109,7 @@ def density(panel: FigureBase, model: Model) -> None:
     axes = panel.add_subplot()
     axes.set_aspect("equal")
     axes.grid(visible=False)
-    top = _scale(model, rows != columns)
+    top, ends = scale(model)
     signed = model.form == "signed"
     mesh = axes.pcolormesh(
         edges,
@@ -127,10 +132,6 @@ def density(panel: FigureBase, model: Model) -> None:
     axes.set_xlabel(label("β, switches down at: " + model.edges_quantity, model.edges_unit))
     axes.set_ylabel(label("α, switches up at: " + model.edges_quantity, model.edges_unit))
     axes.set_title("Preisach density" + ("" if model.form == "direct" else f", {model.form} form"))
-    sizes = np.abs(model.weights[model.covered]) if signed else model.weights[model.covered]
-    ends: Literal["max", "both", "neither"] = "neither"
-    if np.any(sizes > top):
-        ends = "both" if signed else "max"
     axes.text(
         0.97, 0.06, _facts(model, ends), transform=axes.transAxes, ha="right", va="bottom", linespacing=1.5
     )
@@ -138,16 +139,23 @@ def density(panel: FigureBase, model: Model) -> None:
     bar.outline.set_visible(False)
 
 
-def _scale(model: Model, off_diagonal: BoolArray) -> float:
-    """Return the density at the upper end of the colour scale.
+def scale(model: Model) -> tuple[float, Literal["max", "both", "neither"]]:
+    """Return the density at the upper end of the colour scale, and at which ends there is more.
 
     Cells on the diagonal hold the reversible part: however large, it must not darken the rest.
     """
-    for chosen in (model.covered & off_diagonal, model.covered):
+    rows, columns = np.tril_indices(model.levels)
+    top = 1.0
+    for chosen in (model.covered & (rows != columns), model.covered):
         sizes = np.abs(model.weights[chosen & (model.weights != 0)])
         if sizes.size:
-            return float(min(sizes.max(), _DENSITY_REACH * np.quantile(sizes, _DENSITY_QUANTILE)))
-    return 1.0
+            top = float(min(sizes.max(), _DENSITY_REACH * np.quantile(sizes, _DENSITY_QUANTILE)))
+            break
+    signed = model.form == "signed"
+    seen = model.weights[model.covered]
+    if not np.any((np.abs(seen) if signed else seen) > top):
+        return top, "neither"
+    return top, "both" if signed else "max"
 
 
 def _cell(edges: FloatArray, i: int, j: int) -> list[tuple[float, float]]:
@@ -186,13 +194,13 @@ def fit(
         loop.plot(record.wild_input, record.wild_output, **wild, label="left out")
     loop.set_xlabel(label(input_quantity, record.input_unit))
     loop.set_ylabel(label(output_quantity, record.output_unit))
-    loop.set_title("Identification signal")
+    loop.set_title("Measured and model")
     headroom(loop, 0.1)
     x, name = abscissa(record.time_s, record.output.size)
     residual(below, x, record.output - record.predicted, record.rms)
     below.set_xlabel(name)
     below.set_ylabel(label("residual", record.output_unit))
-    below.set_title(f"Residual: rms {record.rms_percent:.3g} % of span, dotted")
+    below.set_title(f"Residual: rms {record.rms_percent:.3g} % of span (dotted: ± rms)")
 
 
 def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> None:
@@ -213,7 +221,7 @@ def prediction(panel: FigureBase, model: ModelEvaluation, reach: float | None = 
     trace(above, x, model.output, **GROUND, label="measured")
     trace(above, x, model.predicted, **MODEL, label="predicted")
     above.set_ylabel(label(quantity_of(model.output_unit), model.output_unit))
-    above.set_title(f"{PurePath(model.name).stem}: rms {model.rms_percent:.3g} % of span, dotted below")
+    above.set_title(f"{PurePath(model.name).stem}: rms {model.rms_percent:.3g} % of span (dotted: ± rms)")
     headroom(above)
     residual(below, x, model.output - model.predicted, model.rms)
     if reach is not None and np.isfinite(reach) and reach > 0:
@@ -257,7 +265,7 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
     for one, style in zip(played, cycle(METHODS)):
         size = min(time.size, one.target.size)
         x, measured, target = time[:size], one.compensated.output[:size], one.target[:size]
-        shown = f"{one.inversion}, mean error {one.compensated.mean_abs_error_percent:.2g} %"
+        shown = f"{one.inversion}, mean error {one.compensated.mean_abs_error_percent:.2f} %"
         trace(above, x, measured, **style, label=shown)
         trace(below, x, 100.0 * (measured - target) / one.full_force, **style)
     above.set_ylabel(label("force", first.output_unit))
@@ -286,14 +294,14 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
         drawn.append((one.inversion if several else "compensated", one, one.compensated, style))
     for name, one, drive, style in drawn:
         beat = slice(0, one.target.size // beats(one.target))
-        shown = f"{name}, loop {drive.hysteresis_percent:.3g} %"
+        shown = f"{name}, loop area {drive.hysteresis_percent:.2f} %"
         orbit(axes, one.target[beat], drive.output[beat], **style, label=shown)
     axes.set_aspect("equal")
     axes.set_xlabel(label("target", first.output_unit))
     axes.set_ylabel(label("force", first.output_unit))
     axes.set_title(f"{first.name if several else _played_title(first)}: one beat")
     # outside, since inside a loop would run through
-    panel.legend(loc="outside lower center", ncols=2 if several else 3, columnspacing=1.2)
+    panel.legend(loc="outside lower center")
 
 
 def drives(panel: FigureBase, waveform: Waveform) -> None:
@@ -308,9 +316,15 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label=waveform.inversion)
     below.set_ylabel(label(f"drive: {quantity_of(waveform.input_unit)}", waveform.input_unit))
     below.set_xlabel(label("time", "s"))
-    for axes in (above, below):
-        unscored(axes, waveform)
-        headroom(axes)
+    unscored(above, waveform)
+    unscored(below, waveform, name="")
+    before = int(np.argmax(waveform.scored))
+    if before:
+        middle = 0.5 * float(waveform.time_s[0] + waveform.time_s[before])
+        room(below)
+        over = below.get_xaxis_transform()
+        below.text(middle, 0.98, "lead-in, which sets the memory", transform=over, ha="center", va="top")
+    panel.legend(loc="outside lower center", ncols=5, columnspacing=1.2)
 
 
 def passes(panel: FigureBase, waveform: Waveform) -> None:
@@ -332,7 +346,7 @@ def passes(panel: FigureBase, waveform: Waveform) -> None:
     panel.legend(loc="outside lower center", ncols=3)
 
 
-def unscored(axes: Axes, waveform: Waveform) -> None:
+def unscored(axes: Axes, waveform: Waveform, name: str = "not scored") -> None:
     """Shade the lead-in and whatever else does not count in the evaluation."""
     edges = np.flatnonzero(np.diff(np.concatenate(([True], waveform.scored, [True])).astype(np.int8)))
     last = waveform.time_s.size - 1
@@ -340,10 +354,10 @@ def unscored(axes: Axes, waveform: Waveform) -> None:
         axes.axvspan(
             waveform.time_s[min(start, last)],
             waveform.time_s[min(stop, last)],
-            color=GRID,
-            alpha=0.5,
+            color=MUTED,
+            alpha=0.2,
             lw=0,
-            label="not scored" if start == 0 else None,
+            label=name or None if start == 0 else None,
         )
 
 

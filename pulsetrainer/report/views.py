@@ -21,7 +21,7 @@ from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import alternatives, figures, heat_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
 from pulsetrainer.report.names import NAMES
-from pulsetrainer.report.panels import largest_residual
+from pulsetrainer.report.panels import largest_residual, scale
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
 
@@ -252,7 +252,8 @@ def model_section(model: Model, which: str = "") -> Section:
             "Preisach density",
             alternatives.density(model),
             "The density over the levels at which relays switch up (α) and down (β). "
-            "The diagonal is the reversible part; orange lies beyond the scale.",
+            "The diagonal is the reversible part"
+            + ("; orange lies beyond the scale." if scale(model)[1] == "max" else "."),
         )
     ]
     if model.fit is not None:
