@@ -88,8 +88,22 @@ def _entry(name: str, verb: Any, level: int = 3) -> Iterator[str]:
             yield f"{_code(' '.join(said.split()))}\n"
 
 
+class _Plain(str):
+    """An annotation as it was written, without the quotes that a text has in a signature."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
 def _signature(verb: Any) -> str:
-    text = str(inspect.signature(verb)).replace("'", "")
+    written = inspect.signature(verb)
+    plain = [
+        one if one.annotation is one.empty else one.replace(annotation=_Plain(one.annotation))
+        for one in written.parameters.values()
+    ]
+    text = str(written.replace(parameters=plain, return_annotation=_Plain(written.return_annotation)))
     text = re.sub(r"pulsetrainer\.[a-z_.]*", "", text)
     return re.sub(r" = <function [^>]*>", " = silent", text)
 

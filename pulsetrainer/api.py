@@ -30,7 +30,7 @@ from pulsetrainer.steps.tune import tune as _tune
 
 
 def load(path: Path | str) -> Any:
-    """Return the artefact in a file: a Run, Model, Waveform, Playback, Evaluation or Diagnosis.
+    """Return the artefact in a file: a Run, Model, Waveform, Playback, Evaluation, Diagnosis or Session.
 
     Raises
     ------

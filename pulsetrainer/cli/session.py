@@ -30,7 +30,7 @@ def session(
     model: Annotated[Path, typer.Option(help="Model of the device, best an extended one.")],
     out: Out,
     pulses: Annotated[
-        str, typer.Option(help="Names of the library or CSV files, separated by commas.")
+        str, typer.Option(help="Names of the library or CSV files, by commas; in turn, an equal share each.")
     ] = "normal",
     rate: Annotated[
         float | None,
