@@ -78,7 +78,7 @@ class Follower:
         if outcome.produced >= 0:
             dropped = outcome.produced - received
         else:  # the device is gone: what is missing between the samples that came
-            dropped = player.last_tick // player.decimation + 1 - received if received else 0
+            dropped = player.last_tick // player.decimation + 1 - received
         return Trace(
             tick=block.tick,
             reference_A=block.reference_A,

@@ -84,7 +84,7 @@ class Player:
         self._checked = 0  # so many samples are known to have arrived as they were sent
         self._told_end = not feed.is_open
         self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
-        self._play_session = -1
+        self._play_session: int | None = None  # known once the reference has arrived
         self._tick = 0  # latest known tick of the device
         self._recorded_tick = -1  # of the last sample received
         self._tick_at_send = 0
@@ -270,15 +270,15 @@ class Player:
                 self._request(m.Start())
                 self._stream()
             except AbandonedError:  # it is to be stopped
-                if self._play_session < 0:
+                if self._play_session is None:
                     return Outcome(0, played_to_end=False, fault=self._stop_reason)
             except RefusedError as error:
-                if self._play_session < 0:
+                if self._play_session is None:
                     raise
                 refused = error.message  # it left the state we thought it in; its status will say why
             return self._judge(self._finish(), refused)
         except (PortLostError, NoAnswerError) as error:
-            if self._play_session < 0:
+            if self._play_session is None:
                 raise
             return Outcome(-1, played_to_end=False, fault=error.message, remedy=error.hint)
         finally:

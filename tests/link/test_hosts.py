@@ -17,6 +17,7 @@ from pulsetrainer.device.limits import Limits
 from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.session import RefusedError
+from pulsetrainer.device.wording import describe_not_off, flows_A
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.simulation.build import firmware_executable
 from wording import raises
@@ -103,6 +104,24 @@ def test_current_that_flows_on_is_said_before_anything_else():
     assert trace.fault.startswith("the output could not be switched off: 2.4 A still flow")
     assert "hard limit" in trace.fault
     assert "plug" in trace.remedy
+
+
+@pytest.mark.parametrize(
+    ("state", "current", "flows"),
+    [
+        (State.IDLE, 990, 0.0),
+        (State.IDLE, 1010, 0.101),
+        (State.FAULT, 1010, 0.101),
+        (State.RUNNING, 1010, 0.0),
+        (State.RAMPING, 1010, 0.0),
+    ],
+)
+def test_a_tenth_of_an_ampere_flows_on(state, current, flows):
+    """In every state in which the output is off; less is the zero of the sensor."""
+    nothing = dict.fromkeys([name for name, _ in m.StatusReply.wire_fields()], 0)
+    status = m.StatusReply(**nothing | {"state": state, "current": current})
+    assert flows_A(status) == pytest.approx(flows)
+    assert bool(describe_not_off(status)) is (flows > 0)
 
 
 def test_current_that_flows_at_rest_is_said_without_the_device_knowing():

@@ -131,6 +131,26 @@ def test_too_little_is_not_judged():
     assert ForceWatch().finish() == ""
 
 
+@pytest.mark.parametrize(
+    ("rms_A", "moves_s", "slope", "dead"),
+    [
+        (0.105, 1.0, 0.45, True),  # of the current in the last second ...
+        (0.095, 1.0, 0.45, False),
+        (0.053, 5.0, 0.45, True),  # ... and over five
+        (0.047, 5.0, 0.45, False),
+        (0.105, 1.0, 0.55, False),  # N/A: alive
+        (0.053, 5.0, 0.55, False),
+    ],
+)
+def test_how_far_the_current_moves_before_a_force_must_follow(rms_A, moves_s, slope, dead):
+    """A tenth of an ampere within a second, half of it within five; half a newton per ampere is enough."""
+    time_s = np.arange(5000) / 1000
+    moves = np.sin(2 * np.pi * 5 * time_s) * (time_s >= 5.0 - moves_s)
+    current = 0.2 + np.sqrt(2.0) * rms_A * moves
+    force = 1.0 + slope * current + 1e-4 * (np.arange(5000) % 2)
+    assert ("does not follow" in judge_force(time_s, current, force)) is dead
+
+
 @pytest.mark.parametrize("piece", [1, 19, 3000])
 def test_the_watch_finds_the_same_in_any_pieces(piece):
     """However the samples come, a force that dies after 20 s of play is found soon, and not before."""
