@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import groupby
 
 import form_devices as devices
 import numpy as np
@@ -155,6 +156,64 @@ def test_a_median_of_neighbours_is_what_it_says():
     assert np.flatnonzero(wild.isolated(u)).tolist() == [77, 78, 79]
     u[80] -= 2.0  # four in a row are no exceptions
     assert not wild.isolated(u).any()
+
+
+def _far_one_by_one(values, motion, usual):
+    """Sorted windows of seven, mirrored at the ends; quantiles of the usual ones."""
+    n = values.size
+    around = [values[2 * (n - 1) - k if k >= n else abs(k)] for k in range(-3, n + 3)]
+    apart = np.array([abs(values[k] - sorted(around[k : k + 7])[3]) for k in range(n)])
+    body = np.quantile(values[usual], 0.99) - np.quantile(values[usual], 0.01)
+    tail = 3.2 * np.quantile(apart[usual], 0.95)
+    return [apart[k] > max(tail + motion[k], 0.01 * body) for k in range(n)]
+
+
+def _exceptions_one_by_one(found):
+    """Runs of up to three, unless they are more than a tenth of all."""
+    runs = [(flag, len(list(run))) for flag, run in groupby(found.tolist())]
+    kept = [flag and count <= 3 for flag, count in runs for _ in range(count)]
+    return kept if sum(kept) <= 0.1 * len(kept) else [False] * len(kept)
+
+
+def _jumps_one_by_one(values):
+    """Of the steps that end at either neighbour, the larger one, less the usual step."""
+    steps = [abs(values[k + 1] - values[k]) for k in range(values.size - 1)]
+    usual = np.median(steps)
+    return [
+        max([0.0, *(steps[j] - usual for j in (k - 2, k + 1) if 0 <= j < len(steps))])
+        for k in range(values.size)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_is_far_off_sample_by_sample(seed):
+    """Against loops over the samples: distances, short runs, jumps of a prediction, and all together."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(50, 90))
+    wild_ones = rng.random(n) < 0.08 * (1 + seed % 2)
+    said = np.cumsum(rng.laplace(size=n)) * (10.0 if seed % 3 else 0.5)
+    values = 0.05 * rng.normal(size=n) * (seed % 4 > 0) + wild_ones * rng.uniform(0.1, 4.0, n)
+    doubt = (rng.random(n) < 0.3) & wild_ones
+    motion = rng.uniform(0.0, 1.0, n)
+    assert wild._far(values, motion, ~doubt).tolist() == _far_one_by_one(values, motion, ~doubt)
+    for found in (wild_ones, rng.random(n) < 0.3 * rng.random()):
+        assert wild._exceptions(found).tolist() == _exceptions_one_by_one(found)
+    assert wild._jumps_beside(said) == pytest.approx(_jumps_one_by_one(said))
+    span = 10.0
+    expected = np.array(_far_one_by_one(values, 0.1 + np.array(_jumps_one_by_one(said)), ~doubt))
+    alone = _exceptions_one_by_one(expected & ~doubt)
+    (found,) = wild.off([said + values], [said], span, [doubt])
+    assert found.tolist() == ((expected & doubt) | alone).tolist()
+
+
+@pytest.mark.parametrize(("n", "level", "told"), [(50, 0.49, True), (49, 0.49, False), (50, 0.51, False)])
+def test_a_fit_that_tells_nothing_returns_what_was_doubtful(n, level, told):
+    """Fewer than fifty samples, or a residual of more than a twentieth of the span."""
+    doubt = np.arange(n) == 7
+    left = np.full(n, level)
+    left[20] = 5.0
+    (found,) = wild.off([left], [np.zeros(n)], 10.0, [doubt])
+    assert np.flatnonzero(found).tolist() == [20 if told else 7]
 
 
 @pytest.mark.parametrize("at", [98, 99, 100, 101, 102])
