@@ -192,10 +192,11 @@ def test_what_is_far_off_sample_by_sample(seed):
     n = int(rng.integers(50, 90))
     wild_ones = rng.random(n) < 0.08 * (1 + seed % 2)
     said = np.cumsum(rng.laplace(size=n)) * (10.0 if seed % 3 else 0.5)
-    values = 0.05 * rng.normal(size=n) * (seed % 4 > 0) + wild_ones * rng.uniform(0.1, 4.0, n)
-    doubt = (rng.random(n) < 0.3) & wild_ones
-    motion = rng.uniform(0.0, 1.0, n)
-    assert wild._far(values, motion, ~doubt).tolist() == _far_one_by_one(values, motion, ~doubt)
+    values = 0.05 * rng.normal(size=n) * (seed % 4 > 1) + wild_ones * 10.0 ** rng.uniform(-3.0, 1.0, n)
+    doubt = (rng.random(n) < (0.3 if seed % 3 else 1.0)) & wild_ones
+    motion = rng.uniform(0.0, 1.0, n) * (seed % 3)
+    moved = values + 0.01 * np.arange(n)
+    assert wild._far(moved, motion, ~doubt).tolist() == _far_one_by_one(moved, motion, ~doubt)
     for found in (wild_ones, rng.random(n) < 0.3 * rng.random()):
         assert wild._exceptions(found).tolist() == _exceptions_one_by_one(found)
     assert wild._jumps_beside(said) == pytest.approx(_jumps_one_by_one(said))

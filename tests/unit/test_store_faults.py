@@ -86,6 +86,10 @@ def test_absent(run_file):
     shutil.copy(run_file, run_file.with_name("long.h5.partial"))
     assert "long.h5.partial" in _refused(run_file.with_name("long.h5"), kinds.Run).hint
     assert "does not exist either" in _refused(run_file.parent / "no" / "a.h5", kinds.Run).hint
+    for k in range(6):
+        shutil.copy(run_file, run_file.with_name(f"monday{k}.h5"))
+    assert "monday3.h5, monday4.h5" in (some := _refused(run_file.with_name("zzzzzzzzzz.h5"), kinds.Run).hint)
+    assert "run.h5" not in some  # five are enough where none is near
 
 
 def test_folder_and_special_files(run_file):
@@ -190,7 +194,15 @@ def test_edited_model(tmp_path, change, words):
     extension = kinds.Extension("creep", (kinds.Parameter("amplitude", 0.1, "1", 0, 1),))
     write(tmp_path / "m.h5", examples.model(extensions=(extension, extension)), examples.header())
     _edit(tmp_path / "m.h5", change)
-    _refused(tmp_path / "m.h5", kinds.Model, *words)
+    error = _refused(tmp_path / "m.h5", kinds.Model, *words)
+    assert "/: " not in error.message
+
+
+def test_an_edited_model_within_a_waveform(tmp_path):
+    """What is wrong with a part is said of the part."""
+    write(tmp_path / "w.h5", examples.waveform(model=examples.model()), examples.header())
+    _edit(tmp_path / "w.h5", lambda f: _instead("levels", data=[0.0, 1])(f["model"]))
+    _refused(tmp_path / "w.h5", kinds.Waveform, "/model: ", "1 levels has 1 cells")
 
 
 def test_damaged_size_does_not_fill_the_memory(run_file):
