@@ -74,8 +74,8 @@ PACKAGES = {  # the tests that answer for a package
         "tests/cli",
     ),
     "artefacts": (
-        *(f"{UNIT}{one}*.py" for one in ("artefacts", "figures", "file", "series", "store")),
-        *(f"{UNIT}{one}*.py" for one in ("table", "units")),
+        *(f"{UNIT}{one}*.py" for one in ("artefacts", "diagnosis_text", "figures", "file", "quiz")),
+        *(f"{UNIT}{one}*.py" for one in ("series", "store", "table", "unlisted", "units")),
         "tests/api",
     ),
     "steps": (

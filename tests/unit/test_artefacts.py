@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import report_examples
 import store_examples as examples
 
-from pulsetrainer.artefacts import ModelEvaluation, Run, Waveform
+from pulsetrainer.artefacts import Model, ModelEvaluation, Run, Waveform
 from pulsetrainer.artefacts.data import LARGEST, beyond_all_quantities
 from pulsetrainer.artefacts.time_steps import steps_of
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import DataError
+from pulsetrainer.files.store import read
+
+FOLDER = Path(__file__).parents[1] / "data/files-0.1"
 
 
 def _seams(*places: int) -> np.ndarray:
@@ -45,7 +49,7 @@ def test_arrays_along_time_have_one_length():
 
 def test_time_that_is_none_is_found_at_its_first_sample():
     """Not a number, and not increasing."""
-    for bad, sample in ((np.nan, "sample 3"), (-1.0, "sample 3")):
+    for bad, sample in ((np.nan, "sample 3"), (-1.0, "sample 3"), (2.0, "sample 3"), (1.5, "sample 3")):
         time = np.arange(8.0)
         time[[3, 5]] = bad
         with pytest.raises(DataError) as caught:
@@ -65,6 +69,28 @@ def test_what_nobody_says_is_nothing():
     assert (examples.run().dropped_samples, examples.run().complete) == (0, True)
     played = examples.playback()
     assert (played.dropped_samples, played.complete, played.fault) == (0, True, "")
+    session = examples.session()
+    assert (session.dropped_samples, session.complete, session.fault) == (0, True, "")
+    fit = read(FOLDER / "model.h5", Model).fit  # its file has none of these
+    assert (fit.masked_samples, fit.false_reversals, fit.stiffness, fit.offsets) == (0, 0, 0.0, ())
+    assert (fit.spacing, fit.warning, fit.loop, fit.notes) == ("even", "", "", ())
+    assert np.isnan([fit.input_noise, fit.minor_percent]).all()
+
+
+@pytest.mark.parametrize(
+    ("correctable", "extends", "command"),
+    [
+        ((), True, "extend"),
+        ((), False, ""),
+        (("output-lag",), True, "correct"),  # the verdict is one of the measurement
+        (("periodic",), True, "extend"),
+        (("periodic",), False, "correct"),
+    ],
+)
+def test_what_to_do_about_a_diagnosis(correctable, extends, command):
+    """Faults of the measurement first, where the verdict is one or nothing else helps."""
+    found = replace(examples.diagnosis(), correctable=correctable)
+    assert (found if extends else replace(found, extended=None)).next_command == command
 
 
 def test_steps_are_even_within_two_percent_and_gaps_count_apart():

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pulsetrainer.artefacts.units import check_unit, is_unit, split_unit, symbol_of, with_seconds
+from pulsetrainer.artefacts.units import (
+    SECONDS,
+    check_unit,
+    is_unit,
+    split_unit,
+    symbol_of,
+    with_seconds,
+)
 from pulsetrainer.errors import DataError
 from wording import raises
 
@@ -100,6 +107,12 @@ def test_a_heading_is_a_quantity_and_a_unit_however_they_are_parted(name, writte
         assert split_unit(heading) == (name, unit)
     else:
         assert split_unit(heading) == (heading, "")
+
+
+def test_units_of_time_are_as_long_as_pint_says():
+    """Without a unit a time is in seconds."""
+    told = {unit: REGISTRY.Quantity(1.0, unit).to("s").magnitude for unit in SECONDS if unit}
+    assert told | {"": 1.0} == pytest.approx(SECONDS)
 
 
 @pytest.mark.parametrize("text", NONE)
