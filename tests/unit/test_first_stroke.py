@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pulsetrainer as pt
-from pulsetrainer.core.initial_state import first_stroke_words, known_from
+from pulsetrainer.core.initial_state import _at_end, _stroke, first_stroke_words, known_from
 
 DT_S = 0.02
 RADII = np.linspace(0.1, 1.5, 8)
@@ -53,28 +53,56 @@ def test_a_first_stroke_apart_does_not_count(down, noisy):
 @pytest.mark.parametrize(
     ("first", "later", "left_out"),
     [
-        ((0.031, 0.0), 3, True),  # shares of the output's span, of the first stroke and of two later ones
-        ((0.029, 0.0), 3, False),
-        ((0.06, 0.0145), 3, True),  # four times as far apart as these
-        ((0.06, 0.0155), 3, False),
-        ((0.031, 0.0), 2, True),
-        ((0.09, 0.0), 1, True),  # the strokes from the other end are alike
+        ((0.0302, 0.0), 3, True),  # shares of the output's span, of the first stroke and of two later ones
+        ((0.0298, 0.0), 3, False),
+        ((0.06, 0.0149), 3, True),  # four times as far apart as these
+        ((0.06, 0.0151), 3, False),
+        ((0.0302, 0.0), 2, True),
+        ((0.0302, 0.0), 1, True),  # the strokes from the other end are alike
+        ((0.0298, 0.0), 1, False),
     ],
 )
-def test_how_far_apart_a_first_stroke_lies(first, later, left_out):
+@pytest.mark.parametrize("down", [False, True])
+def test_how_far_apart_a_first_stroke_lies(first, later, left_out, down):
     """By the rms of twenty places from two hundredths of the range on; too short a stroke is not compared."""
     tops = (5.0, 0.0, *(later * (5.0, 0.0)), 0.9, 0.0)
     u = np.concatenate([[0.0], *(np.linspace(a, b, 501)[1:] for a, b in pairwise((0.0, *tops)))])
     places = np.linspace(0.1, 5.0, 20)
-    apart, unlike = np.array(first) / np.sqrt(np.mean((places > 2.5) & (places < 4.8)))
+    apart, unlike = np.array(first) / np.sqrt(np.mean((places / 5.0 * (places < 4.8)) ** 2))
     shares = np.zeros(len(tops))
     shares[[0, 2]] = -apart, unlike
     if later > 1:
         shares[4] = -unlike
     stroke = np.maximum(np.arange(u.size) - 1, 0) // 500
-    y = u + 5.0 * shares[stroke] * ((u > 2.5) & (u < 4.8))
+    y = u + shares[stroke] * u * (u < 4.8)
     y[stroke == len(tops) - 2] += 3.0
+    if down:
+        u, y = 5.0 - u, -y
     assert known_from(u, 0.0, 5.0, y) == (495 if left_out else 0)  # within a hundredth of the other end
+    assert known_from(np.append(2.0, u), 0.0, 5.0, np.append(2.0, y)) == 1  # it came from elsewhere
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_ends_and_strokes_sample_by_sample(seed):
+    """An end is left twice as far away as it is reached; a stroke ends where it turns by a hundredth."""
+    rng = np.random.default_rng(seed)
+    away = np.abs(np.cumsum(rng.normal(size=300)) * 0.02)
+    near = 0.05
+    told = [a <= near for a in away if not near < a <= 2.0 * near]
+    at, expected = told[0], []
+    for one in away.tolist():
+        at = True if one <= near else False if one > 2.0 * near else at
+        expected.append(at)
+    assert _at_end(away, near).tolist() == expected
+    way, said = [away[0]], [0.0]
+    for k, one in enumerate(away.tolist()):
+        if one < way[-1] - 0.01 * 20.0:
+            break
+        if one > way[-1]:
+            way.append(one)
+            said.append(float(k))
+    found = _stroke(away, np.arange(300.0), 20.0)
+    assert (found[0].tolist(), found[1].tolist()) == (way, said)
 
 
 def test_one_later_stroke_is_enough_where_those_from_the_other_end_are_alike():
