@@ -231,3 +231,12 @@ def test_a_drive_that_is_played_again(last, plausible):
     again[400:500] = before[700:900] = np.nan
     assert (judge_repeat(TIME_S, before, again) == "") is plausible
     assert judge_repeat(TIME_S, before, np.full(TIME_S.size, np.nan)) == ""
+
+
+@pytest.mark.parametrize("off", [0.4, 0.6])
+def test_few_samples_a_second_are_judged_one_by_one(off):
+    """At 5 Hz there is nothing to average over and nothing that lags; twenty of them make a stretch."""
+    time_s, still = 0.2 * np.arange(40), np.full(40, 4.0)
+    assert (judge_repeat(time_s, still, still + off * (time_s == time_s[-1])) != "") is (off > 0.5)
+    wrong = np.arange(40) < 10 + (off > 0.5)  # half of them, and the first, before which nothing is known
+    assert (judge_against(time_s, still, np.where(wrong, 9.6, 4.0)) != "") is (off > 0.5)
