@@ -81,6 +81,7 @@ def _healthy():
     [
         (lambda _i, f, r: r.normal(0, NOISE_N, f.size), "does not follow"),
         (lambda _i, f, r: f.mean() + r.normal(0, 3 * NOISE_N, f.size), "does not follow"),
+        (lambda _i, f, r: f.mean() + r.normal(0, 6 * NOISE_N, f.size), "does not follow"),
         (lambda _i, f, _r: -f, "does not follow"),
         (lambda _i, f, _r: np.where(TIME_S < 2.8, f, f[2800]), "frozen"),
         (lambda _i, f, _r: np.full(f.size, 3.0), "frozen"),
@@ -187,6 +188,8 @@ def test_a_force_that_a_model_has_foretold(gain, offset, plausible):
     force[100:300] = np.nan
     assert (judge_against(TIME_S, expected, force) == "") is plausible
     assert judge_against(TIME_S, expected, np.full(expected.size, np.nan)) == ""
+    for at, could_be in ((-5.4, True), (-5.6, False), (0.4, True), (0.6, False)):
+        assert (judge_against(TIME_S, np.full(3000, -2.0), np.full(3000, at)) == "") is could_be
 
 
 class DiesAt:
