@@ -162,6 +162,8 @@ def test_real_speed_is_the_wall_clock(pulse):
         ([0.1], 0, "not possible"),
         ([0.1], np.inf, "not possible"),
         (np.zeros(901), 1, "900"),
+        ([1.5, 1.500055], 1000, "sample 1 "),
+        ([0.0, -0.000055], 1000, "sample 1 "),
     ],
 )
 def test_what_cannot_be_played_is_refused_before_arming(device, reference, rate_Hz, says):
@@ -169,7 +171,7 @@ def test_what_cannot_be_played_is_refused_before_arming(device, reference, rate_
     with raises(ArgumentError, "names it", named=says):
         device.play(reference, rate_Hz)
     assert device._status().session == 0
-    assert device.play([0.1], 1000).complete
+    assert device.play([-0.000045, 0.1, 1.500045], 1000).complete  # nearer than half a count
 
 
 def test_decimation_is_checked(device):

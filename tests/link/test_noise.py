@@ -46,6 +46,14 @@ def test_every_kind_of_damage_happens_at_the_stated_rate():
     _through(line, bytes(1_000_000), 4096)
     assert set(line.damaged) == set(KINDS)
     assert 700 < line.damaged.total() < 1200  # a cut hides what would come within it
+    every = NoisyLine(1.0, 2)
+    for k in range(200):
+        every.push(b"a", 1e3 * k)  # no cut lasts so long
+    assert every.damaged.total() == 200
+    both = NoisyTransport(SerialTransport, 1e-3, 5, monotonic=time.monotonic)
+    assert [_through(one, bytes(20_000), 4096) for one in (both.to_device, both.to_host)] == [
+        _through(NoisyLine(1e-3, seed), bytes(20_000), 4096) for seed in (10, 11)
+    ]
 
 
 def test_delayed_bytes_keep_their_order():
@@ -150,6 +158,7 @@ def test_thousands_of_commands_on_a_worse_wire():
     finally:
         transport.close()
         bench.close()
+    assert bench._process.returncode == 0  # it left by itself
 
 
 def test_nothing_is_accepted_that_was_not_sent():

@@ -12,7 +12,7 @@ from healthy_plays import SIGNALS, WAVEFORMS, beats, signal, stopped
 from pulsetrainer import load
 from pulsetrainer.device.limits import Limits
 from pulsetrainer.device.opening import open_device
-from pulsetrainer.device.plausibility import ForceWatch, judge_against, judge_force, judge_repeat
+from pulsetrainer.device.plausibility import ForceWatch, _swings, judge_against, judge_force, judge_repeat
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.play import DRIVES, play
 
@@ -243,3 +243,14 @@ def test_few_samples_a_second_are_judged_one_by_one(off):
     assert (judge_repeat(time_s, still, still + off * (time_s == time_s[-1])) != "") is (off > 0.5)
     wrong = np.arange(40) < 10 + (off > 0.5)  # half of them, and the first, before which nothing is known
     assert (judge_against(time_s, still, np.where(wrong, 9.6, 4.0)) != "") is (off > 0.5)
+
+
+@pytest.mark.parametrize(
+    ("noise", "rms", "swings"), [(0.1, 0.32, True), (0.1, 0.28, False), (0.01, 0.14, False)]
+)
+def test_a_force_swings_by_three_times_its_noise(noise, rms, swings):
+    """And by 0.15 N at least; the noise is that from sample to sample."""
+    slow = np.sin(2 * np.pi * TIME_S / 3.0)
+    force = noise * np.random.default_rng(8).standard_normal(3000)
+    assert _swings(4.0 + np.sqrt(2.0 * (rms**2 - noise**2)) * slow + force) is swings
+    assert _swings(np.array([1.0, 1.31])) is True  # too few for noise
