@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import json
 import re
@@ -79,6 +80,15 @@ def test_reference_is_what_the_code_says(name):
 
 
 @pytest.mark.skipif(shutil.which("groff") is None, reason="groff is not here; man would format the page")
+def test_signatures_in_the_reference_are_python():
+    """Defaults and annotations as a reader would write them."""
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    found = re.findall(r"```python\n[\w.]+(\(.*\n(?:.*\n)*?)```", page)
+    assert len(found) > 20
+    for signature in found:
+        ast.parse(f"def verb{signature.strip()}: ...")
+
+
 def test_manual_page_is_formatted_without_a_warning():
     """What `man pulsetrainer` shows: every command with its example, every exit code."""
     page = ROOT / "docs" / "pulsetrainer.1"
