@@ -175,11 +175,12 @@ def _ports() -> Iterator[Finding]:
         yield Finding("ports", "ok", "no serial port; without a device --port bench: is there")
     for port in ports:
         state: State = "ok" if port.status == "free" else "problem" if port.is_device else "warning"
-        kind = "the trainer" if port.is_device else port.description or "unknown"
+        known = [text for text in (port.description, port.vid_pid) if text not in ("", "n/a")]
+        kind = ["our device", port.vid_pid] if port.is_device else known or ["not known what it is"]
         yield Finding(
             f"port {port.device}",
             state,
-            f"{port.status}, {kind} {port.vid_pid}".strip(),
+            f"{port.status}, {' '.join(kind)}".strip(),
             fixes.get(port.status, ""),
         )
 
@@ -243,12 +244,20 @@ def _lost(recording: Trace, expected: int) -> Finding:
 def _noise(recording: Trace, held: slice, range_A: float) -> Iterator[Finding]:
     """Noise while the current is held, against the range of the current and the span of the force."""
     span = float(np.ptp(recording.force_N))
-    for name, values, full, unit, fix in (
-        ("current noise", recording.current_A, range_A, "A", "check the shunt's wiring and its ground"),
+    for name, values, full, of, unit, fix in (
+        (
+            "current noise",
+            recording.current_A,
+            range_A,
+            "range",
+            "A",
+            "check the shunt's wiring and its ground",
+        ),
         (
             "force noise",
             recording.force_N,
             span,
+            "span",
             "N",
             "keep the sensor's cable off the coil; check its screws",
         ),
@@ -256,7 +265,7 @@ def _noise(recording: Trace, held: slice, range_A: float) -> Iterator[Finding]:
         still = values[held]
         sigma = float(np.std(scipy.signal.detrend(still)))  # creep is a slope on so short a hold
         share = sigma / full if full > 0 else 0.0
-        words = f"{1e3 * sigma:.2g} m{unit} rms, {100 * share:.2g} % of {full:.3g} {unit}"
+        words = f"{1e3 * sigma:.2g} m{unit} rms, {100 * share:.2g} % of the {of} of {full:.3g} {unit}"
         if sigma == 0.0:
             yield Finding(
                 name, "warning", f"none at all: {still[0]:.4g} {unit} in every sample", "is the sensor alive?"

@@ -102,6 +102,8 @@ def at_once() -> dict[str, Mistake]:
         name: Mistake(line, 2, next((word for word in line if word in named), ""))
         for name, line in words.items()
     }
+    found["two files to draw"] = Mistake(("plot", "run.h5", "model.h5"), 2, "got model.h5")
+    found["an argument to a command of none"] = Mistake(("tune", "now"), 2, "got now")
     bounds = ("evaluate", "played.h5", "--bounds", "absent.toml")
     found["no such file of bounds"] = Mistake(bounds, 2, "absent.toml")
     found["no such CSV signal"] = Mistake(("capture", "absent.csv", "-o", "out.h5"), 3, "(argument ")

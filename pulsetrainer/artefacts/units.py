@@ -64,7 +64,7 @@ def is_unit(text: str) -> bool:
     text = text.strip().replace("**", "^")
     if text in _BARE:
         return True
-    bare = text.replace("(", " ").replace(")", " ").strip()
+    bare = re.sub(r"[()](\^[-+]?\d)?", " ", text).strip()
     return bool(bare) and all(_is_factor(factor) for factor in _SEPARATOR.split(bare))
 
 
@@ -137,6 +137,15 @@ def claimed_unit(heading: str) -> str:
     """Return what stands where a heading that says no known unit would say one, empty where nothing does."""
     mark = _MARK.search(heading.strip())
     return "" if mark is None else heading.strip()[mark.end() :]
+
+
+def unit_of(template: str, input_unit: str, output_unit: str) -> str:
+    """Return a unit with ``{u}`` and ``{y}`` filled in; behind a slash a compound one stands in brackets."""
+    text = template
+    for place, unit in (("{u}", input_unit), ("{y}", output_unit)):
+        inner = f"({unit})" if _SEPARATOR.search(unit) else unit
+        text = text.replace(f"/{place}", f"/{inner}").replace(place, unit)
+    return text
 
 
 def shown(unit: str) -> str:

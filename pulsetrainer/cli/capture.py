@@ -95,8 +95,12 @@ def capture(
             job.left_over(out, "an interrupted capture: continue it with --resume, or delete it")
         if dry_run:
             planned = plan(played, levels=levels, condition=condition, repeats=repeats, limits=limits, at=at)
+            length = f"{planned.seconds - planned.conditioning_s:.1f} s"
+            if condition:
+                length += f", after {planned.conditioning_s:.1f} s around the major loop"
             rows = {
-                "length": f"{planned.seconds:.1f} s, {planned.samples} samples, {planned.rate_Hz:g} a second",
+                "length": length,
+                "samples": f"{planned.samples}, {planned.rate_Hz:g} a second",
                 "reversals": planned.reversals,
                 "cells switched": f"{planned.coverage_percent:.1f} %",
             }

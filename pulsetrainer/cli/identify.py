@@ -111,7 +111,9 @@ def _show(job: Job, out: Path, model: Model) -> None:
             "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
             "cells switched": f"{fit.coverage_percent:.1f} %",
             "told apart by minor loops": minor_words(fit.minor_percent),
-            "smoothing": f"{fit.smoothing:.3g} of the range" if fit.smoothing else "none",
+            "smoothing": f"{fit.smoothing:.3g} of the range of the {model.input_quantity}"
+            if fit.smoothing
+            else "none",
             "loop": loop_words(model),
             "form": model.form,
             **({"output known within": with_unit(f"{band:.2g}", unit) + " (90 % band)"} if band else {}),

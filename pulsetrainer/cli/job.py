@@ -91,7 +91,9 @@ class Job:
         from pulsetrainer.device.gains import DELIVERED
 
         device = open_device(port, limits=limits, tuned=self._settings)
-        if self._settings is not None and device.gains == DELIVERED:
+        if self._settings is not None and device.gains != DELIVERED:
+            self.notes([f"{device.info.serial} plays with the gains that {self._settings} has for it"])
+        elif self._settings is not None:
             from pulsetrainer.files.tuning import read_tuned
 
             known = read_tuned(self._settings)

@@ -7,13 +7,13 @@ from typing import Any
 from pulsetrainer.cli.console import Screen
 from pulsetrainer.cli.options import AsJson
 
-_HEADS = {"vid_pid": "vendor:product", "is_device": "trainer"}
+_HEADS = {"device": "port", "vid_pid": "vendor:product", "is_device": "our device"}
 
 
 def ports(json: AsJson = False) -> None:
     """List the serial ports.
 
-    Which of them is a trainer, and whether each can be opened.
+    Which of them is our device, and whether each can be opened.
 
     Example: pulsetrainer ports
     """

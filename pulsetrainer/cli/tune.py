@@ -76,17 +76,20 @@ def tune(
 
 
 def _show(job: Job, out: Path | None, found: Tuned) -> None:
+    from pulsetrainer.device.codes import PARAMETERS
+
+    units = {parameter.name: parameter.unit for parameter in PARAMETERS}
     job.notes(found.notes)
     if out is None:
         job.notes(["the gains are not kept: give `out` pulsetrainer.toml to write them down"])
     job.screen.result(plain(found) | {"output": out})
     before, after = found.tracking_percent.before, found.tracking_percent.after
     job.screen.facts(
-        f"{out or 'not kept'}: {found.serial}",
+        f"{out}: {found.serial}" if out else f"{found.serial} (gains not kept)",
         {
             "coil": f"{found.resistance_ohm:.2f} ohm, {1e3 * found.inductance_H:.1f} mH, supply "
             f"{found.supply_V:.1f} V",
-            "gains": ", ".join(f"{name} {value}" for name, value in found.gains.values().items()),
+            **{name: f"{value} {units[name]}" for name, value in found.gains.values().items()},
             "margins": f"gain {found.margins.gain:.1f}, phase {found.margins.phase_deg:.0f} degrees",
             "tracking": f"{after:.2f} % of the range at worst"
             + ("" if before is None else f", {before:.2f} % before"),

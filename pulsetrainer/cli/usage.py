@@ -14,6 +14,7 @@ _EXAMPLES = {
     "--resample": "--resample even for the median time step, or a rate such as --resample 1000",
 }
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
+_EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 
 
@@ -40,16 +41,29 @@ def usage_of(error: Exception) -> UsageError | None:
     if kind == "BadParameter" and isinstance(named, str):
         said = f"{named} {str(getattr(error, 'message', error)).rstrip('.')}"
         return UsageError(said, hint=_EXAMPLES.get(named, help_))
-    return _other(str(explain()).rstrip("."), help_)
+    return _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
 
 
-def _other(said: str, help_: str) -> UsageError:
-    """What has no words of its own here, but for a command that does not exist."""
+def _other(said: str, command: str, parsed: Any) -> UsageError:
+    """What has no words of its own here, but for one argument too many and a command that does not exist."""
+    help_ = f"{command} --help"
+    if extra := _EXTRA.match(said):
+        return _one_too_many(extra[1], command, parsed)
     unknown = _UNKNOWN.match(said)
     if unknown is None:
         return UsageError(said, hint=help_)
     near = f"did you mean {unknown[2]}? All commands: " if unknown[2] else ""
     return UsageError(f"there is no command {unknown[1]!r}", hint=f"{near}{help_}")
+
+
+def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
+    """What stands behind the arguments that a command takes."""
+    taken = [p.human_readable_name for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
+    beside = "one file at a time; evaluations or sessions side by side: pulsetrainer compare a.h5 b.h5"
+    return UsageError(
+        f"{command} takes {' and '.join(taken) or 'options only'}, got {extra} besides",
+        hint=beside if taken == ["FILE.h5"] else f"{command} --help",
+    )
 
 
 def _named(parameter: Any) -> str:

@@ -17,7 +17,7 @@ from pulsetrainer.artefacts import (
     Profile,
     Recorded,
 )
-from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.artefacts.units import unit_of, with_unit
 from pulsetrainer.core.identification import coverage
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.diagnosis import residual, wording
@@ -145,17 +145,18 @@ def _noise_of(state: State) -> float:
     return max(state.floor.noise, float(np.sqrt(np.mean(own))) / state.scale.span)
 
 
-def _unit(text: str, words: Words) -> str:
-    return text.replace("{u}", words["u"]).replace("{y}", words["y"])
-
-
 def _parameters(
     state: State, cause: Asked, estimates: Sequence[Estimate], words: Words
 ) -> tuple[Parameter, ...]:
     meanings = {q.name: q.meaning for q in cause.quantities(state.problem.frames[0])} | {"size": cause.size}
     return tuple(
         Parameter(
-            e.name, e.value, _unit(e.unit, words), e.lower, e.upper, meanings.get(e.name, "").format(**words)
+            e.name,
+            e.value,
+            unit_of(e.unit, words["u"], words["y"]),
+            e.lower,
+            e.upper,
+            meanings.get(e.name, "").format(**words),
         )
         for e in estimates
     )
@@ -194,7 +195,7 @@ def _profiles(state: State, words: Words) -> tuple[Profile, ...]:
     found = [
         Profile(
             group.name,
-            _unit(group.unit, words),
+            unit_of(group.unit, words["u"], words["y"]),
             scale.places(group.at, group.unit),
             residual.rms_by(group, before),
             residual.rms_by(group, after),

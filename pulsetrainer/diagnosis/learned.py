@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pulsetrainer.artefacts import Dependence
-from pulsetrainer.artefacts.units import with_seconds, with_unit
+from pulsetrainer.artefacts.units import unit_of, with_seconds, with_unit
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
 from pulsetrainer.diagnosis.dependence import Bank
@@ -52,7 +52,7 @@ def learned(state: State, words: Mapping[str, str]) -> tuple[Dependence, ...]:
             Dependence(
                 text=_text(curve, state, words),
                 state=_said(curve, words),
-                unit="s" if part.kind.saturates else _unit(part.kind.unit, words),
+                unit="s" if part.kind.saturates else unit_of(part.kind.unit, words["u"], words["y"]),
                 tau_s=curve.tau,
                 at=curve.at,
                 value=state.question.given.model.polarity * curve.value
@@ -86,7 +86,7 @@ def _curve(
 def _text(curve: _Curve, state: State, words: Mapping[str, str]) -> str:
     """Return the dependence in words: where the output is farthest from its mean, and by how much."""
     sign = state.question.given.model.polarity if state.question.given else 1
-    value, unit = sign * curve.value, _unit(curve.part.kind.unit, words)
+    value, unit = sign * curve.value, unit_of(curve.part.kind.unit, words["u"], words["y"])
     k = int(np.argmax(np.abs(value - np.median(value))))
     first, last = LIMITS.curve_end * LIMITS.curve_places, (1.0 - LIMITS.curve_end) * LIMITS.curve_places
     if first <= k <= last:
@@ -108,7 +108,3 @@ def _said(curve: _Curve, words: Mapping[str, str]) -> str:
 def _place(curve: _Curve, k: int, unit: str) -> str:
     value = float(curve.at[k])
     return with_seconds(value) if curve.part.kind.saturates else with_unit(f"{value:.2g}", unit)
-
-
-def _unit(unit: str, words: Mapping[str, str]) -> str:
-    return unit.replace("{u}", words["u"]).replace("{y}", words["y"])

@@ -83,8 +83,8 @@ def loop_words(model: Model) -> str:
     """Say which way the loop of a model runs: "rising, counterclockwise, the output lags"."""
     trend = "falling" if model.polarity < 0 else "rising"
     turns = _LOOPS.get(model.fit.loop, "") if model.fit else ""
-    if model.form == "signed":
-        return turns or "of either direction"
+    if model.form == "signed":  # no loop of one direction fits
+        return f"mostly {turns}" if turns[:1] == "c" else turns or "of either direction"
     return f"{trend}, {turns}" if turns else trend
 
 

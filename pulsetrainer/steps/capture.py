@@ -133,6 +133,7 @@ class Plan:
     signal: str
     samples: int  # recorded, what brings the memory back included
     seconds: float  # conditioning loops included
+    conditioning_s: float  # of these, which are not recorded
     rate_Hz: float
     reversals: int
     coverage_percent: float
@@ -175,6 +176,7 @@ def plan(
         signal=signal.name,
         samples=recorded,
         seconds=played / signal.rate_Hz,
+        conditioning_s=(played - recorded) / signal.rate_Hz,
         rate_Hz=signal.rate_Hz,
         reversals=course.reversals,
         coverage_percent=100.0 * float(covered.mean()),

@@ -102,9 +102,11 @@ def _verified(model: Model, extended: Model, run: Run) -> Model:
     plain = error(model)
     if not best.extensions or least >= plain:
         named = ", ".join(one.cause for one in extended.extensions)
+        one = len(extended.extensions) == 1
+        said, them = ("fits, but does", "it") if one else ("fit, but do", "them")
         raise DataError(
-            f"{named} fits, but does not repeat: the run to verify with is predicted to {least:.4g} "
-            f"{model.output_unit} (rms) with it, and to {plain:.4g} without",
+            f"{named} {said} not repeat: the run to verify with is predicted to {least:.4g} "
+            f"{model.output_unit} (rms) with {them}, and to {plain:.4g} without",
             hint="use the model as it is, or diagnose both runs together",
         )
     return best

@@ -206,6 +206,7 @@ def test_a_signal_in_milliseconds_is_one(ready):
     (ready / "ms.csv").write_text("t_ms,current_A\n0,0\n500,1\n1000,0\n")
     plan = pulsetrainer(ready, "capture", "ms.csv", "--dry-run", "--json", "-o", "never.h5").json
     assert plan["samples"] == 1001
+    assert plan["seconds"] - plan["conditioning_s"] == pytest.approx(1.001)
 
 
 @pytest.mark.parametrize(

@@ -53,6 +53,7 @@ def test_the_gains_survive_a_restart_of_the_host(run, tmp_path):
         words = ("--port", COIL, "-o", "run.h5", "--overwrite", "--levels", 4, "--speed", 20)
         done = run(*settings, "capture", "identification", *words)
         assert done.code == 0, done.err
+        assert ("bench.toml" in done.err) is bool(settings)
         run_of = pt.load(tmp_path / "run.h5")
         worst[settings] = np.quantile(np.abs(run_of.input - run_of.reference), 0.8)  # corners aside
     assert worst["--settings", "bench.toml"] < 0.5 * worst[()]

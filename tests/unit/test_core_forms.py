@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import form_devices as devices
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.report.facts import loop_words
 from wording import raises, tells
 
 NOISE = 0.003  # of the span
@@ -188,6 +191,8 @@ def test_both_forms_are_drawn_and_printed(butterfly, clockwise):
     """A figure, and the form among the facts."""
     for model in (butterfly, clockwise):
         assert model.form in str(model)
+        mostly = loop_words(replace(model, fit=replace(model.fit, loop="clockwise")))
+        assert mostly.startswith("mostly clockwise") is (model is butterfly)
         assert model.plot() is not None
 
 

@@ -13,6 +13,7 @@ from pulsetrainer.artefacts.units import (
     is_unit,
     split_unit,
     symbol_of,
+    unit_of,
     with_seconds,
 )
 from pulsetrainer.errors import DataError
@@ -103,7 +104,7 @@ def test_pint_knows_them_too(text):
 def test_a_heading_is_a_quantity_and_a_unit_however_they_are_parted(name, written, unit):
     """Only brackets make a unit of what is none: behind anything else the heading is a name."""
     heading = written.format(name, unit)
-    if is_unit(symbol_of(unit)) or written[-1] in ")]":
+    if (is_unit(symbol_of(unit)) and unit != "1") or written[-1] in ")]":
         assert split_unit(heading) == (name, unit)
     else:
         assert split_unit(heading) == (heading, "")
@@ -121,6 +122,17 @@ def test_no_units(text):
     assert not is_unit(text)
     with raises(DataError, "no such unit", argument="input unit", place="the heading 'x' of a.csv"):
         check_unit(text, "input unit", "the heading 'x' of a.csv")
+
+
+@pytest.mark.parametrize(
+    ("template", "u", "unit"),
+    [("{y} s/{u}", "kA/m", "T s/(kA/m)"), ("{y} s/{u}", "A", "T s/A"), ("{u}/{y}", "N mm", "N mm/T"),
+     ("1/({u})^2", "A/m", "1/(A/m)^2"), ("{u}/s", "kA/m", "kA/m/s")],
+)  # fmt: skip
+def test_a_unit_behind_a_slash_stands_in_brackets(template, u, unit):
+    """One that is itself a quotient; what comes of it is a unit."""
+    assert unit_of(template, u, "T") == unit
+    assert is_unit(unit)
 
 
 @pytest.mark.parametrize(
