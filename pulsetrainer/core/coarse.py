@@ -4,7 +4,8 @@ A sample that reads c was anywhere in c - q/2 .. c + q/2. With noise s and a fit
 that is Phi((c + q/2 - p)/s) - Phi((c - q/2 - p)/s). It is maximised over the weights by Newton's method: each
 sample is fitted to p + m/k with weight k, where m and 1 - k are mean and variance of the noise that the
 reading leaves possible, in units of s. Far inside a step a sample hardly counts; at its edge it counts whole;
-where the noise is larger than the step all count alike.
+where the noise is larger than the step all count alike. The noise itself is unknown too, since a step hides
+most of it: after each fit s^2 is what the readings leave possible of it, the mean of s^2 (m^2 + 1 - k).
 
 Source: Tobin, Econometrica 26, 1958, 24-36; Dempster, Laird, Rubin, J. R. Stat. Soc. B 39, 1977, section 4.2.
 """
@@ -20,7 +21,8 @@ from pulsetrainer.core.identification import identify
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.record import Record
 
-_ROUNDS = 4  # of Newton's method
+_ROUNDS = 8  # of Newton's method, and of the noise
+_AGAIN = 3  # ... in which smoothing is chosen again: steps taken for what they are not had chosen the first
 _LEAST_NOISE = 0.05  # of a step: keeps the edges of a step finite
 _MOST_NOISE = 0.35  # of a step: with more the averages of the readings are right as they are
 _DIFFERENCES = (3, 20.0)  # third ones, and their variance for white noise: 1 + 9 + 9 + 1
@@ -41,11 +43,13 @@ def between_steps(record: Record, plane: Plane, step: float) -> FloatArray:
         return record.output
     found = identify([record], plane, smoothing="auto")
     fitted = found.operator(record.input, record.start)
-    for _ in range(_ROUNDS):
+    for number in range(_ROUNDS):
         mean, count = _left_possible(record.output - fitted, step, noise)
         wanted = replace(record, output=fitted + mean / count, sample_weight=record.sample_weight * count)
-        operator = identify([wanted], plane, smoothing=found.smoothing).operator
-        fitted = operator(record.input, record.start)
+        found = identify([wanted], plane, smoothing="auto" if number == _AGAIN else found.smoothing)
+        square = np.average(mean**2 + noise**2 * (1.0 - count), weights=record.sample_weight)
+        noise = max(float(np.sqrt(square)), _LEAST_NOISE * step)
+        fitted = found.operator(record.input, record.start)
     return fitted + _left_possible(record.output - fitted, step, noise)[0]
 
 

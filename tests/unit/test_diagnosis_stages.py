@@ -44,6 +44,7 @@ from pulsetrainer.diagnosis.stages import (
     verdict,
 )
 from pulsetrainer.diagnosis.state import Given, Question, State
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 CAUSE = library()
 NUMBER = count()
@@ -712,6 +713,19 @@ def test_the_verdict_is_the_strongest_or_unknown(left, findings, firings, quick,
     state = _state(_fit(left), findings=findings, firings=firings)
     state = replace(state, question=replace(state.question, quick=quick))
     assert verdict.stage(state).verdict == expected
+
+
+@pytest.mark.parametrize(("share", "first"), [(0.9, "creep"), (1.1, "outliers")])
+def test_what_a_gate_saw_comes_before_what_is_small(share, first):
+    """Where all others together are below half a per cent of the span: here they are 1 / share of that."""
+    findings = (_finding("creep", 20.0), _finding("step", 10.0))
+    state = _state(_fit(200.0), findings=findings, firings=((0, WILD),))
+    removed = np.sqrt(0.3 * state.floor.reducible(state.baseline) / state.floor.count)
+    floor = replace(state.floor, span=share * removed / LIMITS.matters)
+    after = verdict.stage(replace(state, floor=floor))
+    assert after.verdict == first
+    assert after.findings[0].cause.id == first
+    assert sum(one.found for one in after.findings) == 3
 
 
 SEEN = dict.fromkeys([cause.id for cause in CAUSE.values() if cause.common], 0.0049)

@@ -2,19 +2,23 @@
 
 Where more than half of what can be explained is left, and enough to matter, the verdict is the jagged cause
 that a gate saw, since no refit takes away what it leaves; else it is `unknown`, whatever was found besides.
-Otherwise it is the cause that explains most, then what a gate on the raw data saw. Where nothing was found it
-is `none`, or `inconclusive` if the record could not have shown half a per cent of the span of a common cause.
-A hum no larger than the noise is found and told, and takes no verdict.
+Otherwise it is the cause that explains most, then what a gate on the raw data saw; that comes first where all
+others together are below half a per cent of the span. Where nothing was found it is `none`, or `inconclusive`
+if the record could not have shown half a per cent of the span of a common cause. A hum no larger than the
+noise is found and told, and takes no verdict.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.raw import Firing
 from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 
 def stage(state: State) -> State:
@@ -25,12 +29,15 @@ def stage(state: State) -> State:
     fired = {one.cause.id for one in gated}
     silent = [Finding(c, False) for c in library().values() if c.stage == "record" and c.id not in fired]
     faint = state.background
-    verdict = next((one.cause.id for one in (*found, *gated) if one.cause.id not in faint), "none")
+    share = sum(one.explains_percent for one in found) / PERCENT
+    most = np.sqrt(share * state.floor.reducible(state.baseline) / state.floor.count)
+    seen = [*gated, *found] if most < LIMITS.matters * state.floor.span else [*found, *gated]
+    verdict = next((one.cause.id for one in seen if one.cause.id not in faint), "none")
     if verdict == "none" and state.blind and not state.question.quick:
         verdict = "inconclusive"
     if state.unexplained and not state.question.quick:
         verdict = next((one.cause.id for one in gated if one.cause.jagged), "unknown")
-    return replace(state, findings=(*found, *gated, *rest, *silent), verdict=verdict)
+    return replace(state, findings=(*seen, *rest, *silent), verdict=verdict)
 
 
 def _gated(state: State) -> list[Finding]:
