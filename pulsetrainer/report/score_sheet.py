@@ -84,7 +84,7 @@ def _quiz(quiz: Quiz, score: Score) -> dict[str, object]:
         "learner": quiz.learner,
         "facts": facts,
         "timed": timed,
-        "picture": picture(session_figures.confusion(quiz), "confusion", "Answers", words),
+        "picture": picture(session_figures.confusion(quiz), "confusion", "Confusion matrix", words),
         "questions": [
             (k, asked, said, number(float(seconds), "", ".1f"))
             for k, (asked, said, seconds) in enumerate(

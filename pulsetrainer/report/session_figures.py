@@ -74,7 +74,7 @@ def confusion(quiz: Quiz) -> Figure:
     axes.set_xlim(-0.5, size - 0.5)
     axes.set_ylim(size - 0.5, -0.5)
     axes.set_aspect("equal")
-    axes.set_title("Answers: how often")
+    axes.set_title("Confusion matrix")
     axes.set_xlabel("answered")
     axes.set_ylabel("asked")
     axes.grid(visible=False)

@@ -49,11 +49,14 @@ def test_the_contract(run, tmp_path):
     assert run("show", "s.h5").code == 0
     assert run("plot", "s.h5", "-o", "s.png").code == 0
     assert "<svg" in page
+    assert "normal: 3 beats, bifid: 3 beats" in page
+    assert "vary by" not in page
 
 
 def test_a_session_in_a_file_has_its_sheet_made_again(run, tmp_path):
     """The same page as when it was pressed; models, bounds and an evaluation do not go with it."""
-    assert run(*SHORT, "--beats", 3, "--html", "s.html").code == 0
+    assert run(*SHORT, "--beats", 3, "--variability", 4, "--html", "s.html").code == 0
+    assert "vary by 4 %" in (tmp_path / "s.html").read_text()
     done = run("evaluate", "s.h5", "--html", "again.html", "--json")
     assert (done.code, done.json["beats"], done.json["complete"]) == (0, 3, True)
     assert (tmp_path / "again.html").read_text() == (tmp_path / "s.html").read_text()
@@ -100,7 +103,10 @@ def test_a_quiz_by_file(run, tmp_path):
     assert (quiz["asked"], quiz["right"], quiz["confusion"]) == (4, kept.right, kept.confusion)
     assert 0 <= quiz["interval"][0] <= kept.right / 4 <= quiz["interval"][1] <= 1
     assert kept.learner == "s"
-    assert "Confusion matrix" in (tmp_path / "q.html").read_text()
+    page = (tmp_path / "q.html").read_text()
+    assert "Confusion matrix" in page
+    assert "no value" not in page  # answers from a file have no time, and that is said once
+    assert page.count("which has no times") == 1
 
 
 @pytest.mark.parametrize(

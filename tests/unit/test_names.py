@@ -1,0 +1,87 @@
+"""Names of figures: each has one that the vocabulary knows, and no row of a table is without its unit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import report_examples as examples
+
+from pulsetrainer.artefacts import Evaluation
+from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
+from pulsetrainer.artefacts.session import FIGURES
+from pulsetrainer.report.names import NAMES, headed, split
+from pulsetrainer.report.tables import label
+from pulsetrainer.report.text import tables_of
+from pulsetrainer.steps.compare import compare
+
+VOCABULARY = (Path(__file__).parents[2] / "docs" / "vocabulary.md").read_text(encoding="utf-8")
+EVALUATION = examples.evaluation()
+
+
+def test_every_figure_has_a_name():
+    """Of playbacks, of models and of sessions."""
+    assert {*METRICS, *MODEL_METRICS, *FIGURES} <= set(NAMES)
+
+
+def test_no_two_figures_of_one_table_have_the_same_name():
+    """A row is told from the next."""
+    for keys in (METRICS, MODEL_METRICS, FIGURES):
+        assert len({NAMES[key] for key in keys}) == len(keys)
+
+
+def test_the_vocabulary_has_every_name_of_an_evaluation():
+    """Each key of the page stands beside the name that a screen has for it."""
+    rows = [line.split(" | ") for line in VOCABULARY.splitlines() if line.startswith("| ")]
+    named = {key: row[0] for row in rows for key in re.findall(r"`(\w+)`", row[-1])}
+    for key in (*METRICS, "max_percent", "rms_percent", "gain_percent", "shape_rms_percent", "noise_percent"):
+        assert NAMES[key].words in named[key], key
+
+
+def test_every_row_of_an_evaluation_has_a_unit():
+    """Of pulses: all columns in the unit of the row."""
+    for table in tables_of(replace(EVALUATION, models=())):
+        assert table.columns[1] == "unit"
+        assert all(row[1].startswith("%") for row in table.rows)
+
+
+def test_a_model_alone_has_no_improvement():
+    """There is nothing that it could be better than."""
+    models = examples.model_comparison().models
+    heads = [next(iter(tables_of(Evaluation(models=models[:n])))).columns for n in (1, 2)]
+    assert [any("improvement" in head for head in columns) for columns in heads] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("dotted", "owner", "words"),
+    [
+        ("normal.closest-match.scaled.hysteresis_percent", "normal.closest-match", "loop area, scaled"),
+        ("normal.mean_error_reduction_percent", "normal", "reduction of the mean error"),
+        ("model.1.rms_percent", "model.1", "rms error"),
+        ("nrmse", "", "rms error"),
+    ],
+)
+def test_a_dotted_name_is_told_in_words(dotted, owner, words):
+    """Whose it is, what it is, of which drive."""
+    found, named = split(dotted)
+    assert (found, named.words) == (owner, words)
+    assert label(dotted).startswith(f"{owner}: {words}" if owner else words)
+
+
+def test_a_title_says_the_kind_once():
+    """Most say it themselves."""
+    assert headed("diagnosis", "Diagnosis of run") == "Diagnosis of run"
+    assert headed("waveform", "normal by refined inversion") == "waveform: normal by refined inversion"
+
+
+@pytest.mark.parametrize(("spread", "better"), [(0.02, True), (0.2, None)])
+def test_no_verdict_within_the_spread_between_repeats(spread, better):
+    """A mean error that fell by 0.1 % is better where repeats differ by less."""
+    before = replace(EVALUATION.waveforms[0], error_spread_percent=spread)
+    mean = before.compensated.mean_abs_error_percent - 0.1
+    after = replace(before, compensated=replace(before.compensated, mean_abs_error_percent=mean))
+    metrics = compare([Evaluation(waveforms=(one,)) for one in (before, after)])
+    name = "compensated.mean_abs_error_percent"
+    assert [m.better for m in metrics if m.name.endswith(name)] == [better]
