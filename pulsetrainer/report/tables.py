@@ -63,7 +63,7 @@ def listed(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) ->
         yield f"  {text(row[0])}"
         for head, cell in zip(heads[1:], row[1:], strict=True):
             if cell not in (None, ""):
-                yield f"    {head:<{width}}  {text(cell)}"
+                yield f"    {cell}" if head == "unit" else f"    {head:<{width}}  {text(cell)}"
 
 
 def label(name: str) -> str:
