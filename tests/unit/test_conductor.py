@@ -19,7 +19,7 @@ from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import COOL, HOT, RATE_HZ, SLEW_A_PER_S, Conductor, Play, Rest
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.session import check_model, reach_of
-from pulsetrainer.steps.steering import Steering
+from pulsetrainer.steps.steering import AMPLITUDE_STEP, RATE_STEP_BPM, Steering
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 NAMES = ("normal", "bifid", "parvus-et-tardus")
@@ -90,6 +90,25 @@ def test_beats_follow_each_other_without_a_gap(model):
         assert before.first + before.count == after.first
         assert after.start_s - before.start_s == pytest.approx(60.0 / 83.0, abs=1e-9)
         assert 0 <= after.first / RATE_HZ - after.start_s < 1 / RATE_HZ + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("keys", "pulse", "bpm", "amplitude"),
+    [
+        ("", 1, 60.0, 1.0),
+        ("p", 1, 60.0, 1.0),  # before anything was played it is the first one's turn
+        ("pp", 0, 60.0, 1.0),
+        ("+", 1, 80.0 + RATE_STEP_BPM, 1.0),  # of the first one's own rate
+        ("<", 1, 60.0, 1.0 - AMPLITUDE_STEP),
+    ],
+)
+def test_keys_before_the_first_beat(keys, pulse, bpm, amplitude):
+    """They change the first pulse of the library, which nothing was said of yet."""
+    steering = Steering(lambda number, time_s: Play(1, bpm=60.0), [80.0, 70.0])
+    for key in keys:
+        steering.press(key)
+    play = steering(0, 0.0)
+    assert (play.pulse, play.bpm, play.amplitude) == (pulse, bpm, pytest.approx(amplitude))
 
 
 def test_a_key_is_in_the_force_of_the_next_beat(model):
