@@ -36,6 +36,7 @@ def test_parts_of_a_run_lie_between_its_seams():
     assert all(part.seam is None for part in parts)
     assert [part.input.size for part in run.parts(11)] == [20, 20]
     assert run.parts(51) == (run,)
+    assert [part.input.size for part in examples.run(50, seam=_seams(10, 11)).parts()] == [10, 1, 39]
     for whole in (examples.run(50), examples.run(50, seam=_seams())):
         assert whole.parts() == (whole,)
 
@@ -104,6 +105,12 @@ def test_steps_are_even_within_two_percent_and_gaps_count_apart():
     assert (found.gaps, found.longest_gap, found.longest) == (1, pytest.approx(1.51), pytest.approx(1.49))
     many = steps_of(np.concatenate((np.arange(300_000.0), [300_007.0, 300_010.0])))
     assert (many.gaps, many.longest_gap, many.median, many.shortest) == (2, 8.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(("form", "quantity"), [("direct", "current"), ("dual", "force")])
+def test_the_levels_of_a_dual_model_are_of_its_output(form, quantity):
+    """There input and output have changed places."""
+    assert examples.model(form=form).edges_quantity == quantity
 
 
 @pytest.mark.parametrize("name", ["models/best.h5", "C:\\models\\best.h5", "best.h5", "best"])
