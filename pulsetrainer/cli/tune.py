@@ -81,7 +81,7 @@ def _show(job: Job, out: Path | None, found: Tuned) -> None:
     units = {parameter.name: parameter.unit for parameter in PARAMETERS}
     job.notes(found.notes)
     if out is None:
-        job.notes(["the gains are not kept: give `out` pulsetrainer.toml to write them down"])
+        job.notes(["the loop gains are not kept: give `out` pulsetrainer.toml to write them down"])
     job.screen.result(plain(found) | {"output": out})
     before, after = found.tracking_percent.before, found.tracking_percent.after
     job.screen.facts(
