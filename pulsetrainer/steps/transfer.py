@@ -16,7 +16,10 @@ from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
 from pulsetrainer.steps.refine import beats, check, whole_current
 
-_GENERAL = 0.7  # of the mean square of what was learnt: less says more of one pulse than of the device
+# Of the mean square of what was learnt. Where less goes with any pulse the model is the wrong one, and
+# another pulse became worse as often as better
+_GENERAL = 0.88
+_RIDGE = 0.01  # of the columns' mean square: one pulse hardly tells low-passes apart, another one does
 _TAUS_S = (0.03, 0.1, 0.3, 1.0, 3.0)  # of what creeps: from a tenth of a beat to a few beats
 
 
@@ -26,8 +29,8 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
         ask' = target + F[target] c,   c by least squares from F[target_r] c = M[u_r] - target_r
 
     where u_r is the refined current, M the model and F the columns 1, y, dy/dt, and y through five
-    low-passes. What the device does with any pulse goes along: a zero, a gain, a lag, a creep. What
-    belongs to one place of one pulse stays behind.
+    low-passes, with a ridge of a hundredth of their mean squares. What the device does with any pulse goes
+    along: a zero, a gain, a lag, a creep. What belongs to one place of one pulse stays behind.
 
     Parameters
     ----------
@@ -59,10 +62,10 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
     there = beats(refined)
     columns = _columns(refined, smooth)[there]
     missing = (part.whole(refined.compensated) - refined.target)[there]
-    share, *_ = np.linalg.lstsq(columns, missing, rcond=None)
-    _check_general(refined, missing, columns @ share)
+    _check_general(refined, columns, missing)
+    share, base = _shares(columns, missing)
     faded = smooth(beats(drive).astype(np.float64))  # a step would put a kink into the current
-    added = faded * (_columns(drive, smooth) @ share)
+    added = faded * (base + _columns(drive, smooth) @ share)
     current, clipped = _current(drive, part, drive.target + added, slew)
     told = 100.0 * metrics.root_mean_square(added[drive.scored]) / drive.full_force
     return replace(
@@ -105,12 +108,18 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
     return drive.model
 
 
-def _check_general(refined: Waveform, missing: FloatArray, general: FloatArray) -> None:
-    """Refuse what was learnt (n,) where too little of it goes with what any pulse has (n,)."""
+def _check_general(refined: Waveform, columns: FloatArray, missing: FloatArray) -> None:
+    """Refuse what was learnt (n,) where too little of it goes with what any pulse has (n, k).
+
+    What is left of it and no larger than the sensor's noise says nothing.
+    """
+    whole = np.column_stack((np.ones(missing.size), columns))
+    best, *_ = np.linalg.lstsq(whole, missing, rcond=None)
     noise = 0.01 * refined.passes[refined.kept - 1].noise_percent * refined.full_force
-    if metrics.root_mean_square(missing) <= noise:
+    own = missing - whole @ best
+    if metrics.root_mean_square(own) <= noise:
         return
-    told = 1.0 - float(np.sum((missing - general) ** 2) / np.sum(missing**2))
+    told = 1.0 - float(np.sum(own**2) / np.sum(missing**2))
     if told < _GENERAL:
         raise DataError(
             f"what was learnt on {refined.name} belongs to that pulse: {100 * told:.0f} % of it go "
@@ -120,10 +129,19 @@ def _check_general(refined: Waveform, missing: FloatArray, general: FloatArray) 
 
 
 def _columns(drive: Waveform, smooth: learning.LowPass) -> FloatArray:
-    """F of a drive's target, (n, 3 + taus), output unit."""
+    """F of a drive's target but its constant, (n, 2 + taus), output unit."""
     target, dt_s = drive.target, 1.0 / drive.rate_Hz
     slow = [low_pass(target, tau, dt_s) for tau in _TAUS_S]
-    return np.stack((np.ones(target.size), target, smooth(np.gradient(target, dt_s)), *slow), axis=1)
+    return np.stack((target, smooth(np.gradient(target, dt_s)), *slow), axis=1)
+
+
+def _shares(columns: FloatArray, missing: FloatArray) -> tuple[FloatArray, float]:
+    """Shares (k,) of columns (n, k) in what is missing (n,), and the constant beside them."""
+    mean, spread = columns.mean(axis=0), columns.std(axis=0)
+    unit = (columns - mean) / spread
+    gram = unit.T @ unit / missing.size + _RIDGE * np.eye(spread.size)
+    share = np.linalg.solve(gram, unit.T @ (missing - missing.mean()) / missing.size) / spread
+    return share, float(missing.mean() - mean @ share)
 
 
 def _current(

@@ -59,6 +59,15 @@ def test_what_belongs_to_one_pulse_stays_there():
     assert caught.value.hint
 
 
+@pytest.mark.slow
+def test_what_a_wrong_model_misses_is_not_carried_over():
+    """On such a device another pulse became worse by up to its whole gain."""
+    refined = refine(drive_of("Jiles-Atherton"), ForeignDevice("Jiles-Atherton", seed=3), slew=SLEW)
+    with pytest.raises(DataError) as caught:
+        transfer(drive_of("Jiles-Atherton", "bifid"), refined, slew=SLEW)
+    assert caught.value.hint
+
+
 def test_what_cannot_be_carried_over_is_refused():
     """A drive that was not refined, another model or rate, another method."""
     drive, other = drive_of("Bouc-Wen"), drive_of("Bouc-Wen", "bifid")
