@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -12,14 +13,15 @@ from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import tables
 from pulsetrainer.report.diagnosis_text import Facts, Table, sections
 from pulsetrainer.report.facts import facts
-from pulsetrainer.report.names import NAMES, split
+from pulsetrainer.report.names import FORCE, NAMES, split
 
 _TITLED = {
     "run": "signal", "model": "cells", "waveform": "waveform", "playback": "waveform", "diagnosis": "verdict",
     "session": "pulses",
 }  # fmt: skip
 _WIDTH = 110  # of a table, unless a screen says otherwise
-_LABEL_WIDTH, _COLUMN_WIDTH = 50, 13
+_LABEL_WIDTH, _COLUMN_WIDTH = 32, 13
+_TEXT_WIDTH = 80
 _ROUNDING = 1e-6
 _PREDICTION = ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent")
 _FIGURES = (
@@ -71,6 +73,14 @@ def tables_of(evaluation: Evaluation, width: int = _WIDTH) -> Iterator[Table]:
         yield _predictions(evaluation)
 
 
+def _title(width: int) -> str:
+    """Name the units: a column of them would leave no room for three methods on 80 columns."""
+    figures = {NAMES[one.rpartition(".")[2]] for one in _FIGURES}
+    others = sorted(f"{words}: {unit}" for words, unit in figures if unit != FORCE)
+    lines = (f"force errors of the pulses, {FORCE}", "; ".join(others))
+    return "\n".join(textwrap.fill(line, min(width, _TEXT_WIDTH)) for line in lines)
+
+
 def _predictions(evaluation: Evaluation) -> Table:
     """How each model predicts the run; an offset far below the error is the rounding of numbers."""
     models = evaluation.models
@@ -101,7 +111,9 @@ def _pulses(evaluation: Evaluation, width: int) -> Iterator[Table]:
             for heading, found in columns[name]
         ]
         yield Table(
-            "force errors of the pulses",
-            ("", "unit", *(heading for heading, _ in named)),
-            tuple((*split(metric)[1], *(found.get(metric) for _, found in named)) for metric in _FIGURES),
+            _title(width),
+            ("", *(heading for heading, _ in named)),
+            tuple(
+                (split(metric)[1].words, *(found.get(metric) for _, found in named)) for metric in _FIGURES
+            ),
         )
