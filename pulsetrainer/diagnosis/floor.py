@@ -50,6 +50,12 @@ class Floor:
         return float(np.hypot(self.white, self.discretisation))
 
     @property
+    def slow(self) -> float:
+        """Noise of an average, as a multiple of that from sample to sample and of steps; NaN for none."""
+        quick = float(np.sqrt(self.sampled + self.held))
+        return self.white / quick if quick > 0 else float("nan")
+
+    @property
     def relevant(self) -> float:
         """Fall of the sum of squares below which an effect is irrelevant."""
         sure = float(np.sqrt(max(self.white**2 - self.doubtful, 0.0)))

@@ -38,6 +38,11 @@ TEXTS: Mapping[str, str] = {
         "{names} explain only a part of it: {rest:.2g} % of the span is something else, which noise and "
         "levels do not account for"
     ),
+    "slow noise": (
+        "What is taken for noise here is slow: short averages have {white:.2g} % of the span of it, "
+        "{times:.1f} times what the noise from sample to sample would leave. If the sensor does not do that "
+        "by itself, something that was not recorded acts on the device"
+    ),
     "not accepted": (
         "Noise alone hardly looks like {names} (p = {p:.3f}). But once the model is fitted together with it, "
         "it is too small to matter, or does not predict the parts of the recordings that were left out. So "

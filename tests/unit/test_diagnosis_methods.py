@@ -544,6 +544,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
     figures = dict.fromkeys(
         [
             "left",
+            "white",
             "floor",
             "p",
             "explains",

@@ -817,6 +817,16 @@ def _accounted(monkeypatch, **more):
     return account.stage(replace(state, **more)).evidence
 
 
+@pytest.mark.parametrize(
+    ("verdict", "times", "said"), [("none", 3.1, 1), ("none", 2.9, 0), ("creep", 3.1, 0)]
+)
+def test_slow_noise_is_told_where_nothing_was_named(monkeypatch, verdict, times, said):
+    """More than three times what noise from sample to sample leaves in an average."""
+    floor = replace(FLOOR, sampled=(FLOOR.white / times) ** 2)
+    found = [e for e in _accounted(monkeypatch, verdict=verdict, floor=floor) if e.kind == "slow noise"]
+    assert [e.figures["times"] for e in found] == [pytest.approx(times)] * said
+
+
 def test_the_account_says_what_is_left_before_and_after(monkeypatch):
     """Per cent of a span of 1: the static model, the floor, and with the causes."""
     static, extended = _accounted(monkeypatch, extended=True, verdict="creep")

@@ -17,8 +17,7 @@ _PILE = 2.0  # times the samples just inside: noise makes a tail at the end of a
 _AT = 0.5  # converter steps: nearer than that is at the rail
 _INSIDE = 10.5  # converter steps beside the rail that are compared with it ...
 _INSIDE_SPAN = 0.02  # ... but no more than this share of the span
-# Converter steps of noise: with less a flat top repeats its value by itself; the steps alone look like 0.66
-_NOISY = 0.7
+_NOISY = 0.7  # converter steps of noise: with less a flat top repeats itself; steps alone look like 0.66
 _BESIDE = 3  # samples beside a cut off one, in time: only those with low noise are left there
 _AROUND = 9  # samples whose mean is near the rail where ...
 _NEAR = 3.0  # ... it is nearer than this many times the noise
