@@ -238,7 +238,8 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
     tried = _tried(error)
     likely = _mean_length(tried, error.whole.weight_sum / memory)
     alike = _longest_alike(tried, lambda s: np.concatenate([cut.squares(error.operators(s)) for cut in cuts]))
-    return Choice(max(likely, alike / _STEP), tried)
+    # three digits: what more there are is rounding of small differences, and would depend on the units
+    return Choice(float(f"{max(likely, alike / _STEP):.3g}"), tried)
 
 
 def _memory_of_residual(records: Sequence[Record], plane: Plane, reading: Reading, *, signed: bool) -> float:
