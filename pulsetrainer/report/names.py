@@ -57,6 +57,18 @@ NAMES: Final = {
 }
 
 
+# what is said first of a pulse, as dotted names within it
+OVERVIEW: Final = (
+    "scaled.mean_abs_error_percent",
+    "compensated.mean_abs_error_percent",
+    "mean_error_reduction_percent",
+    "scaled.max_abs_error_percent",
+    "compensated.max_abs_error_percent",
+    "scaled.hysteresis_percent",
+    "compensated.hysteresis_percent",
+)
+
+
 def split(dotted: str) -> tuple[str, Named]:
     """Return whose a figure is and what it is called: ``normal.scaled.rms_percent`` is of "normal"."""
     stem, _, metric = dotted.rpartition(".")

@@ -13,7 +13,7 @@ from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import tables
 from pulsetrainer.report.diagnosis_text import Facts, Table, sections
 from pulsetrainer.report.facts import facts
-from pulsetrainer.report.names import FORCE, NAMES, split
+from pulsetrainer.report.names import FORCE, NAMES, OVERVIEW, split
 
 _TITLED = {
     "run": "signal", "model": "cells", "waveform": "waveform", "playback": "waveform", "diagnosis": "verdict",
@@ -24,16 +24,7 @@ _LABEL_WIDTH, _COLUMN_WIDTH = 32, 13
 _TEXT_WIDTH = 80
 _ROUNDING = 1e-6
 _PREDICTION = ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent")
-_FIGURES = (
-    "scaled.mean_abs_error_percent",
-    "compensated.mean_abs_error_percent",
-    "mean_error_reduction_percent",
-    "scaled.max_abs_error_percent",
-    "compensated.max_abs_error_percent",
-    "scaled.hysteresis_percent",
-    "compensated.hysteresis_percent",
-    "compensated.current_tracking_max_percent",
-)
+_FIGURES = (*OVERVIEW, "compensated.current_tracking_max_percent")
 
 
 def title(artefact: Any) -> str:

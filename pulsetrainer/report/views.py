@@ -10,7 +10,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import Final
 
 from markupsafe import Markup
 from matplotlib.figure import Figure
@@ -20,23 +19,12 @@ from pulsetrainer.artefacts.evaluation import METRICS
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import alternatives, figures, heat_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
-from pulsetrainer.report.names import NAMES
+from pulsetrainer.report.names import NAMES, OVERVIEW
 from pulsetrainer.report.panels import largest_residual, scale
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
 
 Published = Mapping[str, Mapping[str, float]]
-
-# the columns of the overview, as dotted names within a waveform
-OVERVIEW: Final = (
-    "scaled.mean_abs_error_percent",
-    "compensated.mean_abs_error_percent",
-    "mean_error_reduction_percent",
-    "scaled.max_abs_error_percent",
-    "compensated.max_abs_error_percent",
-    "scaled.hysteresis_percent",
-    "compensated.hysteresis_percent",
-)
 
 
 @dataclass(frozen=True, slots=True)
