@@ -50,9 +50,14 @@ class Floor:
         return float(np.hypot(self.white, self.discretisation))
 
     @property
+    def quick(self) -> Floor:
+        """The floor with no other noise than that from sample to sample and of steps."""
+        return replace(self, white=float(np.sqrt(self.sampled + self.held)), doubtful=0.0)
+
+    @property
     def slow(self) -> float:
         """Noise of an average, as a multiple of that from sample to sample and of steps; NaN for none."""
-        quick = float(np.sqrt(self.sampled + self.held))
+        quick = self.quick.white
         return self.white / quick if quick > 0 else float("nan")
 
     @property

@@ -179,6 +179,17 @@ def quiet_square(residual: FloatArray, bins: Bins, level: FloatArray, speed: Flo
     return Heard(usual + _impulses(residual, usual), usual - sure)
 
 
+def burstiness(residual: FloatArray, bins: Bins, level: FloatArray) -> float:
+    """Kurtosis of a residual (count,) within its octaves, each with the weight of its power.
+
+    It is 3 for normal noise of any spectrum, and larger for what comes and goes or jumps, however slow it is.
+    Noise that grows with the output's ``level`` (count,) is brought to one size first.
+    """
+    bands = np.asarray(_octaves(residual / _scale(residual, bins, level), bins)[0])
+    power = bands.var(axis=1)
+    return float(np.average(stats.kurtosis(bands, axis=1, fisher=False), weights=np.maximum(power, TINY)))
+
+
 def _impulses(residual: FloatArray, usual: float) -> float:
     """Mean square of averages that stand alone, far out of noise of the ``usual`` size: heavy tails."""
     size = np.abs(residual)

@@ -17,6 +17,7 @@ from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.noise import burstiness
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.raw import Firing
 from pulsetrainer.diagnosis.scale import Scale
@@ -100,11 +101,20 @@ class State:
         return any(library()[firing.cause].jagged for _, firing in self.firings)
 
     @property
+    def in_bursts(self) -> bool:
+        """Whether what is taken for slow noise matters, and comes and goes or jumps as no noise does."""
+        if not self.floor.slow > LIMITS.slow_noise or self.floor.white < LIMITS.matters * self.floor.span:
+            return False
+        problem = self.problem
+        return burstiness(self.current.residual, problem.bins, problem.measured) > LIMITS.burstiness
+
+    @property
     def unexplained(self) -> bool:
         """Whether more than half of what can be explained is left, and enough to matter."""
-        left = self.current.squares - self.floor.squares
-        half = LIMITS.unexplained * self.floor.reducible(self.baseline)
-        return left > max(half, LIMITS.unexplained_relevant * self.floor.relevant)
+        floor = self.floor.quick if self.in_bursts else self.floor
+        left = self.current.squares - floor.squares
+        half = LIMITS.unexplained * floor.reducible(self.baseline)
+        return left > max(half, LIMITS.unexplained_relevant * floor.relevant)
 
     @property
     def blind(self) -> tuple[str, ...]:

@@ -91,6 +91,7 @@ class Thresholds:
     nine_of_ten: float = 1.2816  # standard deviations of noise that nine of ten effects are sure against
     halves: tuple[float, float, int] = (1.0, 200.0, 4000)  # half squares among which a line's limit is sought
     slow_noise: float = 3.0  # times the noise from sample to sample: averages with more have slow noise
+    burstiness: float = 4.5  # kurtosis in octaves: drawn noises have 2.9 to 4, bursts and loads 5.5 to 8
     matters: float = 0.005  # of the span: an effect so large must show, or nothing can be said
     draws: int = 1999  # of the noise: the smallest p is a twentieth of the limit
     probes: int = 12  # white signals that tell how much of a spectrum the weights and the library take away

@@ -43,6 +43,11 @@ TEXTS: Mapping[str, str] = {
         "{times:.1f} times what the noise from sample to sample would leave. If the sensor does not do that "
         "by itself, something that was not recorded acts on the device"
     ),
+    "bursts": (
+        "What is left comes and goes, or jumps, as no noise does: short averages have {white:.2g} % of the "
+        "span of it, {times:.1f} times what the noise from sample to sample would leave. Something that was "
+        "not recorded acts on the device or on the sensor"
+    ),
     "not accepted": (
         "Noise alone hardly looks like {names} (p = {p:.3f}). But once the model is fitted together with it, "
         "it is too small to matter, or does not predict the parts of the recordings that were left out. So "

@@ -52,7 +52,7 @@ LIBRARY = {
         {"coefficient": v, "tau": t},
     ),
     "offset-drift": lambda r, s: (
-        {"offset-drift": (v := s * _sign(r) * _log(r, 0.0015, 0.008))},
+        {"offset-drift": (v := max(s * _sign(r) * _log(r, 0.0015, 0.008), LOWEST_DRIFT))},
         {"rate": v},
     ),
     "resonance": lambda r, s: (
@@ -89,6 +89,7 @@ LIBRARY = {
     "current-tracking": lambda r, _: ({}, {"top": r.uniform(1.24, 1.44)}),
     "out-of-range": lambda r, _: ({}, {"high": r.uniform(1.2, 1.4)}),
 }
+LOWEST_DRIFT = -0.006  # N/s: with more the zero falls below what the device takes for a sound sensor
 SETTINGS = ("seed", "noise-seed", "noise")
 # what the library does not hold, put on the measured output
 OUTSIDE = ("gain wander", "hidden load", "bursts")

@@ -11,7 +11,7 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.outliers import _beyond_the_tail
 from pulsetrainer.diagnosis.design import bins_of
-from pulsetrainer.diagnosis.noise import Noise, noise_in, quiet_square
+from pulsetrainer.diagnosis.noise import Noise, burstiness, noise_in, quiet_square
 
 COUNT = 8000
 LEVEL = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(COUNT) / 500)
@@ -137,3 +137,20 @@ def test_a_frequency_chosen_by_the_data_is_no_surprise():
 
 def _frame(count: int) -> Frame:
     return Frame(1e-2, np.zeros(count), 1.0, 1.0)
+
+
+@pytest.mark.parametrize("how", [0.0, 0.9, 0.98])
+@pytest.mark.parametrize("grows", [0.0, 3.0])
+def test_noise_of_any_spectrum_has_the_tails_of_noise(how, grows):
+    """Kurtosis 3 in its octaves, also where it is several times larger at one level than at another."""
+    noise = _coloured(np.random.default_rng(5), how) * (1.0 + grows * LEVEL)
+    assert burstiness(noise, _bins(), LEVEL) == pytest.approx(3.0, abs=0.6)
+
+
+@pytest.mark.parametrize("slow", ["load", "bursts"])
+def test_what_comes_and_goes_has_heavier_tails(slow):
+    """A load that is put on and off, and an oscillation now and then, on white noise."""
+    rng, t = np.random.default_rng(6), np.arange(COUNT)
+    on = np.searchsorted(np.sort(rng.uniform(0, COUNT, 32)), t) % 4 == 1
+    there = on * (np.sin(0.3 * t) if slow == "bursts" else 1.0)
+    assert burstiness(3.0 * there + 0.3 * rng.standard_normal(COUNT), _bins(), LEVEL) > 5.0

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pulsetrainer.diagnosis import design, fitting, residual, velocity, wording
+from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.congruency import Contrast
@@ -123,6 +124,7 @@ PROBLEM = SimpleNamespace(
     records=("one",),
     frames=(Frame(1e-3, np.zeros(10_000), 1.0, 1.0),),
     measured=np.asarray([0.0, 1.0]),
+    bins=None,
     plane=SimpleNamespace(low=0.0, high=2.0),
     base=None,
 )
@@ -822,9 +824,25 @@ def _accounted(monkeypatch, **more):
 )
 def test_slow_noise_is_told_where_nothing_was_named(monkeypatch, verdict, times, said):
     """More than three times what noise from sample to sample leaves in an average."""
+    monkeypatch.setattr(state_module, "burstiness", lambda *_: 3.0)
     floor = replace(FLOOR, sampled=(FLOOR.white / times) ** 2)
     found = [e for e in _accounted(monkeypatch, verdict=verdict, floor=floor) if e.kind == "slow noise"]
     assert [e.figures["times"] for e in found] == [pytest.approx(times)] * said
+
+
+@pytest.mark.parametrize(
+    ("kurtosis", "times", "white", "said"),
+    [(4.6, 3.1, 0.006, True), (4.4, 3.1, 0.006, False), (4.6, 2.9, 0.006, False), (4.6, 3.1, 0.004, False)],
+)
+def test_slow_noise_that_comes_in_bursts_is_no_noise(monkeypatch, kurtosis, times, white, said):
+    """Heavier tails than 4.5, slow, and above half a per cent of the span: it is unexplained, and told."""
+    monkeypatch.setattr(state_module, "burstiness", lambda *_: kurtosis)
+    floor = replace(FLOOR, white=white, sampled=(white / times) ** 2)
+    left = SimpleNamespace(squares=100 * white**2, residual=None)
+    state = _state(left, left, floor=floor)
+    assert (state.in_bursts, state.unexplained) == (said, said)
+    told = [e.kind for e in _accounted(monkeypatch, verdict="unknown", floor=floor)]
+    assert ("bursts" in told) is said
 
 
 def test_the_account_says_what_is_left_before_and_after(monkeypatch):

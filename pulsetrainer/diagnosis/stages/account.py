@@ -43,7 +43,7 @@ def stage(state: State) -> State:
         said += _largest(state)
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:
         figures = {"white": percent * state.floor.white, "times": state.floor.slow}
-        said.append(Evidence("slow noise", figures=figures))
+        said.append(Evidence("bursts" if state.in_bursts else "slow noise", figures=figures))
     if state.verdict in ("none", "inconclusive") and not state.question.quick:
         said += _not_accepted(state)
     if state.question.quick:
