@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import PurePath
 from typing import Any
@@ -12,8 +12,11 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pulsetrainer.artefacts import Evaluation
-from pulsetrainer.artefacts.evaluation import PUBLISHED
+from pulsetrainer.artefacts.evaluation import METRICS, PUBLISHED
+from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import views
+from pulsetrainer.report.diagnosis_text import of_a_curve
+from pulsetrainer.report.names import NAMES, OVERVIEW
 
 _UNIT = re.compile(r"(?<=\d) (?=%|[A-Za-z]{1,2}\b)")
 
@@ -42,30 +45,27 @@ def page(
 
 
 def render_evaluation(
-    evaluation: Evaluation, *, published: views.Published = PUBLISHED, **header: Any
+    evaluation: Evaluation, *, published: Mapping[str, Mapping[str, float]] = PUBLISHED, **header: Any
 ) -> str:
     """Return the report of an evaluation; ``header`` as in ``page``.
 
     Beside its figures stand those of a ``published`` device by waveform: ``mean_error_reduction_percent``,
     ``scaled.max_abs_error_percent`` and so on.
     """
-    played = [(one, f"waveform-{k}") for k, one in enumerate(evaluation.waveforms, start=1)]
-    several = len({(one.name, one.inversion) for one in evaluation.waveforms}) > 1
+    played = evaluation.waveforms
     # whose model the evaluation holds: that of the last
-    last = f" of {views.titled(evaluation.waveforms[-1])}" if several else ""
+    last = f" of {views.titled(played[-1])}" if len(set(map(views.titled, played))) > 1 else ""
     if len(evaluation.models) > 1:
         last = f" {PurePath(evaluation.models[-1].name).stem}"
     return page(
         "evaluation.html.j2",
         **header,
-        readouts=[views.readout(one, identifier) for one, identifier in played],
-        overview=views.overview(played, published),
-        compared=any(one.name in published for one, _ in played),
-        warning=evaluation.model.fit.warning if evaluation.model and evaluation.model.fit else "",
-        beats=views.beats(evaluation.waveforms),
-        model=None if evaluation.model is None else views.model_section(evaluation.model, last),
-        waveforms=[views.waveform_section(one, identifier) for one, identifier in played],
-        prediction=views.prediction_section(evaluation.models) if evaluation.models else None,
+        waveforms=[views.waveform_part(one, f"waveform-{k}") for k, one in enumerate(played, start=1)],
+        published=published,
+        beats=views.beats(played),
+        model=None if evaluation.model is None else views.model_part(evaluation.model, last),
+        predicted=evaluation.models,
+        predictions=views.predictions(evaluation.models),
     )
 
 
@@ -80,7 +80,10 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters["unbroken"] = unbroken
+    made.filters |= {"unbroken": unbroken, "unit": shown, "stem": lambda name: PurePath(name).stem}
+    made.tests["of_a_curve"] = of_a_curve
+    made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS}
+    made.globals |= {"number": views.number, "metric": views.metric}
     return made
 
 
