@@ -64,8 +64,11 @@ class Attribute:
 
 
 def beyond_all_quantities(values: NDArray[Any]) -> str:
-    """Say which of the values (...) are beyond ``LARGEST``, nothing where none is; NaN is none of them."""
-    if values.dtype.kind != "f":
+    """Say which values (...) are beyond ``LARGEST``, nothing where none is.
+
+    NaN is none of them, nor is a single infinity.
+    """
+    if values.dtype.kind != "f" or (values.ndim == 0 and not np.isfinite(values)):
         return ""
     low, high = np.fmin.reduce(values, None, initial=0.0), np.fmax.reduce(values, None, initial=0.0)
     return (

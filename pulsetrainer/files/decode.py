@@ -6,13 +6,13 @@ believed before it is checked, not even a shape: a damaged size must not fill th
 
 from __future__ import annotations
 
+import math
 from dataclasses import MISSING, dataclass
 from typing import Any
 
 import h5py
 import numpy as np
 
-from pulsetrainer.artefacts import beyond_all_quantities
 from pulsetrainer.errors import DamagedFileError, DataError
 from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
 
@@ -39,8 +39,8 @@ def decode(
 ) -> Any:
     """Read a dataclass from a group.
 
-    ``samples`` along the time axis of THIS group are to be trusted; None: all. ``inherited`` is the length of
-    the time axis of the group above.
+    ``samples`` is the length of the time axis of this group, where the file says it; ``inherited`` that of
+    the group above.
 
     Raises
     ------
@@ -53,9 +53,8 @@ def decode(
         lengths[TIME] = samples
     elif inherited is not None and not any(plan.is_time_axis for plan in plans):
         lengths[TIME] = inherited
-    values: dict[str, Any] = {}
-    for plan in sorted(plans, key=lambda plan: not plan.is_time_axis):
-        values[plan.name] = _field(group, plan, origin, lengths, trusted=samples)
+    ordered = sorted(plans, key=lambda plan: not plan.is_time_axis)
+    values = {plan.name: _field(group, plan, origin, lengths) for plan in ordered}
     try:
         return cls(**values)
     except DataError as error:
@@ -63,9 +62,7 @@ def decode(
         raise DataError(f"{origin.file}: {place}{error.message}", hint=error.hint) from error
 
 
-def _field(
-    group: h5py.Group, plan: FieldPlan, origin: Origin, lengths: dict[str, int], *, trusted: int | None
-) -> Any:
+def _field(group: h5py.Group, plan: FieldPlan, origin: Origin, lengths: dict[str, int]) -> Any:
     is_attribute = plan.role in ("attribute", "list")
     if plan.path not in (group.attrs if is_attribute else group):
         return _absent(group, plan, origin)
@@ -75,11 +72,7 @@ def _field(
     if plan.role in ("array", "number"):
         if not isinstance(item, h5py.Dataset):
             raise origin.fault(f"{item.name!r}", "is a group, expected a dataset")
-        return (
-            _number(item, plan, origin)
-            if plan.role == "number"
-            else _array(item, plan, origin, lengths, trusted=trusted)
-        )
+        return _dataset(item, plan, origin, lengths)
     if not isinstance(item, h5py.Group):
         raise origin.fault(f"{item.name!r}", "is a dataset, expected a group")
     time_length = lengths.get(TIME)
@@ -107,43 +100,22 @@ def _absent(group: h5py.Group, plan: FieldPlan, origin: Origin) -> Any:
     raise origin.fault(f"the {what.get(plan.role, 'group')} {name!r}", "is missing")
 
 
-def _array(
-    dataset: h5py.Dataset, plan: FieldPlan, origin: Origin, lengths: dict[str, int], *, trusted: int | None
-) -> Any:
-    """Read one array, as many samples of it as are to be trusted."""
+def _dataset(dataset: h5py.Dataset, plan: FieldPlan, origin: Origin, lengths: dict[str, int]) -> Any:
+    """Read one array or number."""
     where = f"dataset {dataset.name!r}"
     _check_type(dataset, plan, origin)
     shape = dataset.shape
     if shape is None or len(shape) != len(plan.dims):
-        raise origin.fault(where, f"has the shape {shape}, expected the axes ({', '.join(plan.dims)})")
+        expected = f"the axes ({', '.join(plan.dims)})" if plan.dims else "a single number"
+        raise origin.fault(where, f"has the shape {shape}, expected {expected}")
     for axis, length in zip(plan.dims, shape, strict=True):
-        expected = lengths.setdefault(axis, length)
-        if axis == TIME and trusted is not None and length > expected:
-            continue  # what lies beyond the trusted samples was being written when the program died
-        if length != expected:
-            raise origin.fault(where, f"has {length} values along {axis}, expected {expected}")
-    wanted = tuple(slice(0, lengths[axis]) for axis in plan.dims)
-    _check_size(dataset, [lengths[axis] for axis in plan.dims], origin)
-    values = np.asarray(dataset[wanted]).astype(plan.type)
-    if plan.data is not None and plan.data.finite and not np.all(np.isfinite(values)):
-        where_bad = ", ".join(str(k[0]) for k in np.nonzero(~np.isfinite(values)))
-        raise origin.fault(where, f"holds a value that is not finite, the first at index {where_bad}")
-    if said := beyond_all_quantities(values):
+        if length != lengths.setdefault(axis, length):
+            raise origin.fault(where, f"has {length} values along {axis}, expected {lengths[axis]}")
+    _check_size(dataset, origin)
+    values = np.asarray(dataset[()]).astype(plan.type)
+    if said := plan.fault_in(values):
         raise origin.fault(where, said)
-    return values
-
-
-def _number(dataset: h5py.Dataset, plan: FieldPlan, origin: Origin) -> Any:
-    where = f"dataset {dataset.name!r}"
-    _check_type(dataset, plan, origin)
-    if dataset.shape != ():
-        raise origin.fault(where, f"has the shape {dataset.shape}, expected a single number")
-    value = dataset[()]
-    if plan.data is not None and plan.data.finite and not np.isfinite(value):
-        raise origin.fault(where, f"is {value}, expected a finite number")
-    if np.isfinite(value) and (said := beyond_all_quantities(np.asarray(value))):
-        raise origin.fault(where, said)
-    return plan.type(value)
+    return values if plan.dims else plan.type(values)
 
 
 def _check_type(dataset: h5py.Dataset, plan: FieldPlan, origin: Origin) -> None:
@@ -154,9 +126,9 @@ def _check_type(dataset: h5py.Dataset, plan: FieldPlan, origin: Origin) -> None:
         raise origin.fault(f"dataset {dataset.name!r}", f"holds {dataset.dtype}, expected {expected}")
 
 
-def _check_size(dataset: h5py.Dataset, shape: list[int], origin: Origin) -> None:
+def _check_size(dataset: h5py.Dataset, origin: Origin) -> None:
     """Raise DataError where the shape promises more than the file can hold: a damaged size."""
-    promised = int(np.prod([float(length) for length in shape])) * dataset.dtype.itemsize
+    promised = math.prod(dataset.shape) * dataset.dtype.itemsize
     if promised > _DEFLATE_RATIO * dataset.id.get_storage_size() + _ALLOWANCE_BYTES:
         raise origin.fault(
             f"dataset {dataset.name!r}", f"claims {promised:.3g} bytes that the file does not hold"

@@ -13,7 +13,6 @@ from typing import Any
 import h5py
 import numpy as np
 
-from pulsetrainer.artefacts import beyond_all_quantities
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.provenance import clean
 from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
@@ -63,10 +62,8 @@ def encode(group: h5py.Group, cls: type, values: Mapping[str, Any], *, inherited
 
 def _put(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes) -> None:
     value = values[plan.name]
-    if plan.role == "array":
-        _put_array(group, plan, values, axes)
-    elif plan.role == "number":
-        _put_number(group, plan, value, values)
+    if plan.role in ("array", "number"):
+        _put_dataset(group, plan, values, axes)
     elif plan.role == "attribute":
         group.attrs[plan.path] = _attribute(plan, value)
     elif plan.role == "list":
@@ -83,9 +80,9 @@ def _time_of(axes: Axes) -> Axes:
     return {TIME: axes[TIME]} if TIME in axes else {}
 
 
-def _put_array(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes) -> None:
+def _put_dataset(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], axes: Axes) -> None:
     value = values[plan.name]
-    is_bool = plan.type is np.bool_
+    is_bool = plan.type in (bool, np.bool_)
     stored = np.uint8 if is_bool else plan.type
     if isinstance(value, Later):
         # a view of one number: it has a shape, and takes no memory
@@ -121,11 +118,7 @@ def _checked(plan: FieldPlan, array: np.ndarray[Any, Any]) -> np.ndarray[Any, An
         )
     if array.dtype.kind not in "biuf":
         raise DataError(f"{plan.name!r} holds {array.dtype}, expected numbers", hint=_WRITE_AGAIN)
-    if plan.data is not None and plan.data.finite and not np.all(np.isfinite(array)):
-        raise DataError(
-            f"{plan.name!r} holds a value that is not finite", hint="correct the data it was made from"
-        )
-    if said := beyond_all_quantities(array):
+    if said := plan.fault_in(array):
         raise DataError(f"{plan.name!r} {said}", hint="correct the data it was made from")
     return array
 
@@ -149,20 +142,6 @@ def _scale(group: h5py.Group, axes: Axes, axis: str, length: int) -> h5py.Datase
         scale.make_scale(name)
         axes[axis] = scale
     return axes[axis]
-
-
-def _put_number(group: h5py.Group, plan: FieldPlan, value: Any, values: Mapping[str, Any]) -> None:
-    number = np.asarray(plan.type(value))
-    if plan.data is not None and plan.data.finite and not np.isfinite(number):
-        raise DataError(
-            f"{plan.name!r} is {value} and must be finite", hint="correct the data it was made from"
-        )
-    if np.isfinite(number) and (said := beyond_all_quantities(number)):
-        raise DataError(f"{plan.name!r} {said}", hint="correct the data it was made from")
-    dataset = group.create_dataset(plan.path, data=number.astype(np.uint8) if plan.type is bool else number)
-    _describe(dataset, plan, values)
-    if plan.type is bool:
-        dataset.attrs["dtype"] = "bool"
 
 
 def _describe(dataset: h5py.Dataset, plan: FieldPlan, values: Mapping[str, Any]) -> None:

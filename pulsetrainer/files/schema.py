@@ -10,8 +10,9 @@ from functools import cache
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pulsetrainer.artefacts import Attribute, Data
+from pulsetrainer.artefacts import Attribute, Data, beyond_all_quantities
 
 Role = Literal["array", "number", "attribute", "list", "group", "groups"]
 TIME = "time"
@@ -44,6 +45,13 @@ class FieldPlan:
     def is_time_axis(self) -> bool:
         """Whether this dataset is the scale of the axis ``time`` in its group."""
         return self.path == TIME and self.dims == (TIME,)
+
+    def fault_in(self, values: NDArray[Any]) -> str:
+        """Say what is wrong with the values of this dataset, nothing where nothing is."""
+        if self.data is not None and self.data.finite and not np.all(np.isfinite(values)):
+            first = ", ".join(map(str, np.argwhere(~np.isfinite(values))[0]))
+            return "holds a value that is not finite" + (f", the first at index {first}" if first else "")
+        return beyond_all_quantities(values)
 
 
 def _without_none(hint: Any) -> tuple[Any, bool]:

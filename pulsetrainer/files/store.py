@@ -168,8 +168,8 @@ def _recording(path: Path | str) -> Recording | None:
         raise unreadable(path, error) from error
 
 
-def _trusted(file: h5py.File, path: Path | str) -> int | None:
-    """Return the sample count at the root; None where the kind has no time axis."""
+def _samples_in(file: h5py.File, path: Path | str) -> int | None:
+    """Return the length of the root's time axis as the file says it; None where it says none."""
     samples = file.attrs.get("samples")
     if samples is None:
         return None
@@ -179,7 +179,7 @@ def _trusted(file: h5py.File, path: Path | str) -> int | None:
 
 
 def _decode(file: h5py.File, path: Path | str, kind: str) -> Any:
-    return decode(file, KINDS[kind], Origin(str(path), kind), samples=_trusted(file, path))
+    return decode(file, KINDS[kind], Origin(str(path), kind), samples=_samples_in(file, path))
 
 
 def _kind(file: h5py.File, path: Path | str) -> str:
