@@ -196,7 +196,7 @@ class _Sink:
         self._recorder, self._blind, self._learner = recorder, blind, learner
 
     def append(self, *columns: FloatArray) -> None:
-        self._recorder.press(*columns)
+        self._recorder.append(*columns)
 
     def judge(self, fields: Mapping[str, Any]) -> None:
         told: dict[str, Any] = {"quiz": None}

@@ -8,10 +8,10 @@ What ``append`` has returned from survives the death of the program. The file is
 
 A ``HEAD`` is JSON: the header of the artefact and the run's texts. Whoever goes on with a recording adds
 another, and the last one counts. ``DATA`` is little-endian float64 (4, n): time, reference, input, output.
-``PART`` is the same, and its first sample comes after a pause. In the journal of a session, a ``GOAL`` after
-one of them has the targets (n,) of its samples, and a ``BEAT`` the beats that are over, as in
-``session_journal``. The last block may be incomplete, where the writer was killed or is writing: it is
-ignored. Anything else that does not fit is damage.
+``PART`` is the same, and its first sample comes after a pause. The journal of a session has ``GOAL`` instead,
+(5, n) with the targets, and ``BEAT``, the beats that are over, as in ``session_journal``. The last block may
+be incomplete, where the writer was killed or is writing: it is ignored. Anything else that does not fit is
+damage.
 """
 
 from __future__ import annotations
@@ -34,8 +34,10 @@ from pulsetrainer.files.provenance import Header, Provenance
 from pulsetrainer.files.session_journal import session_of
 
 COLUMNS = ("time_s", "reference", "input", "output")
+PRESSED = ("time_s", "target", "reference", "input", "output")
 PIECE = 1 << 16  # samples at a time, where not all are to be in memory
-GOAL, BEAT = b"GOAL", b"BEAT"
+DATA, PART, GOAL, BEAT = b"DATA", b"PART", b"GOAL", b"BEAT"
+_WIDTHS = {DATA: len(COLUMNS), PART: len(COLUMNS), GOAL: len(PRESSED)}  # of blocks that hold samples
 _HEAD = struct.Struct("<4sQQII")
 _LARGEST = 1 << 32  # bytes of a block; a batch of samples has some thousands
 
@@ -51,15 +53,10 @@ class Block:
 
     @property
     def samples(self) -> FloatArray:
-        """Time, reference, input and output, (4, n); none but in DATA and PART."""
-        if self.tag in (b"HEAD", GOAL, BEAT):
-            return np.zeros((len(COLUMNS), 0))
-        return np.frombuffer(self.content, dtype="<f8").reshape(len(COLUMNS), -1)
-
-    @property
-    def targets(self) -> FloatArray:
-        """Targets (n,) of the samples before; none but in a GOAL."""
-        return np.frombuffer(self.content if self.tag == GOAL else b"", dtype="<f8")
+        """The columns (c, n) of its samples; (0, 0) where it holds none."""
+        if self.tag not in _WIDTHS:
+            return np.zeros((0, 0))
+        return np.frombuffer(self.content, dtype="<f8").reshape(_WIDTHS[self.tag], -1)
 
 
 class Journal:
@@ -163,11 +160,13 @@ class Recording:
         if not heads:
             raise DamagedFileError(f"{path} holds no recording yet", path=path, artefact="run")
         header, texts = _described(path, heads[-1])
-        columns = np.concatenate([block.samples for block in found], axis=1)
-        if said := [block.content for block in found if block.tag == BEAT]:
-            session = session_of(path, columns, np.concatenate([block.targets for block in found]), said)
-            return cls(header, session, found[-1].end)
-        arrays: dict[str, Any] = dict(zip(COLUMNS, columns, strict=True))
+        said = [block.content for block in found if block.tag == BEAT]
+        names = PRESSED if said else COLUMNS
+        samples = [block.samples for block in found if _WIDTHS.get(block.tag) == len(names)]
+        columns = np.concatenate([np.zeros((len(names), 0)), *samples], axis=1)
+        arrays: dict[str, Any] = dict(zip(names, columns, strict=True))
+        if said:
+            return cls(header, session_of(path, arrays, said), found[-1].end)
         seam, dropped = _seam(found, columns.shape[1]), found[-1].dropped
         run = Run(**arrays, **texts, seam=seam, complete=False, dropped_samples=dropped)
         return cls(header, run, found[-1].end)
@@ -177,7 +176,7 @@ def _seam(found: list[Block], samples: int) -> BoolArray | None:
     """Return which samples (n,) come first after a pause; None where there was no pause."""
     starts, count = [], 0
     for block in found:
-        if block.tag == b"PART" and count:
+        if block.tag == PART and count:
             starts.append(count)
         count += block.samples.shape[1]
     if not starts:

@@ -26,7 +26,7 @@ from pulsetrainer.files.atomic_write import cannot_write, check_output
 from pulsetrainer.files.encode import Later
 from pulsetrainer.files.file_lock import Lease, create_locked, is_abandoned, sweep
 from pulsetrainer.files.input_file import is_journal
-from pulsetrainer.files.journal import COLUMNS, PIECE, Block, Journal, Recording
+from pulsetrainer.files.journal import COLUMNS, PIECE, Journal, Recording
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.schema import plan_of
 
@@ -38,9 +38,8 @@ class RunRecorder:
     """Writes a run batch by batch; use it in a ``with`` block.
 
     A block that ends well finishes the run as complete, one that ends with an exception (Ctrl-C too) keeps
-    what was recorded as ``complete=False``; if nothing was recorded, nothing is left behind. Units,
-    quantities and ``signal`` are those of the run. ``earlier`` is a recording that was cut off, with its
-    file: a journal goes on, an artefact is copied.
+    what was recorded as ``complete=False``; if nothing was recorded, nothing is left behind. ``earlier`` is a
+    recording that was cut off, with its file: a journal goes on, an artefact is copied.
 
     Raises
     ------
@@ -52,7 +51,7 @@ class RunRecorder:
 
     _kind: ClassVar[type] = Run
     _columns: ClassVar[tuple[str, ...]] = COLUMNS
-    _ends_a_piece: ClassVar[tuple[bytes, ...]] = (b"DATA", b"PART")
+    _tag: ClassVar[bytes] = journal.DATA
 
     def __init__(
         self,
@@ -60,10 +59,6 @@ class RunRecorder:
         header: Header,
         *,
         overwrite: bool = False,
-        input_unit: str = "A",
-        output_unit: str = "N",
-        input_quantity: str = "current",
-        output_quantity: str = "force",
         signal: str = "",
         earlier: tuple[Path, Run] | None = None,
     ) -> None:
@@ -71,14 +66,7 @@ class RunRecorder:
         self._final = Path(path)
         self._overwrite = overwrite
         self._header = header
-        self._texts: dict[str, Any] = {
-            "captured": True,
-            "input_unit": input_unit,
-            "output_unit": output_unit,
-            "input_quantity": input_quantity,
-            "output_quantity": output_quantity,
-            "signal": signal,
-        }
+        self._texts: dict[str, Any] = {"captured": True, "signal": signal}
         self._samples = 0
         self._last_time = -np.inf
         self._seams: list[int] = []  # numbers of the samples that come first after a pause
@@ -115,8 +103,8 @@ class RunRecorder:
         """Time of the last sample."""
         return self._last_time
 
-    def append(self, time_s: ArrayLike, reference: ArrayLike, input: ArrayLike, output: ArrayLike) -> None:  # noqa: A002 - the field's name
-        """Append a batch; when this returns, it survives the death of the program.
+    def append(self, *batch: ArrayLike) -> None:
+        """Append a batch: time, reference, input and output (n,). It now survives the death of the program.
 
         Raises
         ------
@@ -125,18 +113,21 @@ class RunRecorder:
         DataError
             The disk is full or failed; what was appended before is kept.
         """
-        columns = [np.atleast_1d(np.asarray(a, dtype="<f8")) for a in (time_s, reference, input, output)]
+        columns = [np.atleast_1d(np.asarray(a, dtype="<f8")) for a in batch]
         count = self._check_batch(columns)
         if count == 0:
             return
         self._check_space(count)
-        tag = b"PART" if self._seams[-1:] == [self._samples] else b"DATA"
-        try:
-            self._journal.append(tag, np.stack(columns).tobytes(), self.dropped_samples)
-        except OSError as error:
-            raise cannot_write(self.partial, error) from error
+        tag = journal.PART if self._seams[-1:] == [self._samples] else self._tag
+        self._add(tag, np.stack(columns).tobytes())
         self._samples += count
         self._last_time = float(columns[0][-1])
+
+    def _add(self, tag: bytes, content: bytes) -> None:
+        try:
+            self._journal.append(tag, content, self.dropped_samples)
+        except OSError as error:
+            raise cannot_write(self.partial, error) from error
 
     def begin_part(self) -> None:
         """Say that the device was off since the last sample: the next one is the first of a new part."""
@@ -163,9 +154,9 @@ class RunRecorder:
         if self._complete is not None:
             raise ArgumentError("the run is finished: nothing can be appended", hint="record a new run")
         if len({column.shape for column in columns}) != 1 or columns[0].ndim != 1:
-            shapes = ", ".join(f"{n} {column.shape}" for n, column in zip(COLUMNS, columns, strict=True))
+            shapes = ", ".join(f"{n} {one.shape}" for n, one in zip(self._columns, columns, strict=True))
             raise ArgumentError(
-                f"a batch needs four arrays of one length: {shapes}", hint="this is a bug in the caller"
+                f"a batch needs arrays of one length: {shapes}", hint="this is a bug in the caller"
             )
         time = np.concatenate(([self._last_time], columns[0]))
         fits = (np.diff(time) > 0) & np.isfinite(time[1:])
@@ -244,23 +235,16 @@ class RunRecorder:
         return {**self._texts, "seam": seam if starts else None, "coil": self.coil}
 
     def _fill(self, file: h5py.File) -> None:
-        start, count, kept = 0, 0, list[Block]()
-        for block in itertools.chain(journal.blocks(self.partial), [None]):
-            if block is not None:
-                kept.append(block)
-                count += block.samples.shape[1]
-            if count and (block is None or (count >= PIECE and block.tag in self._ends_a_piece)):
-                self._copy(file, start, self._rows(kept))
-                start, count, kept = start + count, 0, []
-
-    def _copy(self, file: h5py.File, start: int, rows: FloatArray) -> None:
         paths = {plan.name: plan.path for plan in plan_of(self._kind)}
-        for name, values in zip(self._columns, rows, strict=True):
-            file[paths[name]][start : start + values.size] = values
-
-    def _rows(self, blocks: list[Block]) -> FloatArray:
-        """Return the columns (c, n) in some blocks."""
-        return np.concatenate([block.samples for block in blocks], axis=1)
+        start, count, kept = 0, 0, list[FloatArray]()
+        for block in itertools.chain(journal.blocks(self.partial), [None]):
+            if block is not None and block.samples.size:
+                kept.append(block.samples)
+                count += block.samples.shape[1]
+            if count and (block is None or count >= PIECE):
+                for name, values in zip(self._columns, np.concatenate(kept, axis=1), strict=True):
+                    file[paths[name]][start : start + count] = values
+                start, count, kept = start + count, 0, []
 
     def __enter__(self) -> Self:
         return self

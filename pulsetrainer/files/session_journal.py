@@ -44,11 +44,8 @@ def _array(values: FloatArray | None) -> FloatArray:
     return np.zeros(0) if values is None else values
 
 
-def session_of(path: Path, columns: FloatArray, target: FloatArray, blocks: Sequence[bytes]) -> Session:
-    """Return the session in a journal, not complete, from what ``SessionWriter`` gave.
-
-    ``columns`` are time, reference, input and output (4, n), ``target`` (m,) is that of the first m samples:
-    the others were cut off.
+def session_of(path: Path, samples: Mapping[str, FloatArray], blocks: Sequence[bytes]) -> Session:
+    """Return the session in a journal, not complete, from its samples and what ``SessionWriter`` gave.
 
     Raises
     ------
@@ -63,17 +60,8 @@ def session_of(path: Path, columns: FloatArray, target: FloatArray, blocks: Sequ
         windows = np.asarray([row for one in said for row in one["windows"]], dtype=np.float64)
         warm = dict(zip(_WINDOW, windows.reshape(-1, len(_WINDOW)).T, strict=True)) if windows.size else {}
         plain = {name: _tupled(value) for name, value in said[-1]["fields"].items()}
-        time_s, reference, current, force = columns[:, : target.size]
-        return Session(
-            time_s=time_s,
-            target=target,
-            reference=reference,
-            input=current,
-            output=force,
-            beats=beats,
-            quiz=_quiz(said[-1]["quiz"]),
-            **plain | warm | {"complete": False, "fault": CUT_OFF},
-        )
+        fields: dict[str, Any] = {**samples, **plain, **warm, "complete": False, "fault": CUT_OFF}
+        return Session(beats=beats, quiz=_quiz(said[-1]["quiz"]), **fields)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise DamagedFileError(
             f"{path} does not say what was pressed: {error}", path=path, artefact="session"

@@ -91,7 +91,7 @@ def _cut_session(folder: Path) -> None:
     fields = values_of(examples.session())
     samples = [fields.pop(name) for name in ("time_s", "target", "reference", "input", "output")]
     with SessionRecorder(folder / "whole.h5", examples.header(), signal="session") as recorder:
-        recorder.press(*samples)
+        recorder.append(*samples)
         recorder.judge(fields)
         shutil.copy(recorder.partial, folder / CUT_SESSION)
     (folder / "whole.h5").unlink()

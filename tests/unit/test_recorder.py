@@ -66,16 +66,6 @@ def test_the_same_file_as_the_store_writes(tmp_path):
     assert _names(tmp_path) == ["recorder.h5", "store.h5"]
 
 
-def test_units_and_quantities_are_the_callers(tmp_path):
-    """Another bench, other units."""
-    words = {"input_unit": "V", "output_unit": "mN", "input_quantity": "voltage", "output_quantity": "thrust"}
-    with RunRecorder(tmp_path / "a.h5", examples.header(), **words) as recorder:
-        recorder.append(0.0, 1.0, 2.0, 3.0)
-    run = read(tmp_path / "a.h5", Run)
-    assert {word: getattr(run, word) for word in words} == words
-    assert run.complete
-
-
 @pytest.mark.parametrize("error", [RuntimeError("link lost"), KeyboardInterrupt()])
 def test_an_exception_keeps_what_was_recorded(tmp_path, error):
     """A lost link or Ctrl-C in the block: the run is there under its name, complete=False."""

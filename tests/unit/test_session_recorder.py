@@ -56,7 +56,7 @@ def pressed(tmp_path):
         recorder.judge(_so_far(whole, 0))
         for beat in range(BEATS):
             part = slice(beat * SAMPLES, (beat + 1) * SAMPLES)
-            recorder.press(*(getattr(whole, name)[part] for name in SAMPLED))
+            recorder.append(*(getattr(whole, name)[part] for name in SAMPLED))
             recorder.judge(_so_far(whole, beat + 1))
         yield whole, recorder
         recorder.keep(_so_far(whole, BEATS), examples.header())
@@ -124,7 +124,7 @@ def test_an_exception_keeps_the_session_as_far_as_it_went(tmp_path):
 
 def _begin_and_stop(recorder: SessionRecorder, whole: Session) -> None:
     recorder.judge(_so_far(whole, 0))
-    recorder.press(*(getattr(whole, name)[:SAMPLES] for name in SAMPLED))
+    recorder.append(*(getattr(whole, name)[:SAMPLES] for name in SAMPLED))
     recorder.judge(_so_far(whole, 1))
     raise KeyboardInterrupt
 
@@ -138,7 +138,7 @@ def test_the_end_of_a_long_session_takes_no_more_memory_than_that_of_a_short_one
             recorder.judge(_so_far(_whole(), 0))
             for second in range(60 * minutes):
                 time_s = second + np.arange(1000) / 1000
-                recorder.press(time_s, *(np.cos(time_s + k) for k in range(4)))
+                recorder.append(time_s, *(np.cos(time_s + k) for k in range(4)))
             tracemalloc.start()
             try:
                 recorder.finish()
