@@ -17,6 +17,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.api import open_device
+from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import Device
@@ -52,6 +53,12 @@ class Finding:
     fix: str = ""
 
 
+def _finding(name: str, found: str, *, warning: str | None = None, problem: str | None = None) -> Finding:
+    """Return what was found; ``warning`` or ``problem`` is the fix of one, and without it all is well."""
+    state: State = "problem" if problem is not None else "warning" if warning is not None else "ok"
+    return Finding(name, state, found, problem or warning or "")
+
+
 @dataclass(frozen=True, slots=True)
 class Result:
     """All findings, in the order in which they were looked at."""
@@ -81,7 +88,7 @@ def examine(
         _compiler,
         _emulator,
         _folder,
-        lambda: iter([Finding("settings", "ok", settings or "none: defaults")]),
+        lambda: iter([_finding("settings", settings or "none: defaults")]),
         _ports,
         lambda: _device(port, tuned, capture=capture),
     ]
@@ -107,10 +114,8 @@ def _versions() -> Iterator[Finding]:
         names.append(f"{name} {version}")
         if _numbers(version) < _numbers(least):
             old.append(f"{name}>={least}")
-    if old:
-        yield Finding("versions", "problem", own, f"python -m pip install --upgrade {' '.join(old)}")
-    else:
-        yield Finding("versions", "ok", f"{own}; {', '.join(names)}")
+    newer = f"python -m pip install --upgrade {' '.join(old)}" if old else None
+    yield _finding("versions", own if old else f"{own}; {', '.join(names)}", problem=newer)
 
 
 def _numbers(version: str) -> tuple[int, ...]:
@@ -121,22 +126,18 @@ def _compiler() -> Iterator[Finding]:
     try:
         words = build.find_compiler()
     except PulsetrainerError as error:
-        yield Finding("compiler", "problem", error.message, error.hint)
+        yield _finding("compiler", error.message, problem=error.hint)
     else:
-        yield Finding("compiler", "ok", f"{shutil.which(words[0]) or ' '.join(words)}, for the virtual bench")
+        yield _finding("compiler", f"{shutil.which(words[0]) or ' '.join(words)}, for the virtual bench")
 
 
 def _emulator() -> Iterator[Finding]:
     missing = [p for p in ("qemu-system-arm", "arm-none-eabi-gcc") if not shutil.which(p)]
     if missing:
-        yield Finding(
-            "emulator",
-            "warning",
-            f"{' and '.join(missing)} not found; only --port qemu: needs it",
-            f"sudo apt install {build.DEBIAN_PACKAGES}",
-        )
+        said = f"{' and '.join(missing)} not found; only --port qemu: needs it"
+        yield _finding("emulator", said, warning=f"sudo apt install {build.DEBIAN_PACKAGES}")
     else:
-        yield Finding("emulator", "ok", str(shutil.which("qemu-system-arm")))
+        yield _finding("emulator", str(shutil.which("qemu-system-arm")))
 
 
 def _folder() -> Iterator[Finding]:
@@ -148,20 +149,12 @@ def _folder() -> Iterator[Finding]:
             probe.flush()
             os.fsync(probe.fileno())
     except OSError as error:
-        yield Finding(
-            "folder",
-            "problem",
-            f"{where} cannot be written: {error.strerror or error}",
-            "work in a folder of your own, or make room",
-        )
+        said = f"{where} cannot be written: {error.strerror or error}"
+        yield _finding("folder", said, problem="work in a folder of your own, or make room")
         return
     free_MB = shutil.disk_usage(where).free / 1e6
-    yield Finding(
-        "folder",
-        "ok" if free_MB > _ROOM_MB else "warning",
-        f"{where} can be written, {free_MB:.0f} MB free",
-        "" if free_MB > _ROOM_MB else "make room: an hour of capture takes 150 MB",
-    )
+    fix = None if free_MB > _ROOM_MB else "make room: an hour of capture takes 150 MB"
+    yield _finding("folder", f"{where} can be written, {free_MB:.0f} MB free", warning=fix)
 
 
 def _ports() -> Iterator[Finding]:
@@ -172,17 +165,13 @@ def _ports() -> Iterator[Finding]:
     }
     ports = list_ports()
     if not ports:
-        yield Finding("ports", "ok", "no serial port; without a device --port bench: is there")
+        yield _finding("ports", "no serial port; without a device --port bench: is there")
     for port in ports:
         state: State = "ok" if port.status == "free" else "problem" if port.is_device else "warning"
         known = [text for text in (port.description, port.vid_pid) if text not in ("", "n/a")]
         kind = ["our device", port.vid_pid] if port.is_device else known or ["not known what it is"]
-        yield Finding(
-            f"port {port.device}",
-            state,
-            f"{port.status}, {' '.join(kind)}".strip(),
-            fixes.get(port.status, ""),
-        )
+        said = f"{port.status}, {' '.join(kind)}".strip()
+        yield Finding(f"port {port.device}", state, said, fixes.get(port.status, ""))
 
 
 # --- the device -----------------------------------------------------------------------------------------
@@ -192,26 +181,23 @@ def _device(port: str | None, tuned: Path | None, *, capture: bool) -> Iterator[
     try:
         with open_device(port, tuned=tuned) as device:
             yield from _identity(device, redact(port or DEFAULT_PORT))
-            known = device.gains != DELIVERED
-            yield Finding("gains", "ok", f"those of `tune`, from {tuned}" if known else "as delivered")
+            own = f"those of `tune`, from {tuned}" if device.gains != DELIVERED else "as delivered"
+            yield _finding("gains", own)
             if capture:
                 yield from _short_capture(device)
     except PulsetrainerError as error:
-        yield Finding("device", "problem", error.message, error.hint)
+        yield _finding("device", error.message, problem=error.hint)
 
 
 def _identity(device: Device, port: str) -> Iterator[Finding]:
     info = device.info
-    yield Finding(
+    yield _finding(
         "device",
-        "ok",
         f"{port} {info.serial}, firmware {info.firmware}, protocol {info.protocol}, "
         f"limits {info.current_limit_A:g} A and {info.force_limit_N:g} N",
     )
     if info.latched_fault:
-        yield Finding(
-            "last fault", "warning", info.latched_fault, "remove its cause; the next play clears it"
-        )
+        yield _finding("last fault", info.latched_fault, warning="remove its cause; the next play clears it")
 
 
 def _short_capture(device: Device) -> Iterator[Finding]:
@@ -223,82 +209,49 @@ def _short_capture(device: Device) -> Iterator[Finding]:
     held = slice(rest.size + up.size + rest.size // 5, rest.size + up.size + rest.size)
     recording = device.play(reference, _RATE_HZ, decimation=round(device.info.tick_rate_Hz / _RATE_HZ))
     if recording.fault:
-        yield Finding("short capture", "problem", f"it ended early: {recording.fault}", recording.remedy)
+        yield _finding("short capture", f"it ended early: {recording.fault}", problem=recording.remedy)
         return
-    yield _lost(recording, reference.size)
-    yield from _noise(recording, held, device.info.current_limit_A)
+    if lost := recording.dropped_samples:
+        cable = "use a shorter or shielded cable, another USB port, no hub"
+        yield _finding("link", f"{lost} of {reference.size} samples were lost on the wire", warning=cable)
+    else:
+        yield _finding("link", f"{recording.tick.size} samples, none lost")
+    range_A, span_N = device.info.current_limit_A, float(np.ptp(recording.force_N))
+    still_A, still_N = recording.current_A[held], recording.force_N[held]
+    shunt, sensor = (
+        "check the shunt's wiring and its ground",
+        "keep the sensor's cable off the coil; check its screws",
+    )
+    yield _noise("current noise", still_A, range_A, f"range of {range_A:.3g} A", "A", shunt)
+    yield _noise("force noise", still_N, span_N, f"span of {span_N:.3g} N", "N", sensor)
     yield from _rails(recording, top)
 
 
-def _lost(recording: Trace, expected: int) -> Finding:
-    if recording.dropped_samples:
-        return Finding(
-            "link",
-            "warning",
-            f"{recording.dropped_samples} of {expected} samples were lost on the wire",
-            "use a shorter or shielded cable, another USB port, no hub",
-        )
-    return Finding("link", "ok", f"{recording.tick.size} samples, none lost")
-
-
-def _noise(recording: Trace, held: slice, range_A: float) -> Iterator[Finding]:
-    """Noise while the current is held, against the range of the current and the span of the force."""
-    span = float(np.ptp(recording.force_N))
-    for name, values, full, of, unit, fix in (
-        (
-            "current noise",
-            recording.current_A,
-            range_A,
-            "range",
-            "A",
-            "check the shunt's wiring and its ground",
-        ),
-        (
-            "force noise",
-            recording.force_N,
-            span,
-            "span",
-            "N",
-            "keep the sensor's cable off the coil; check its screws",
-        ),
-    ):
-        still = values[held]
-        sigma = float(np.std(scipy.signal.detrend(still)))  # creep is a slope on so short a hold
-        share = sigma / full if full > 0 else 0.0
-        words = f"{1e3 * sigma:.2g} m{unit} rms, {100 * share:.2g} % of the {of} of {full:.3g} {unit}"
-        if sigma == 0.0:
-            yield Finding(
-                name, "warning", f"none at all: {still[0]:.4g} {unit} in every sample", "is the sensor alive?"
-            )
-        elif share > _NOISE_SHARE:
-            yield Finding(name, "warning", words, fix)
-        else:
-            yield Finding(name, "ok", words)
+def _noise(name: str, still: FloatArray, full: float, of: str, unit: str, fix: str) -> Finding:
+    """Noise while the current is held, against the range of the current or the span of the force."""
+    sigma = float(np.std(scipy.signal.detrend(still)))  # creep is a slope on so short a hold
+    if sigma == 0.0:
+        said = f"none at all: {still[0]:.4g} {unit} in every sample"
+        return _finding(name, said, warning="is the sensor alive?")
+    share = sigma / full if full > 0 else 0.0
+    said = f"{1e3 * sigma:.2g} m{unit} rms, {100 * share:.2g} % of the {of}"
+    return _finding(name, said, warning=fix if share > _NOISE_SHARE else None)
 
 
 def _rails(recording: Trace, top: float) -> Iterator[Finding]:
     """Saturation, tracking and what else the raw data show by themselves."""
     measured = Record(recording.current_A, recording.force_N, dt_s=_GRID_S, reference=recording.reference_A)
     fired = {one.cause: one for one in gates.check(measured, 0.0, top) if one.cause != "out-of-range"}
-    cut = fired.pop("saturation", None)
-    if cut is None:
-        yield Finding("saturation", "ok", f"none up to {top:g} A and {recording.force_N.max():.3g} N")
+    if cut := fired.pop("saturation", None):
+        fix = "lower the gain of the force amplifier"
+        yield _finding("saturation", wording.text(cut.evidence), problem=fix)
     else:
-        yield Finding(
-            "saturation", "problem", wording.text(cut.evidence), "lower the gain of the force amplifier"
-        )
+        yield _finding("saturation", f"none up to {top:g} A and {recording.force_N.max():.3g} N")
     worst = float(np.abs(recording.current_A - recording.reference_A).max()) / top
-    if worst > _TRACKING_SHARE:
-        yield Finding(
-            "current tracking",
-            "warning",
-            f"{100 * worst:.2g} % of the range at worst",
-            "measure the coil and set the gains for it: pulsetrainer tune -o pulsetrainer.toml",
-        )
-    else:
-        yield Finding("current tracking", "ok", f"{100 * worst:.2g} % of the range at worst")
+    tune = "measure the coil and set the gains for it: pulsetrainer tune -o pulsetrainer.toml"
+    said = f"{100 * worst:.2g} % of the range at worst"
+    yield _finding("current tracking", said, warning=tune if worst > _TRACKING_SHARE else None)
     fired.pop("current-tracking", None)
     for cause, one in fired.items():
-        yield Finding(
-            f"force: {cause}", "warning", wording.text(one.evidence), "pulsetrainer diagnose tells more"
-        )
+        more = "pulsetrainer diagnose tells more"
+        yield _finding(f"force: {cause}", wording.text(one.evidence), warning=more)
