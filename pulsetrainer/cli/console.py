@@ -6,12 +6,15 @@ import json
 import math
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+import typer
+
+from pulsetrainer.errors import QualityError
 from pulsetrainer.report import tables
 from pulsetrainer.steps.progress import Progress
 
@@ -68,12 +71,24 @@ class Screen:
             task = bars.add_task(label, total=1.0)
             yield lambda share: bars.update(task, completed=min(share, 1.0))
 
-    def result(self, payload: Any) -> None:
-        """Write the one JSON object of this command, a mapping or a dataclass, when it was asked for."""
+    def result(self, payload: Any, failed: QualityError | None = None) -> None:
+        """Write the one JSON object of this command, a mapping or a dataclass, when it was asked for.
+
+        It also says which quality gate ``failed``, which ``end`` says to a person.
+        """
         if self.as_json:
             document = {"schema": 1, "command": self.command} | plain(payload)
+            if failed is not None:
+                error = {"kind": failed.kind, "message": failed.message, "hint": failed.hint}
+                document |= {"error": error}
             universal = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
             sys.stdout.write(json.dumps(document, ensure_ascii=not universal) + "\n")
+
+    def end(self, failed: QualityError | None) -> None:
+        """Exit with the code of a quality gate that failed, after everything was said; None: none did."""
+        if failed is not None:
+            typer.echo(f"error: {failed.message}\n  try: {failed.hint}", err=True)
+            raise typer.Exit(failed.exit_code)
 
     def facts(self, title: str, rows: Mapping[str, Any]) -> None:
         """Print names and values, one a line, unless JSON was asked for."""
@@ -89,6 +104,14 @@ class Screen:
             return
         for name, value in zip(names, rows.values(), strict=True):
             self.line(f"  {name:<{width}}  " if width else "  ", tables.text(value))
+
+    def parts(self, parts: Iterable[tables.Facts | tables.Table]) -> None:
+        """Print facts and tables, unless JSON was asked for."""
+        for part in parts:
+            if isinstance(part, tables.Facts):
+                self.facts(part.title, part.rows)
+            else:
+                self.table(part.title, part.columns, part.rows)
 
     def line(self, lead: str, text: str, *, indent: int | None = None) -> None:
         """Print a line; on a terminal that is too narrow, on several, broken between words below ``lead``."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pulsetrainer.cli.console import Screen, picked
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
@@ -36,6 +36,7 @@ def diagnose(
     """
     job = Job(context, inputs=(*runs, model), outputs=(out, html), overwrite=overwrite, as_json=json)
     from pulsetrainer.artefacts import Model, Run
+    from pulsetrainer.report.diagnosis_text import sections
     from pulsetrainer.steps.diagnose import diagnose as find
 
     with job.working("diagnosing") as progress:
@@ -57,7 +58,7 @@ def diagnose(
     job.screen.result(
         _payload(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
     )
-    show_diagnosis(job.screen, found)
+    job.screen.parts(sections(found))
     job.wrote(out, html)
     for line in commands:
         job.screen.whole(f"then: {line}")
@@ -70,17 +71,6 @@ def _commands(found: Diagnosis, runs: list[Path], model: Path, out: Path) -> lis
     if found.next_command and found.correctable:
         words += [["correct", run, "--diagnosis", out, "-o", f"{run.stem}-corrected.h5"] for run in runs]
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
-
-
-def show_diagnosis(screen: Screen, found: Diagnosis) -> None:
-    """Print what a diagnosis says."""
-    from pulsetrainer.report.diagnosis_text import Facts, sections
-
-    for part in sections(found):
-        if isinstance(part, Facts):
-            screen.facts(part.title, part.rows)
-        else:
-            screen.table(part.title, part.columns, part.rows)
 
 
 def _payload(found: Diagnosis) -> dict[str, Any]:

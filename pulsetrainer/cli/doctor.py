@@ -38,18 +38,13 @@ def doctor(
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
     with screen.bar("looking") as progress:
         result = examine(port, capture=capture, settings=words, tuned=file, progress=progress)
-    payload = plain(result) | {"problems": result.problems}
     problem = f"{result.problems} of {len(result.findings)} findings stand in the way"
-    hint = "follow the fixes, from the top"
-    if result.problems:
-        payload["error"] = {"kind": QualityError.kind, "message": problem, "hint": hint}
-    screen.result(payload)
+    failed = QualityError(problem, hint="follow the fixes, from the top") if result.problems else None
+    screen.result(plain(result) | {"problems": result.problems}, failed)
     if not json:
         width = max(len(one.name) for one in result.findings)
         for one in result.findings:
             screen.line(f"{_MARKS[one.state]:<8} {one.name:<{width}}  ", one.found)
             if one.fix and one.state != "ok":
                 screen.whole(f"{'':<8} fix: {one.fix}")
-    if result.problems:
-        typer.echo(f"error: {problem}\n  try: {hint}", err=True)
-        raise typer.Exit(QualityError.exit_code)
+    screen.end(failed)

@@ -62,21 +62,21 @@ def evaluate(
 
             job.page(html, render_evaluation, evaluation, header)
     broken = breaches(evaluation, limits)
-    problem = ""
+    failed = None
     if broken:
         listed = "; ".join(f"{b.metric} = {b.value:.4g} is outside [{b.low:g}, {b.high:g}]" for b in broken)
         problem = f"{len(broken)} of {len(limits)} bounds of {bounds} are broken: {listed}"
+        hint = "look at what changed; if the new figure is right, change the bound knowingly"
+        failed = QualityError(problem, hint=hint)
     job.notes(evaluation.notes)
     job.screen.result(
         _payload(evaluation)
-        | {"output": out, "html": html, "bounds_checked": len(limits), "breaches": plain(broken)}
-        | ({"error": {"kind": QualityError.kind, "message": problem, "hint": _HINT}} if problem else {})
+        | {"output": out, "html": html, "bounds_checked": len(limits), "breaches": plain(broken)},
+        failed,
     )
     show_tables(job.screen, evaluation)
     job.wrote(out, html)
-    if problem:
-        typer.echo(f"error: {problem}\n  try: {_HINT}", err=True)
-        raise typer.Exit(QualityError.exit_code)
+    job.screen.end(failed)
     if limits:
         job.screen.whole(f"all {len(limits)} bounds of {bounds} hold")
 
@@ -93,16 +93,12 @@ def _of_session(job: Job, path: Path, session: Session, html: Path | None, *, al
     say(job, path, html, session)
 
 
-_HINT = "look at what changed; if the new figure is right, change the bound knowingly"
-
-
 def show_tables(screen: Screen, evaluation: Evaluation) -> None:
     """Print the figures of an evaluation beside those of the published device."""
     from pulsetrainer.artefacts.evaluation import PUBLISHED
     from pulsetrainer.report.text import tables_of
 
-    for table in tables_of(evaluation, screen.width):
-        screen.table(table.title, table.columns, table.rows)
+    screen.parts(tables_of(evaluation, screen.width))
     if len(evaluation.models) > 1:
         screen.line("improvement: ", "how much less rms error than by the first model")
     if any(w.name in PUBLISHED for w in evaluation.waveforms):

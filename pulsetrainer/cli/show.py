@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from pulsetrainer.cli.diagnose import show_diagnosis
 from pulsetrainer.cli.evaluate import show_tables
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson
@@ -27,6 +26,7 @@ def show(
     job = Job(context, inputs=(file,), as_json=json)
     from pulsetrainer.artefacts import Diagnosis, Evaluation
     from pulsetrainer.files import store
+    from pulsetrainer.report.diagnosis_text import sections
     from pulsetrainer.report.facts import facts
     from pulsetrainer.report.names import headed
 
@@ -49,7 +49,7 @@ def show(
         show_tables(job.screen, artefact)
     elif isinstance(artefact, Diagnosis):
         job.screen.facts(title, {})
-        show_diagnosis(job.screen, artefact)
+        job.screen.parts(sections(artefact))
     else:
         job.screen.facts(title, {name: value for name, value in found.items() if value is not None})
     job.screen.whole("\n".join(["history", *(f"  {line}" for line in header.history)]))

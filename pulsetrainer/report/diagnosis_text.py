@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.report.tables import Facts, Table
 
 _SHOWN = 8  # causes in the table
 _CURVE = re.compile(r"f\d+")  # the values of a learned curve: one by one they say nothing
@@ -27,23 +27,6 @@ COLUMNS = {
     "causes that look alike overlap",
     "held-out share": "the same share, on parts of the recordings that were left out of the fit",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """Names and values, one a line."""
-
-    title: str
-    rows: dict[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A table: the first column is text, the others are numbers or words."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Any, ...], ...]
 
 
 def sections(found: Diagnosis) -> Iterator[Facts | Table]:

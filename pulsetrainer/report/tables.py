@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from pulsetrainer.report.names import NAMES, split
@@ -12,6 +13,23 @@ from pulsetrainer.report.names import NAMES, split
 ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
 _BROAD = 10_000  # as wide as the table needs: figures are never cut
 _NARROWEST = 24  # beside a lead; less, and the lines go on further left
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Names and values, one a line."""
+
+    title: str
+    rows: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table: the first column is text, the others are numbers or words."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
 
 
 def folded(lead: str, text: str, width: int | None, indent: int | None = None) -> str:

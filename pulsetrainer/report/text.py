@@ -11,9 +11,10 @@ from pulsetrainer.artefacts import Diagnosis, Evaluation
 from pulsetrainer.artefacts.evaluation import PUBLISHED
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import tables
-from pulsetrainer.report.diagnosis_text import Facts, Table, sections
+from pulsetrainer.report.diagnosis_text import sections
 from pulsetrainer.report.facts import facts
 from pulsetrainer.report.names import FORCE, NAMES, OVERVIEW, split
+from pulsetrainer.report.tables import Facts, Table
 
 _TITLED = {
     "run": "signal", "model": "cells", "waveform": "waveform", "playback": "waveform", "diagnosis": "verdict",

@@ -11,7 +11,7 @@ import store_examples
 from pulsetrainer.artefacts import Cause, Parameter
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report import tables
-from pulsetrainer.report.diagnosis_text import Table, answer, explains, parameters, sections
+from pulsetrainer.report.diagnosis_text import answer, explains, parameters, sections
 
 NAN = float("nan")
 
@@ -74,7 +74,7 @@ def test_its_tables_fit_a_terminal_of_eighty_columns():
     drawn = [
         tables.ESCAPE.sub("", tables.drawn(part.title, part.columns, part.rows))
         for part in sections(found)
-        if isinstance(part, Table)
+        if isinstance(part, tables.Table)
     ]
     assert len(drawn) == 2
     assert max(len(line) for text in drawn for line in text.splitlines()) <= 80
