@@ -32,28 +32,15 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True, init=False)
+@dataclass(frozen=True, slots=True)
 class Data:
-    """Marks a field as a dataset: units, quantity in words, axes, path, whether NaN is refused."""
+    """Marks a field as a dataset."""
 
     units: str
-    quantity: str
-    dims: tuple[str, ...]
-    path: str | None
-    finite: bool
-
-    def __init__(
-        self, units: str, quantity: str, *dims: str, path: str | None = None, finite: bool = False
-    ) -> None:
-        fields = (
-            ("units", units),
-            ("quantity", quantity),
-            ("dims", dims),
-            ("path", path),
-            ("finite", finite),
-        )
-        for name, value in fields:
-            object.__setattr__(self, name, value)
+    quantity: str  # in words
+    dims: str = ""  # names of the axes, between blanks
+    path: str | None = None
+    finite: bool = False  # NaN is refused
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,9 +14,9 @@ from pulsetrainer.artefacts.waveform import Waveform
 class DrivePlayback:
     """What the device measured while it played one drive, repeat by repeat; NaN where a block was lost."""
 
-    reference: Annotated[FloatArray, Data("@input_unit", "reference as played", "repeat", "time")]  # (r, n)
-    input: Annotated[FloatArray, Data("@input_unit", "measured input", "repeat", "time")]  # (r, n)
-    output: Annotated[FloatArray, Data("@output_unit", "measured output", "repeat", "time")]  # (r, n)
+    reference: Annotated[FloatArray, Data("@input_unit", "reference as played", "repeat time")]  # (r, n)
+    input: Annotated[FloatArray, Data("@input_unit", "measured input", "repeat time")]  # (r, n)
+    output: Annotated[FloatArray, Data("@output_unit", "measured output", "repeat time")]  # (r, n)
     input_unit: str = "A"
     output_unit: str = "N"
 

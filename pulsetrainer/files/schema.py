@@ -39,7 +39,7 @@ class FieldPlan:
     @property
     def dims(self) -> tuple[str, ...]:
         """The names of the axes."""
-        return () if self.data is None else self.data.dims
+        return () if self.data is None else tuple(self.data.dims.split())
 
     @property
     def is_time_axis(self) -> bool:

@@ -70,16 +70,14 @@ def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
     return next((place for place in places if place.is_file()), None)
 
 
-def read_toml(path: Path | str) -> dict[str, Any]:
-    """Return the content of a file of settings; UsageError where it cannot be read, or is no TOML."""
+def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
+    """Return the content of a file of settings, say; UsageError where it cannot be read, or is no TOML."""
     import tomllib  # noqa: PLC0415 - most benches have no such file
 
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise UsageError(
-            f"the settings in {path} cannot be read: {error}", hint="correct the file"
-        ) from error
+        raise UsageError(f"the {what} in {path} cannot be read: {error}", hint="correct the file") from error
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -92,13 +90,14 @@ def read(path: Path) -> dict[str, Any]:
     """
     tree = read_toml(path)
     tree.pop("tuned", None)  # what `tune` wrote: looked at when a device is opened
-    return {key: _value(path, key, value) for key, value in _leaves(tree)}
+    return {key: _value(path, key, value) for key, value in leaves(tree)}
 
 
-def _leaves(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+def leaves(tree: Mapping[str, Any], above: str = "") -> list[tuple[str, Any]]:
+    """Return the values in a TOML file, each with its key; tables in tables are joined by dots."""
     found: list[tuple[str, Any]] = []
     for name, value in tree.items():
-        found += _leaves(value, f"{above}{name}.") if isinstance(value, dict) else [(above + name, value)]
+        found += leaves(value, f"{above}{name}.") if isinstance(value, dict) else [(above + name, value)]
     return found
 
 
