@@ -114,7 +114,8 @@ class State:
         floor = self.floor.quick if self.in_bursts else self.floor
         left = self.current.squares - floor.squares
         half = LIMITS.unexplained * floor.reducible(self.baseline)
-        return left > max(half, LIMITS.unexplained_relevant * floor.relevant)
+        small = floor.count * (LIMITS.unexplained_span * floor.span) ** 2
+        return left > max(half, small, LIMITS.unexplained_relevant * floor.relevant)
 
     @property
     def blind(self) -> tuple[str, ...]:

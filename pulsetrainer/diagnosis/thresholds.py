@@ -174,7 +174,8 @@ class Thresholds:
 
     # Verdict
     unexplained: float = 0.5  # of the reducible part: with more left the cause is unknown
-    unexplained_relevant: float = 4.0  # times the relevant fall of squares: less left is not worth a word
+    unexplained_relevant: float = 4.0  # times the relevant fall of squares: less left is not worth a word ...
+    unexplained_span: float = 0.002  # ... nor is less of the span: plants of other kinds leave up to that
 
     # The model as given
     speed_groups: int = 40  # of equal velocity, whose mean outputs stand against the model

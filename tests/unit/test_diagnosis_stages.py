@@ -144,6 +144,14 @@ def test_the_made_up_floor_is_what_it_says():
     assert FLOOR.reducible(_fit(1100.0)) == pytest.approx(1000.0)
 
 
+@pytest.mark.parametrize(("left", "unknown"), [(0.0019, False), (0.0021, True)])
+def test_what_is_below_a_fifth_of_a_per_cent_of_the_span_is_not_unexplained(left, unknown):
+    """However small noise is, and however large the share of what can be explained."""
+    floor = replace(FLOOR, white=1e-5)
+    state = _state(_fit(100 * left**2), _fit(110 * left**2), floor=floor)
+    assert state.unexplained is unknown
+
+
 # --- what the state knows
 @pytest.mark.parametrize(("left", "unknown"), [(600.0, False), (601.0, True), (100.0, False)])
 def test_more_than_half_is_unexplained(left, unknown):
