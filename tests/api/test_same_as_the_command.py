@@ -117,12 +117,12 @@ def test_refine(tmp_path):
     """On two benches that are alike in every bit."""
     drive = KEPT / "drive.h5"
     with pt.open_device("bench:?seed=5") as device:
-        refined = pt.refine(pt.load(drive), device, passes=3)
-    words = ("refine", drive, "--passes", 3, "--port", "bench:?seed=5")
+        refined = pt.refine(pt.load(drive), device, passes=2)
+    words = ("refine", drive, "--passes", 2, "--port", "bench:?seed=5")
     same(by_command(tmp_path, *words), stored(refined, tmp_path))
     model = pt.load(KEPT / "model.h5")
     with pt.open_device("bench:?seed=5") as device:
-        refined = pt.refine(pt.invert("normal", model), device, passes=2)
+        refined = pt.refine(pt.invert("normal", model), device, passes=1)
     pt.save(refined, tmp_path / "refined.h5")
     other = pt.transfer(pt.invert("bifid", model), pt.load(tmp_path / "refined.h5"))
     words = ("invert", "bifid", "--model", KEPT / "model.h5", "--learnt", "refined.h5")

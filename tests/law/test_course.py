@@ -57,6 +57,8 @@ def test_after_the_lead_in_the_output_goes_on_as_if_nothing_had_happened(course,
     whole = np.tile(course.signal.value, course.repeats)
     unbroken = PREISACH(whole)[at:]
     lead = course.lead_in(at, speed=3.0, rest_s=0.1)
+    longer = course.lead_in(at, speed=3.0, rest_s=0.3)
+    assert longer.size - lead.size == (20 if lead.size else 0)  # samples of 0.2 s
     resumed = PREISACH(np.concatenate((lead, whole[at:])))[lead.size :]
     np.testing.assert_allclose(resumed, unbroken, atol=1e-9 * PREISACH.total)
 

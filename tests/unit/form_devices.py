@@ -24,7 +24,7 @@ def play(u: FloatArray, radius: FloatArray) -> FloatArray:
     """Play operators (n, k) that follow with a slack of their radius (k,), after a falling input."""
     state, out = u[0] + radius, np.empty((u.size, radius.size))
     for n, value in enumerate(u):
-        state = np.clip(state, value - radius, value + radius)
+        state = np.minimum(np.maximum(state, value - radius), value + radius)
         out[n] = state
     return out
 

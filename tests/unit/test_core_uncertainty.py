@@ -97,6 +97,7 @@ def test_blocks_grow_with_the_memory_of_the_residual():
     assert white <= 25
     assert slow >= 3 * white
     assert uncertainty.block_length([np.zeros(4000)]) == 10
+    assert uncertainty.block_length([rng.normal(size=40_001)]) == 101  # so that there are at most 400
 
 
 def test_blocks_are_as_long_as_asked():

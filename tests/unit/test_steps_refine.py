@@ -73,7 +73,7 @@ def test_it_ends_when_only_noise_is_left():
 
 def test_more_noise_asks_for_more_repeats():
     """Two where the error is large; up to five where the noise hides it."""
-    quiet = refine(drive_of("Bouc-Wen"), ForeignDevice("Bouc-Wen", seed=6, noise_N=0.01), slew=SLEW)
+    quiet = refine(drive_of("Coleman-Hodgdon"), ForeignDevice("Coleman-Hodgdon", seed=6, noise_N=0.01), slew=SLEW)
     loud = refine(
         drive_of("Coleman-Hodgdon"), ForeignDevice("Coleman-Hodgdon", seed=6, noise_N=0.3), slew=SLEW
     )
@@ -85,25 +85,25 @@ def test_more_noise_asks_for_more_repeats():
 @pytest.mark.parametrize("dead", [0.0, 7.0])
 def test_a_force_that_says_nothing_is_not_learnt_from(dead):
     """A sensor that is dead or stuck."""
-    device = ForeignDevice("Bouc-Wen", noise_N=0.0)
+    device = ForeignDevice("Coleman-Hodgdon", noise_N=0.0)
     device.press = lambda current: np.full(current.size, dead)
     with pytest.raises(DeviceError):
-        refine(drive_of("Bouc-Wen"), device, slew=SLEW)
+        refine(drive_of("Coleman-Hodgdon"), device, slew=SLEW)
 
 
 @pytest.mark.parametrize(
     ("drive", "passes"),
     [
-        (lambda: drive_of("Bouc-Wen"), 0),
-        (lambda: replace(drive_of("Bouc-Wen"), model=None), 5),
-        (lambda: replace(drive_of("Bouc-Wen"), input_unit="V"), 5),
+        (lambda: drive_of("Coleman-Hodgdon"), 0),
+        (lambda: replace(drive_of("Coleman-Hodgdon"), model=None), 5),
+        (lambda: replace(drive_of("Coleman-Hodgdon"), input_unit="V"), 5),
         (lambda: examples.waveform(400, model=examples.model(reading="relay")), 5),
     ],
     ids=["no pass", "no model", "no current", "relays"],
 )
 def test_what_cannot_be_refined_is_refused(drive, passes):
     """Before anything is played."""
-    device = ForeignDevice("Bouc-Wen")
+    device = ForeignDevice("Coleman-Hodgdon")
     with pytest.raises(PulsetrainerError) as caught:
         refine(drive(), device, passes=passes)
     assert caught.value.exit_code in (2, 3)

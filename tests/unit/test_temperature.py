@@ -42,6 +42,10 @@ def test_a_capture_tells_the_coil_and_how_it_warms():
     assert found.duty_s_per_A == pytest.approx(COLD.duty_s_per_A, rel=0.05)
     assert found.rise_per_A2 == pytest.approx(COLD.rise_per_A2, rel=0.1)
     assert found.rise_tau_s == pytest.approx(20.0, rel=0.3)
+    windows.begin_part()
+    rest_s = 90.0 + DT_S * np.arange(5000)
+    windows.add(rest_s, *np.zeros((3, rest_s.size)))
+    assert record_of(windows) == found  # what the coil does without current tells nothing of it
     cold = Windows()
     cold.add(*telemetry(90.0, rise=0.0)[:4])
     assert record_of(cold).rise_per_A2 < 0.1 * COLD.rise_per_A2
