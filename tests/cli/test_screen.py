@@ -125,14 +125,10 @@ def test_no_color_is_honoured(recorded):
 
 def test_a_pipe_gets_text_alone(recorded):
     """No escape sequence on either stream, whatever the terminal is said to be."""
-    done = subprocess.run(
-        [*PROGRAM, "identify", "run.h5", "--levels", "6", "-o", "model.h5"],
-        cwd=recorded,
-        env={**os.environ, "TERM": "xterm-256color"},
-        capture_output=True,
-        check=True,
-    )
-    assert b"\x1b" not in done.stdout + done.stderr
+    words = ("identify", "run.h5", "--levels", "6", "-o", "model.h5")
+    done = piped(recorded, *words, env={"TERM": "xterm-256color"})
+    assert done.code == 0
+    assert "\x1b" not in done.out + done.err
 
 
 ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
@@ -146,12 +142,10 @@ def test_no_figure_is_cut_on_a_narrow_terminal(tmp_path, columns):
     store.write(tmp_path / "evaluation.h5", report_examples.evaluation(), header())
     words = ("show", "evaluation.h5")
     said = ESCAPE.sub("", on_terminal(tmp_path, *words, COLUMNS=str(columns)).decode())
-    piped = subprocess.run(
-        [*PROGRAM, *words], cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True, check=True
-    ).stdout
+    whole = piped(tmp_path, *words).out
     table = re.compile(r"(?<![\w.-])-?\d+\.\d\d(?![\w.-])")
     figures, _, _ = said.partition("history")
-    expected, _, _ = piped.partition("history")
+    expected, _, _ = whole.partition("history")
     assert sorted(table.findall(figures)) == sorted(table.findall(expected))
     assert len(table.findall(expected)) > 5
     assert "…" not in said
@@ -181,18 +175,12 @@ def test_long_words_are_folded_between_words_and_commands_are_not(tmp_path):
 def test_a_pipe_gets_whole_lines_without_blanks_at_their_ends(tmp_path):
     """One row of a table a line, however long: a pipe has no width."""
     store.write(tmp_path / "evaluation.h5", report_examples.evaluation(), header())
-    done = subprocess.run(
-        [*PROGRAM, "compare", *["evaluation.h5"] * 12],
-        cwd=tmp_path,
-        env={**os.environ, "COLUMNS": "40"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    lines = done.stdout.splitlines()
+    done = piped(tmp_path, "compare", *["evaluation.h5"] * 12, env={"COLUMNS": "40"})
+    assert done.code == 0
+    lines = done.out.splitlines()
     assert all(line == line.rstrip() for line in lines)
     assert any(line.count("evaluation.h5") == 12 for line in lines)
-    assert "…" not in done.stdout
+    assert "…" not in done.out
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])

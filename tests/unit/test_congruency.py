@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -82,6 +84,24 @@ def test_no_weights_make_equal_loops_differ(seed, n_h):
     assert [one.begin for one in weighted] == [loops[k].begin for k in (0, 2, 3, 5)]
     assert np.ptp([output[loop.begin] for loop in loops]) > 0 or n_h < 6
     assert np.abs(congruency.contrasts(loops, [output])).max() < 1e-9 * np.ptp(output)
+
+
+@pytest.mark.parametrize("k", [0.008, 0.0])
+def test_seven_equal_loops_after_each_of_two_histories_are_enough(k):
+    """A short record with them: the feedback within a twentieth, and none where there is none."""
+    loops = (0.9, 0.3) * 7
+    u = excitations.through(np.asarray((0.0, 0.3, *loops, HIGH, 0.3, *loops, 0.0)), 6.0, 500.0)
+    model = Extended.of(_operator(90), [("load-dependence", (k,))] if k else [])
+    rng = np.random.default_rng(1)
+    record = Record(u, model(u, 2e-3) + 0.01 * rng.standard_normal(u.size), dt_s=2e-3)
+    problem = problem_for([record], 0.0, HIGH)
+    found = congruency.fitted_contrast(problem, weights_for(problem, (), None), LOAD, rng)
+    assert found.value == pytest.approx(k, abs=0.05 * 0.008)
+    assert found.error < 0.05 * 0.008
+    assert found.p_value < 0.01 if k else found.p_value > 0.05
+    assert not found.at_bound
+    raised = replace(model, static=replace(model.static, offset=model.static.offset + 3.0))
+    assert raised(u, 2e-3) == pytest.approx(model(u, 2e-3) + 3.0)  # the zero of the output is no matter
 
 
 @pytest.mark.slow

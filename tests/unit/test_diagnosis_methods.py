@@ -214,6 +214,15 @@ def test_a_refit_far_from_its_goal_is_given_up():
 
 
 # --- blocks left out, intervals
+def test_what_does_not_count_moves_no_block():
+    """Of a record whose second half is masked, the last average lies in a block of the first half."""
+    u = np.tile(_loops(), 4)
+    weight = np.where(np.arange(u.size) < u.size // 2, 1.0, 0.0)
+    block = HeldOut(problem_for([Record(u, 3.0 * u, weight, dt_s=0.01)], 0.0, 1.5)).block
+    assert np.all(np.diff(block) >= 0)
+    assert block[-1] <= LIMITS.blocks // 2
+
+
 @pytest.mark.parametrize("whole", [False, True])
 def test_errors_of_folds_are_those_of_as_many_fits(whole):
     """The sums over blocks against each fold fitted on its own rows, weighted one by one."""

@@ -19,6 +19,7 @@ from pulsetrainer.steps.refine import refine
 
 SLEW = 30.0
 AWAY = 0.1  # of the reach, from both ends: a current at the end of its range can learn nothing
+PLANT = "Coleman-Hodgdon"
 
 
 @cache
@@ -53,8 +54,8 @@ def test_what_is_left_on_a_foreign_plant_is_noise(plant, pulse):
 
 def test_the_best_pass_is_kept():
     """Also where the device changes after it; what is told of the others stays."""
-    drive = drive_of("Coleman-Hodgdon")
-    device = ForeignDevice("Coleman-Hodgdon", seed=4)
+    drive = drive_of(PLANT)
+    device = ForeignDevice(PLANT, seed=4)
     device.shift_N = lambda play: 0.6 if play > 6 else 0.0
     refined = refine(drive, device, slew=SLEW)
     mean = [one.mean_abs_error_percent for one in refined.passes]
@@ -63,8 +64,8 @@ def test_the_best_pass_is_kept():
 
 def test_it_ends_when_only_noise_is_left():
     """A device that is its model needs one pass."""
-    drive = drive_of("Coleman-Hodgdon")
-    device = ForeignDevice("Coleman-Hodgdon", seed=5)
+    drive = drive_of(PLANT)
+    device = ForeignDevice(PLANT, seed=5)
     device.press = lambda current: np.asarray(drive.model.predict(current, 1e-3))
     refined = refine(drive, device, slew=SLEW)
     assert len(refined.passes) == refined.kept == 1
@@ -73,10 +74,8 @@ def test_it_ends_when_only_noise_is_left():
 
 def test_more_noise_asks_for_more_repeats():
     """Two where the error is large; up to five where the noise hides it."""
-    quiet = refine(drive_of("Coleman-Hodgdon"), ForeignDevice("Coleman-Hodgdon", seed=6, noise_N=0.01), slew=SLEW)
-    loud = refine(
-        drive_of("Coleman-Hodgdon"), ForeignDevice("Coleman-Hodgdon", seed=6, noise_N=0.3), slew=SLEW
-    )
+    quiet = refine(drive_of(PLANT), ForeignDevice(PLANT, seed=6, noise_N=0.01), slew=SLEW)
+    loud = refine(drive_of(PLANT), ForeignDevice(PLANT, seed=6, noise_N=0.3), slew=SLEW)
     assert {one.repeats for one in quiet.passes} == {2}
     assert loud.passes[0].repeats == 2
     assert max(one.repeats for one in loud.passes) > 2
@@ -85,25 +84,25 @@ def test_more_noise_asks_for_more_repeats():
 @pytest.mark.parametrize("dead", [0.0, 7.0])
 def test_a_force_that_says_nothing_is_not_learnt_from(dead):
     """A sensor that is dead or stuck."""
-    device = ForeignDevice("Coleman-Hodgdon", noise_N=0.0)
+    device = ForeignDevice(PLANT, noise_N=0.0)
     device.press = lambda current: np.full(current.size, dead)
     with pytest.raises(DeviceError):
-        refine(drive_of("Coleman-Hodgdon"), device, slew=SLEW)
+        refine(drive_of(PLANT), device, slew=SLEW)
 
 
 @pytest.mark.parametrize(
     ("drive", "passes"),
     [
-        (lambda: drive_of("Coleman-Hodgdon"), 0),
-        (lambda: replace(drive_of("Coleman-Hodgdon"), model=None), 5),
-        (lambda: replace(drive_of("Coleman-Hodgdon"), input_unit="V"), 5),
+        (lambda: drive_of(PLANT), 0),
+        (lambda: replace(drive_of(PLANT), model=None), 5),
+        (lambda: replace(drive_of(PLANT), input_unit="V"), 5),
         (lambda: examples.waveform(400, model=examples.model(reading="relay")), 5),
     ],
     ids=["no pass", "no model", "no current", "relays"],
 )
 def test_what_cannot_be_refined_is_refused(drive, passes):
     """Before anything is played."""
-    device = ForeignDevice("Coleman-Hodgdon")
+    device = ForeignDevice(PLANT)
     with pytest.raises(PulsetrainerError) as caught:
         refine(drive(), device, passes=passes)
     assert caught.value.exit_code in (2, 3)
