@@ -80,7 +80,7 @@ class Case:
             time_s=np.arange(u.size) / RATE_HZ, input=u, output=y, input_unit="V", output_unit="mm",
             input_quantity="voltage", output_quantity="stroke",
         )  # fmt: skip
-        self.model = pt.identify(self.run, form=form)
+        self.model = pt.identify(self.run, form=form, levels=24 if quick else None)
         self.found = pt.diagnose(self.run, self.model, quick=quick)
 
     def error(self, model):

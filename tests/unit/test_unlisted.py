@@ -115,7 +115,7 @@ def dipping():
     """A device with a dip, its model and its diagnosis."""
     u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
     run = _run(u, _dip(u))
-    model = pt.identify(run, levels=32, form="direct")
+    model = pt.identify(run, levels=20, form="direct")
     return model, pt.diagnose(run, model)
 
 
