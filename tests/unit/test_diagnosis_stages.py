@@ -483,6 +483,22 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
     assert tuple(one.kind for one in after.evidence) == said
 
 
+@pytest.mark.parametrize(
+    ("left", "instead", "kept"),
+    [(400.0, 345.0, True), (400.0, 343.0, False), (199.0, 100.0, True), (201.0, 100.0, False)],
+)
+def test_a_curve_takes_the_place_of_a_listed_cause_where_it_is_clearly_better(
+    monkeypatch, left, instead, kept
+):
+    """By 8 % of what that explains, and where that leaves more than a tenth of what can be explained."""
+    term = Term(unlisted.Unlisted([unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
+    monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(instead, (term,)), 0.001, False))
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+    after = unlisted.stage(_state(_fit(left, "creep")))
+    assert after.current.names == (("creep",) if kept else ("unlisted",))
+
+
 @pytest.mark.parametrize("again", [None, FIRED])
 def test_jumps_that_the_causes_found_make_are_withdrawn(monkeypatch, again):
     """The gate is asked about the output less what the causes add to the hysteresis."""

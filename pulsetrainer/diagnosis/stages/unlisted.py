@@ -11,7 +11,7 @@ repeats (`repetition`). The next one is sought in what is left, up to three.
 Where the listed causes found leave more than half unexplained, the search begins without them: they may have
 been taken for what they are not. They are then asked for again, beside the curve; and every cause, listed or
 not, must be missed when it is taken out. But a curve that only takes the place of listed causes which explain
-nearly all is a better formula for them, and no dependence of its own.
+nearly all, or as much as it does but for what their formulas may miss, is no dependence of its own.
 """
 
 from __future__ import annotations
@@ -49,13 +49,14 @@ def stage(state: State) -> State:
         state = search.stage(state)
     state = elimination.stage(state)
     replaced = set(begun.current.names) - set(state.current.names)
-    return begun if replaced and _explain_most(begun) else state
+    return begun if replaced and _keep_their_names(begun, state.current) else state
 
 
-def _explain_most(state: State) -> bool:
-    """Whether the listed causes explain nearly all that can be: what replaces them is a better formula."""
-    explained = state.baseline.squares - state.current.squares
-    return explained > LIMITS.nearly_all * (state.baseline.squares - state.floor.squares)
+def _keep_their_names(state: State, instead: Fitted) -> bool:
+    """Whether the listed causes explain nearly all that can be, or nearly as much as what replaces them."""
+    base, left = state.baseline.squares, state.current.squares
+    most = base - left > LIMITS.nearly_all * (base - state.floor.squares)
+    return most or left - instead.squares < LIMITS.imperfect * (base - left)
 
 
 def _more_is_left(state: State) -> bool:
