@@ -110,7 +110,6 @@ MESSAGES = {
     "does not repeat": Message("does not repeat", "diagnose"),
     "another model": Message("is not the model", "pulsetrainer diagnose"),
     "another run": Message("is not a diagnosis", "pulsetrainer diagnose"),
-    "no such form": Message("", "", expected="png, svg, pdf", got="'{got}'"),
     "nothing to draw": Message("nothing to draw", ""),
     "no figure of it": Message("no figure", "", got="{got}"),
     "an empty range": Message("low < high", ""),

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
-from pulsetrainer.artefacts import Cause, Diagnosis
+from pulsetrainer.artefacts import Diagnosis
 from pulsetrainer.report import diagnosis_figures as figures
-from pulsetrainer.report.diagnosis_text import (
-    COLUMNS,
-    ERRORS,
-    answer,
-    explains,
-    in_doubt,
-    parameters,
-    stands,
-)
+from pulsetrainer.report import diagnosis_text
+from pulsetrainer.report.diagnosis_text import explains, in_doubt
 from pulsetrainer.report.html import page
-from pulsetrainer.report.views import Number, Picture, number, picture
+from pulsetrainer.report.views import Picture, picture
 
 
 def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header: Any) -> str:
@@ -28,12 +20,10 @@ def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header
         "diagnosis.html.j2",
         **header,
         found=found,
+        words=diagnosis_text,
         commands=commands,
         headline=headline(found),
-        named=[_words(one) for one in found.found],
-        levels=_levels(found),
-        rows=[_row(one, found) for one in shown],
-        columns=COLUMNS,
+        shown=shown,
         course=_course(found),
         profiles=[*_dependences(found), *_profiles(found)],
         ranking=_ranking(found) if any(one.found or explains(one, found) > 0 for one in shown) else None,
@@ -55,39 +45,6 @@ def headline(found: Diagnosis) -> str:
     tied = f" (could equally be {' or '.join(cause.confounded_with)})" if cause.confounded_with else ""
     rest = "" if found.left.whole else ". That explains only a part: something else is left"
     return f"{words}{tied}{'; in addition, ' + '; '.join(also) if also else ''}{rest}."
-
-
-def _words(one: Cause) -> dict[str, Any]:
-    doubt = f". In doubt: {'; '.join(one.doubts)}" if one.doubts else ""
-    return {
-        "id": one.cause,
-        "text": f"{one.text[:1].upper()}{one.text[1:]}{doubt}",
-        "parameters": parameters(one.parameters),
-        "tied": ", ".join(one.confounded_with),
-    }
-
-
-def _levels(found: Diagnosis) -> list[tuple[str, list[Number]]]:
-    """Return the table of errors: words, then of single samples and of averages."""
-    return [
-        (words, [_number(getattr(found, name), name, ".3f") if name else Number("") for name in fields])
-        for words, *fields in ERRORS
-        if stands(found, fields)
-    ]
-
-
-def _number(value: float, metric: str, digits: str) -> Number:
-    return number(value, metric, digits) if math.isfinite(value) else Number("")
-
-
-def _row(one: Cause, found: Diagnosis) -> dict[str, str | Number]:
-    gain = one.held_out_gain_percent if one.found else float("nan")
-    return {
-        "id": one.cause,
-        "found": answer(one, quick=found.quick),
-        "explains": _number(explains(one, found), f"{one.cause}.explains_percent", ".1f"),
-        "gain": _number(gain, f"{one.cause}.held_out_gain_percent", ".1f"),
-    }
 
 
 def _course(found: Diagnosis) -> Picture:

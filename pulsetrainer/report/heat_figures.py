@@ -1,4 +1,4 @@
-"""The figure of the coil's temperature: what a play told of it, and the truth where somebody knows it."""
+"""The figure of the coil's temperature: what the duty told of it."""
 
 from __future__ import annotations
 
@@ -8,16 +8,11 @@ from matplotlib.ticker import MaxNLocator
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.report import panels
-from pulsetrainer.report.style import COLUMN_IN, COMPENSATED, GUIDE, TARGET, styled
+from pulsetrainer.report.style import COLUMN_IN, COMPENSATED, GUIDE, styled
 
 
-def temperature(axes: Axes, time_s: FloatArray, told_K: FloatArray, true_K: FloatArray | None = None) -> None:
-    """Draw how much warmer the copper was than at calibration, arrays (w,) in s and K.
-
-    ``true_K`` is known of a simulated device only, and to who set its room.
-    """
-    if true_K is not None:
-        panels.trace(axes, time_s, true_K, **TARGET, label="true")
+def temperature(axes: Axes, time_s: FloatArray, told_K: FloatArray) -> None:
+    """Draw how much warmer the copper was than at calibration, arrays (w,) in s and K."""
     panels.trace(axes, time_s, told_K, **COMPENSATED, label="told by the duty")
     _finish(axes)
     axes.set_xlabel("time [s]")

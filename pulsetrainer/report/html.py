@@ -83,7 +83,7 @@ def environment() -> Environment:
     made.filters |= {"unbroken": unbroken, "unit": shown, "stem": lambda name: PurePath(name).stem}
     made.tests["of_a_curve"] = of_a_curve
     made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS}
-    made.globals |= {"number": views.number, "metric": views.metric}
+    made.globals |= {"number": views.number, "known": views.known, "metric": views.metric}
     return made
 
 

@@ -9,8 +9,6 @@ from xml.etree import ElementTree as ET
 
 from matplotlib import rc_context
 
-from pulsetrainer.errors import UsageError
-from pulsetrainer.report.forms import FORMATS
 from pulsetrainer.report.style import SETTINGS, THEME
 
 if TYPE_CHECKING:
@@ -31,17 +29,11 @@ _REFERENCE: Final = re.compile(r"url\(#([^)]+)\)")
 _COLOUR: Final = re.compile(r"#[0-9a-f]{6}\b")
 
 
-def encode(figure: Figure, fmt: str) -> bytes:
-    """Return ``figure`` as a file on white; UsageError where the format is not png, svg or pdf."""
-    wanted = fmt.lower().lstrip(".")
-    if wanted not in FORMATS:
-        raise UsageError(
-            f"a figure cannot be written as {fmt!r}: expected one of {', '.join(FORMATS)}",
-            hint="let the name of the figure end in .png, .svg or .pdf",
-        )
+def encode(figure: Figure, form: str) -> bytes:
+    """Return ``figure`` as a file on white: png, svg or pdf."""
     file = io.BytesIO()
     with rc_context(SETTINGS):  # ticks are made while drawing, and take the settings of that moment
-        figure.savefig(file, format=wanted, dpi=_DPI, facecolor="white", metadata=_UNDATED[wanted])
+        figure.savefig(file, format=form, dpi=_DPI, facecolor="white", metadata=_UNDATED[form])
     return file.getvalue()
 
 

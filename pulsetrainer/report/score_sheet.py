@@ -54,7 +54,8 @@ def render_session(
             f"Target and measured force for {session_figures.SHOWN_S:g} seconds, and the errors of all "
             f"{beats} beats.",
         ),
-        quiz=None if session.quiz is None or score is None else _quiz(session.quiz, score),
+        quiz=session.quiz if score is not None else None,
+        scored=None if session.quiz is None or score is None else _scored(session.quiz, score),
     )
 
 
@@ -67,7 +68,7 @@ def _rhythm(asked: Mapping[str, Any]) -> str:
     )
 
 
-def _quiz(quiz: Quiz, score: Score) -> dict[str, object]:
+def _scored(quiz: Quiz, score: Score) -> dict[str, object]:
     low, high = score.interval
     facts = [
         ("right", Number(f"{score.right} of {score.asked}", str(score.right), "quiz.right")),
@@ -80,15 +81,5 @@ def _quiz(quiz: Quiz, score: Score) -> dict[str, object]:
     if timed:
         facts.append(("median time to the answer [s]", number(score.response_s, "quiz.response_s", ".1f")))
     words = "What was asked, downwards, and what was answered, across; on the diagonal what is right."
-    return {
-        "learner": quiz.learner,
-        "facts": facts,
-        "timed": timed,
-        "picture": picture(session_figures.confusion(quiz), "confusion", "Confusion matrix", words),
-        "questions": [
-            (k, asked, said, number(float(seconds), "", ".1f"))
-            for k, (asked, said, seconds) in enumerate(
-                zip(quiz.asked, quiz.answered, quiz.response_s, strict=True), start=1
-            )
-        ],
-    }
+    matrix = picture(session_figures.confusion(quiz), "confusion", "Confusion matrix", words)
+    return {"facts": facts, "timed": timed, "matrix": matrix}

@@ -14,33 +14,30 @@ MOST_POINTS: Final = 4000
 _FAR = 4.0  # times as far off its bin as the farthest usually is: no noise, and no fast stretch either
 
 
-def extremes(*series: FloatArray, most: int = MOST_POINTS) -> IntArray:
-    """Return at most ``most`` sample numbers that keep the envelope of every series.
+def extremes(values: FloatArray, most: int = MOST_POINTS) -> IntArray:
+    """Return at most ``most`` sample numbers that keep the envelope of a series (n,).
 
-    The samples are cut into bins of equal length; of each bin stay the sample where each series is
-    least, where it is greatest, and the first that is NaN (so that a gap stays a gap). First and
-    last sample stay. A record that is short enough stays whole. The series have one length n; ``most`` is at
-    least 3 for each and two more.
+    The samples are cut into bins of equal length; of each bin stay the least, the greatest, and the first
+    that is NaN (so that a gap stays a gap). First and last sample stay. A record that is short enough stays
+    whole; ``most`` is at least 5.
     """
-    n = series[0].size
+    n = values.size
     if n <= most:
         return np.arange(n)
-    bins = max(1, (most - 2) // (3 * len(series)))
-    size = -(-n // bins)
+    size = -(-n // max(1, (most - 2) // 3))
     starts = np.arange(0, n, size)
-    picked = [np.array([0, n - 1])]
-    for values in series:
-        padded = np.full(starts.size * size, np.nan)
-        padded[:n] = values
-        table = padded.reshape(starts.size, size)
-        hole = np.isnan(table)
-        # of a bin that is all NaN each of the three is its first sample
-        picked += [
-            starts + np.argmin(np.where(hole, np.inf, table), axis=1),
-            starts + np.argmax(np.where(hole, -np.inf, table), axis=1),
-        ]
-        gap = starts + np.argmax(hole, axis=1)
-        picked.append(gap[hole.any(axis=1) & (gap < n)])
+    padded = np.full(starts.size * size, np.nan)
+    padded[:n] = values
+    table = padded.reshape(starts.size, size)
+    hole = np.isnan(table)
+    gap = starts + np.argmax(hole, axis=1)
+    picked = (
+        np.array([0, n - 1]),
+        # of a bin that is all NaN both are its first sample
+        starts + np.argmin(np.where(hole, np.inf, table), axis=1),
+        starts + np.argmax(np.where(hole, -np.inf, table), axis=1),
+        gap[hole.any(axis=1) & (gap < n)],
+    )
     kept: IntArray = np.unique(np.concatenate(picked))
     return kept
 

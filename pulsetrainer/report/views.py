@@ -60,6 +60,11 @@ def number(value: float | None, metric: str = "", digits: str = ".2f", *, publis
     return Number(text, repr(float(value)), metric, published)
 
 
+def known(value: float | None, metric: str, digits: str) -> Number:
+    """Return a number for the page; an empty place where it was not measured."""
+    return number(value if value is not None and math.isfinite(value) else None, metric, digits)
+
+
 def _count(value: int, metric: str) -> Number:
     return Number(str(value), str(value), metric)
 
