@@ -66,20 +66,16 @@ def check(
 
 def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, *, updatable: bool) -> None:
     job.screen.result(plain(found) | {"output": out})
+    kelvin, error = found.temperature_K, found.error_percent
+    unknown = f"not known: {found.temperature_unknown}"
     rows = {
         "offset": _said(found.offset, "N", 3),
         "gain": _said(found.gain, "", 4),
         "shape": _said(found.shape_percent, "% of the span", 2),
+        "temperature": unknown if kelvin is None else _said(kelvin, "K against calibration", 1),
+        "error": f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain",
+        **{f"reason {number}": reason for number, reason in enumerate(found.reasons, 1)},
     }
-    rows["temperature"] = (
-        _said(found.temperature_K, "K against calibration", 1)
-        if found.temperature_K is not None
-        else f"not known: {found.temperature_unknown}"
-    )
-    error = found.error_percent
-    rows["error"] = f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain"
-    for number, reason in enumerate(found.reasons, 1):
-        rows[f"reason {number}"] = reason
     if found.verdict == "shifted" and updatable and out is None:
         rows["next"] = f"pulsetrainer check {shlex.quote(str(model))} --update -o updated.h5"
     elif found.verdict == "changed" or (found.verdict == "shifted" and not updatable):

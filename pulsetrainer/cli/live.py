@@ -37,7 +37,7 @@ class Live:
 
     def __init__(self, press: Callable[[str, float], None], names: Sequence[str], *, blind: bool) -> None:
         self._press, self._names, self._blind = press, tuple(names), blind
-        self._traces: deque[tuple[np.ndarray, np.ndarray]] = deque()
+        self._traces: deque[np.ndarray] = deque()
         self._show: Callable[[RenderableType], None] = lambda _text: None
         self._drawn_s = -1.0
         self.status: Callable[[], str] = lambda: ""
@@ -49,8 +49,8 @@ class Live:
             if not key:
                 break
             self._press(key, now.time_s)
-        self._traces.append((now.target, now.force))
-        while sum(target.size for target, _ in self._traces) > _SHOWN_S * 1000:
+        self._traces.append(now.force)
+        while sum(force.size for force in self._traces) > _SHOWN_S * 1000:
             self._traces.popleft()
         if now.time_s - self._drawn_s >= _DRAWN_EACH_S:
             self._drawn_s = now.time_s
@@ -63,7 +63,7 @@ class Live:
             choices = "  ".join(f"{letter} {name}" for letter, name in zip(LETTERS, self._names))  # noqa: B905
             return Text(f"{self.status()}\n{choices}")
         width = max(os.get_terminal_size(sys.stderr.fileno()).columns - 2, 20)
-        force = np.concatenate([force for _, force in self._traces])
+        force = np.concatenate(self._traces)
         lines = plotted(force, width, _ROWS)
         beat = now.beat
         said = f"{now.time_s:7.1f} s  {force[-1]:5.2f} N  {now.current[-1]:5.3f} A"
@@ -104,8 +104,6 @@ def why_not() -> str:
         return "this system has no terminal of the kind that is needed"
     columns, rows = os.get_terminal_size(sys.stderr.fileno())
     if columns < SMALLEST[0] or rows < SMALLEST[1]:
-        return (
-            f"the terminal of {columns} x {rows} is too small for the live view: it needs "
-            f"{SMALLEST[0]} x {SMALLEST[1]}"
-        )
+        least = " x ".join(map(str, SMALLEST))
+        return f"the terminal of {columns} x {rows} is too small for the live view: it needs {least}"
     return ""

@@ -27,20 +27,13 @@ _HOLDS = {
     "file": (),
 }
 
-# (command, kind of file): what to do instead of making one in the usual way
-_WANTED = {
-    (
-        "diagnose",
-        "run",
-    ): "to make one: pulsetrainer capture diagnostic -o diagnostic.h5, or import your own table",
-    (
-        "evaluate",
-        "run",
-    ): "to make one: pulsetrainer capture diagnostic -o diagnostic.h5, or import your own table",
-    ("correct", "run"): "give the run that was diagnosed: pulsetrainer show DIAGNOSIS.h5 says which",
+# of commands that take a run: what to do instead of making one in the usual way
+_DIAGNOSTIC = "to make one: pulsetrainer capture diagnostic -o diagnostic.h5, or import your own table"
+_RUN_FOR = {
+    "diagnose": _DIAGNOSTIC,
+    "evaluate": _DIAGNOSTIC,
+    "correct": "give the run that was diagnosed: pulsetrainer show DIAGNOSIS.h5 says which",
 }
-
-
 # what else an argument takes that may be a table; tables nearby are mostly something else
 _TABLES = {
     "signal": "give identification, diagnostic, or a table with a column of time and one of current",
@@ -101,8 +94,8 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     if near:
         error.hint = f"{' or '.join(kinds) or 'pulsetrainer'} files {where}: {', '.join(near)}"
     elif kinds:
-        error.hint = f"there is no {' or '.join(kinds)} file {where}; " + _WANTED.get(
-            (command, kinds[0]), f"to make one: {MAKES[kinds[0]]}"
-        )
+        usual = f"to make one: {MAKES[kinds[0]]}"
+        instead = _RUN_FOR.get(command, usual) if kinds == ("run",) else usual
+        error.hint = f"there is no {' or '.join(kinds)} file {where}; {instead}"
     else:
         error.hint = f"there is no .h5 file of pulsetrainer {where}: give the path of one"

@@ -87,14 +87,8 @@ def _must(parameter: Any, error: Exception) -> str:
         return said
     kind = "a whole number" if "int" in parameter.type.name else "a number"
     low, high = (getattr(parameter.type, end, None) for end in ("min", "max"))
-    within = (
-        f" from {low} to {high}" if None not in (low, high) else f", {low} or more" if low is not None else ""
-    )
-    return (
-        f"must be {kind}{within}, got {got[1]!r}"
-        if "valid" in got[0]
-        else f"must be {kind}{within}, got {got[1]}"
-    )
+    within = f" from {low} to {high}" if high is not None else f", {low} or more" if low is not None else ""
+    return f"must be {kind}{within}, got {repr(got[1]) if 'valid' in got[0] else got[1]}"
 
 
 def _without(parameter: Any, help_: str) -> str:
