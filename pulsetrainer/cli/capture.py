@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import (
     AsJson,
@@ -86,13 +88,12 @@ def capture(
     limits = Limits(limit_current_A, limit_force_N)
     course, earlier, at = Course(played, repeats), None, 0
     if resume:
-        asked = {name: context.params[name] for name in _SAME}
-        earlier = earlier_of(out, asked, overwrite=overwrite)
-    try:
+        earlier = earlier_of(out, {name: context.params[name] for name in _SAME}, overwrite=overwrite)
+    else:
+        job.left_over(out, "an interrupted capture: continue it with --resume, or delete it")
+    with contextlib.nullcontext() if earlier is None else contextlib.closing(earlier):
         if earlier is not None:
             at = samples_played(earlier.run, course)
-        if not resume:
-            job.left_over(out, "an interrupted capture: continue it with --resume, or delete it")
         if dry_run:
             planned = plan(played, levels=levels, condition=condition, repeats=repeats, limits=limits, at=at)
             length = f"{planned.seconds - planned.conditioning_s:.1f} s"
@@ -117,9 +118,6 @@ def capture(
                 job, out, course, device, earlier, at,
                 condition=condition, levels=levels, progress=progress, watch=view.take if view else None,
             )  # fmt: skip
-    finally:
-        if earlier is not None:
-            earlier.lease.end()
     _show(job, payload)
 
 
@@ -196,8 +194,7 @@ def _record(
         "force_range_N": tally.force_N,
         "dropped_samples": recorder.dropped_samples,
         "complete": ending.complete,
-        "serial": info.serial,
-        "firmware": info.firmware,
+        **picked(info, "serial", "firmware"),
     }
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.console import picked, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
 from pulsetrainer.report.forms import figure_form
@@ -55,7 +55,7 @@ def compare(
 
             job.write(out, render.encode(comparison_figure.draw(labels, values), form))
     sources = [
-        {"file": path, "title": header.title, "created": header.created}
+        {"file": path, **picked(header, "title", "created")}
         for path, header in zip(evaluations, headers, strict=True)
     ]
     job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})

@@ -83,8 +83,7 @@ def _payload(found: Diagnosis) -> dict[str, Any]:
         "detectable_from_percent", "text", "doubts",
     )  # fmt: skip
     return {
-        "verdict": found.verdict,
-        "quick": found.quick,
+        **picked(found, "verdict", "quick"),
         "baseline": picked(found, *errors),
         "left": found.left._asdict(),
         "causes": [
@@ -92,18 +91,11 @@ def _payload(found: Diagnosis) -> dict[str, Any]:
                 "id": one.cause,
                 **picked(one, *figures),
                 "parameters": {
-                    p.name: {
-                        "value": p.value,
-                        "unit": p.unit,
-                        "interval": (p.lower, p.upper),
-                        "meaning": p.meaning,
-                    }
+                    p.name: picked(p, "value", "unit", "meaning") | {"interval": (p.lower, p.upper)}
                     for p in one.parameters
                 },
             }
             for one in found.causes
         ],
-        "lacks": found.lacks,
-        "evidence": found.evidence,
-        "next_experiment": found.next_experiment,
+        **picked(found, "lacks", "evidence", "next_experiment"),
     }

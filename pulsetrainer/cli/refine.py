@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pulsetrainer.cli.console import plain
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port
 
@@ -47,15 +47,7 @@ def refine(
     title = f"{refined.name} refined on {info.serial}"
     job.save(out, refined, title, device=job.device(info))
     job.notes(refined.notes[len(waveform.notes) :])
-    job.screen.result(
-        {
-            "output": out,
-            "name": refined.name,
-            "passes": [plain(one) for one in refined.passes],
-            "kept": refined.kept,
-            "serial": info.serial,
-        }
-    )
+    job.screen.result({"output": out, **picked(refined, "name", "passes", "kept"), "serial": info.serial})
     rows = {
         f"pass {number}{', kept' if number == refined.kept else ''}": (
             f"mean {one.mean_abs_error_percent:.3f} %, max {one.max_abs_error_percent:.2f} % of full force, "

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 
 if TYPE_CHECKING:
@@ -70,8 +71,7 @@ def tell(
         "clipped_samples": done.clipped,
         "dropped_samples": done.dropped,
         "temperature_K": kelvins or None,
-        "serial": info.serial,
-        "firmware": info.firmware,
+        **picked(info, "serial", "firmware"),
         **quizzed,
     }
     rows: dict[str, Any] = {
@@ -97,14 +97,7 @@ def _quizzed(quiz: Quiz | None) -> tuple[dict[str, Any], dict[str, str]]:
         return {}, {}
     result = score(quiz)
     low, high = (100 * end for end in result.interval)
-    said = {
-        "asked": result.asked,
-        "right": result.right,
-        "interval": result.interval,
-        "chance": result.chance,
-        "p_value": result.p_value,
-        "response_s": result.response_s,
-        "confusion": quiz.confusion,
-    }
+    said = picked(result, "asked", "right", "interval", "chance", "p_value", "response_s")
+    said["confusion"] = quiz.confusion
     share = f"{100 * result.share:.0f} %, 95 % interval {low:.0f} to {high:.0f} %"
     return {"quiz": said}, {"right": f"{result.right} of {result.asked}: {share}"}

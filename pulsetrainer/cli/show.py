@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.evaluate import show_tables
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson
@@ -33,16 +34,8 @@ def show(
     with job.working("reading"):
         artefact, header = job.load_any(file), store.read_header(file)
         found = facts(artefact)
-    job.screen.result(
-        {
-            "file": file,
-            "kind": artefact.kind,
-            "title": header.title,
-            "created": header.created,
-            "history": header.history,
-            "facts": found,
-        }
-    )
+    said = {"file": file, "kind": artefact.kind, **picked(header, "title", "created", "history")}
+    job.screen.result({**said, "facts": found})
     title = f"{file}: {headed(artefact.kind, header.title)}, {header.created}"
     if isinstance(artefact, Evaluation):
         job.screen.facts(title, {})

@@ -20,13 +20,17 @@ from pulsetrainer.files.recorder import interrupted
 
 @dataclass(frozen=True, slots=True)
 class Earlier:
-    """An interrupted recording."""
+    """An interrupted recording; ``close`` it when it is taken over, or is not."""
 
     path: Path
     run: Run
     header: Header
     lease: Lease  # so that nobody else goes on with it meanwhile
     contains_final: bool  # what has the final name is the beginning of this recording
+
+    def close(self) -> None:
+        """Let others go on with it."""
+        self.lease.end()
 
     def check_device(self, serial: str) -> None:
         """Raise DeviceError where it was recorded on the device of another serial number."""

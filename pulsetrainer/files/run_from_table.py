@@ -75,23 +75,14 @@ def run_from_table(
     if skip_bad_rows:
         table, notes = _without_bad_rows(table, counted=rate_Hz is not None)
     columns = {name: np.ascontiguousarray(table.check_finite(name, remedy=_LEAVE_OUT)) for name in wanted}
-    rows = table.rows
-    if rows < 2:
+    if table.rows < 2:
         raise DataError(
-            f"{table.path} has {rows} row, a run needs two or more", hint="export the record again"
+            f"{table.path} has {table.rows} row, a run needs two or more", hint="export the record again"
         )
-    time_s: FloatArray | None = None
-    if rate_Hz is not None:
-        time_s = np.arange(rows) / rate_Hz
-    elif time is not None:
-        time_s, more = seconds(table, time, of_record=True), _note_on_unit(table, time)
-        notes += more
-        _check_distinct(table, input=input, output=output, reference=reference, time=time)
-    elif not no_time:
-        time_s, more = _own_time(table, [table.index(name) for name in wanted])
-        notes += more
+    when = _Time(None, "no time") if no_time else _time(table, wanted, time, rate_Hz)
+    _check_distinct(table, input=input, output=output, reference=reference, time=time)
     run = Run(
-        time_s=time_s,
+        time_s=when.s,
         input=columns[input],
         output=columns[output],
         reference=None if reference is None else columns[reference],
@@ -104,22 +95,41 @@ def run_from_table(
     meanings = {"input": (input, run.input_unit), "output": (output, run.output_unit)}
     if reference is not None:
         meanings["reference"] = (reference, run.input_unit)
-    return TableRun(run, notes, _read_as(table, _time_words(table, time_s, time, rate_Hz, wanted), meanings))
+    return TableRun(run, (*notes, *when.notes), _read_as(table, when.words, meanings))
 
 
-def _time_words(
-    table: Table, time_s: FloatArray | None, time: str | None, rate_Hz: float | None, wanted: Sequence[str]
-) -> str:
-    """Say where the time comes from."""
-    if time_s is None:
-        return "no time"
+class _Time(NamedTuple):
+    """The time of a record: s (n,), where it comes from, and what there is to say of that."""
+
+    s: FloatArray | None
+    words: str
+    notes: tuple[str, ...] = ()
+
+
+def _time(table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float | None) -> _Time:
+    """Return the time by a rate, in a column, or, where neither is given, what the file has by itself."""
     rate_Hz = table.rate_Hz if rate_Hz is None and time is None else rate_Hz
     if rate_Hz is not None:
-        return f"time by the rate of {rate_Hz:g} Hz"
-    column = table.names[
-        table.index(time) if time is not None else _free(table, {table.index(name) for name in wanted})[0]
-    ]
-    return f"time from {split_unit(column)[0]} [{_unit_of_time(table, column) or 's'}]"
+        return _Time(np.arange(table.rows) / rate_Hz, f"time by the rate of {rate_Hz:g} Hz")
+    if time is None:
+        place = _own_column(table, {table.index(name) for name in wanted})
+        if place is None:
+            lack = f"{table.path} has no time column: its samples have an order only"
+            return _Time(None, "no time", (f"{lack} (give `time` or `rate_Hz`)",))
+        time = table.names[place]
+        if _just_counts(table.columns[time]):
+            note = (
+                f"the column {time} of {table.path} just counts the rows, so it is not used as time: the "
+                f"samples have an order only (if it is in seconds, give `time` {time})"
+            )
+            return _Time(None, "no time", (note,))
+    heading, unit = table.names[table.index(time)], _unit_of_time(table, time)
+    notes: tuple[str, ...] = ()
+    if not unit and _unknown_unit(table, time):
+        said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
+        notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
+    words = f"time from {split_unit(heading)[0]} [{unit or 's'}]"
+    return _Time(seconds(table, time, of_record=True), words, notes)
 
 
 def _read_as(table: Table, time: str, meanings: Mapping[str, tuple[str, str]]) -> dict[str, str]:
@@ -193,46 +203,21 @@ def _needed(table: Table, wanted: Sequence[str], time_column: str | None, *, aut
     places = {table.index(name) for name in wanted}
     if time_column is not None:
         return places | {table.index(time_column)}
-    return places | set(_free(table, places)[:1]) if automatic else places
+    own = _own_column(table, places) if automatic else None
+    return places if own is None else {*places, own}
 
 
-def _free(table: Table, used: Collection[int]) -> list[int]:
-    """Return the places of the columns that may be the file's own time."""
+def _own_column(table: Table, used: Collection[int]) -> int | None:
+    """Return the place of the column that may be the file's own time; None where there is none."""
     if table.rate_Hz is not None:
-        return []
+        return None
     if table.shifts:
         candidates = [0]  # of a text, where columns have an order
     else:
         words = [split_unit(name)[0].rpartition(".")[2].lower() for name in table.names]
         candidates = [k for k, word in enumerate(words) if word in _TIME_NAMES]
-    return [k for k in candidates if k not in used and table.names[k] not in table.text_names]
-
-
-def _own_time(table: Table, used: Collection[int]) -> tuple[FloatArray | None, tuple[str, ...]]:
-    """Return the time that a file has by itself, if it has one, and a note if it has none."""
-    if table.rate_Hz is not None:
-        return np.arange(table.rows) / table.rate_Hz, ()
-    free = _free(table, used)
-    if not free:
-        note = f"{table.path} has no time column: its samples have an order only (give `time` or `rate_Hz`)"
-        return None, (note,)
-    name = table.names[free[0]]
-    if _just_counts(table.columns[name]):
-        note = (
-            f"the column {name} of {table.path} just counts the rows, so it is not used as time: the samples "
-            f"have an order only (if it is in seconds, give `time` {name})"
-        )
-        return None, (note,)
-    return seconds(table, name, of_record=True), _note_on_unit(table, name)
-
-
-def _note_on_unit(table: Table, name: str) -> tuple[str, ...]:
-    """Return a note where the heading of a time says a unit that nobody knows."""
-    if _unit_of_time(table, name) or not _unknown_unit(table, name):
-        return ()
-    heading = table.names[table.index(name)]
-    said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
-    return (f"{said} (write the unit in brackets, such as 't [min]')",)
+    free = (k for k in candidates if k not in used and table.names[k] not in table.text_names)
+    return next(free, None)
 
 
 def _unit_of_time(table: Table, name: str) -> str:

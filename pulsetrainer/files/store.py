@@ -16,7 +16,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import KINDS
 from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, WrongKindError
-from pulsetrainer.files.atomic_write import check_output, replacing
+from pulsetrainer.files.atomic_write import replacing
 from pulsetrainer.files.checksum import append_checksum, check_checksum
 from pulsetrainer.files.decode import Origin, decode, text_of
 from pulsetrainer.files.encode import Later, encode, values_of
@@ -26,8 +26,6 @@ from pulsetrainer.files.provenance import Header, Provenance, clean
 from pulsetrainer.files.schema import TIME, kind_of, plan_of
 from pulsetrainer.files.unfailing_file import UnfailingFile
 from pulsetrainer.version import __version__
-
-__all__ = ["check_output", "read", "read_any", "read_header", "read_one_of", "write"]
 
 FORMAT_VERSION = 1
 # from 1.10 on a file can be read while it grows, and HDF5 keeps checksums of most of its own structures
@@ -115,15 +113,15 @@ def read_one_of(path: Path | str, *kinds: type) -> Any:
     """Read an artefact of any of these kinds; raises as ``read``."""
     expected = [kind_of(kind) for kind in kinds]
     recording = _recording(path)
-    if recording is not None and type(recording.artefact) in kinds:
-        return recording.artefact
     if recording is not None:
-        raise WrongKindError(path, expected, recording.artefact.kind)
+        if type(recording.artefact) not in kinds:
+            raise WrongKindError(path, expected, recording.artefact.kind)
+        return recording.artefact
     with _opened(path) as file:
         got = _kind(file, path)
         if got not in expected:
             raise WrongKindError(path, expected, got)
-        return _decode(file, path, got)
+        return decode(file, KINDS[got], Origin(str(path), got), samples=_samples_in(file, path))
 
 
 def read_any(path: Path | str) -> Any:
@@ -134,10 +132,7 @@ def read_any(path: Path | str) -> Any:
     DataError
         The file is absent, unreadable, damaged, not an artefact, or of a newer format.
     """
-    if recording := _recording(path):
-        return recording.artefact
-    with _opened(path) as file:
-        return _decode(file, path, _kind(file, path))
+    return read_one_of(path, *KINDS.values())
 
 
 def read_header(path: Path | str) -> Header:
@@ -176,10 +171,6 @@ def _samples_in(file: h5py.File, path: Path | str) -> int | None:
     if np.ndim(samples) or not np.issubdtype(type(samples), np.integer) or samples < 0:
         raise DamagedFileError(f"{path}: the attribute 'samples' is {samples!r}, expected a count", path=path)
     return int(samples)
-
-
-def _decode(file: h5py.File, path: Path | str, kind: str) -> Any:
-    return decode(file, KINDS[kind], Origin(str(path), kind), samples=_samples_in(file, path))
 
 
 def _kind(file: h5py.File, path: Path | str) -> str:

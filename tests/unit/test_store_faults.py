@@ -23,9 +23,9 @@ from pulsetrainer.artefacts import KINDS
 from pulsetrainer.cli.next_step import next_step
 from pulsetrainer.errors import DataError, ExistsError, NotAnArtefactError, UsageError, WrongKindError
 from pulsetrainer.files import atomic_write, store
-from pulsetrainer.files.atomic_write import cannot_write
+from pulsetrainer.files.atomic_write import cannot_write, check_output
 from pulsetrainer.files.checksum import CHECKSUM_LENGTH
-from pulsetrainer.files.store import check_output, read, read_any, read_header, write
+from pulsetrainer.files.store import read, read_any, read_header, write
 from wording import raises
 
 SEED = 20260102
