@@ -29,7 +29,6 @@ from pulsetrainer.version import __version__
 
 PROGRAM = "pulsetrainer"
 _LIBRARIES = ("numpy", "scipy", "h5py")
-_HASH_BLOCK = 1 << 20
 
 # From the question mark to the END of the text, not to the next blank: a quoted value may hold blanks,
 # and a title cut short costs less than a parameter let through.
@@ -203,15 +202,12 @@ def library_versions() -> dict[str, str]:
 
 
 def sha256_of(path: Path | str) -> str:
-    """Return the sha256 of a file as hexadecimal text, read in blocks; DataError where it cannot be read."""
-    digest = hashlib.sha256()
+    """Return the sha256 of a file as hexadecimal text; DataError where it cannot be read."""
     try:
         with Path(path).open("rb") as stream:
-            while block := stream.read(_HASH_BLOCK):
-                digest.update(block)
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise unreadable(path, error) from error
-    return digest.hexdigest()
 
 
 def digests(paths: Iterable[Path | str]) -> dict[str, str]:

@@ -107,13 +107,15 @@ class Table:
             There is no such column (the nearest names are offered), or it holds text.
         """
         bare = [split_unit(own)[0].lower() for own in self.names]
-        if name in self.names:
-            k = self.names.index(name)
-        elif bare.count(name.lower()) == 1:
-            k = bare.index(name.lower())
-        elif (same := self._spelled_otherwise(name)) is not None:
-            k = same
-        else:
+        wanted, unit = split_unit(name)
+        units = [self.units.get(own) for own in self.names]
+        alike = (
+            [own == name for own in self.names],
+            [own == name.lower() for own in bare],
+            [bool(unit) and pair == (wanted.lower(), unit) for pair in zip(bare, units, strict=True)],
+        )
+        k = next((which.index(True) for which in alike if which.count(True) == 1), None)
+        if k is None:
             near = difflib.get_close_matches(name, self.names, n=3, cutoff=0.3) or list(self.names)[:8]
             raise DataError(
                 f"{self.path} has no column {name!r}; it has {', '.join(self.names)}",
@@ -126,16 +128,6 @@ class Table:
                 "01.05.2024 12:34:56",
             )
         return k
-
-    def _spelled_otherwise(self, name: str) -> int | None:
-        """Return the place of a column with this name and unit, its unit written otherwise: ``force [N]``."""
-        wanted, unit = split_unit(name)
-        found = [
-            k
-            for k, own in enumerate(self.names)
-            if unit and split_unit(own)[0].lower() == wanted.lower() and self.units.get(own) == unit
-        ]
-        return found[0] if len(found) == 1 else None
 
 
 def numbered(names: Sequence[str]) -> tuple[str, ...]:

@@ -130,9 +130,7 @@ def playback(played: Playback) -> Figure:
         panels.repeats(current, played.time_s, drive.input, name, style)
         panels.current_error(error, played.time_s, drive, played.input_range, style)
     force.set_ylabel(label("force", played.scaled.output_unit))
-    force.set_title(
-        f"{asked.name}, {asked.inversion} inversion" + ("" if played.complete else ", incomplete")
-    )
+    force.set_title(panels.titled(asked) + ("" if played.complete else ", incomplete"))
     current.set_ylabel(label(panels.quantity_of(played.scaled.input_unit), played.scaled.input_unit))
     error.axhline(0.0, **GUIDE)
     error.set_ylabel("current error\n[% of range]")

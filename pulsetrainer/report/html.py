@@ -17,6 +17,7 @@ from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import views
 from pulsetrainer.report.diagnosis_text import of_a_curve
 from pulsetrainer.report.names import NAMES, OVERVIEW
+from pulsetrainer.report.panels import titled
 
 _UNIT = re.compile(r"(?<=\d) (?=%|[A-Za-z]{1,2}\b)")
 
@@ -54,7 +55,7 @@ def render_evaluation(
     """
     played = evaluation.waveforms
     # whose model the evaluation holds: that of the last
-    last = f" of {views.titled(played[-1])}" if len(set(map(views.titled, played))) > 1 else ""
+    last = f" of {titled(played[-1])}" if len(set(map(titled, played))) > 1 else ""
     if len(evaluation.models) > 1:
         last = f" {PurePath(evaluation.models[-1].name).stem}"
     return page(

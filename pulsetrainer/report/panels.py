@@ -244,7 +244,7 @@ def tracking(panel: FigureBase, played: WaveformEvaluation) -> None:
     trace(above, played.time_s, played.scaled.output, **SCALED, label="scaled")
     trace(above, played.time_s, played.compensated.output, **COMPENSATED, label="compensated")
     above.set_ylabel(label("force", played.output_unit))
-    above.set_title(_played_title(played))
+    above.set_title(titled(played))
     headroom(above)
     below.axhline(0.0, **GUIDE)
     for drive, style in ((played.scaled, SCALED), (played.compensated, COMPENSATED)):
@@ -275,8 +275,9 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
     panel.legend(loc="outside lower center", ncols=2)
 
 
-def _played_title(played: WaveformEvaluation) -> str:
-    return f"{played.name}, {played.inversion} inversion"
+def titled(one: Waveform | WaveformEvaluation) -> str:
+    """Return a pulse and the inversion that made its drive, in words."""
+    return f"{one.name}, {one.inversion} inversion"
 
 
 def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
@@ -299,7 +300,7 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
     axes.set_aspect("equal")
     axes.set_xlabel(label("target", first.output_unit))
     axes.set_ylabel(label("force", first.output_unit))
-    axes.set_title(f"{first.name if several else _played_title(first)}: one beat")
+    axes.set_title(f"{first.name if several else titled(first)}: one beat")
     # outside, since inside a loop would run through
     panel.legend(loc="outside lower center")
 
@@ -311,7 +312,7 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     measured = "pressed in the kept pass, mean" if waveform.passes else "predicted by the model"
     trace(above, waveform.time_s, waveform.predicted, **MODEL, label=measured)
     above.set_ylabel(label(quantity_of(waveform.output_unit), waveform.output_unit))
-    above.set_title(f"{waveform.name}, {waveform.inversion} inversion: what is asked for, and the drive")
+    above.set_title(f"{titled(waveform)}: what is asked for, and the drive")
     trace(below, waveform.time_s, waveform.scaled, **SCALED, label="scaled")
     trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label=waveform.inversion)
     below.set_ylabel(label(f"drive: {quantity_of(waveform.input_unit)}", waveform.input_unit))

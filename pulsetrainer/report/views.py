@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from pulsetrainer.artefacts import Model, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.report import alternatives, figures, heat_figures
 from pulsetrainer.report.names import NAMES
-from pulsetrainer.report.panels import largest_residual, scale
+from pulsetrainer.report.panels import largest_residual, scale, titled
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
 
@@ -73,11 +73,6 @@ def picture(figure: Figure, identifier: str, title: str, description: str, capti
     """Return a figure for the page; the caption is the description where there is no other."""
     svg = inline_svg(figure, identifier=identifier, title=title, description=description)
     return Picture(Markup(svg), caption or description)  # noqa: S704 - our own XML, its texts are escaped
-
-
-def titled(played: WaveformEvaluation) -> str:
-    """Return a pulse and the inversion that made its drive, in words."""
-    return f"{played.name}, {played.inversion} inversion"
 
 
 def metric(played: WaveformEvaluation, dotted: str, digits: str = ".2f") -> Number:
