@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Overwrite, Port
@@ -45,17 +46,15 @@ def check(
             hint="give both, or neither",
         )
     job = Job(context, inputs=(model,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Model
     from pulsetrainer.device.limits import Limits
-    from pulsetrainer.steps.check import check as measure
     from pulsetrainer.steps.check import check_updatable, hindrance, updated
 
-    loaded = job.load(model, Model)
+    loaded = job.load(model, pt.Model)
     if update:
         check_updatable(loaded)
     limits = Limits(limit_current_A, limit_force_N)
     with job.working(f"checking {model.name}") as progress, job.open_device(port, limits) as device:
-        found = measure(loaded, device, progress=progress)
+        found = pt.check(loaded, device, progress=progress)
         info = device.info
     if out is not None:
         job.save(

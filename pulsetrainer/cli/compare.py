@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
@@ -36,17 +37,15 @@ def compare(
     check_several(evaluations)
     form = figure_form(out, "a comparison", "csv") if out is not None else ""
     job = Job(context, inputs=evaluations, outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Evaluation, Session
     from pulsetrainer.files import store
     from pulsetrainer.report import names
     from pulsetrainer.report.comparison_text import as_csv, labels_of
-    from pulsetrainer.steps.compare import compare as side_by_side
 
     labels = labels_of(evaluations)
     with job.working("comparing"):
-        loaded = [job.load_any(path, Evaluation, Session) for path in evaluations]
+        loaded = [job.load_any(path, pt.Evaluation, pt.Session) for path in evaluations]
         headers = [store.read_header(path) for path in evaluations]
-        metrics = side_by_side(loaded, names=list(map(str, evaluations)), everything=everything)
+        metrics = pt.compare(loaded, names=list(map(str, evaluations)), everything=everything)
         values = {m.name: m.values for m in metrics}
         if out is not None and form == "csv":
             job.write(out, as_csv(evaluations, values))
@@ -59,7 +58,7 @@ def compare(
         for path, header in zip(evaluations, headers, strict=True)
     ]
     job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})
-    learners = isinstance(loaded[0], Session)
+    learners = isinstance(loaded[0], pt.Session)
     words = {True: "better", False: "worse", None: ""}
     rows = []
     for m in metrics:

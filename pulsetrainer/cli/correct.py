@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
@@ -29,12 +30,9 @@ def correct(
     Example: pulsetrainer correct diagnostic.h5 --diagnosis diagnosis.h5 -o corrected.h5
     """
     job = Job(context, inputs=(run, diagnosis), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Diagnosis, Run
-    from pulsetrainer.steps.correct import correct as corrected_by
-
     with job.working("correcting"):
-        found = job.load(diagnosis, Diagnosis)
-        corrected = corrected_by(job.load(run, Run), found, delay_s=delay, names=(str(run), str(diagnosis)))
+        found = job.load(diagnosis, pt.Diagnosis)
+        corrected = pt.correct(job.load(run, pt.Run), found, delay_s=delay, names=(str(run), str(diagnosis)))
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
     masked = 0 if corrected.masked is None else int(corrected.masked.sum())
     job.screen.result({"output": out, "corrected": corrected.corrected, "masked_samples": masked})

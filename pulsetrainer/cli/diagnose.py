@@ -5,16 +5,14 @@ from __future__ import annotations
 import shlex
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Diagnosis
 
 
 def diagnose(
@@ -35,14 +33,12 @@ def diagnose(
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
     job = Job(context, inputs=(*runs, model), outputs=(out, html), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Model, Run
     from pulsetrainer.report.diagnosis_text import sections
-    from pulsetrainer.steps.diagnose import diagnose as find
 
     with job.working("diagnosing") as progress:
-        found = find(
-            [job.load(path, Run) for path in runs],
-            job.load(model, Model),
+        found = pt.diagnose(
+            [job.load(path, pt.Run) for path in runs],
+            job.load(model, pt.Model),
             quick=quick,
             seed=seed,
             names=[str(path) for path in (*runs, model)],
@@ -64,7 +60,7 @@ def diagnose(
         job.screen.whole(f"then: {line}")
 
 
-def _commands(found: Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:
+def _commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:
     words: list[list[object]] = []
     if found.next_command == "extend":
         words.append(["extend", out, "--model", model, "-o", "extended.h5"])
@@ -73,7 +69,7 @@ def _commands(found: Diagnosis, runs: list[Path], model: Path, out: Path) -> lis
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
 
 
-def _payload(found: Diagnosis) -> dict[str, Any]:
+def _payload(found: pt.Diagnosis) -> dict[str, Any]:
     errors = (
         "rms", "rms_percent", "noise_percent", "extended_rms_percent",
         "static_percent", "extended_percent", "floor_percent",

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import Screen, picked, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Evaluation, Session
 
 
 def evaluate(
@@ -39,19 +37,17 @@ def evaluate(
     from pulsetrainer.files.bounds import read_bounds
 
     limits = read_bounds(bounds) if bounds else {}
-    from pulsetrainer.artefacts import Model, Playback, Run, Session
     from pulsetrainer.errors import QualityError
     from pulsetrainer.steps.evaluate import breaches
-    from pulsetrainer.steps.evaluate import evaluate as errors_of
 
     with job.working("evaluating") as progress:
-        measured = [job.load_any(path, Playback, Run, Session) for path in inputs]
-        if len(measured) == 1 and isinstance(measured[0], Session):
+        measured = [job.load_any(path, pt.Playback, pt.Run, pt.Session) for path in inputs]
+        if len(measured) == 1 and isinstance(measured[0], pt.Session):
             _of_session(job, inputs[0], measured[0], html, alone=not (model or out or bounds))
             return
-        models = [job.load(path, Model) for path in model]
+        models = [job.load(path, pt.Model) for path in model]
         progress(0.2)
-        evaluation = errors_of(
+        evaluation = pt.evaluate(
             measured, models, names=list(map(str, inputs)), model_names=list(map(str, model))
         )
         progress(0.6)
@@ -81,7 +77,7 @@ def evaluate(
         job.screen.whole(f"all {len(limits)} bounds of {bounds} hold")
 
 
-def _of_session(job: Job, path: Path, session: Session, html: Path | None, *, alone: bool) -> None:
+def _of_session(job: Job, path: Path, session: pt.Session, html: Path | None, *, alone: bool) -> None:
     from pulsetrainer.cli.score import say
     from pulsetrainer.errors import UsageError
 
@@ -93,7 +89,7 @@ def _of_session(job: Job, path: Path, session: Session, html: Path | None, *, al
     say(job, path, html, session)
 
 
-def show_tables(screen: Screen, evaluation: Evaluation) -> None:
+def show_tables(screen: Screen, evaluation: pt.Evaluation) -> None:
     """Print the figures of an evaluation beside those of the published device."""
     from pulsetrainer.artefacts.evaluation import PUBLISHED
     from pulsetrainer.report.text import tables_of
@@ -105,7 +101,7 @@ def show_tables(screen: Screen, evaluation: Evaluation) -> None:
         screen.line("published: ", "the device of Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631")
 
 
-def _payload(evaluation: Evaluation) -> dict[str, Any]:
+def _payload(evaluation: pt.Evaluation) -> dict[str, Any]:
     from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 
     waveforms = [

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Diagnosis, Model
 
 _FIGURES = (
     "rms_percent", "extended_rms_percent", "static_percent", "extended_percent", "held_out_gain_percent",
@@ -39,16 +37,14 @@ def extend(
     """
     inputs = (diagnosis, model, *([] if verify is None else [verify]))
     job = Job(context, inputs=inputs, outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Diagnosis, Model, Run
     from pulsetrainer.report.diagnosis_text import parameters
-    from pulsetrainer.steps.extend import extend as extended_by
 
     with job.working("extending"):
-        found = job.load(diagnosis, Diagnosis)
-        extended = extended_by(
-            job.load(model, Model),
+        found = job.load(diagnosis, pt.Diagnosis)
+        extended = pt.extend(
+            job.load(model, pt.Model),
             found,
-            verify=None if verify is None else job.load(verify, Run),
+            verify=None if verify is None else job.load(verify, pt.Run),
             names=(str(model), str(diagnosis)),
         )
         added = [one.cause for one in extended.extensions]
@@ -68,7 +64,7 @@ def extend(
         job.screen.facts(f"with {one.cause}", parameters(one.parameters))
 
 
-def _apart(found: Diagnosis, extended: Model) -> dict[str, str]:
+def _apart(found: pt.Diagnosis, extended: pt.Model) -> dict[str, str]:
     """Say how the extended model differs from what the diagnosis told."""
     added = {one.cause: [p.value for p in one.parameters] for one in extended.extensions}
     rows = {
@@ -84,7 +80,7 @@ def _apart(found: Diagnosis, extended: Model) -> dict[str, str]:
     return rows
 
 
-def _left(found: Diagnosis, extended: Model) -> dict[str, str]:
+def _left(found: pt.Diagnosis, extended: pt.Model) -> dict[str, str]:
     """Say what both models leave of the recordings, rms of single samples."""
     assert found.extended is not None
     if not math.isfinite(found.extended_rms_percent) or found.extended.extensions != extended.extensions:

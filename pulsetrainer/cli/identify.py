@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting, word_or_number
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Model
-
 
 Reading = Literal["continuous", "relay"]
 _MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
@@ -72,12 +69,10 @@ def identify(
     """
     job = Job(context, inputs=runs, outputs=(out,), overwrite=overwrite, as_json=json)
     length = word_or_number(smoothing, "auto", "--smoothing", "auto or a number from 0 to 1", least=0, most=1)
-    from pulsetrainer.artefacts import Run
-    from pulsetrainer.steps.identify import identify as fit
 
     with job.working("fitting") as progress:
-        model = fit(
-            [job.load(path, Run) for path in runs],
+        model = pt.identify(
+            [job.load(path, pt.Run) for path in runs],
             levels=levels,
             form=form,
             reading=operator or reading,
@@ -92,7 +87,7 @@ def identify(
     _show(job, out, model)
 
 
-def _show(job: Job, out: Path, model: Model) -> None:
+def _show(job: Job, out: Path, model: pt.Model) -> None:
     from pulsetrainer.artefacts.units import with_unit
     from pulsetrainer.report.facts import loop_words, minor_words
 
@@ -122,7 +117,7 @@ def _show(job: Job, out: Path, model: Model) -> None:
     )
 
 
-def _payload(out: Path, model: Model, seconds: float) -> dict[str, Any]:
+def _payload(out: Path, model: pt.Model, seconds: float) -> dict[str, Any]:
     fit = model.fit
     assert fit is not None
     same = (

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting
-
-if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Waveform
 
 
 def invert(
@@ -79,12 +77,10 @@ def invert(
     job = Job(context, inputs=inputs, outputs=(out,), overwrite=overwrite, as_json=json)
     check_beat(beat)
     check_force_range(force_min, force_max)
-    from pulsetrainer.artefacts import Model, Waveform
     from pulsetrainer.steps.invert import invert as inverse_of
-    from pulsetrainer.steps.transfer import transfer
 
     with job.working(f"inverting {waveform}") as progress:
-        source = job.load(model, Model)
+        source = job.load(model, pt.Model)
         drive = inverse_of(
             read_pulse(waveform),
             source,
@@ -99,14 +95,14 @@ def invert(
             progress=progress,
         )
         if learnt is not None:
-            drive = transfer(drive, job.load(learnt, Waveform), slew=slew_A_per_s)
+            drive = pt.transfer(drive, job.load(learnt, pt.Waveform), slew=slew_A_per_s)
         if pulse.name == waveform:
             job.uses(pulse)
         job.save(out, drive, f"{drive.name} by {drive.inversion} inversion")
     _show(job, out, drive)
 
 
-def _show(job: Job, out: Path, drive: Waveform) -> None:
+def _show(job: Job, out: Path, drive: pt.Waveform) -> None:
     from pulsetrainer.artefacts.units import with_unit
 
     job.notes(drive.notes)

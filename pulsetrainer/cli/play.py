@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import (
@@ -23,7 +24,7 @@ from pulsetrainer.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import FloatArray, Playback, Waveform
+    from pulsetrainer.artefacts import FloatArray
     from pulsetrainer.cli.loop_view import LoopView
     from pulsetrainer.core.plane import IntArray
     from pulsetrainer.device.identity import DeviceInfo
@@ -53,13 +54,11 @@ def play(
     Example: pulsetrainer play drive.h5 -o played.h5
     """
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Playback, Waveform
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.errors import PulsetrainerError
     from pulsetrainer.steps.play import plan
-    from pulsetrainer.steps.play import play as press
 
-    waveform, limits = job.load(drive, Waveform), Limits(limit_current_A, limit_force_N)
+    waveform, limits = job.load(drive, pt.Waveform), Limits(limit_current_A, limit_force_N)
     if dry_run:
         planned = plan(waveform, repeats=repeats, limits=limits)
         rows = {
@@ -75,11 +74,11 @@ def play(
     with job.working(f"playing {drive.name}", view) as progress, job.open_device(port, limits) as device:
         info = device.info
         try:
-            played = press(
+            played = pt.play(
                 waveform, device, repeats=repeats, track_heat=track_heat, progress=progress, watch=watch
             )
         except PulsetrainerError as error:
-            if not isinstance(error.kept, Playback):
+            if not isinstance(error.kept, pt.Playback):
                 raise
             stopped, played = error, error.kept
     whole = played.compensated.output.shape[0]
@@ -90,16 +89,16 @@ def play(
     _show(job, out, played, info)
 
 
-def _named(drive: Waveform) -> str:
+def _named(drive: pt.Waveform) -> str:
     return f"{drive.name} by {drive.inversion} inversion"
 
 
-def _ends(drive: Waveform) -> tuple[float, float]:
+def _ends(drive: pt.Waveform) -> tuple[float, float]:
     """Ends of the axes of the live view: a little beyond what is asked for."""
     return 1.05 * float(max(drive.compensated.max(), drive.scaled.max())), 1.1 * float(drive.target.max())
 
 
-def _shown_by(view: LoopView, drive: Waveform) -> Watch:
+def _shown_by(view: LoopView, drive: pt.Waveform) -> Watch:
     """Return what shows a play on a live view: loop and error of each drive as they grow."""
     from pulsetrainer.steps.play import ErrorsSoFar
 
@@ -113,7 +112,7 @@ def _shown_by(view: LoopView, drive: Waveform) -> Watch:
     return watch
 
 
-def _show(job: Job, out: Path, played: Playback, info: DeviceInfo) -> None:
+def _show(job: Job, out: Path, played: pt.Playback, info: DeviceInfo) -> None:
     from pulsetrainer.report.facts import warmth_words
 
     drive, repeats, kelvin = played.waveform, played.compensated.output.shape[0], played.temperature_K

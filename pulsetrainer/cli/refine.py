@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port
@@ -33,16 +34,14 @@ def refine(
     Example: pulsetrainer refine drive.h5 -o refined.h5
     """
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.artefacts import Waveform
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.steps.refine import check
-    from pulsetrainer.steps.refine import refine as learn
 
-    waveform = job.load(drive, Waveform)
+    waveform = job.load(drive, pt.Waveform)
     check(waveform, passes)
     limits = Limits(limit_current_A, limit_force_N)
     with job.working(f"refining {drive.name}") as progress, job.open_device(port, limits) as device:
-        refined = learn(waveform, device, passes=passes, progress=progress)
+        refined = pt.refine(waveform, device, passes=passes, progress=progress)
         info = device.info
     title = f"{refined.name} refined on {info.serial}"
     job.save(out, refined, title, device=job.device(info))

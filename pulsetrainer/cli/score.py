@@ -5,17 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import Quiz, Session
+    from pulsetrainer.artefacts import Quiz
     from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.files.provenance import Header
     from pulsetrainer.steps.performance import Performed
 
 
-def sheet(job: Job, html: Path, session: Session, header: Header) -> None:
+def sheet(job: Job, html: Path, session: pt.Session, header: Header) -> None:
     """Write the score sheet of a session."""
     from functools import partial
 
@@ -27,7 +28,7 @@ def sheet(job: Job, html: Path, session: Session, header: Header) -> None:
     job.page(html, partial(render_session, score=result, asked=asked), session, header)
 
 
-def say(job: Job, path: Path, html: Path | None, session: Session) -> None:
+def say(job: Job, path: Path, html: Path | None, session: pt.Session) -> None:
     """Say what a session in a file amounts to, whole or cut off, and write its sheet."""
     from pulsetrainer.files import store
     from pulsetrainer.report.facts import facts
@@ -45,7 +46,6 @@ def tell(
     job: Job, out: Path, html: Path | None, done: Performed, quiz: Quiz | None, info: DeviceInfo
 ) -> None:
     """Write the sheet and say what came out, also where the session was stopped."""
-    from pulsetrainer.artefacts import Session
     from pulsetrainer.errors import PulsetrainerError
     from pulsetrainer.files import store
     from pulsetrainer.report.facts import warmth_words
@@ -53,7 +53,7 @@ def tell(
 
     job.notes(done.notes)
     if html is not None:
-        sheet(job, html, store.read(out, Session), store.read_header(out))
+        sheet(job, html, store.read(out, pt.Session), store.read_header(out))
     try:
         raise_if_stopped(done.fault, done.remedy, "the session")
     except PulsetrainerError as error:

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port, TrackHeat
 from pulsetrainer.files.settings import variable
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import FloatArray, Model
+    from pulsetrainer.artefacts import FloatArray
     from pulsetrainer.cli.hands import Hands
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.session_recorder import SessionRecorder
@@ -100,7 +101,6 @@ def session(
     for path, name in zip(tables, names, strict=True):
         if str(path) == name:
             job.uses(path)
-    from pulsetrainer.artefacts import Model
     from pulsetrainer.cli.hands import Hands
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.device.limits import Limits
@@ -108,7 +108,7 @@ def session(
     from pulsetrainer.steps.programme import Change
     from pulsetrainer.steps.session import check_model, programme
 
-    loaded = job.load(model, Model)
+    loaded = job.load(model, pt.Model)
     check_model(loaded)
     if seed is None:  # in a quiz one that nobody can look up; the file tells it when all is answered
         seed = secrets.randbelow(_MOST_SEED) if quiz else 0
@@ -137,7 +137,7 @@ def session(
 def _press(
     job: Job,
     outputs: tuple[Path, Path | None],
-    model: Model,
+    model: pt.Model,
     pulses: list[str],
     chosen: Programme | Blind,
     asked: dict[str, Any],

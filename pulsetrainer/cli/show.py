@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.evaluate import show_tables
 from pulsetrainer.cli.job import Job
@@ -25,7 +26,6 @@ def show(
     Example: pulsetrainer show model.h5
     """
     job = Job(context, inputs=(file,), as_json=json)
-    from pulsetrainer.artefacts import Diagnosis, Evaluation
     from pulsetrainer.files import store
     from pulsetrainer.report.diagnosis_text import sections
     from pulsetrainer.report.facts import facts
@@ -37,10 +37,10 @@ def show(
     said = {"file": file, "kind": artefact.kind, **picked(header, "title", "created", "history")}
     job.screen.result({**said, "facts": found})
     title = f"{file}: {headed(artefact.kind, header.title)}, {header.created}"
-    if isinstance(artefact, Evaluation):
+    if isinstance(artefact, pt.Evaluation):
         job.screen.facts(title, {})
         show_tables(job.screen, artefact)
-    elif isinstance(artefact, Diagnosis):
+    elif isinstance(artefact, pt.Diagnosis):
         job.screen.facts(title, {})
         job.screen.parts(sections(artefact))
     else:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Overwrite, Port, positive
@@ -57,18 +58,15 @@ def tune(
     if out is not None:
         check_output(out, overwrite=True)
     job = Job(context, inputs=drive, as_json=json)
-    from pulsetrainer.api import open_device
-    from pulsetrainer.api import tune as measure
-    from pulsetrainer.artefacts import Waveform
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.tuning import check_tuned, write_tuned
 
-    drives = [job.load(path, Waveform) for path in drive]
+    drives = [job.load(path, pt.Waveform) for path in drive]
     limits = Limits(limit_current_A, limit_force_N)
-    with job.working("tuning") as progress, open_device(port, limits=limits) as device:
+    with job.working("tuning") as progress, pt.open_device(port, limits=limits) as device:
         if out is not None:
             check_tuned(out, device.info.serial, overwrite=overwrite)
-        found = measure(device, pulses=drives or ("normal", "bifid"), supply_V=supply_V, progress=progress)
+        found = pt.tune(device, pulses=drives or ("normal", "bifid"), supply_V=supply_V, progress=progress)
     if out is not None:
         measured = {"resistance_ohm": found.resistance_ohm, "inductance_H": found.inductance_H}
         write_tuned(out, found.serial, measured | found.gains.values(), overwrite=overwrite)
