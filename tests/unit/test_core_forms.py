@@ -11,10 +11,12 @@ from scipy.signal import lfilter
 
 import pulsetrainer as pt
 from pulsetrainer.core.forms import try_all
+from pulsetrainer.core.identification import identify
 from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.report.facts import loop_words
 from wording import raises, tells
@@ -242,6 +244,10 @@ def test_other_forms_are_fitted_jointly_and_continuously(other, option):
     with pytest.raises(ArgumentError):
         pt.identify(run_of(u, y), levels=8, form=other, **option)
     assert pt.identify(run_of(u, y), levels=8, **option).form == "direct"
+    with pytest.raises(ArgumentError):
+        identify([Record(u, y)], Plane.uniform(0.0, 1.0, 8), signed=True, **option)
+    found = identify([Record(u, y)], Plane.uniform(0.0, 1.0, 8), signed=True)
+    assert (found.iterations, found.kkt, found.stiffness) == (1, 0.0, 0.0)  # one solution of linear equations
 
 
 def test_an_unknown_form_is_refused():
