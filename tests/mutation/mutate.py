@@ -55,6 +55,7 @@ PACKAGES = {  # the tests that answer for a package
     "diagnosis": (
         *(f"{UNIT}{one}.py" for one in ("congruency", "conductor", "scale", "sticking", "unlisted")),
         f"{UNIT}diagnosis*.py",
+        f"{UNIT}steps_correct.py",
         "tests/law/test_piecewise.py",
         "tests/law/test_scale_free_diagnosis.py",
         "tests/blind/test_p*.py",

@@ -144,7 +144,11 @@ def test_steps_and_jumps_do_not_average_out(jump):
     found = floor.floor_of([Record(u, y, dt_s=0.01)], [*fired, Firing("step", "x", 9.0, "{y}")], problem, 5.0)
     assert found.held == pytest.approx((0.1**2 + (jump / 5.0) ** 2) / 12.0)
     assert found.white == pytest.approx(np.sqrt(found.sampled + found.held))
-    assert found.sampled == pytest.approx(found.single**2 * np.mean(1.0 / problem.bins.sizes))
+    noisy = Record(u, u + 0.02 * np.random.default_rng(1).standard_normal(u.size), dt_s=0.01)
+    other = problem_for([noisy], 0.0, 1.0)
+    heard = floor.floor_of([noisy], [], other)
+    assert heard.single == pytest.approx(0.02, rel=0.1)
+    assert heard.sampled == pytest.approx(heard.single**2 * np.mean(1.0 / other.bins.sizes))
     assert (found.count, found.span) == (problem.bins.count, pytest.approx(1.0))
 
 

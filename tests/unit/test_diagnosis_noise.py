@@ -44,7 +44,8 @@ def test_the_variance_of_a_sum_is_that_of_many_draws(how):
 def test_noise_that_grows_with_the_level_is_larger_there():
     """Ten times as large at the top: so it is along a column that lives there."""
     rng = np.random.default_rng(3)
-    noise = _told((0.1 + 0.9 * LEVEL) * rng.standard_normal(COUNT))
+    x = (0.1 + 0.9 * LEVEL) * rng.standard_normal(COUNT)
+    noise = noise_in(x, lambda columns: columns, _bins(), LEVEL + 5.0, np.random.default_rng(1))
     high, low = (LEVEL > 0.9).astype(float), (LEVEL < 0.1).astype(float)
     spread = np.sqrt(
         np.diagonal(noise.covariance(np.stack((high, low), axis=1) * np.sign(rng.normal(size=(COUNT, 1)))))

@@ -144,6 +144,7 @@ def test_what_is_left_is_the_error_of_its_models(dipping):
         left = one.predict(u, dt_s=DT_S) - y
         assert percent == pytest.approx(100.0 * np.sqrt(np.mean(left**2)) / np.ptp(y))
     assert found.rms == pytest.approx(0.01 * found.rms_percent * np.ptp(y))
+    assert found.extended_rms_percent < 0.5 * found.rms_percent
     (record,) = found.records
     assert (record.step_s, record.begin_s) == (pytest.approx(DT_S), 0.0)
     np.testing.assert_allclose(found.time_s, DT_S * (np.arange(u.size) + 0.5))
