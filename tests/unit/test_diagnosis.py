@@ -18,7 +18,7 @@ from pulsetrainer.diagnosis.causes.base import Frame, low_pass
 from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
-from pulsetrainer.diagnosis.procedure import diagnose
+from pulsetrainer.diagnosis.procedure import FULL, QUICK, diagnose
 from pulsetrainer.diagnosis.state import Question, State
 from pulsetrainer.errors import ArgumentError, DataError
 from wording import raises
@@ -62,6 +62,14 @@ def test_the_library_is_the_vocabulary():
         for text in (cause.title, cause.formula, cause.signature, cause.excitation, cause.source):
             assert len(text) > 2
         assert all(q.low <= q.high and q.small > 0 for q in cause.parameters)
+
+
+@pytest.mark.parametrize("stages", [FULL, QUICK])
+def test_what_is_done_rises_to_the_whole(stages):
+    """The share that is told after each stage never falls, and ends with one."""
+    done = [share for _, share in stages]
+    assert done == sorted(done)
+    assert 0.0 < done[0] < done[-1] == 1.0
 
 
 def test_an_unknown_cause_is_refused():
