@@ -8,29 +8,30 @@ import numpy as np
 
 from pulsetrainer.artefacts import Model, Waveform
 from pulsetrainer.core import learning, metrics
-from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import low_pass
+from pulsetrainer.core.missed import Path, elsewhere, told_by_the_rest
+from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.diagnosis.prediction import predict
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
 from pulsetrainer.steps.refine import beats, check, whole_current
 
-# Of the mean square of what was learnt. Where less goes with any pulse the model is the wrong one, and
-# another pulse became worse as often as better
-_GENERAL = 0.88
-_RIDGE = 0.01  # of the columns' mean square: one pulse hardly tells low-passes apart, another one does
-_TAUS_S = (0.03, 0.1, 0.3, 1.0, 3.0)  # of what creeps: from a tenth of a beat to a few beats
+_STEP_S = 0.016  # between the samples that are looked at: half a period of the band
+_PARTS = 5  # of a beat, of which each is foretold by the others
+# Set together with the deviations of ``core.missed``: docs/how-to/refine.md says on what
+_REFINED = 1.2  # times the noise: what refining could not take out of its own pulse says nothing of another
+_TOLD = 0.65  # of what is missed in a part of the beat, in squares, has to be told by the other parts
+_UNCERTAIN = 0.007  # of the variance may be left on the new pulse, or it goes where the other never was
 
 
 def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -> Waveform:
     """Return a drive that also asks for what refining found missing on another pulse.
 
-        ask' = target + F[target] c,   c by least squares from F[target_r] c = M[u_r] - target_r
+        ask' = target + E[missed on the way of this drive | missed on the way of the refined one]
 
-    where u_r is the refined current, M the model and F the columns 1, y, dy/dt, and y through five
-    low-passes, with a ridge of a hundredth of their mean squares. What the device does with any pulse goes
-    along: a zero, a gain, a lag, a creep. What belongs to one place of one pulse stays behind.
+    What is missed is M[u] less the force measured, M the model; it is taken for a zero, a lag and a density
+    on the Preisach plane that the model has not (``core.missed``). What belongs to one place of one pulse
+    stays behind, and so does all where it cannot be told whether it holds: see Raises.
 
     Parameters
     ----------
@@ -44,8 +45,8 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
     Raises
     ------
     DataError
-        ``refined`` was not refined, or another model, method or rate made it, or what was learnt belongs to
-        that pulse alone.
+        ``refined`` was not refined, or another model, method or rate made it; refining did not get down to
+        the noise; the parts of its beat do not tell each other; or this pulse goes where that one never was.
 
     Examples
     --------
@@ -59,13 +60,28 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
     model = check_transfer(drive, refined)
     part = invertible(model, drive.rate_Hz)
     smooth = learning.LowPass(learning.BAND_HZ, 1.0 / drive.rate_Hz)
-    there = beats(refined)
-    columns = _columns(refined, smooth)[there]
-    missing = (part.whole(refined.compensated) - refined.target)[there]
-    _check_general(refined, columns, missing)
-    share, base = _shares(columns, missing)
-    faded = smooth(beats(drive).astype(np.float64))  # a step would put a kink into the current
-    added = faded * (base + _columns(drive, smooth) @ share)
+    low, high = part.reach
+    missing = smooth(part.whole(refined.compensated) - refined.predicted) / (high - low)
+    noise = 0.01 * refined.passes[refined.kept - 1].noise_percent * refined.full_force / (high - low)
+    step = max(1, round(_STEP_S * drive.rate_Hz))
+    known_at = np.flatnonzero(beats(refined))[::step]
+    missed, new_at = missing[known_at], np.arange(0, drive.time_s.size, step)
+    if metrics.root_mean_square(missed) <= noise:
+        added = np.zeros(drive.time_s.size)
+    else:
+        known = _path(part, refined, part.whole(refined.compensated), smooth, known_at)
+        new = _path(part, drive, drive.target, smooth, new_at)
+        expected, variance = elsewhere(known, missed, new)
+        phase = known_at / refined.rate_Hz / refined.period_s % 1.0
+        scored = drive.scored[new_at]
+        _check_general(
+            refined,
+            drive,
+            told_by_the_rest(known, missed, (_PARTS * phase).astype(np.int64)),
+            float(variance[scored].mean() / new.variance[scored].mean()),
+        )
+        faded = smooth(beats(drive).astype(np.float64))  # a step would put a kink into the current
+        added = faded * np.interp(np.arange(drive.time_s.size), new_at, (high - low) * expected)
     current, clipped = _current(drive, part, drive.target + added, slew)
     told = 100.0 * metrics.root_mean_square(added[drive.scored]) / drive.full_force
     return replace(
@@ -108,40 +124,39 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
     return drive.model
 
 
-def _check_general(refined: Waveform, columns: FloatArray, missing: FloatArray) -> None:
-    """Refuse what was learnt (n,) where too little of it goes with what any pulse has (n, k).
-
-    What is left of it and no larger than the sensor's noise says nothing.
-    """
-    whole = np.column_stack((np.ones(missing.size), columns))
-    best, *_ = np.linalg.lstsq(whole, missing, rcond=None)
-    noise = 0.01 * refined.passes[refined.kept - 1].noise_percent * refined.full_force
-    own = missing - whole @ best
-    if metrics.root_mean_square(own) <= noise:
-        return
-    told = 1.0 - float(np.sum(own**2) / np.sum(missing**2))
-    if told < _GENERAL:
-        raise DataError(
-            f"what was learnt on {refined.name} belongs to that pulse: {100 * told:.0f} % of it go "
-            f"with any pulse, and {100 * _GENERAL:.0f} % are needed",
-            hint="refine the other drive itself, or identify a better model first",
+def _check_general(refined: Waveform, drive: Waveform, told: float, uncertain: float) -> None:
+    """Refuse what was learnt where it is not known to hold for another pulse."""
+    last = refined.passes[refined.kept - 1]
+    if last.mean_abs_error_percent > _REFINED * last.noise_percent:
+        why = (
+            f"refining {refined.name} left {last.mean_abs_error_percent:.2f} % of full force, which is more "
+            f"than {_REFINED:g} times the noise of {last.noise_percent:.2f} %"
         )
+    elif told < _TOLD:
+        why = (
+            f"what was learnt on {refined.name} belongs to that pulse: from the rest of the beat, "
+            f"{100 * max(told, 0.0):.0f} % of each part can be told, and {100 * _TOLD:.0f} % are needed"
+        )
+    elif uncertain > _UNCERTAIN:
+        why = (
+            f"{drive.name} goes where {refined.name} never was: {100 * uncertain:.1f} % of the variance are "
+            f"left to chance, and {100 * _UNCERTAIN:.1f} % are allowed"
+        )
+    else:
+        return
+    raise DataError(
+        f"{why}; another pulse might become worse",
+        hint="refine the other drive itself, or identify a better model first",
+    )
 
 
-def _columns(drive: Waveform, smooth: learning.LowPass) -> FloatArray:
-    """F of a drive's target but its constant, (n, 2 + taus), output unit."""
-    target, dt_s = drive.target, 1.0 / drive.rate_Hz
-    slow = [low_pass(target, tau, dt_s) for tau in _TAUS_S]
-    return np.stack((target, smooth(np.gradient(target, dt_s)), *slow), axis=1)
-
-
-def _shares(columns: FloatArray, missing: FloatArray) -> tuple[FloatArray, float]:
-    """Shares (k,) of columns (n, k) in what is missing (n,), and the constant beside them."""
-    mean, spread = columns.mean(axis=0), columns.std(axis=0)
-    unit = (columns - mean) / spread
-    gram = unit.T @ unit / missing.size + _RIDGE * np.eye(spread.size)
-    share = np.linalg.solve(gram, unit.T @ (missing - missing.mean()) / missing.size) / spread
-    return share, float(missing.mean() - mean @ share)
+def _path(
+    part: Invertible, drive: Waveform, output: FloatArray, smooth: learning.LowPass, at: IntArray
+) -> Path:
+    """Path of a drive's current, which gives the output (n,), at some of its samples."""
+    low, high = part.reach
+    rate = smooth(np.gradient(output / (high - low), 1.0 / drive.rate_Hz))
+    return Path.of((part.low, part.high), drive.compensated, rate, at)
 
 
 def _current(
