@@ -56,7 +56,7 @@ def test_what_cannot_be_refined_writes_nothing(tmp_path, words, code):
 
 def test_what_was_learnt_is_asked_for_in_another_pulse(tmp_path):
     """A refined drive gives its share: the error of another pulse, noise included, falls by a third."""
-    port, model = ("--port", "bench:?seed=5"), ("--model", KEPT / "model.h5")
+    port, model = ("--port", "bench:"), ("--model", KEPT / "model.h5")
     jobs = (
         ("invert", "normal", *model, "-o", "normal.h5"),
         ("refine", "normal.h5", "-o", "refined.h5", *port),
