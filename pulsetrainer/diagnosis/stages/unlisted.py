@@ -11,7 +11,7 @@ repeats (`repetition`). The next one is sought in what is left, up to three.
 Where the listed causes found leave more than half unexplained, the search begins without them: they may have
 been taken for what they are not. They are then asked for again, beside the curve; and every cause, listed or
 not, must be missed when it is taken out. But a curve that only takes the place of listed causes which explain
-nearly all, or as much as it does but for what their formulas may miss, is no dependence of its own.
+nearly as much is a better formula for them, and no dependence of its own.
 """
 
 from __future__ import annotations
@@ -53,10 +53,9 @@ def stage(state: State) -> State:
 
 
 def _keep_their_names(state: State, instead: Fitted) -> bool:
-    """Whether the listed causes explain nearly all that can be, or nearly as much as what replaces them."""
-    base, left = state.baseline.squares, state.current.squares
-    most = base - left > LIMITS.nearly_all * (base - state.floor.squares)
-    return most or left - instead.squares < LIMITS.imperfect * (base - left)
+    """Whether the listed causes explain nearly as much as the model ``instead``."""
+    base = state.baseline.squares
+    return base - state.current.squares > LIMITS.nearly_all * (base - instead.squares)
 
 
 def _more_is_left(state: State) -> bool:
