@@ -186,6 +186,7 @@ NOTES = {
     "changed": ("(limit 0.", "next", "identify again", "temperature"),
     "taken as seconds": ("says no unit that is known", "seconds", "[min]"),
     "beats found": ("6 whole beats", "0.644 to 0.653 s"),
+    "stretched": ("are stretched to", "N: give --force-min and --force-max"),
 }
 
 

@@ -29,14 +29,21 @@ def correct(
 
     Example: pulsetrainer correct diagnostic.h5 --diagnosis diagnosis.h5 -o corrected.h5
     """
+    from pulsetrainer.artefacts.units import with_unit
+
     job = Job(context, inputs=(run, diagnosis), outputs=(out,), overwrite=overwrite, as_json=json)
     with job.working("correcting"):
         found = job.load(diagnosis, pt.Diagnosis)
-        corrected = pt.correct(job.load(run, pt.Run), found, delay_s=delay, names=(str(run), str(diagnosis)))
+        measured = job.load(run, pt.Run)
+        corrected = pt.correct(measured, found, delay_s=delay, names=(str(run), str(diagnosis)))
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
     masked = 0 if corrected.masked is None else int(corrected.masked.sum())
     job.screen.result({"output": out, "corrected": corrected.corrected, "masked_samples": masked})
-    samples = f"{masked} of {corrected.output.size}"
-    job.screen.facts(
-        f"{out}: corrected run", {"taken out": ", ".join(corrected.corrected), "samples left out": samples}
-    )
+    changed = abs(corrected.output - measured.output)
+    most = float(changed[changed >= 0].max())  # lost samples are not numbers
+    facts = {
+        "taken out": ", ".join(corrected.corrected),
+        "largest change": with_unit(f"{most:.3g}", corrected.output_unit),
+        "samples left out": f"{masked} of {corrected.output.size}",
+    }
+    job.screen.facts(f"{out}: corrected run", facts)

@@ -27,10 +27,11 @@ def invert(
         ),
     ] = None,
     force_min: Annotated[
-        float | None, typer.Option(help="Force at the foot of the pulse, N; default: the lowest.")
+        float | None,
+        typer.Option(help="Output at the foot of the pulse, such as N; default: the lowest."),
     ] = None,
     force_max: Annotated[
-        float | None, typer.Option(help="Force at its top, N; default: the highest.")
+        float | None, typer.Option(help="Output at its top, such as N; default: the highest.")
     ] = None,
     beat: Annotated[
         str | None,
@@ -61,7 +62,7 @@ def invert(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Find the current that presses a pulse.
+    """Find the drive that presses a pulse.
 
     Both the compensated one and, to compare, the merely scaled one with the same extremes.
 
@@ -96,7 +97,7 @@ def invert(
         )
         if learnt is not None:
             drive = pt.transfer(drive, job.load(learnt, pt.Waveform), slew=slew_A_per_s)
-        if pulse.name == waveform:
+        if pulse == Path(waveform):  # a file of the user's, wherever it lies
             job.uses(pulse)
         job.save(out, drive, f"{drive.name} by {drive.inversion} inversion")
     _show(job, out, drive)

@@ -140,9 +140,10 @@ def rms_of(state: State, model: Model) -> float:
 
 
 def _noise_of(state: State) -> float:
-    """White noise of single samples as measured, of the span of the problem."""
+    """Noise of single samples as measured, of the span of the problem; what may be a slow error is none."""
     own = [noise_of(r.output, r.sample_weight) ** 2 for r in state.question.records]
-    return max(state.floor.noise, float(np.sqrt(np.mean(own))) / state.scale.span)
+    heard = 0.0 if state.in_bursts else max(state.floor.noise**2 - state.floor.doubtful, 0.0)
+    return float(np.sqrt(max(heard, float(np.mean(own)) / state.scale.span**2)))
 
 
 def _parameters(

@@ -32,3 +32,8 @@ class Finding:
     held_out_gain_percent: float = 0.0  # of the reducible part; NaN where it was not measured
     doubts: tuple[str, ...] = ()  # what speaks against it: see ``wording.DOUBTS``
     seen: Evidence | None = None  # on the raw data, or in what the model as given leaves
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether it predicts worse, does not repeat or may be nothing."""
+        return any(one != "at bound" for one in self.doubts)

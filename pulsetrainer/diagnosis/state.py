@@ -160,10 +160,11 @@ class State:
 
     @property
     def correctable(self) -> list[str]:
-        """Ids of the faults of the measurement that were found and can be taken out of a record."""
+        """Ids of the faults of the measurement that can be taken out of a record: found, and not in doubt."""
         if self.question.quick:
             return []
-        return [one.cause.id for one in self.findings if one.found and one.cause.corrects]
+        found = [one for one in self.findings if one.found and one.cause.corrects]
+        return [one.cause.id for one in found if not one.in_doubt]
 
     def explains(self, gain: float) -> float:
         """Per cent of what can be explained."""

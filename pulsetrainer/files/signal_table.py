@@ -50,7 +50,13 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
 
     from pulsetrainer.core import excitations  # noqa: PLC0415
 
-    _, time, current = first_two(path, "a reference needs a time and a current", names="t_s,current_A")
+    table, time, current = first_two(path, "a reference needs a time and a current", names="t_s,current_A")
+    unit = table.unit(table.names[1])
+    if unit not in ("", "A"):
+        raise DataError(
+            f"{path}: the column {table.names[1]} is in {unit}, expected the current to be played in A",
+            hint="write the current in A into the second column, such as current_A",
+        )
     seconds = float(time[-1]) - float(time[0])
     lasts = seconds * rate_Hz
     if not lasts <= excitations.MOST_SAMPLES:

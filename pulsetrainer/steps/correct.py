@@ -39,8 +39,8 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     Raises
     ------
     DataError
-        The diagnosis is of another run, found nothing that can be corrected, or the run has no time and a
-        delay.
+        The diagnosis is of another run, found nothing beyond doubt that can be corrected, or the run has no
+        time and a delay.
 
     Source: Ljung, System Identification, 1999, section 14.1: what is done to data before a fit.
 
@@ -82,14 +82,11 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
 
 
 def _faults(diagnosis: Diagnosis) -> list[tuple[Cause, Values]]:
-    """Faults of the measurement that were found, in the order in which they are undone."""
-    if diagnosis.quick:
-        return []
-    known = library()
+    """Faults of the measurement that can be taken out, in the order in which they are undone."""
     found = [
-        (known[one.cause], tuple(p.value for p in one.parameters))
+        (library()[one.cause], tuple(p.value for p in one.parameters))
         for one in diagnosis.found
-        if one.cause in known and known[one.cause].corrects
+        if one.cause in diagnosis.correctable
     ]
     # wild and clipped samples must not reach the others; what lies between steps is told from what is left
     rank = {"record": 0, "output": 1}
@@ -127,8 +124,8 @@ def _nothing(diagnosis: Diagnosis, name: str) -> str:
     if diagnosis.quick:
         return f"{name} only screened for causes and fitted none: there is nothing to correct"
     return (
-        f"{name} ended with the verdict {diagnosis.verdict!r} and found no fault of the measurement that can "
-        "be taken out: there is nothing to correct"
+        f"{name} ended with the verdict {diagnosis.verdict!r} and found no fault of the measurement that is "
+        "beyond doubt and can be taken out: there is nothing to correct"
     )
 
 

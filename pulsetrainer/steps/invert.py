@@ -26,6 +26,7 @@ Inversion = Literal["continuous", "closest-match", "extended"]
 
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
+_NORMALISED = 0.02  # how far the ends of a mere shape may lie from 0 and 1
 RAMP_S = 0.4  # from rest to the first target, and back after the last
 
 
@@ -101,6 +102,7 @@ def invert(
     forces = _force_range(part, model, force_min, force_max, name)
     if chosen == "extended":
         forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz)
+    notes += _stretched(shape, forces, (force_min, force_max), model)
     progress(0.2)
     layout = _laid_out(shape, part, forces, periods, rate_Hz)
     if chosen == "extended":
@@ -310,6 +312,18 @@ def _within_beats(
             hint="give `force_min` and `force_max`, a faster pulse, or the model without extensions",
         )
     return within
+
+
+def _stretched(
+    shape: Shape, forces: tuple[float, float], asked: tuple[float | None, float | None], model: Model
+) -> list[str]:
+    """Say it where the values of a pulse are not those that are played; one from 0 to 1 is only a shape."""
+    own = float(shape.value.min()), float(shape.value.max())
+    if None not in asked or np.allclose(own, (0.0, 1.0), atol=_NORMALISED) or np.allclose(own, forces):
+        return []
+    ends = with_unit(f"{forces[0]:.4g} .. {forces[1]:.4g}", model.output_unit)
+    said = f"the values of {shape.name} go from {own[0]:.4g} to {own[1]:.4g}; they are stretched to {ends}"
+    return [f"{said}: give `force_min` and `force_max` for other ends"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,6 +53,21 @@ def test_it_says_what_was_corrected_and_masks_the_rest(folder):
     assert fitted.json["masked_samples"] >= 5
 
 
+def test_a_fault_in_doubt_is_left_in(folder):
+    """A step that was found, but predicts worse or may be nothing, changes no sample; the rest is said."""
+    told = pt.load(folder / "diagnosis.h5")
+    numbers = (("offset", 4.0, "N"), ("gain", 0.6, ""), ("time", 2.0, "s"))
+    step = Cause(
+        "step", True, 0.005, 9.0, -90.0, tuple(Parameter(n, v, unit, -v, v) for n, v, unit in numbers)
+    )
+    pt.save(replace(told, causes=(*told.causes, replace(step, doubts=("worse",)))), folder / "doubt.h5")
+    done = pulsetrainer(folder, "correct", "run.h5", "--diagnosis", "doubt.h5", "-o", "left.h5")
+    assert done.code == 0, done
+    assert "largest change" in done.out
+    run, known = pt.load(folder / "run.h5"), pt.load(folder / "diagnosis.h5")
+    np.testing.assert_array_equal(pt.load(folder / "left.h5").output, pt.correct(run, known).output)
+
+
 @pytest.mark.parametrize(
     ("run", "diagnosis", "words"),
     [

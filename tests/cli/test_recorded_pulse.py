@@ -31,6 +31,7 @@ def test_a_recorded_beat_is_played_like_one_of_the_library(as_built, tmp_path, b
         assert done.code == 0, done
         if words[0] == "invert":
             tells(done.err, "beats found")
+            tells(done.err, "stretched")
     pulse = done.json["waveforms"][0]
     print({k: pulse[k] for k in ("name", "mean_error_reduction_percent")}, pulse["compensated"])
     assert pulse["name"] == f"fingerbp_AAC3_3_{'mean' if beat == 'mean' else 'beat2'}"

@@ -152,6 +152,22 @@ def test_what_is_below_a_fifth_of_a_per_cent_of_the_span_is_not_unexplained(left
     assert state.unexplained is unknown
 
 
+@pytest.mark.parametrize(
+    ("doubts", "kept"),
+    [
+        ((), True),
+        (("at bound",), True),
+        (("spans zero",), False),
+        (("predicts worse",), False),
+        (("at bound", "predicts worse"), False),
+    ],
+)
+def test_a_fault_in_doubt_is_not_taken_out_of_a_record(doubts, kept):
+    """A parameter at its bound is still a fault; what may be nothing, or predicts worse, may be none."""
+    state = _state(_fit(1.0), findings=(Finding(CAUSE["step"], found=True, doubts=doubts),))
+    assert state.correctable == (["step"] if kept else [])
+
+
 # --- what the state knows
 @pytest.mark.parametrize(("left", "unknown"), [(600.0, False), (601.0, True), (100.0, False)])
 def test_more_than_half_is_unexplained(left, unknown):
@@ -490,7 +506,7 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
 def test_a_curve_takes_the_place_of_a_listed_cause_where_it_is_clearly_better(
     monkeypatch, left, instead, kept
 ):
-    """Where the listed cause explains less than nine tenths of what the curve does, whatever noise is heard."""
+    """Where the listed cause explains less than nine tenths of what the curve does."""
     term = Term(unlisted.Unlisted([unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
     monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(instead, (term,)), 0.001, False))
     for one in (search, elimination):

@@ -33,6 +33,16 @@ def test_a_signal_needs_two_columns(tmp_path):
     assert "t_s,current_A" in caught.value.hint
 
 
+@pytest.mark.parametrize("heading", ["Weg [µm]", "current_mA"])
+def test_a_signal_is_a_current_in_amperes(tmp_path, heading):
+    """What another quantity or another unit would make of a device that presses a finger is not tried."""
+    path = tmp_path / "other.csv"
+    path.write_text(f"t_s,{heading}\n0,0\n1,0.9\n")
+    with pytest.raises(DataError) as caught:
+        read_signal(path, 10.0)
+    assert "current_A" in caught.value.hint
+
+
 def test_bounds_are_named_by_their_tables(tmp_path):
     """A pair of numbers a metric; tables in tables are joined by dots."""
     path = tmp_path / "bounds.toml"

@@ -15,6 +15,7 @@ from pulsetrainer.core.coarse import between_steps
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.errors import DataError
 from wording import raises
 
@@ -49,6 +50,7 @@ def _diagnosis(
     return Diagnosis(
         name, False, *[0.0] * 6, (found,), (), "", (), *[empty] * 5,
         records=(Recorded(run.fingerprint, step_s or run.dt_s),), polarity=polarity, empty=0.0,
+        correctable=(name,) * library()[name].corrects,
     )  # fmt: skip
 
 
