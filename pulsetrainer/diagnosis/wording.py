@@ -102,6 +102,11 @@ ADVICE: Mapping[str, str] = {
         "{there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ by "
         "{here:.2g} %. Then diagnose that recording.{command}"
     ),
+    "tied, no better": (
+        "No recording that is known would tell {names} apart better than this one, on which they differ by "
+        "{here:.2g} % of the span (rms, after the best fit of the model). A longer one of the same kind "
+        "would, as noise averages out."
+    ),
     "lacks": f"To see what this recording cannot show, {AGAIN}",
     "unknown": (
         "No known cause fits. Repeat the recording to see whether the remaining error repeats; if it does, "

@@ -959,6 +959,16 @@ def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
         assert said.figures == {"there": pytest.approx(2.0), "here": pytest.approx(0.1), "faster": 4.0}
 
 
+@pytest.mark.parametrize(("there", "kind"), [(0.00101, "tied"), (0.001, "tied, no better")])
+def test_no_recording_is_asked_for_that_tells_less(monkeypatch, there, kind):
+    """Of two causes that differ by 0.1 % of the span on this one."""
+    best = SimpleNamespace(name="heating", distance=there, distance_here=0.001, faster=4.0)
+    monkeypatch.setattr(advice, "best_experiment", lambda state, names: best)
+    said = advice.stage(_state(_fit(1.0), findings=(TIED,))).advice
+    assert said.kind == kind
+    assert said.names[-2:] == ("field-lag", "delay")
+
+
 def test_a_quick_look_makes_no_experiment():
     """It says that the full diagnosis tells more."""
     state = _state(_fit(1.0), findings=(TIED,))

@@ -43,6 +43,8 @@ def _advice(state: State) -> Evidence:
             "here": percent * best.distance_here,
             "faster": best.faster,
         }
+        if best.distance <= best.distance_here:
+            return Evidence("tied, no better", figures=figures, names=names)
         return Evidence("tied", figures=figures, names=(best.name, *names))
     if state.verdict == "inconclusive":
         return _to_see_more(state)
