@@ -141,8 +141,8 @@ class Thresholds:
     curve_end: float = 0.15  # of its places: with its extreme nearer to an end a curve rises or falls
 
     # Equal loops (decision 042)
-    contrast_p_max: float = 0.005  # the second of two tests: together they alarm in one or two of a hundred
-    permutations: int = 1999  # of equal loops: the smallest p is a tenth of the limit
+    contrast_p_max: float = 0.001  # the second of two tests: at 0.005 it alarmed in 3 of 141 controls
+    permutations: int = 1999  # of equal loops: the smallest p is half of the limit
     loop_places: int = 12  # averages along each branch
     loop_same: float = 0.015  # of the range: turns that near are equal
     loop_same_time: float = 0.1  # relative: loops that took as long are equal

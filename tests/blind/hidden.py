@@ -168,7 +168,7 @@ def measure(case: Case) -> Data:
 
     A device that trips its force limit, as a ringing one may, is played at less.
     """
-    for high in (HIGH_A, 1.2, 0.9, 0.6):
+    for high in (HIGH_A, 1.2, 0.9, 0.6, 0.4):
         record = _play(case, high)
         if record is not None:
             break

@@ -539,7 +539,7 @@ def test_jumps_that_the_causes_found_make_are_withdrawn(monkeypatch, again):
     assert (asked[0].low, asked[0].high) == (0.0, 2.0)
 
 
-def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firings=(), none=False, base=None):
+def _looped(monkeypatch, p=0.0008, *, rise=9.0, at_bound=False, left=100.0, firings=(), none=False, base=None):
     held = None if none else Contrast(0.003, 0.001, p, at_bound)
     monkeypatch.setattr(equal_loops.congruency, "fitted_contrast", lambda *_: held)
     monkeypatch.setattr(
@@ -554,8 +554,8 @@ def _looped(monkeypatch, p=0.004, *, rise=9.0, at_bound=False, left=100.0, firin
 @pytest.mark.parametrize(
     ("how", "found"),
     [
-        ({"p": 0.005}, True),
-        ({"p": 0.0051}, False),
+        ({"p": 0.001}, True),
+        ({"p": 0.0011}, False),
         ({"rise": 9.1}, False),
         ({"at_bound": True}, False),
         ({"none": True}, False),
@@ -578,7 +578,7 @@ def test_what_equal_loops_show_comes_with_its_interval(monkeypatch):
     (known,) = after.by_contrast["load-dependence"]
     half = 1.96 * 0.001 + 0.2 * 0.003
     assert (known.value, known.lower, known.upper) == pytest.approx((0.003, 0.003 - half, 0.003 + half))
-    assert after.p_values["load-dependence"] == 0.004
+    assert after.p_values["load-dependence"] == 0.0008
     assert after.without["load-dependence"].names == ("creep",)
 
 
