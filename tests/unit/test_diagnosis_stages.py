@@ -539,7 +539,7 @@ def test_jumps_that_the_causes_found_make_are_withdrawn(monkeypatch, again):
     assert (asked[0].low, asked[0].high) == (0.0, 2.0)
 
 
-def _looped(monkeypatch, p=0.0008, *, rise=9.0, at_bound=False, left=100.0, firings=(), none=False, base=None):
+def _looped(monkeypatch, p=8e-4, *, rise=9.0, at_bound=False, left=100.0, firings=(), none=False, base=None):
     held = None if none else Contrast(0.003, 0.001, p, at_bound)
     monkeypatch.setattr(equal_loops.congruency, "fitted_contrast", lambda *_: held)
     monkeypatch.setattr(
