@@ -104,7 +104,7 @@ class Table:
         Raises
         ------
         DataError
-            There is no such column (the nearest names are offered), or it holds text.
+            There is no such column (similar names are offered), or it holds text.
         """
         bare = [split_unit(own)[0].lower() for own in self.names]
         wanted, unit = split_unit(name)
@@ -116,10 +116,12 @@ class Table:
         )
         k = next((which.index(True) for which in alike if which.count(True) == 1), None)
         if k is None:
-            near = difflib.get_close_matches(name, self.names, n=3, cutoff=0.3) or list(self.names)[:8]
+            near = difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
             raise DataError(
                 f"{self.path} has no column {name!r}; it has {', '.join(self.names)}",
-                hint=f"did you mean {' or '.join(repr(n) for n in near)}?",
+                hint=f"did you mean {' or '.join(repr(n) for n in near)}?"
+                if near
+                else "name one of these columns",
             )
         if self.names[k] in self.text_names:
             raise DataError(

@@ -77,6 +77,15 @@ def test_a_column_that_is_not_there_offers_the_nearest(run, tmp_path):
     assert not (tmp_path / "run.h5").exists()
 
 
+def test_a_column_like_none_gets_no_suggestion(run, tmp_path):
+    """Exit 3; the columns that are there are listed once."""
+    (tmp_path / "a.csv").write_text("Zeit;Spannung;Weg\n0;0;0\n1;1;1\n")
+    done = run("import", "a.csv", "--input", "Spannung", "--output", "Kraft", "-o", "run.h5")
+    assert done.code == 3
+    assert "did you mean" not in done.err
+    assert done.err.count("Zeit") == 1
+
+
 # --- what is read, said and refused, on real records ----------------------------------------------------
 
 
