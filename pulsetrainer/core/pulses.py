@@ -11,6 +11,8 @@ from pulsetrainer.core.excitations import check_size
 from pulsetrainer.core.plane import FloatArray, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
 
+FEWEST_SAMPLES = 4  # of a period
+
 
 @dataclass(frozen=True, slots=True)
 class Shape:
@@ -23,8 +25,8 @@ class Shape:
     feet_s: tuple[float, ...] = (0.0,)  # where its beats begin, from the first sample on
 
     def __post_init__(self) -> None:
-        t = finite_vector("time", self.time_s, at_least=4)
-        value = finite_vector("value", self.value, at_least=4)
+        t = finite_vector("time", self.time_s, at_least=FEWEST_SAMPLES)
+        value = finite_vector("value", self.value, at_least=FEWEST_SAMPLES)
         if t.size != value.size or not np.all(np.diff(t) > 0):
             raise ArgumentError(
                 f"the waveform {self.name} needs one value for each of its increasing times, got shapes "

@@ -47,11 +47,16 @@ def read_pulse(name: str) -> Shape:
 
     Raises as ``pulse_file``, and DataError where the table cannot be used.
     """
-    from pulsetrainer.core.pulses import Shape  # noqa: PLC0415 - so that a mistyped name is answered at once
+    from pulsetrainer.core.pulses import FEWEST_SAMPLES, Shape  # noqa: PLC0415 - so that a mistyped name is answered at once
     from pulsetrainer.files.signal_table import first_two  # noqa: PLC0415
 
     path = pulse_file(name)
     columns, time_s, value = first_two(path, "a pulse needs a time and a value", names="t_s,p")
+    if columns.rows < FEWEST_SAMPLES:
+        raise DataError(
+            f"{path} has {columns.rows} rows, expected {FEWEST_SAMPLES} or more: one period of a pulse",
+            hint="give a whole period, with samples close enough to draw it",
+        )
     said = {c.partition(":")[0]: c.partition(":")[2].strip() for c in columns.comments}
     try:
         feet_s = tuple(float(foot) for foot in said.get("beats", "0").split())

@@ -8,6 +8,7 @@ import pytest
 from pulsetrainer.core.excitations import MOST_SAMPLES
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.bounds import read_bounds
+from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.files.signal_table import read_signal
 
 
@@ -41,6 +42,16 @@ def test_a_signal_is_a_current_in_amperes(tmp_path, heading):
     with pytest.raises(DataError) as caught:
         read_signal(path, 10.0)
     assert "current_A" in caught.value.hint
+
+
+def test_a_pulse_of_two_rows_is_refused_with_its_file(tmp_path):
+    """And with the number of rows: it has no shape."""
+    path = tmp_path / "tiny.csv"
+    path.write_text("t_s,p\n0,0\n1,1\n")
+    with pytest.raises(DataError) as caught:
+        read_pulse(str(path))
+    assert "tiny.csv has 2 rows" in str(caught.value)
+    assert caught.value.hint
 
 
 def test_bounds_are_named_by_their_tables(tmp_path):
