@@ -29,14 +29,14 @@ def correct(
 
     Example: pulsetrainer correct diagnostic.h5 --diagnosis diagnosis.h5 -o corrected.h5
     """
-    from pulsetrainer.artefacts.units import with_unit
-
     job = Job(context, inputs=(run, diagnosis), outputs=(out,), overwrite=overwrite, as_json=json)
     with job.working("correcting"):
         found = job.load(diagnosis, pt.Diagnosis)
         measured = job.load(run, pt.Run)
         corrected = pt.correct(measured, found, delay_s=delay, names=(str(run), str(diagnosis)))
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
+    from pulsetrainer.artefacts.units import with_unit
+
     masked = 0 if corrected.masked is None else int(corrected.masked.sum())
     job.screen.result({"output": out, "corrected": corrected.corrected, "masked_samples": masked})
     changed = abs(corrected.output - measured.output)
