@@ -60,7 +60,7 @@ MESSAGES = {
     "not writable": Message("not writable", "", "{folder}"),
     "no such figure": Message("png, svg or pdf", "model.png", "{file}", got="h5"),
     # --- tables ------------------------------------------------------------------------------------------
-    "no such column": Message("no column", "name one of these columns", "{file}", "force_N", "t_s, current_A"),
+    "no such column": Message("no column", "name one of these", "{file}", "force_N", "t_s, current_A"),
     "not finite": Message("lack a number", "remove", "{file}", got="{value} in column {column}, line {line}"),
     "separator of thousands": Message(
         "not a number", "separator of thousands", got="{cell!r} in column {column}, line {line}"
