@@ -71,7 +71,13 @@ def _diagnosis(folder: Path) -> None:
     diagnosis = examples.diagnosis()
     records = tuple(Recorded(part.fingerprint, 0.005) for part in run.parts())
     extended = replace(model, fit=None, extensions=diagnosis.extended.extensions)
-    whole = replace(diagnosis, extended=extended, causes=(*diagnosis.causes, drift), records=records)
+    whole = replace(
+        diagnosis,
+        extended=extended,
+        causes=(*diagnosis.causes, drift),
+        records=records,
+        correctable=("offset-drift",),
+    )
     store.write(folder / "diagnosis.h5", whole, examples.header())
 
 
