@@ -109,9 +109,14 @@ class State:
         return burstiness(self.current.residual, problem.bins, problem.measured) > LIMITS.burstiness
 
     @property
+    def floor_left(self) -> Floor:
+        """The floor under what is left: what comes in bursts is no noise."""
+        return self.floor.quick if self.in_bursts else self.floor
+
+    @property
     def unexplained(self) -> bool:
         """Whether more than half of what can be explained is left, and enough to matter."""
-        floor = self.floor.quick if self.in_bursts else self.floor
+        floor = self.floor_left
         left = self.current.squares - floor.squares
         half = LIMITS.unexplained * floor.reducible(self.baseline)
         small = floor.count * (LIMITS.unexplained_span * floor.span) ** 2
@@ -135,8 +140,8 @@ class State:
 
     def is_whole(self, fitted: Fitted) -> bool:
         """Whether what a fit leaves is noise, as far as it matters."""
-        left = fitted.squares - self.floor.squares
-        return left <= LIMITS.unexplained_relevant * self.floor.relevant
+        floor = self.floor_left
+        return fitted.squares - floor.squares <= LIMITS.unexplained_relevant * floor.relevant
 
     @property
     def background(self) -> set[str]:

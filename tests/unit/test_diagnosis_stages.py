@@ -881,6 +881,7 @@ def test_slow_noise_that_comes_in_bursts_is_no_noise(monkeypatch, kurtosis, time
     left = SimpleNamespace(squares=100 * white**2, residual=None)
     state = _state(left, left, floor=floor)
     assert (state.in_bursts, state.unexplained) == (said, said)
+    assert state.is_whole(left) is not said
     told = [e.kind for e in _accounted(monkeypatch, verdict="unknown", floor=floor)]
     assert ("bursts" in told) is said
 

@@ -35,7 +35,9 @@ def stage(state: State) -> State:
     if state.current is not state.baseline:
         said.append(Evidence("extended", figures={"left": percent * state.current.rms}))
         if not state.is_whole(state.current):
-            rest = float(np.sqrt(state.current.squares - state.floor.squares) / np.sqrt(state.floor.count))
+            rest = float(
+                np.sqrt(state.current.squares - state.floor_left.squares) / np.sqrt(state.floor.count)
+            )
             said.append(Evidence("not whole", figures={"rest": percent * rest}, names=state.current.names))
     if state.verdict in ("none", "inconclusive") and state.limits:
         said.append(Evidence("would have shown", figures={k: PERCENT * v for k, v in state.limits.items()}))
