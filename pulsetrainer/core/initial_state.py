@@ -20,8 +20,8 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 
 NEAR = 0.01  # of the range: a noisy record touches its extreme only once, late
-_APART = 0.03  # of the span of the output: a first stroke that runs so far from the later ones is another ...
-_TIMES = 4.0  # ... if these run nearer to each other by this factor
+_APART = 0.005  # of the output's span: a first stroke that runs so far from the later ones is another ...
+_TIMES = 2.0  # ... if these run nearer to each other by this factor
 _LEFT = 2.0  # times ``NEAR``: so far away the end is left, for noise crosses a single limit again and again
 _COMPARED = 0.2  # of the range: shorter strokes are not compared ...
 _PLACES = 20  # ... nor those of fewer samples; and at so many places

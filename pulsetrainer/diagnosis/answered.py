@@ -168,9 +168,11 @@ def _causes(state: State, finding: Finding, words: Words, dependences: Sequence[
     one = _cause(state, finding, words)
     if not finding.found or finding.cause.id != Unlisted.id or not dependences:
         return [one]
-    size = len(one.parameters) // len(dependences)
+    # as the curves are: of the model that goes on
+    rows = _parameters(state, finding.cause, state.repeated_estimates[Unlisted.id], words)
+    size = len(rows) // len(dependences)
     return [
-        replace(one, text=told.text, parameters=one.parameters[k * size : (k + 1) * size])
+        replace(one, text=told.text, parameters=rows[k * size : (k + 1) * size])
         for k, told in enumerate(dependences)
     ]
 

@@ -52,7 +52,8 @@ class Floor:
     @property
     def quick(self) -> Floor:
         """The floor with no other noise than that from sample to sample and of steps."""
-        return replace(self, white=float(np.sqrt(self.sampled + self.held)), doubtful=0.0)
+        white = float(np.sqrt(self.sampled + self.held))
+        return replace(self, white=white, noise=self.single, doubtful=0.0)
 
     @property
     def slow(self) -> float:

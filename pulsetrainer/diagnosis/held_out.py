@@ -14,6 +14,7 @@ from scipy import linalg
 
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.smoothing import blocks
+from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.problem import Problem
@@ -28,6 +29,7 @@ class HeldOut:
     def __init__(self, problem: Problem) -> None:
         self.count = problem.bins.count
         self.block = _blocks_of(problem)
+        self._by_rate = _sorted_by_rate(problem, self.block)
         self._errors: list[tuple[Fitted, float]] = []
 
     def error(self, fitted: Fitted) -> float:
@@ -52,6 +54,14 @@ class HeldOut:
         """
         return np.asarray([float(error @ error) for error, _ in self._left_out(fitted, count, whole=True)])
 
+    def rates(self, fitted: Fitted, count: int) -> FloatArray:
+        """Sums of squares (count,) on the slowest to the fastest blocks, each predicted from the others.
+
+        Empty for too few blocks. A formula that only holds at the rates of a record misleads at others.
+        """
+        errors = self._left_out(fitted, count, whole=True, block=self._by_rate)
+        return np.asarray([float(error @ error) for error, _ in errors])
+
     def piece_of(self, count: int) -> IntArray:
         """Return the number of the piece of the time that each average (count,) is in."""
         return np.asarray(_fold_of(count, whole=True)[self.block])
@@ -67,25 +77,25 @@ class HeldOut:
         return (1.0 - 1.0 / LIMITS.jackknife) * np.sum((changes - changes.mean(axis=0)) ** 2, axis=0)
 
     def _left_out(
-        self, fitted: Fitted, folds: int, *, whole: bool = False
+        self, fitted: Fitted, folds: int, *, whole: bool = False, block: IntArray | None = None
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
         """For each fold its errors, and the changes (p,) of the parameters, when it is left out."""
         fold_of = _fold_of(folds, whole=whole)
         design, free = fitted.design, np.flatnonzero(fitted.passive)
         extra = design.bins.settled(fitted.slopes)
         more = np.hstack((extra, design.bins.free))
-        test = fold_of[self.block][:, None] == np.arange(folds)  # (count, folds)
+        test = fold_of[self.block if block is None else block][:, None] == np.arange(folds)  # (count, folds)
         size, starts = free.size + more.shape[1], design.bins.free.shape[1]
         if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | ~test.any(axis=0)):
             return
         beside = np.hstack((more, fitted.residual[:, None]))
         # of each fold: what is left when it is taken off all is what the fold is predicted from
-        block = np.ix_(free, free)
+        inner = np.ix_(free, free)
         parts = [
-            (design.squares_of(own)[block], design.across(beside, own).T[:, free], beside[own].T @ more[own])
+            (design.squares_of(own)[inner], design.across(beside, own).T[:, free], beside[own].T @ more[own])
             for own in test.T[1:]
         ]
-        total = (design.squares[block], design.across(beside).T[:, free], beside.T @ more)
+        total = (design.squares[inner], design.across(beside).T[:, free], beside.T @ more)
         parts = [
             tuple(all_ - sum(some) for all_, some in zip(total, zip(*parts, strict=True), strict=True)),
             *parts,
@@ -135,3 +145,10 @@ def _blocks_of(problem: Problem) -> IntArray:
         inside = number >= 0
         found[number[inside]] = part[inside]
     return found
+
+
+def _sorted_by_rate(problem: Problem, block: IntArray) -> IntArray:
+    """Block of every average (count,), the blocks numbered anew from the slowest to the fastest."""
+    square = np.bincount(block, residual.rates(problem) ** 2, LIMITS.blocks)
+    mean = square / np.maximum(np.bincount(block, minlength=LIMITS.blocks), 1)
+    return np.asarray(np.argsort(np.argsort(mean, kind="stable"))[block])

@@ -117,3 +117,16 @@ def _holds(record: Record) -> bool:
     noise = input_noise.estimate(record.input)
     band = max(LIMITS.hold_within * reach, LIMITS.hold_noise * noise if np.isfinite(noise) else 0.0)
     return bool(np.any(highest[inside] - lowest[inside] <= band))
+
+
+def wander(residual: FloatArray, measured: FloatArray) -> float:
+    """Sum of squares of a residual (count,) that a gain and an offset of each tenth of the time take away.
+
+    ``measured`` (count,) is the output. A static error, or one that follows the input, hardly has any.
+    """
+    pieces = zip(*(np.array_split(x, LIMITS.wander_pieces) for x in (residual, measured)), strict=True)
+    found = 0.0
+    for left, level in pieces:
+        columns = np.linalg.qr(np.stack((np.ones(left.size), level - level.mean()), axis=1))[0]
+        found += float(np.sum((columns.T @ left) ** 2))
+    return found

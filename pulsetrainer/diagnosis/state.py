@@ -103,7 +103,11 @@ class State:
     @property
     def in_bursts(self) -> bool:
         """Whether what is taken for slow noise matters, and comes and goes or jumps as no noise does."""
-        if not self.floor.slow > LIMITS.slow_noise or self.floor.white < LIMITS.matters * self.floor.span:
+        if not self.floor.slow > LIMITS.slow_noise:
+            return False
+        # beside a cause that was found less of it is what its formula, or another kind of plant, leaves
+        least = LIMITS.matters if self.current.terms else LIMITS.bursts_span
+        if self.floor.white < least * self.floor.span:
             return False
         problem = self.problem
         return burstiness(self.current.residual, problem.bins, problem.measured) > LIMITS.burstiness

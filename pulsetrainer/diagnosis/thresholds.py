@@ -92,6 +92,7 @@ class Thresholds:
     halves: tuple[float, float, int] = (1.0, 200.0, 4000)  # half squares among which a line's limit is sought
     slow_noise: float = 3.0  # times the noise from sample to sample: averages with more have slow noise
     burstiness: float = 4.5  # kurtosis in octaves: drawn noises have 2.9 to 4, bursts and loads 5.5 to 8
+    bursts_span: float = 0.004  # of the span: plants of other kinds leave less that comes in bursts
     matters: float = 0.005  # of the span: an effect so large must show, or nothing can be said
     draws: int = 1999  # of the noise: the smallest p is a twentieth of the limit
     probes: int = 12  # white signals that tell how much of a spectrum the weights and the library take away
@@ -111,6 +112,8 @@ class Thresholds:
     linearised: float = 0.5  # of what a refit gains: a linearised score shows at least so much (decision 044)
     nearly: float = 0.75  # of the relevant fall: a candidate that gains so much is refitted to its end first
     held_out_least: float = 0.05  # of the reducible part: a smaller fall of the held-out error is no gain
+    held_out_kept: float = 0.33  # of that part: on foreign plants true causes reach 0.43, false ones 0.28
+    least_share: float = 0.01  # of what all causes explain: less is what the formulas of the others miss
     blocks: int = 20  # of a record, cut where its memory is wiped out
     jackknife: int = 10  # parts left out in turn for the intervals
     rows_per_unknown: int = 2  # averages that must stay for each unknown when blocks are left out
@@ -118,9 +121,13 @@ class Thresholds:
 
     # Repetition
     pieces: int = 5  # whole ones, of the time, each predicted from the others
+    rates: int = 4  # groups of blocks by their rate, each predicted from the others
     repeated: float = 0.5  # of what the fit gains: a smaller gain on the pieces is chance
     piece_worse: float = 0.1  # of that gain: no piece may be predicted worse by more
     piece_told: float = 0.02  # weight of a piece that is left out: enough where the others tell nothing
+    wander_pieces: int = 10  # of the time: a gain and an offset of each show that the record wanders ...
+    wander_left: float = 0.33  # ... if they take away so much of what is left (true drifts: up to 0.15) ...
+    wander_fall: float = 0.1  # ... and so much of what a drift took away
     begin_share: float = 0.2  # of a record: what went on before it has decayed by then
     slow_share: float = 0.4  # of what is left: so much that may be slow noise is sought in the bank too
 
@@ -129,6 +136,7 @@ class Thresholds:
     learned_rounds: int = 4  # Gauss-Newton steps of the joint refit with each
     fastest_state_s: float = 0.05  # time constants of the bank from here: what is faster mends a lag ...
     nearly_all: float = 0.9  # of what a curve in their place explains: listed causes that do keep their names
+    learned_predicts: float = 0.75  # of the reducible held-out error: foreign plants without any reach 0.7
     imperfect: float = 0.08  # of what listed causes explain: so much their formulas may miss
     slowest_state: float = 0.25  # ... to this share of the longest record ...
     state_ratio: float = 2.0  # ... so far apart; the best is refined within that factor ...

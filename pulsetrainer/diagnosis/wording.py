@@ -112,7 +112,7 @@ ADVICE: Mapping[str, str] = {
         "No known cause fits. Repeat the recording to see whether the remaining error repeats; if it does, "
         "vary one thing at a time: temperature, load, amplitude."
     ),
-    "none": "Nothing is left to explain on this recording.",
+    "none": "Nothing was found on this recording beyond what is taken for noise.",
     "too noisy": (
         "These recordings could not have shown {names} of {matters:.2g} % of the span. Record the same for "
         "{times:.2g} times as long, or with less noise, and diagnose that."
@@ -150,6 +150,7 @@ ADVICE: Mapping[str, str] = {
 DOUBTS: Mapping[str, str] = {
     "predicts worse": "with it, parts of the recordings that were left out are predicted worse",
     "does not repeat": "it fits, but does not repeat: it is not added to the model",
+    "wanders": "what is left wanders still, so it may be a piece of that: it is neither added nor taken out",
     "spans zero": "its strength may be nothing, as the interval spans zero",
     "at bound": "a parameter is at the end of the range that was searched",
 }

@@ -196,10 +196,10 @@ def _piled(at: int, inside: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("at", "inside", "fires"), [(21, 0, True), (20, 0, False), (40, 19, True), (40, 20, False)]
+    ("at", "inside", "fires"), [(21, 0, True), (20, 0, False), (40, 33, True), (40, 34, False)]
 )
 def test_a_cut_off_output_piles_up_at_its_end(at, inside, fires):
-    """More than twenty samples, more than twice as many as just inside."""
+    """More than twenty samples, more than 1.2 times as many as just inside."""
     y = np.random.default_rng(3).permutation(_piled(at, inside))
     assert _fires("saturation", y) is fires
 
@@ -253,6 +253,31 @@ def test_wild_is_eight_sigmas_or_four_fast_steps(over, fires):
     y[near] = 0.0
     y[near[:, 6]] = over * max(8.0 * np.sqrt(2.0) * noise_of(y), 4.0 * np.quantile(np.abs(np.diff(y)), 0.95))
     assert _fires("outliers", y) is fires
+
+
+@pytest.mark.parametrize("samples", [3, 40])
+def test_where_the_input_turns_within_a_few_samples_none_is_wild(samples):
+    """A stiff device follows: its tips are as sharp; wild ones elsewhere are still seen."""
+    slow = np.interp(np.arange(3000), np.arange(7) * 500, [0, 1, 0, 1, 0, 1, 0])
+    fast = np.interp(np.arange(samples * 8), np.arange(9) * samples, [0, 1, 0.3, 1, 0, 0.7, 0.1, 1, 0])
+    u = np.concatenate((slow, fast, slow))
+    y = np.tanh(3.0 * u) + 1e-4 * np.random.default_rng(5).standard_normal(u.size)
+    assert not _fires("outliers", y, u)
+    wild = [200, 1200, 2200, 5000]
+    y[wild] += 0.7
+    np.testing.assert_array_equal(np.flatnonzero(CAUSE["outliers"].gate(_raw(y, u)).mask), wild)
+
+
+def test_a_step_has_loops_on_both_sides():
+    """A twentieth of the record at least, wherever the residual jumps."""
+    frame = Frame(0.01, np.zeros(10_000), 1.0, 1.0)
+    step = CAUSE["step"]
+    starts = [block[0] for block in step.starts([frame], [])]
+    assert (starts[0][2], starts[-1][2]) == pytest.approx((5.0, 95.0))
+    for at in (100, 9900):
+        left = np.where(np.arange(10_000) < at, 1.0, 0.0)
+        for start in (starts[0], starts[-1]):
+            assert 5.0 <= step.sharpened(start, [frame], [left])[2] <= 95.0
 
 
 @pytest.mark.parametrize(("values", "times", "fires"), [(250, 2, True), (252, 2, False), (200, 1, False)])

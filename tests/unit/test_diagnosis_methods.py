@@ -10,7 +10,7 @@ from scipy import stats
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import asked, floor, intervals, residual, screening, velocity, wording
+from pulsetrainer.diagnosis import asked, floor, intervals, repeats, residual, screening, velocity, wording
 from pulsetrainer.diagnosis.causes import library, stick_slip
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.design import bins_of
@@ -227,17 +227,20 @@ def test_what_does_not_count_moves_no_block():
     assert block[-1] <= LIMITS.blocks // 2
 
 
-@pytest.mark.parametrize("whole", [False, True])
-def test_errors_of_folds_are_those_of_as_many_fits(whole):
+@pytest.mark.parametrize(("whole", "by_rate"), [(False, False), (True, False), (True, True)])
+def test_errors_of_folds_are_those_of_as_many_fits(whole, by_rate):
     """The sums over blocks against each fold fitted on its own rows, weighted one by one."""
     u = np.tile(_loops(), 4)
+    u = np.concatenate((np.repeat(u, 2), u)) if by_rate else u
     rng = np.random.default_rng(3)
     y = CAUSE["output-lag"].on_output(3.0 * u, (0.03,), FRAME) + 0.01 * rng.standard_normal(u.size)
     problem = problem_for([Record(u, y, dt_s=0.01)], 0.0, 1.5)
     fitted = refit(problem, (Term(CAUSE["output-lag"], (0.02,)),), None, rounds=2)
     held_out, folds = HeldOut(problem), 4
     blocks = np.arange(LIMITS.blocks)
-    fold_of = (blocks * folds // LIMITS.blocks if whole else blocks % folds)[held_out.block]
+    fold_of = (blocks * folds // LIMITS.blocks if whole else blocks % folds)[
+        held_out._by_rate if by_rate else held_out.block
+    ]
     design, free = fitted.design, np.flatnonzero(fitted.passive)
     rows = design.bins.settled(design.output(np.eye(design.plane.n_q)))
     columns = np.hstack((rows[:, free], design.bins.settled(fitted.slopes), design.bins.free))
@@ -248,7 +251,16 @@ def test_errors_of_folds_are_those_of_as_many_fits(whole):
     masses = np.zeros(columns.shape[1])
     masses[: free.size] = fitted.simulator.operator.masses[free]
     masses[free.size :] = 0.0
-    for fold, (error, _) in enumerate(held_out._left_out(fitted, folds, whole=whole)):
+    if by_rate:
+        rate = np.abs(residual.rates(problem))
+        means = [np.sqrt(np.mean(rate[held_out._by_rate == k] ** 2)) for k in range(LIMITS.blocks)]
+        assert means == sorted(means)
+        np.testing.assert_allclose(
+            held_out.rates(fitted, folds),
+            [e @ e for e, _ in held_out._left_out(fitted, folds, whole=True, block=held_out._by_rate)],
+        )
+    block = held_out._by_rate if by_rate else None
+    for fold, (error, _) in enumerate(held_out._left_out(fitted, folds, whole=whole, block=block)):
         told = LIMITS.piece_told if whole else 0.0
         weight = np.where(fold_of == fold, told, 1.0)
         share = 1.0 - (1.0 - told) / folds
@@ -657,3 +669,25 @@ def test_evidence_names_its_cause_and_its_record():
     assert wording.cause_text(Finding(CAUSE["creep"], True), {"output": "force"}) == (
         "the force creeps on under a constant input"
     )
+
+
+@pytest.mark.parametrize(
+    ("pieces", "rates", "share"),
+    [
+        ([1.0] * 5, [1.0] * 4, 0.5),
+        ([2.4, -0.9, 1.0, 1.0, 1.5], [1.0] * 4, 0.5),
+        ([2.6, -1.1, 1.0, 1.0, 1.5], [1.0] * 4, 0.0),  # worse on one piece
+        ([1.0] * 5, [9.0, 9.0, -0.9, 9.0], 0.5),
+        ([1.0] * 5, [9.0, 9.0, -1.1, 9.0], 0.0),  # worse at some of the rates
+        ([1.0] * 5, [], 0.5),  # too few blocks to sort by rates
+        ([1.0] * 4, [1.0] * 4, 0.0),  # too short a record
+    ],
+)
+def test_a_cause_repeats_on_pieces_of_the_time_and_at_other_rates(pieces, rates, share):
+    """The gain on the pieces over that of the fit; a tenth of that it may be worse on any."""
+    before, after = SimpleNamespace(squares=30.0), SimpleNamespace(squares=20.0)
+    told = SimpleNamespace(
+        pieces=lambda fitted, _: np.asarray(pieces) * (fitted is before),
+        rates=lambda fitted, _: np.asarray(rates) * (fitted is before),
+    )
+    assert repeats.repeated(told, before, after) == pytest.approx(share)

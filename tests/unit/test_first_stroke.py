@@ -53,13 +53,13 @@ def test_a_first_stroke_apart_does_not_count(down, noisy):
 @pytest.mark.parametrize(
     ("first", "later", "left_out"),
     [
-        ((0.0302, 0.0), 3, True),  # shares of the output's span, of the first stroke and of two later ones
-        ((0.0298, 0.0), 3, False),
-        ((0.06, 0.0149), 3, True),  # four times as far apart as these
-        ((0.06, 0.0151), 3, False),
-        ((0.0302, 0.0), 2, True),
-        ((0.0302, 0.0), 1, True),  # the strokes from the other end are alike
-        ((0.0298, 0.0), 1, False),
+        ((0.0052, 0.0), 3, True),  # shares of the output's span, of the first stroke and of two later ones
+        ((0.0048, 0.0), 3, False),
+        ((0.03, 0.0149), 3, True),  # twice as far apart as these
+        ((0.03, 0.0151), 3, False),
+        ((0.0052, 0.0), 2, True),
+        ((0.0052, 0.0), 1, True),  # the strokes from the other end are alike
+        ((0.0048, 0.0), 1, False),
     ],
 )
 @pytest.mark.parametrize("down", [False, True])

@@ -132,6 +132,7 @@ class Cause:
     jagged: ClassVar[bool] = False  # leaves what no refit can take away: then what is left is its own
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
+    drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
 
     def gate(self, raw: Raw) -> Firing | None:
         """Return what the raw data of a record show of a cause of stage ``record``."""

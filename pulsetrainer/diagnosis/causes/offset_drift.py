@@ -22,6 +22,7 @@ class OffsetDrift(Cause):
     stage = "output"
     order = 140
     family = "drift"
+    drifts = True
     parameters = (Quantity("rate", "{y}/s", -1e6, 1e6, 1e-5, "drift of the zero of the {output}"),)
     lasting = False
     corrects = True

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from pulsetrainer.core.plane import FloatArray
@@ -21,6 +22,8 @@ _STEPS = 2.0  # converter steps: nearer is its rounding
 _LINE = 5  # samples on one side of a suspect that may explain it
 _TAIL = 0.5  # of them between half the limit and the limit: more are the tail of the noise
 _HIGHER = 1.25  # factor from one limit to the next that is tried
+_BACK = 0.1  # of the range: an input that comes back so far within these samples has turned fast
+_ALONE = 3  # samples of a median that takes away a single wild one
 _LEAST = 3  # wild samples: fewer are no fault of a device
 
 
@@ -50,7 +53,8 @@ class Outliers(Cause):
         apart = np.abs(y - ndimage.median_filter(y, _AROUND, mode="nearest"))
         usual = _TIP * float(np.quantile(np.abs(np.diff(y)), _FAST))
         limit = max(_SIGMAS * _DIFFERENCE * noise_of(y), usual, _STEPS * spacing_of(y))
-        off = np.where((apart > 0.5 * limit) & ~raw.beside_breaks(_AROUND), apart, 0.0)
+        told = ~raw.beside_breaks(_AROUND) & ~_turns_fast(raw.record.input, raw.high - raw.low)
+        off = np.where((apart > 0.5 * limit) & told, apart, 0.0)
         for at in np.flatnonzero(off):  # where a stroke ends with a jump, its last sample still lies on it
             off[at] = min(off[at], _off_line(y, int(at), -1), _off_line(y, int(at), 1))
         found = _beyond_the_tail(np.sort(off[off > 0.5 * limit]), limit)
@@ -73,6 +77,20 @@ def _beyond_the_tail(off: FloatArray, limit: float) -> float | None:
             return limit
         limit *= _HIGHER
     return None
+
+
+def _turns_fast(u: FloatArray, reach: float) -> NDArray[np.bool_]:
+    """Whether an input (n,) turns and comes far back within the samples that may explain a suspect.
+
+    There the output turns as fast, and no sample can be told from those beside it.
+    """
+    own = ndimage.median_filter(u, _ALONE, mode="nearest")  # a wild sample of the input is no turn
+    width = 2 * _LINE + 1
+    way = width * ndimage.uniform_filter1d(np.abs(np.diff(own, prepend=own[0])), width, mode="nearest")
+    swing = ndimage.maximum_filter1d(own, width, mode="nearest") - ndimage.minimum_filter1d(
+        own, width, mode="nearest"
+    )
+    return np.asarray(way - swing > _BACK * reach)
 
 
 def _off_line(y: FloatArray, at: int, side: int) -> float:

@@ -13,7 +13,7 @@ from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 
 _LEAST = 20  # samples at the rail: fewer may be chance
-_PILE = 2.0  # times the samples just inside: noise makes a tail at the end of a distribution, a rail a pile
+_PILE = 1.2  # times the samples just inside: noise makes a tail at the end of a distribution, a rail a pile
 _AT = 0.5  # converter steps: nearer than that is at the rail
 _INSIDE = 10.5  # converter steps beside the rail that are compared with it ...
 _INSIDE_SPAN = 0.02  # ... but no more than this share of the span

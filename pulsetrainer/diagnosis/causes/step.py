@@ -10,7 +10,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
 _TRIED = 0.003  # of the span, and of the gain
-_MOMENTS = (0.02, 0.98, 25)  # of the record, from, to, how many
+_MOMENTS = (0.05, 0.95, 25)  # of the record, from, to, how many: a side with less holds no loops to compare
 _BESIDE = 1.5  # distances of two moments on either side: a refit cannot move far, so it must begin near
 _SHARED = 20.0  # samples over which the change is shared out, so that the error falls smoothly with the time
 _EDGE = 20  # of a window: splits within one such part of its ends are left out
@@ -29,6 +29,7 @@ class Step(Cause):
     stage = "output"
     order = 120
     family = "drift"
+    drifts = True
     needs_time = False
     strengths = 2
     parameters = (
@@ -51,9 +52,13 @@ class Step(Cause):
         one = max((f for f in frames if f.begin_s <= values[2]), key=lambda f: f.begin_s, default=frames[0])
         left = residual[one.record]
         total = frames[-1].begin_s + frames[-1].input.size * frames[-1].dt_s
-        near = _BESIDE * total * (_MOMENTS[1] - _MOMENTS[0]) / (_MOMENTS[2] - 1) / one.dt_s
-        at = (values[2] - one.begin_s) / one.dt_s
-        split = _split(left, int(max(at - near, 0.0)), int(min(at + near, left.size)))
+        near = _BESIDE * total * (_MOMENTS[1] - _MOMENTS[0]) / (_MOMENTS[2] - 1)
+        first, last = (edge * total for edge in _MOMENTS[:2])
+        begin, end = (
+            int(min(max((at - one.begin_s) / one.dt_s, 0.0), left.size))
+            for at in (max(values[2] - near, first), min(values[2] + near, last))
+        )
+        split = _split(left, begin, end)
         return (*values[:2], one.begin_s + split * one.dt_s)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
@@ -73,9 +78,9 @@ class Step(Cause):
 def _split(residual: FloatArray, begin: int, end: int) -> int:
     """Place within a window where the means on both sides differ most (a refit cannot move far from it)."""
     window = residual[begin:end]
+    edge = window.size // _EDGE + 1
+    if window.size <= _LEAST * edge:
+        return begin + edge
     count = np.arange(1, window.size)
     apart = np.cumsum(window - window.mean())[:-1] ** 2 / (count * (window.size - count))
-    edge = window.size // _EDGE + 1
-    return (
-        begin + edge + 1 + int(np.argmax(apart[edge:-edge])) if window.size > _LEAST * edge else begin + edge
-    )
+    return begin + edge + 1 + int(np.argmax(apart[edge:-edge]))

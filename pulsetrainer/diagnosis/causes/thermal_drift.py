@@ -37,6 +37,7 @@ class ThermalDrift(Cause):
     stage = "output"
     order = 50
     family = "slow gain"
+    drifts = True
     common = True
     parameters = (
         Quantity(

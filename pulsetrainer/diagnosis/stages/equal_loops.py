@@ -23,7 +23,8 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 def stage(state: State) -> State:
     """Return the state with the causes that only equal loops show."""
-    if state.unexplained or state.jagged or state.problem.base is not None:
+    whole = state.is_whole(state.current)
+    if not whole or state.jagged or state.problem.base is not None:
         return state
     for cause in library().values():
         if cause.by_contrast and cause.id not in state.current.names:

@@ -7,7 +7,7 @@ records.
   sought on top of it are withdrawn. If the speed matters and not only the direction, the force is `viscous`;
   else the cause is `unknown`.
 - If the model as given leaves less than the search's best, the search found faults of its own coarser levels
-  only: they are withdrawn.
+  only: they are withdrawn. What the given one leaves may still be more than noise, and is then `unknown`.
 - If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), the
   device is in another condition: `condition-change` comes first. Where that is all but a thousandth of the
   squared error, other causes would only repair the rest of it, and are withdrawn.
@@ -60,13 +60,15 @@ def stage(state: State) -> State:
         told = tuple(c.id for c in library().values() if c.stage != "record" and not c.needs_time)
         said.append(Evidence("untimed", names=told))
     span = state.scale.span
-    noise = span * state.floor.noise
+    noise = span * state.floor_left.noise
     if judged.speed.wrong:
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
-    elif left_by(judged.measured, judged.predicted, noise) <= span * state.left_rms:
+    elif (left := left_by(judged.measured, judged.predicted, noise)) <= span * state.left_rms:
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
+        if state.verdict in ("none", "inconclusive") and _unexplained(state, left):
+            state = replace(state, verdict="unknown")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
     if changed is not None:
         state, more = _in_another_condition(state, changed, judged.polarity)
@@ -108,6 +110,13 @@ def _judged(state: State, given: Given) -> _Judged:
         velocity.compare(core, steps, residuals),
         model.polarity,
     )
+
+
+def _unexplained(state: State, left: float) -> bool:
+    """Whether a model that leaves so much (output unit, less noise) misses something, refitted or not."""
+    if state.question.quick or left <= LIMITS.unexplained_span * state.scale.span * state.floor.span:
+        return False
+    return replace(state, current=state.baseline).unexplained
 
 
 def withdrawn(state: State, told: Collection[str] = ()) -> State:

@@ -3,8 +3,10 @@
 What wanders slowly looks like heat, creep or a step, and blocks that alternate only interpolate it. So for
 each cause that belongs to the device whole pieces, a fifth of the time each, are predicted from the others:
 with the cause the errors must fall by at least half of what they fall by in the fit, and on no piece may they
-rise. A cause that does not do that fits, but does not repeat: it is told with these words, and is not added
-to the model; nor is one that predicts blocks worse (`rivals`). What equal loops show was tested by itself.
+rise. Nor may they on any quarter of the blocks, sorted by their rate and predicted from the others: a formula
+that only fits the rates of one record misleads at others. A cause that does not do that fits, but does not
+repeat: it is told with these words, and is not added to the model; nor is one that is in doubt for
+another reason (`rivals`). What equal loops show was tested by itself.
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
 been fitted beside it.
@@ -16,7 +18,6 @@ from dataclasses import replace
 
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
-from pulsetrainer.diagnosis.stages.rivals import WORSE
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -27,7 +28,7 @@ def stage(state: State) -> State:
     """Return the state with the causes that do not repeat, and the model without them."""
     kept = state.current
     asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
-    told = {one.cause.id for one in asked if WORSE in one.doubts}
+    told = {one.cause.id for one in asked if one.in_doubt}
     once = told or _weakest(state, kept)
     while once:
         told |= once

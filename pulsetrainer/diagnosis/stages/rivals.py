@@ -7,7 +7,8 @@ the rate are named together: there they are just a wider loop. Causes that equal
 here: equal loops differ by nothing else that is known.
 
 What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
-than the model without it, the interval of its strength spans zero, or a parameter sits on its bound.
+than the model without it, the interval of its strength spans zero, a parameter sits on its bound, or it is
+slow and what is left still wanders from one tenth of the time to the next.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
-WORSE = "predicts worse"
+WORSE, WANDERS = "predicts worse", "wanders"
 
 
 def stage(state: State) -> State:
@@ -51,15 +52,19 @@ def _finding(state: State, term: Term) -> Finding:
         parameters=state.estimates[name],
         confounded_with=() if term.cause.by_contrast else rivals(state, term),
         held_out_gain_percent=gain,
-        doubts=tuple(_doubts(state, term, gain)),
+        doubts=tuple(_doubts(state, term, gain, without.squares - state.current.squares)),
     )
 
 
-def _doubts(state: State, term: Term, gain: float) -> Iterator[str]:
+def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]:
     """Yield what speaks against a cause that was found: it is told, but with these words beside it."""
-    if gain < 0:
-        yield WORSE
     cause, known = term.cause, state.estimates[term.cause.id]
+    if gain < 0 and not cause.by_contrast:  # the weights hold that: it predicts as well without
+        yield WORSE
+    if cause.drifts:
+        left = residual.wander(state.current.residual, state.problem.measured)
+        if left > max(LIMITS.wander_left * state.current.squares, LIMITS.wander_fall * fall):
+            yield WANDERS
     strengths = known[: cause.strengths]
     if strengths and all(one.lower <= 0 <= one.upper for one in strengths):
         yield "spans zero"

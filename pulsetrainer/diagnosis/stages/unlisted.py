@@ -39,6 +39,8 @@ def stage(state: State) -> State:
     if state.unexplained:
         state = replace(state, current=state.baseline, p_values={}, without={})
     found, p_value, doubtful = _learned(state)
+    if found is not None and not _predicts(state, found):
+        found, doubtful = None, True
     if found is None:
         said = (Evidence("not repeated", _ID),) if doubtful else ()
         return replace(begun, evidence=(*begun.evidence, *said))
@@ -58,9 +60,17 @@ def _keep_their_names(state: State, instead: Fitted) -> bool:
     return base - state.current.squares > LIMITS.nearly_all * (base - instead.squares)
 
 
+def _predicts(state: State, found: Fitted) -> bool:
+    """Whether learned dependences predict most of what can be lowered on blocks that were left out.
+
+    The loops of a device that is no Preisach operator look like a dependence on the last turn, but by halves.
+    """
+    return state.held_out.gain(state.current, found, state.floor) >= LIMITS.learned_predicts
+
+
 def _more_is_left(state: State) -> bool:
     """Tell whether more is left than noise, or much that is slow: that may be either, and this finds out."""
-    left, floor = state.current.squares, state.floor
+    left, floor = state.current.squares, state.floor_left
     slow = left - floor.sure_squares > LIMITS.slow_share * left
     return left - floor.squares > floor.relevant or (slow and left - floor.sure_squares > floor.relevant)
 

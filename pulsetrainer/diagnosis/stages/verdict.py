@@ -5,7 +5,7 @@ that a gate saw, since no refit takes away what it leaves; else it is `unknown`,
 Otherwise it is the cause that explains most, then what a gate on the raw data saw; that comes first where all
 others together are below half a per cent of the span. Where nothing was found it is `none`, or `inconclusive`
 if the record could not have shown half a per cent of the span of a common cause. A hum no larger than the
-noise is found and told, and takes no verdict.
+noise is found and told, and takes no verdict; nor does a cause that is in doubt (`rivals`, `repetition`).
 """
 
 from __future__ import annotations
@@ -32,10 +32,14 @@ def stage(state: State) -> State:
     share = sum(one.explains_percent for one in found) / PERCENT
     most = np.sqrt(share * state.floor.reducible(state.baseline) / state.floor.count)
     seen = [*gated, *found] if most < LIMITS.matters * state.floor.span else [*found, *gated]
-    verdict = next((one.cause.id for one in seen if one.cause.id not in faint), "none")
+    sure = [one.cause.id for one in seen if not one.in_doubt]
+    verdict = next((name for name in sure if name not in faint), "none")
     if verdict == "none" and state.blind and not state.question.quick:
         verdict = "inconclusive"
-    if state.unexplained and not state.question.quick:
+    doubtful = {one.cause.id for one in seen if one.in_doubt}
+    in_doubt = bool(state.current.names) and doubtful.issuperset(state.current.names)
+    believed = replace(state, current=state.baseline) if in_doubt else state
+    if believed.unexplained and not state.question.quick:
         verdict = next((one.cause.id for one in gated if one.cause.jagged), "unknown")
     return replace(state, findings=(*seen, *rest, *silent), verdict=verdict)
 
