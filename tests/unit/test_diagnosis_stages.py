@@ -1158,7 +1158,7 @@ def test_a_model_that_is_better_than_the_search_clears_what_it_found(monkeypatch
 
 @pytest.mark.parametrize(("error", "verdict"), [(0.0019, "none"), (0.0021, "unknown")])
 def test_a_better_model_that_misses_something_is_unknown(monkeypatch, error, verdict):
-    """Above a fifth of a per cent of the span, where the levels of the search leave more than noise as well."""
+    """Above a fifth of a per cent of the span, where the search leaves more than noise as well."""
     monkeypatch.setattr(state_module.State, "unexplained", property(lambda self: True))
     after = _given(monkeypatch, RAMP + error, findings=(_finding("creep", 20.0),))
     assert (after.verdict, after.extends) == (verdict, False)
