@@ -228,8 +228,7 @@ def margins(coil: Coil, gains: LoopGains, dt_s: float) -> Margins:
     controller = np.array([gains.proportional, gains.integral * dt_s - gains.proportional])
     numerator = np.convolve(np.convolve(controller, [0.0, coil.gain_A * (1.0 - decay)]), top)
     denominator = np.convolve(np.convolve([1.0, -1.0], [1.0, -decay]), bottom)
-    size = max(numerator.size, denominator.size)
-    closed = np.pad(denominator, (0, size - denominator.size)) + np.pad(numerator, (0, size - numerator.size))
+    closed = np.polynomial.polynomial.polyadd(denominator, numerator)
     stable = bool(np.all(np.abs(np.roots(closed)) < 1.0))
     angle = np.geomspace(1e-5, 1.0, 8000) * math.pi
     _, response = scipy.signal.freqz(numerator, denominator, worN=angle)

@@ -41,11 +41,6 @@ class Course:
         return self.signal.value.size * self.repeats
 
     @property
-    def duration_s(self) -> float:
-        """Length of the course."""
-        return self.size / self.signal.rate_Hz
-
-    @property
     def reversals(self) -> int:
         """Number of times the input turns, where one repeat goes over into the next included."""
         return self.signal.reversals * self.repeats + self.repeats - 1

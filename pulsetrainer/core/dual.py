@@ -85,7 +85,7 @@ class Dual:
         beyond = np.maximum(plane.low - wanted, wanted - plane.high)
         u, final = self.inner.run(wanted, state)
         slack = 1e-9 * (plane.high - plane.low)
-        return Inverse(u, int(np.sum(beyond > slack)), float(max(beyond.max(), 0.0)), final)
+        return Inverse(u, int(np.sum(beyond > slack)), final)
 
 
 def exchanged(signals: Sequence[tuple[FloatArray, FloatArray]]) -> list[tuple[FloatArray, FloatArray]]:

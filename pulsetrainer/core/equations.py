@@ -8,8 +8,10 @@ cells by cumulative sums: the n x n_q design matrix never exists.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from operator import add, sub
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy  # its parts load when they are first used
@@ -62,22 +64,11 @@ class NormalEquations:
 
     def __add__(self, part: NormalEquations) -> NormalEquations:
         """Sums over both sets of samples."""
-        return self._with(part, 1.0)
+        return _combined(self, part, add)
 
     def __sub__(self, part: NormalEquations) -> NormalEquations:
         """Sums over the samples that are not in ``part``."""
-        return self._with(part, -1.0)
-
-    def _with(self, part: NormalEquations, sign: float) -> NormalEquations:
-        return NormalEquations(
-            self.plane,
-            self.gram + sign * part.gram,
-            self.moment + sign * part.moment,
-            self.row_sum + sign * part.row_sum,
-            self.weight_sum + sign * part.weight_sum,
-            self.output_sum + sign * part.output_sum,
-            self.output_square + sign * part.output_square,
-        )
+        return _combined(self, part, sub)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,15 +95,7 @@ class NodeSums:
 
     def __add__(self, other: NodeSums) -> NodeSums:
         """Sums over both sets of samples."""
-        return NodeSums(
-            self.plane,
-            self.gram + other.gram,
-            self.moment + other.moment,
-            self.row_sum + other.row_sum,
-            self.weight_sum + other.weight_sum,
-            self.output_sum + other.output_sum,
-            self.output_square + other.output_square,
-        )
+        return _combined(self, other, add)
 
     def dense(self) -> NormalEquations:
         """Carry the sums to the cells: two cumulative sums on each side."""
@@ -130,6 +113,16 @@ class NodeSums:
             self.output_sum,
             self.output_square,
         )
+
+
+_Sums = TypeVar("_Sums", NormalEquations, NodeSums)
+
+
+def _combined(one: _Sums, other: _Sums, how: Callable[[Any, Any], Any]) -> _Sums:
+    """Put the sums over two sets of samples on one plane together, each by itself."""
+    names = [field.name for field in fields(one) if field.name != "plane"]
+    sums: dict[str, Any] = {name: how(getattr(one, name), getattr(other, name)) for name in names}
+    return replace(one, **sums)
 
 
 def _part_sums(
@@ -189,15 +182,8 @@ def node_sums(plane: Plane, records: Sequence[Record], reading: Reading) -> Node
     ArgumentError
         The reading is unknown.
     """
-    total = NodeSums.nothing(plane)
-    for record in records:
-        path = follow(plane, record.input, record.start, reading)
-        every = np.arange(record.input.size)
-        part = _part_sums(
-            plane, path, base_rows(plane, path), every, record.fitted_output, record.sample_weight
-        )
-        total = total + part
-    return total
+    every = [np.zeros(record.input.size, dtype=np.int64) for record in records]
+    return parted_sums(plane, records, reading, every, 1)[0]
 
 
 def parted_sums(

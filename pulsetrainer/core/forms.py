@@ -109,7 +109,7 @@ def try_all(signals: Signals, low: float, high: float) -> Tried:
     records = [record_of(u, y, low, high) for u, y in signals]
     folds = [np.where(r.sample_weight > 0, blocks(r.input, low, high) % FOLDS, -1) for r in records]
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
-    direct, signed = (_HeldOut.of(records, folds, plane, signed=either) for either in (False, True))
+    direct, signed = (_HeldOut(records, folds, plane, signed=either) for either in (False, True))
     span = float(np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in records])))
     left: dict[Form, float] = {"direct": direct(_FIRST), "signed": signed(_FIRST)}
     # the dual form too is rarely much worse as a signed one than by itself
@@ -132,7 +132,7 @@ def _is_late(records: Sequence[Record], folds: Sequence[IntArray], plane: Plane)
     diagonal. No static loop has one, however its density changes sign; what is late is a matter of time.
     """
     turned, _ = levelled(records, polarity_of(records, plane))
-    whole = _sum([part.dense() for part in parted_sums(plane, turned, "continuous", folds, FOLDS)])
+    whole = reduce(add, _parts(turned, folds, plane))
     masses = nnls.solve_signed(*smoothed(whole, _FIRST))
     operator = Preisach(plane, masses / plane.areas, whole.offset(masses), signed=True)
     i, j = plane.cell_indices
@@ -142,26 +142,21 @@ def _is_late(records: Sequence[Record], folds: Sequence[IntArray], plane: Plane)
 class _HeldOut:
     """The rms error on held-out blocks as a function of the smoothing, for weights of one sign or either."""
 
-    def __init__(self, parts: list[NormalEquations], *, signed: bool) -> None:
-        self.signed, self.outs = signed, _each_out(parts)
-        self.errors: dict[float, float] = {}
-
-    @classmethod
-    def of(
-        cls, records: Sequence[Record], folds: Sequence[IntArray], plane: Plane, *, signed: bool
-    ) -> _HeldOut:
+    def __init__(
+        self, records: Sequence[Record], folds: Sequence[IntArray], plane: Plane, *, signed: bool
+    ) -> None:
         turned, _ = levelled(records, 1 if signed else polarity_of(records, plane))
-        parts = [part.dense() for part in parted_sums(plane, turned, "continuous", folds, FOLDS)]
-        return cls([part for part in parts if part.weight_sum > 0], signed=signed)
+        self.signed, self.outs = signed, _each_out(turned, folds, plane)
+        self.errors: dict[float, float] = {}
 
     def __call__(self, smoothing: float) -> float:
         if smoothing not in self.errors:
             squares = 0.0
-            for part, rest in self.outs:
+            for part, rest in self.outs.values():
                 gram, rhs = smoothed(rest, smoothing)
                 masses = nnls.solve_signed(gram, rhs) if self.signed else nnls.solve(gram, rhs).x
                 squares += part.sum_of_squares(masses, rest.offset(masses))
-            weight = sum(part.weight_sum for part, _ in self.outs)
+            weight = sum(part.weight_sum for part, _ in self.outs.values())
             self.errors[smoothing] = float(np.sqrt(max(squares, 0.0) / weight))
         return self.errors[smoothing]
 
@@ -170,14 +165,18 @@ class _HeldOut:
         return min(self(s) for s in _SMOOTHINGS)
 
 
-def _each_out(parts: Sequence[NormalEquations]) -> list[tuple[NormalEquations, NormalEquations]]:
-    """Each part, and the sums over all the others."""
-    whole = _sum(parts)
-    return [(part, whole - part) for part in parts]
+def _parts(records: Sequence[Record], folds: Sequence[IntArray], plane: Plane) -> list[NormalEquations]:
+    """Sums over each fold."""
+    return [part.dense() for part in parted_sums(plane, records, "continuous", folds, FOLDS)]
 
 
-def _sum(parts: Sequence[NormalEquations]) -> NormalEquations:
-    return reduce(add, parts)
+def _each_out(
+    records: Sequence[Record], folds: Sequence[IntArray], plane: Plane
+) -> dict[int, tuple[NormalEquations, NormalEquations]]:
+    """Sums over each fold that holds a sample, by its number, and over all the others."""
+    held = {k: part for k, part in enumerate(_parts(records, folds, plane)) if part.weight_sum > 0}
+    whole = reduce(add, held.values())
+    return {k: (part, whole - part) for k, part in held.items()}
 
 
 def _held_out_dual(signals: Signals, folds: Sequence[IntArray]) -> float:
@@ -188,12 +187,11 @@ def _held_out_dual(signals: Signals, folds: Sequence[IntArray]) -> float:
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
     sign = polarity_of(records, plane)
     turned, zero = levelled(records, sign)
-    parts = [part.dense() for part in parted_sums(plane, turned, "continuous", folds, FOLDS)]
-    used = [k for k, part in enumerate(parts) if part.weight_sum > 0]
+    outs = _each_out(turned, folds, plane)
 
     def left(smoothing: float) -> float:
         squares, count = 0.0, 0
-        for k, (_, rest) in zip(used, _each_out([parts[k] for k in used]), strict=True):
+        for k, (_, rest) in outs.items():
             gram, rhs = smoothed(rest, smoothing)
             masses = nnls.solve(gram, rhs).x
             if not masses.sum() > 0:

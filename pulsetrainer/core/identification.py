@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.core import large, nnls
-from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NormalEquations, node_sums, normal_equations
 from pulsetrainer.core.operator import Preisach
@@ -27,21 +26,6 @@ from pulsetrainer.core.record import Record, levelled
 from pulsetrainer.core.smoothing import LEAST_SIGNED, choose, smoothed
 from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
 from pulsetrainer.errors import ArgumentError, ConvergenceError
-
-__all__ = [
-    "LEAST_SIGNED",
-    "Identified",
-    "Method",
-    "NormalEquations",
-    "Record",
-    "Smoothing",
-    "correlation_of",
-    "coverage",
-    "identify",
-    "normal_equations",
-    "offsets_between",
-    "polarity_of",
-]
 
 Method = Literal["joint", "alternating"]
 Smoothing = float | Literal["auto"]

@@ -16,7 +16,7 @@ from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.memory import State, demagnetised, negative_saturation, positive_saturation
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.record import Record
 
 NEAR = 0.01  # of the range: a noisy record touches its extreme only once, late
@@ -40,8 +40,7 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
     this is seen, and the memory is known from where it next reaches an end. The same goes for an end of the
     input's own range, where what lies beyond may be switched by the first stroke alone.
     """
-    near = NEAR * (high - low)
-    ends = np.flatnonzero((inputs <= low + near) | (inputs >= high - near))
+    ends = _near_ends(inputs, low, high)
     begin = int(ends[0]) if ends.size else first_extreme(inputs)[0]
     if outputs is None or (ends.size and begin > 0):
         return begin
@@ -131,15 +130,19 @@ def _stroke(away: FloatArray, outputs: FloatArray, reach: float) -> tuple[FloatA
 def first_extreme(inputs: FloatArray) -> tuple[int, bool]:
     """First sample (n,) that is ``NEAR`` an end of the input's own range, and whether that is the top."""
     bottom, top = float(inputs.min()), float(inputs.max())
-    near = NEAR * (top - bottom)
-    at = int(np.flatnonzero((inputs <= bottom + near) | (inputs >= top - near))[0])
-    return at, bool(inputs[at] >= top - near)
+    at = int(_near_ends(inputs, bottom, top)[0])
+    return at, bool(inputs[at] >= top - NEAR * (top - bottom))
 
 
 def reaches_an_end(inputs: FloatArray, low: float, high: float) -> bool:
     """Tell whether an input (n,) comes ``NEAR`` an end of [low, high], so that its memory becomes known."""
+    return _near_ends(inputs, low, high).size > 0
+
+
+def _near_ends(inputs: FloatArray, low: float, high: float) -> IntArray:
+    """Samples (k,) at which an input (n,) is ``NEAR`` an end of [low, high]."""
     near = NEAR * (high - low)
-    return bool(np.any((inputs <= low + near) | (inputs >= high - near)))
+    return np.flatnonzero((inputs <= low + near) | (inputs >= high - near))
 
 
 def start_of(inputs: FloatArray, low: float, high: float) -> State | None:

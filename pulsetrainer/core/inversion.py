@@ -2,8 +2,7 @@
 
 On a monotone branch the output is a continuous, rising, piecewise linear function of the input, so its
 inverse is interpolation between a few dozen points. The memory of the wanted output has the same
-extremes as the memory of the input, so one trace of the target tells every branch. That is
-``invert``, and ``InverseStream`` is the same sample by sample.
+extremes as the memory of the input, so one trace of the target tells every branch. That is ``invert``.
 
 ``closest_match`` is the method of the original device: step the input edge by edge until the output is
 nearest (Tan, Venkataraman, Krishnaprasad 2001; Tan, Baras, Krishnaprasad 2005); ``smoothed`` is the
@@ -15,7 +14,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -34,7 +33,6 @@ class Inverse:
 
     input: FloatArray  # (n,) input unit
     clipped: int  # targets outside the reachable range, moved to its end
-    worst_clip: float  # farthest such target, output unit
     final: State  # memory after the last sample
 
 
@@ -148,23 +146,6 @@ def invert(
     Source: own; the memory that it rests on is that of Mayergoyz 2003, chapter 1 (wiping out).
     """
     wanted = finite_vector("target", target)
-    _check_invertible(operator, monotone=monotone)
-    clipped, worst, y = _into_reach(operator, wanted)
-    # the memory in terms of outputs turns where the memory of inputs turns
-    path = trace_after(_heights(operator, start), y, -operator.total, operator.total)
-    branches = _Branches(operator)
-    value = [operator.plane.low]
-    rises = path.node_value - path.node_value[path.parent]
-    for parent, rise in zip(path.parent[1:].tolist(), rises[1:].tolist(), strict=True):
-        value.append(branches.reach(value[parent], abs(rise), rising=rise > 0))
-    rise = path.value - path.node_value[path.anchor]
-    u = branches.reach_all(np.asarray(value)[path.anchor], np.abs(rise), rise > 0)
-    remembered = np.asarray(branches.inputs_of(path.final.extremes))
-    final = trace_after(remembered, u[-1:], operator.plane.low, operator.plane.high).final
-    return Inverse(u, clipped, worst, final)
-
-
-def _check_invertible(operator: Preisach, *, monotone: bool = False) -> None:
     if operator.reading != "continuous":
         raise ArgumentError(
             "the relay reading has no continuous inverse: its output is a staircase",
@@ -176,6 +157,19 @@ def _check_invertible(operator: Preisach, *, monotone: bool = False) -> None:
             hint="invert it where its branches are monotone: core.monotone",
         )
     _check_not_empty(operator)
+    clipped, y = _into_reach(operator, wanted)
+    # the memory in terms of outputs turns where the memory of inputs turns
+    path = trace_after(_heights(operator, start), y, -operator.total, operator.total)
+    branches = _Branches(operator)
+    value = [operator.plane.low]
+    rises = path.node_value - path.node_value[path.parent]
+    for parent, rise in zip(path.parent[1:].tolist(), rises[1:].tolist(), strict=True):
+        value.append(branches.reach(value[parent], abs(rise), rising=rise > 0))
+    rise = path.value - path.node_value[path.anchor]
+    u = branches.reach_all(np.asarray(value)[path.anchor], np.abs(rise), rise > 0)
+    remembered = np.asarray(branches.inputs_of(path.final.extremes))
+    final = trace_after(remembered, u[-1:], operator.plane.low, operator.plane.high).final
+    return Inverse(u, clipped, final)
 
 
 def _check_not_empty(operator: Preisach) -> None:
@@ -185,16 +179,12 @@ def _check_not_empty(operator: Preisach) -> None:
         )
 
 
-def _into_reach(operator: Preisach, wanted: FloatArray) -> tuple[int, float, FloatArray]:
+def _into_reach(operator: Preisach, wanted: FloatArray) -> tuple[int, FloatArray]:
     """Count the targets out of reach and return all of them as outputs of polarity 1 without offset."""
     y = operator.polarity * (wanted - operator.offset)
     slack = 1e-9 * operator.total  # rounding of a target that was computed from the range itself
-    beyond = np.abs(y) - operator.total
-    return (
-        int(np.sum(beyond > slack)),
-        float(max(beyond.max(), 0.0)),
-        np.clip(y, -operator.total, operator.total),
-    )
+    clipped = int(np.sum(np.abs(y) - operator.total > slack))
+    return clipped, np.clip(y, -operator.total, operator.total)
 
 
 def _heights(operator: Preisach, start: State | None) -> FloatArray:
@@ -204,65 +194,6 @@ def _heights(operator: Preisach, start: State | None) -> FloatArray:
     extremes[0] = plane.low
     rise = operator.step(extremes[1:], extremes[:-1])
     return np.append(0.0, np.cumsum(rise)) - operator.total
-
-
-@dataclass
-class InverseStream:
-    """The exact inverse one sample at a time, with the same result as ``invert``, to the last digit.
-
-    The stack holds output and input of every remembered turning point; a call costs one bisection, plus
-    what the memory pushes or wipes out. ``clipped`` counts the targets out of reach so far.
-
-    Raises
-    ------
-    ArgumentError
-        As ``invert``, of the operator.
-    """
-
-    operator: Preisach
-    start: State | None = None
-    clipped: int = 0
-    _branches: _Branches = field(init=False, repr=False)
-    _heights: list[float] = field(init=False, repr=False)  # of the turning points
-    _inputs: list[float] = field(init=False, repr=False)
-    _present: tuple[float, float] = field(init=False, repr=False)  # height and input now
-    _rising: bool = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        _check_invertible(self.operator)
-        self._branches = _Branches(self.operator)
-        heights = _heights(self.operator, self.start)
-        total = self.operator.total
-        extremes = trace_after(heights, heights[-1:], -total, total).final.extremes
-        inputs = self._branches.inputs_of(extremes)
-        self._present = extremes[-1], inputs[-1]
-        self._rising = len(extremes) % 2 == 0
-        self._heights, self._inputs = list(extremes[:-1] or extremes), inputs[:-1] or inputs
-
-    def step(self, target: float) -> float:
-        """Return the input, input unit, for the next target, output unit.
-
-        Raises
-        ------
-        ArgumentError
-            The target is not finite.
-        """
-        outside, _, wanted = _into_reach(self.operator, finite_vector("target", [target]))
-        self.clipped += outside
-        height, heights, inputs = float(wanted[0]), self._heights, self._inputs
-        if height == self._present[0]:
-            return self._present[1]
-        rising = height > self._present[0]
-        if rising != self._rising and self._present[0] != heights[-1]:  # the present value is a turning point
-            heights.append(self._present[0])
-            inputs.append(self._present[1])
-        self._rising = rising
-        while len(heights) > 1 and ((height >= heights[-2]) if rising else (height <= heights[-2])):
-            last = max(len(heights) - 2, 1)  # the root stays
-            del heights[last:], inputs[last:]
-        need = height - heights[-1]
-        self._present = height, self._branches.reach(inputs[-1], abs(need), rising=need > 0)
-        return self._present[1]
 
 
 def closest_match(operator: Preisach, target: ArrayLike, start: State | None = None) -> Inverse:
@@ -279,7 +210,7 @@ def closest_match(operator: Preisach, target: ArrayLike, start: State | None = N
     """
     wanted = finite_vector("target", target)
     _check_not_empty(operator)
-    clipped, worst, y = _into_reach(operator, wanted)
+    clipped, y = _into_reach(operator, wanted)
     grid, edges, top = operator.grid, operator.plane.edges, operator.plane.n_h
     state = start or negative_saturation(operator.plane.low)
     rounded = operator.plane.round_to_nodes(np.asarray(state.extremes))
@@ -295,7 +226,7 @@ def closest_match(operator: Preisach, target: ArrayLike, start: State | None = N
             memory = before
         chosen[n] = memory.edge
     final = State(tuple(edges[memory.extremes].tolist()))
-    return Inverse(edges[chosen], clipped, worst, final)
+    return Inverse(edges[chosen], clipped, final)
 
 
 class _EdgeMemory:

@@ -49,9 +49,7 @@ class Large(NamedTuple):
     kkt: float  # largest violation of the optimality conditions, relative
 
 
-def solve(
-    sums: NodeSums, smoothing: float = 0.0, *, tolerance: float = TOLERANCE, max_iterations: int = 60
-) -> Large:
+def solve(sums: NodeSums, smoothing: float = 0.0, *, max_iterations: int = 60) -> Large:
     """Return the non-negative minimiser for the sums of a record, smoothed over s = ``smoothing``.
 
     Raises
@@ -74,7 +72,7 @@ def solve(
         kkt = problem.kkt_violation(cut)
         if kkt < best.kkt:
             best = Large(cut, problem.offset(cut), iteration, kkt)
-        if kkt <= tolerance:
+        if kkt <= TOLERANCE:
             return best
         if iteration == max_iterations:
             break
@@ -90,7 +88,7 @@ def solve(
         m, lam = m + step * dm, lam + step * dlam
     raise ConvergenceError(
         f"the fit on {sums.plane.n_h} levels did not settle within {max_iterations} Newton steps: relative "
-        f"violation {best.kkt:.1e}, wanted {tolerance:.1e}",
+        f"violation {best.kkt:.1e}, wanted {TOLERANCE:.1e}",
         hint="use fewer levels, add smoothing, or record a signal that covers the plane",
     )
 

@@ -251,21 +251,6 @@ class Plane:
         i, j = self.cell_indices
         return square[..., i, j]
 
-    def masses_of(self, nodes: FloatArray) -> FloatArray:
-        """Masses of the cells (n_q,) from packed Everett nodes (n_q,): the inverse of ``everett_nodes``.
-
-        m[i, j] = E[i + 1, j] - E[i, j] - E[i + 1, j + 1] + E[i, j + 1]
-
-        Raises
-        ------
-        ArgumentError
-            As ``everett_grid``.
-        """
-        grid = self.everett_grid(nodes)
-        square = grid[1:, :-1] - grid[:-1, :-1] - grid[1:, 1:] + grid[:-1, 1:]
-        i, j = self.cell_indices
-        return square[i, j]
-
     def adjoint(self, node_values: FloatArray) -> FloatArray:
         """Transpose of ``everett_nodes``: (..., n_q) node space to (..., n_q) cell space.
 

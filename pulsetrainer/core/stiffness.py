@@ -43,18 +43,15 @@ def stiffness_penalty(plane: Plane, diagonal: FloatArray, strength: float) -> sc
     strength
         t, no unit.
     """
-    n = plane.n_h
-    i, j = plane.cell_indices
-    number = np.zeros((n, n), dtype=np.int64)
-    number[i, j] = np.arange(plane.n_q)
-    inner = i + 1 < n
-    here, there = number[i[inner], j[inner]], number[i[inner] + 1, j[inner] + 1]
+    i, _ = plane.cell_indices
+    here = np.flatnonzero(i + 1 < plane.n_h)
+    there = here + i[here] + 2  # cell (i + 1, j + 1)
     usable = diagonal > nnls.SMALLEST_DIAGONAL * diagonal.max(initial=0.0)
     both = usable[here] & usable[there]
     here, there = here[both], there[both]
     count = here.size
-    value = np.concatenate((np.ones(count), -np.ones(count)))
-    row = np.concatenate((np.arange(count), np.arange(count)))
+    value = np.repeat((1.0, -1.0), count)
+    row = np.tile(np.arange(count), 2)
     difference = scipy.sparse.csr_array(
         (value, (row, np.concatenate((here, there)))), shape=(count, plane.n_q)
     )

@@ -23,7 +23,6 @@ from pulsetrainer.core import nnls
 from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.equations import NodeSums, parted_sums
 from pulsetrainer.core.identification import Identified, fits_dense, penalised
-from pulsetrainer.core.memory import State
 from pulsetrainer.core.operator import Preisach, outputs
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.record import Record, levelled
@@ -58,7 +57,7 @@ class Ensemble:
         """Ends () of the interval of the offset."""
         return _interval(self.offsets, level)
 
-    def output_band(self, values: ArrayLike, level: float = 0.9, start: State | None = None) -> Interval:
+    def output_band(self, values: ArrayLike, level: float = 0.9) -> Interval:
         """Ends (n,) of the band of the predicted output for an input (n,), output unit.
 
         It holds the output without the noise of a measurement.
@@ -74,7 +73,6 @@ class Ensemble:
             self.weights,
             operator.polarity * self.offsets,
             values,
-            start=start,
             reading=operator.reading,
         )
         return _interval(operator.polarity * rising, level)

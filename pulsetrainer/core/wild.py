@@ -232,11 +232,6 @@ class Tamed:
     wild_input: BoolArray  # (n,)
     wild_output: BoolArray  # (n,)
 
-    @property
-    def wild(self) -> BoolArray:
-        """Samples (n,) that are wild in either."""
-        return self.wild_input | self.wild_output
-
 
 def tame(signals: Sequence[tuple[FloatArray, FloatArray]]) -> list[Tamed]:
     """Return records, pairs of input and output (n,), without their wild samples.

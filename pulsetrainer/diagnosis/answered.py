@@ -18,7 +18,7 @@ from pulsetrainer.artefacts import (
     Recorded,
 )
 from pulsetrainer.artefacts.units import unit_of, with_unit
-from pulsetrainer.core.identification import coverage
+from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
