@@ -301,7 +301,7 @@ class Device:
                 return False
             samples = more()
             if samples is None:
-                feed.end()
+                feed.ended = True
             else:
                 feed.append(to_wire(samples, limit_A=self.info.current_limit_A))
             return True

@@ -23,39 +23,25 @@ class Feed:
         self._lock = threading.Lock()
         self._held = bytearray()
         self._first = 0  # number of the first sample that is held
-        self._size = 0
-        self._ended = False
+        self.size = 0  # samples put in so far
+        self.ended = False  # no more will come
         self.total = codes.WAVE_OPEN  # as the device is told
         self.crc32 = 0  # of all of them, where all are known beforehand
         if samples is not None:
             self.append(samples)
-            self._ended = True
-            self.total, self.crc32 = self._size, zlib.crc32(self._held)
+            self.ended = True
+            self.total, self.crc32 = self.size, zlib.crc32(self._held)
 
     @property
     def is_open(self) -> bool:
         """Whether the device is not told beforehand how many samples come."""
         return self.total == codes.WAVE_OPEN
 
-    @property
-    def size(self) -> int:
-        """Samples put in so far."""
-        return self._size
-
-    @property
-    def ended(self) -> bool:
-        """Whether no more will come."""
-        return self._ended
-
     def append(self, samples: NDArray[np.int16]) -> None:
         """Put samples in behind the others."""
         with self._lock:
             self._held += samples.astype("<i2").tobytes()
-            self._size += samples.size
-
-    def end(self) -> None:
-        """Say that no more will come."""
-        self._ended = True
+            self.size += samples.size
 
     def piece(self, at: int, most: int) -> bytes:
         """Return up to ``most`` samples from number ``at`` on; those before it are not asked for again."""

@@ -86,7 +86,7 @@ class Player:
         self._ack = m.Ack(0, codes.State.IDLE, 0, 0, 0, 0)
         self._play_session: int | None = None  # known once the reference has arrived
         self._tick = 0  # latest known tick of the device
-        self._recorded_tick = -1  # of the last sample received
+        self.last_tick = -1  # of the last sample received; -1 before the first
         self._tick_at_send = 0
         self._last_block = False
         # A plain list: appending is atomic, and a Ctrl-C in the reader's thread can lose nothing of it.
@@ -105,11 +105,6 @@ class Player:
     def played(self) -> int:
         """Samples whose time has come, as far as is known."""
         return self._tick // self._ticks_per_sample
-
-    @property
-    def last_tick(self) -> int:
-        """Tick of the last sample received; -1 before the first."""
-        return self._recorded_tick
 
     def forget(self, start: int, stop: int) -> None:
         """Let go of the samples of these blocks: a long play must not fill the memory."""
@@ -138,11 +133,11 @@ class Player:
             return  # stale bytes of an earlier play, or of an older host's
         last_tick = block.first_tick + (block.count - 1) * self.decimation
         if block.count:
-            if block.first_tick <= self._recorded_tick or block.first_tick % self.decimation:
+            if block.first_tick <= self.last_tick or block.first_tick % self.decimation:
                 return  # a wire that repeats itself
             if last_tick > (self._feed.size - 1) * self._ticks_per_sample:
                 return  # no such sample was asked for: damage that happens to fit the checksum
-            self._recorded_tick = last_tick
+            self.last_tick = last_tick
             self._tick = max(self._tick, last_tick)
         self._last_block = self._last_block or bool(block.flags & codes.FLAG_LAST)
         self.received.append(block)
