@@ -10,11 +10,12 @@ import numpy as np
 
 from pulsetrainer.artefacts import Model
 from pulsetrainer.core import beside_hysteresis, excitations
+from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.temperature import COPPER_PER_K
 from pulsetrainer.diagnosis.causes.base import low_pass
-from pulsetrainer.diagnosis.prediction import predict
+from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.heat import check_same_device, rest_force, thermal_of, thermometer
 from pulsetrainer.steps.progress import Progress, silent
@@ -61,6 +62,11 @@ class Estimate:
 
     value: float
     interval: tuple[float, float]
+
+    @classmethod
+    def of(cls, value: float, error: float) -> Estimate:
+        """Return a value with this standard deviation."""
+        return cls(value, (value - _QUANTILE * error, value + _QUANTILE * error))
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,19 +124,20 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
             hint="identify a run that was captured on the device",
         )
     check_same_device(model, device)
-    low, high = float(model.edges[0]), float(model.edges[-1])
+    operator = operator_of(model)  # the edges of a dual model are forces
+    low, high = operator.low, operator.high
     condition(device, high, RATE_HZ)
     progress(0.2)
     reference = signal(max(low, 0.0), high)
     trace = device.play(reference, RATE_HZ)
     raise_if_stopped(trace.fault, trace.remedy, "the check")
     progress(0.9)
-    current, force = _on_grid(trace.tick, (trace.current_A, trace.force_N), reference.size)
+    at = 10 * np.arange(reference.size)  # in ticks; lost samples lie between their neighbours
+    current, force = (np.interp(at, trace.tick, told) for told in (trace.current_A, trace.force_N))
     predicted = predict(model, current, 1.0 / RATE_HZ)
     rest = rest_force(model)
     span = float(np.ptp(predicted))
-    found, intervals, left = _fitted(predicted - rest, _beside(model, current, predicted), force - rest)
-    offset, gain = (Estimate(float(v), i) for v, i in zip(found, intervals, strict=True))
+    offset, gain, left = _fitted(predicted - rest, _beside(model, current, predicted), force - rest)
     shape = _shape(left, span)
     temperature, unknown = _temperature(model, device, trace)
     reasons = _reasons(model, offset, gain, shape, temperature)
@@ -180,16 +187,17 @@ def updated(model: Model, checked: Checked) -> Model:
     if coil is not None and checked.temperature_K is not None:
         warmer = 1.0 + COPPER_PER_K * checked.temperature_K.value
         coil = replace(coil, duty_per_A=coil.duty_per_A * warmer, rise_per_A2=coil.rise_per_A2 / warmer)
-    scaled = {
-        name: None if values is None else gain * values
-        for name, values in (("weights_lower", model.weights_lower), ("weights_upper", model.weights_upper))
-    }
+
+    def scaled(weights: FloatArray | None) -> FloatArray | None:
+        return None if weights is None else gain * weights
+
     return replace(
         model,
         weights=gain * model.weights,
+        weights_lower=scaled(model.weights_lower),
+        weights_upper=scaled(model.weights_upper),
         offset=rest + checked.offset.value + gain * (model.offset - rest),
         coil=coil,
-        **scaled,  # type: ignore[arg-type]
     )
 
 
@@ -215,12 +223,6 @@ def hindrance(model: Model) -> str:
     return f"the causes {', '.join(hindered)}" if hindered else f"the form {model.form}"
 
 
-def _on_grid(tick: np.ndarray, columns: tuple[FloatArray, ...], samples: int) -> list[FloatArray]:
-    """Lay measured columns on the samples of the reference; lost ones lie between their neighbours."""
-    at = 10 * np.arange(samples)
-    return [np.interp(at, tick, values) for values in columns]
-
-
 def _beside(model: Model, current: FloatArray, predicted: FloatArray) -> FloatArray:
     """What a lag and creeps add to a prediction (n,), each for its unit, (n, k).
 
@@ -230,7 +232,11 @@ def _beside(model: Model, current: FloatArray, predicted: FloatArray) -> FloatAr
     if fit is None or fit.time_s is None:
         return np.empty((current.size, 0))
     # a coarse model could take no more for hysteresis than its own levels hold
-    plane = thinned(Plane(model.edges), beside_hysteresis.LEVELS)
+    operator, levels = operator_of(model), beside_hysteresis.LEVELS
+    if isinstance(operator, Dual):
+        plane = Plane.uniform(operator.low, operator.high, levels)
+    else:
+        plane = thinned(operator.plane, levels)
     dt_s = float(np.median(np.diff(fit.time_s)))
     then, now = _effects(predict(model, fit.input, dt_s), dt_s), _effects(predicted, 1.0 / RATE_HZ)
     return beside_hysteresis.missed(plane, fit.input, then, current, now)
@@ -244,7 +250,7 @@ def _effects(predicted: FloatArray, dt_s: float) -> FloatArray:
 
 def _fitted(
     model_N: FloatArray, beside_N: FloatArray, force_N: FloatArray
-) -> tuple[FloatArray, list[tuple[float, float]], FloatArray]:
+) -> tuple[Estimate, Estimate, FloatArray]:
     """Offset and gain by least squares, their intervals by leaving out blocks, and what is left (n,).
 
     What is ``beside_N`` (n, k) is fitted as well and taken out of what is left.
@@ -257,11 +263,8 @@ def _fitted(
     found = np.linalg.solve(whole[0], whole[1])
     without = np.stack([np.linalg.solve(whole[0] - n, whole[1] - r) for n, r in normal])
     spread = np.sqrt((_BLOCKS - 1) / _BLOCKS * np.sum((without - without.mean(axis=0)) ** 2, axis=0))
-    intervals = [
-        (float(v - _QUANTILE * s), float(v + _QUANTILE * s))
-        for v, s in zip(found[:2], spread[:2], strict=True)
-    ]
-    return np.asarray(found[:2]), intervals, np.asarray(force_N - design @ found)
+    offset, gain = (Estimate.of(float(found[k]), float(spread[k])) for k in range(2))
+    return offset, gain, np.asarray(force_N - design @ found)
 
 
 def _shape(left: FloatArray, span: float) -> Estimate:
@@ -296,7 +299,7 @@ def _temperature(model: Model, device: Device, trace: Trace) -> tuple[Estimate |
     if len(told) < 3:
         return None, "too few seconds of the check tell it"
     mean, error = float(np.mean(told)), float(np.std(told, ddof=1)) / np.sqrt(len(told))
-    return Estimate(mean, (mean - _QUANTILE * error, mean + _QUANTILE * error)), ""
+    return Estimate.of(mean, error), ""
 
 
 def _shape_of_fit(model: Model) -> float:

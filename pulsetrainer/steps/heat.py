@@ -32,7 +32,7 @@ def thermal_of(model: Model) -> Thermal | None:
     for extension in model.extensions:
         if extension.cause == "thermal-drift":
             value = {parameter.name: parameter.value for parameter in extension.parameters}
-            return Thermal(value["coefficient"], value["tau"], float(model.edges[0]))
+            return Thermal(value["coefficient"], value["tau"], operator_of(model).low)
     return None
 
 
@@ -124,9 +124,9 @@ class Correction:
         if abs(loss - self._kept[0]) > _NEW:
             if self._cold is None:
                 self._cold = self._made(0.0)
-            low, high = float(self._model.edges[0]), float(self._model.edges[-1])
             changed = self._drive.compensated + self._made(loss) - self._cold
-            self._kept = (loss, np.clip(changed, low, high))
+            whole = self._part.whole
+            self._kept = (loss, np.clip(changed, whole.low, whole.high))
         return self._kept[1]
 
     def _made(self, loss: float) -> FloatArray:
@@ -145,5 +145,4 @@ class Correction:
 
 def rest_force(model: Model) -> float:
     """Force of a model at the low end of its current, which no heat changes, N."""
-    static = extended_of(model).static if model.extensions else operator_of(model)
-    return float(static(np.asarray([float(model.edges[0])]))[0])
+    return operator_of(model).saturation[0]

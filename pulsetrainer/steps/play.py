@@ -163,7 +163,7 @@ class _Tracked:
         thermometer = thermometer_of(model, device, asked=asked)
         if thermometer is None or model is None:
             return None
-        take_temperature(device, thermometer, float(model.edges[-1]))
+        take_temperature(device, thermometer, operator_of(model).high)
         return cls(drive, model, thermometer)
 
     def current(self) -> FloatArray:

@@ -9,8 +9,10 @@ import pytest
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts.model import Extension, Parameter
+from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError
-from pulsetrainer.steps.check import check_updatable, updated
+from pulsetrainer.steps.check import RATE_HZ, check_updatable, signal, updated
+from pulsetrainer.steps.heat import rest_force
 from wording import raises
 
 # What a diagnosis of the as-built bench finds.
@@ -85,6 +87,25 @@ def test_a_coarse_and_fast_calibration_stays_true():
         with pt.open_device(port) as device:
             verdicts.append(pt.check(coarse, device).verdict)
     assert verdicts == ["true", "changed"]
+
+
+def test_a_dual_model_is_checked_over_its_current():
+    """The levels of the dual form are forces, which no device plays."""
+    with pt.open_device("bench:?ideal") as device:
+        run = pt.capture("identification", device, levels=6, speed_A_per_s=4.0)
+        dual = pt.identify(run, levels=12, form="dual")
+        found = pt.check(dual, device)
+    operator = operator_of(dual)
+    assert found.seconds == signal(max(operator.low, 0.0), operator.high).size / RATE_HZ
+
+
+@pytest.mark.parametrize("polarity", [1, -1])
+@pytest.mark.parametrize("extensions", [(), (THERMAL,)])
+def test_the_force_at_rest_is_what_the_model_predicts(model, polarity, extensions):
+    """With causes and without, rising and falling."""
+    whole = replace(model, polarity=polarity, extensions=extensions)
+    resting = np.full(3, operator_of(whole).low)
+    assert rest_force(whole) == pytest.approx(predict(whole, resting, 1.0 / RATE_HZ)[0])
 
 
 def test_what_an_offset_and_a_gain_do_not_mend_is_refused(model):
