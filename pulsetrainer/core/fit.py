@@ -51,13 +51,20 @@ class Fitted:
         """Measured less fitted output (n,) of each record."""
         return [r.output - y for r, y in zip(self.records, self.predicted, strict=True)]
 
+    def counted(self, values: Sequence[FloatArray]) -> list[FloatArray]:
+        """Those of the values (n,) of each record whose samples count in the fit."""
+        return [x[r.sample_weight > 0] for x, r in zip(values, self.records, strict=True)]
+
+    @property
+    def counted_output(self) -> FloatArray:
+        """Measured outputs (k,) of all records that count in the fit."""
+        return np.concatenate(self.counted([r.output for r in self.records]))
+
     @property
     def misfit(self) -> float:
         """Rms error of the fit as a share of the output's span."""
-        counted = [r.sample_weight > 0 for r in self.records]
-        left = np.concatenate([e[c] for e, c in zip(self.residuals, counted, strict=True)])
-        output = np.concatenate([r.output[c] for r, c in zip(self.records, counted, strict=True)])
-        return root_mean_square(left) / float(np.ptp(output))
+        left = np.concatenate(self.counted(self.residuals))
+        return root_mean_square(left) / float(np.ptp(self.counted_output))
 
     @property
     def evenly_spaced(self) -> bool:

@@ -23,10 +23,9 @@ from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES
 from pulsetrainer.steps.one_thread import one_thread
 
-TRACE_SAMPLES = 6000  # of a prediction, kept for the figures
-SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
 BEYOND = 0.005  # of the model's range: an input further out than this was never identified
 
 

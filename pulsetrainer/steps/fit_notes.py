@@ -11,7 +11,6 @@ from pulsetrainer.core.fit import Fitted
 from pulsetrainer.core.forms import leaves_more_than_noise
 from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -46,7 +45,7 @@ def of_wild(masks: Sequence[BoolArray]) -> list[str]:
 
 def of_rest(fitted: Fitted) -> list[str]:
     """Say that a fit leaves many times the noise, and enough to matter; nothing where it does not."""
-    residuals, output = _with_weight(fitted)
+    residuals, output = fitted.counted(fitted.residuals), fitted.counted_output
     left, noise = root_mean_square(np.concatenate(residuals)), max(white(one) for one in residuals)
     share = left / float(np.ptp(output))
     if share <= MUCH or left <= MANY * noise:
@@ -56,16 +55,9 @@ def of_rest(fitted: Fitted) -> list[str]:
     return [f"{found}: pulsetrainer diagnose tells what it misses"]
 
 
-def _with_weight(fitted: Fitted) -> tuple[list[FloatArray], FloatArray]:
-    """Residuals of each record (k,), and all outputs (n,), of the samples with weight."""
-    counted = [r.sample_weight > 0 for r in fitted.records]
-    residuals = [e[c] for e, c in zip(fitted.residuals, counted, strict=True)]
-    return residuals, np.concatenate([r.output[c] for r, c in zip(fitted.records, counted, strict=True)])
-
-
 def warning(fitted: Fitted, runs: Sequence[Run], asked: str) -> str:
     """Say that no form describes the record, and why where that is plain; nothing where one does."""
-    residuals, output = _with_weight(fitted)
+    residuals, output = fitted.counted(fitted.residuals), fitted.counted_output
     left = root_mean_square(np.concatenate(residuals))
     span = float(np.ptp(output))
     if left <= POOR * span:

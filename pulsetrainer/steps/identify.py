@@ -314,10 +314,8 @@ def _model(
     """Return the model with its fit, of which some fields are ``said``."""
     found, first, record = fitted.identified, runs[0], fitted.records[0]
     inner, operator = found.operator, fitted.operator
-    counted = [r.sample_weight > 0 for r in fitted.records]
-    measured = np.concatenate([r.output[c] for r, c in zip(fitted.records, counted, strict=True)])
-    predicted = np.concatenate([y[c] for y, c in zip(fitted.predicted, counted, strict=True)])
-    errors = metrics.prediction(measured, predicted)
+    measured = fitted.counted_output
+    errors = metrics.prediction(measured, np.concatenate(fitted.counted(fitted.predicted)))
     thinned = slice(
         known_from(first.input, operator.low, operator.high, first.output),
         None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -63,18 +64,15 @@ def invertible(model: Model, rate_Hz: float) -> Invertible:
         rate_Hz=rate_Hz,
         rest_s=REST_S,
     )
-    low, high = sorted(whole.saturation)
+    inverse: Callable[[FloatArray], inversion.Inverse]
     if isinstance(whole, Dual):
-        return Invertible(
-            whole, whole.low, whole.high, (low, high), whole.polarity, loop, np.zeros(0),
-            lambda wanted: whole.inverse(wanted, loop),
-        )  # fmt: skip
-    if not whole.signed:
-        return Invertible(
-            whole, whole.low, whole.high, (low, high), whole.polarity, loop, np.zeros(0),
-            lambda wanted: inversion.invert(whole, wanted),
-        )  # fmt: skip
-    return _within(whole, model, loop, rate_Hz)
+        inverse = partial(whole.inverse, lead=loop)
+    elif whole.signed:
+        return _within(whole, model, loop, rate_Hz)
+    else:
+        inverse = partial(inversion.invert, whole)
+    low, high = sorted(whole.saturation)
+    return Invertible(whole, whole.low, whole.high, (low, high), whole.polarity, loop, np.zeros(0), inverse)
 
 
 def _within(whole: Preisach, model: Model, loop: FloatArray, rate_Hz: float) -> Invertible:
@@ -91,7 +89,5 @@ def _within(whole: Preisach, model: Model, loop: FloatArray, rate_Hz: float) -> 
         excitations.through((found.low, whole.low), speed, rate_Hz) if found.low > whole.low else np.zeros(0)
     )
     low, high = sorted(held.saturation)
-    return Invertible(
-        whole, found.low, found.high, (low, high), held.polarity, np.concatenate((loop, way)), back,
-        lambda wanted: inversion.invert(held, wanted, monotone=True),
-    )  # fmt: skip
+    lead, inverse = np.concatenate((loop, way)), partial(inversion.invert, held, monotone=True)
+    return Invertible(whole, found.low, found.high, (low, high), held.polarity, lead, back, inverse)

@@ -141,7 +141,6 @@ class Performance:
         self._parts = self._dropped = self._underruns = 0
         self._fault = self._remedy = self._implausible = ""
         self._last: Given | None = None
-        self.measured_s = 0.0
 
     def run(self, lead_s: float) -> Performed:
         """Press part after part until the end is decided, or the device or the user stops it."""
@@ -196,11 +195,11 @@ class Performance:
         self._dropped += int(sample[-1]) + 1 - self._next - sample.size
         self._next = int(sample[-1]) + 1
         target, done, measured = self._ledger.measure(sample, block.force_N)
-        self.measured_s = float(sample[-1]) / RATE_HZ
+        measured_s = float(sample[-1]) / RATE_HZ
         meter = self._thermometer
         if meter is not None and meter.add(sample / RATE_HZ, block.reference_A, block.current_A, block.duty):
             self._loss += _FOLLOW * (meter.extra - self._loss)
-            self._warmth.append((self.measured_s + self._gap_s, meter.temperature_K))
+            self._warmth.append((measured_s + self._gap_s, meter.temperature_K))
         self._sink.append(
             sample / RATE_HZ + self._gap_s, target, block.reference_A, block.current_A, block.force_N
         )
@@ -214,7 +213,7 @@ class Performance:
         last = self._last.beat if self._last else None
         self._watch(
             Now(
-                self.measured_s,
+                measured_s,
                 target,
                 block.current_A,
                 block.force_N,

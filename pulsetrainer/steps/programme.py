@@ -90,17 +90,17 @@ class Programme:
         """Every rate that is asked for."""
         return (self._start.bpm, *(change.rate for change, _ in self._changes if change.rate is not None))
 
-    def share(self, number: int, time_s: float) -> float:
+    def _share(self, number: int, time_s: float) -> float:
         """How much of it is over."""
         return number / self._beats if self._beats else time_s / (self._seconds or np.inf)
 
     def share_at(self, time_s: float) -> float:
         """How much of it is over at a time; 0 where beats are counted."""
-        return 0.0 if self._beats else self.share(0, time_s)
+        return self._share(0, time_s)
 
     def __call__(self, number: int, time_s: float) -> Decision:
         """Return what is played next."""
-        share = self.share(number, time_s)
+        share = self._share(number, time_s)
         if share >= 1.0:
             return None
         play = replace(self._start, pulse=int(share * len(self._names)))

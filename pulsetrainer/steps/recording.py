@@ -223,11 +223,7 @@ def record(
         _LOG.info("playing samples %d to %d of %d at %g Hz", part.start, part.end, course.size, rate_Hz)
         before = sink.samples
         played = device.play(
-            part.reference(course),
-            rate_Hz,
-            decimation=decimation,
-            on_block=keep,
-            keep=False,
+            part.reference(course), rate_Hz, decimation=decimation, on_block=keep, keep=False
         )
         tally.end_part()
         parts += 1

@@ -90,10 +90,10 @@ def refine(
     >>> refined.passes[1].mean_abs_error_percent < refined.passes[0].mean_abs_error_percent
     True
     """
-    check(drive, passes)
-    part = invertible(_model(drive), drive.rate_Hz)
+    model = check(drive, passes)
+    part = invertible(model, drive.rate_Hz)
     middle = slice(part.lead.size, drive.time_s.size - part.tail.size)
-    limit = slew_limit(slew, _model(drive))
+    limit = slew_limit(slew, model)
     start = part.whole(drive.compensated)
     smooth = learning.LowPass(learning.BAND_HZ, 1.0 / drive.rate_Hz)
     in_beats = beats(drive)[middle]
@@ -139,8 +139,8 @@ def refine(
     )
 
 
-def check(drive: Waveform, passes: int) -> None:
-    """Refuse what cannot be refined, before any device is opened.
+def check(drive: Waveform, passes: int) -> Model:
+    """Return the model of a drive; refuse what cannot be refined, before any device is opened.
 
     Raises
     ------
@@ -150,19 +150,15 @@ def check(drive: Waveform, passes: int) -> None:
     if passes < 1:
         raise ArgumentError(f"passes must be at least 1, got {passes}", hint="5 is usual")
     check_current(drive)
-    model = _model(drive)
-    if model.reading == "relay":
-        raise DataError(
-            f"the weights of the model of {drive.name} are read as relays, which have no continuous inverse",
-            hint="identify with `reading` continuous, invert again and refine that drive",
-        )
-
-
-def _model(drive: Waveform) -> Model:
     if drive.model is None:
         raise DataError(
             f"the drive {drive.name} does not say what model it was made with",
             hint="make it again: pulsetrainer invert normal --model model.h5 -o drive.h5",
+        )
+    if drive.model.reading == "relay":
+        raise DataError(
+            f"the weights of the model of {drive.name} are read as relays, which have no continuous inverse",
+            hint="identify with `reading` continuous, invert again and refine that drive",
         )
     return drive.model
 

@@ -208,7 +208,7 @@ def session(
 
     def watch(now: Now) -> None:
         if isinstance(chosen, Programme):
-            progress(chosen.share(0, now.time_s))
+            progress(chosen.share_at(now.time_s))
 
     done = perform(
         model,

@@ -82,14 +82,15 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
         )
         faded = smooth(beats(drive).astype(np.float64))  # a step would put a kink into the current
         added = faded * np.interp(np.arange(drive.time_s.size), new_at, (high - low) * expected)
-    current, clipped = _current(drive, part, drive.target + added, slew)
+    found = part.inverse((drive.target + added)[part.lead.size : drive.time_s.size - part.tail.size])
+    current = whole_current(drive, part, found.input, slew_limit(slew, model))
     told = 100.0 * metrics.root_mean_square(added[drive.scored]) / drive.full_force
     return replace(
         drive,
         compensated=current,
         predicted=predict(model, current, 1.0 / drive.rate_Hz) - added,
         inversion="transferred",
-        clipped_samples=clipped,
+        clipped_samples=found.clipped,
         notes=(*drive.notes, f"what was learnt on {refined.name} adds {told:.2g} % of full force (rms)"),
     )
 
@@ -102,16 +103,13 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
     DataError
         As ``transfer``.
     """
-    for one in (drive, refined):
-        check(one, passes=1)
-    assert drive.model is not None
-    assert refined.model is not None
+    model, of_refined = check(drive, passes=1), check(refined, passes=1)
     if not refined.passes:
         raise DataError(
             f"the drive {refined.name} was not refined, so there is nothing to learn from",
             hint="refine it first: pulsetrainer refine drive.h5 -o refined.h5",
         )
-    if drive.model.fingerprint != refined.model.fingerprint or abs(drive.rate_Hz - refined.rate_Hz) > 1e-6:
+    if model.fingerprint != of_refined.fingerprint or abs(drive.rate_Hz - refined.rate_Hz) > 1e-6:
         raise DataError(
             f"{refined.name} was refined with another model or rate than {drive.name} is made with",
             hint="invert with the model of the refined drive",
@@ -121,7 +119,7 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
             f"{drive.name} is made by {drive.inversion} inversion; only continuous takes what was learnt",
             hint="refine this drive itself",
         )
-    return drive.model
+    return model
 
 
 def _check_general(refined: Waveform, drive: Waveform, told: float, uncertain: float) -> None:
@@ -157,13 +155,3 @@ def _path(
     low, high = part.reach
     rate = smooth(np.gradient(output / (high - low), 1.0 / drive.rate_Hz))
     return Path.of((part.low, part.high), drive.compensated, rate, at)
-
-
-def _current(
-    drive: Waveform, part: Invertible, asked: FloatArray, slew: float | None
-) -> tuple[FloatArray, int]:
-    """Current (n,) that the model needs for what is asked, and how many samples were out of reach."""
-    assert drive.model is not None
-    middle = slice(part.lead.size, drive.time_s.size - part.tail.size)
-    found = part.inverse(asked[middle])
-    return whole_current(drive, part, found.input, slew_limit(slew, drive.model)), found.clipped

@@ -11,7 +11,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Waveform
 from pulsetrainer.core import coil as electrical
-from pulsetrainer.core.coil import Coil, LoopGains, Margins
+from pulsetrainer.core.coil import Coil, Margins
 from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.device.gains import Gains
@@ -136,7 +136,10 @@ class _Tuning:
         ohm, henry, volts = self._scaled(coil)
         references = self._references()
         self._check_drivable(coil, references[1:], ohm, volts)
-        gains = to_wire(self._rule(coil), self._dt_s)
+        rule = electrical.tuned_gains(
+            coil, self._dt_s, top_A=self._range_A, most_proportional=MOST_PROPORTIONAL
+        )
+        gains = to_wire(rule, self._dt_s)
         was = electrical.margins(coil, from_wire(before, self._dt_s), self._dt_s)
         now = electrical.margins(coil, from_wire(gains, self._dt_s), self._dt_s)
         error_before = self._before(before, was, references)
@@ -165,13 +168,6 @@ class _Tuning:
         if self._supply_V is None:
             return coil.resistance_ohm, coil.inductance_H, coil.supply_V
         return (*coil.scaled_to(self._supply_V), self._supply_V)
-
-    # --- the rule --------------------------------------------------------------------------------
-
-    def _rule(self, coil: Coil) -> LoopGains:
-        return electrical.tuned_gains(
-            coil, self._dt_s, top_A=self._range_A, most_proportional=MOST_PROPORTIONAL
-        )
 
     def _check_drivable(self, coil: Coil, references: Sequence[FloatArray], ohm: float, volts: float) -> None:
         """Refuse a coil that no gains can make follow the pulses: R i + L di/dt is beyond what drives it."""
