@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from operator import add, sub
-from typing import Any, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 import scipy  # its parts load when they are first used
@@ -21,23 +21,40 @@ from pulsetrainer.core.operator import base_rows, follow, steps
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading
 from pulsetrainer.core.record import Record
 
+_Matrix = TypeVar("_Matrix")
 _CHUNK = 200_000  # samples whose sparse rows are held at one time
 
 
 @dataclass(frozen=True, slots=True)
-class NormalEquations:
-    """Sums over all samples in the coordinates of the cells' masses; relays are -1 or +1.
-
-    v is the sample weight.
-    """
+class _Sums(Generic[_Matrix]):
+    """Sums over samples of rows r and outputs y; v is the sample weight."""
 
     plane: Plane
-    gram: FloatArray  # (n_q, n_q) sum v r r'
+    gram: _Matrix  # (n_q, n_q) sum v r r'
     moment: FloatArray  # (n_q,) sum v r y
     row_sum: FloatArray  # (n_q,) sum v r
     weight_sum: float  # sum v
     output_sum: float  # sum v y
     output_square: float  # sum v y^2
+
+    def __add__(self, other: Self) -> Self:
+        """Sums over both sets of samples."""
+        return self._with(other, add)
+
+    def __sub__(self, part: Self) -> Self:
+        """Sums over the samples that are not in ``part``."""
+        return self._with(part, sub)
+
+    def _with(self, other: Self, how: Callable[[Any, Any], Any]) -> Self:
+        names = [field.name for field in fields(self) if field.name != "plane"]
+        sums: dict[str, Any] = {name: how(getattr(self, name), getattr(other, name)) for name in names}
+        return replace(self, **sums)
+
+
+class NormalEquations(_Sums[FloatArray]):
+    """Sums over all samples in the coordinates of the cells' masses; relays are -1 or +1."""
+
+    __slots__ = ()
 
     def centred(self) -> tuple[FloatArray, FloatArray]:
         """Gram matrix and right side with the offset eliminated: rows and outputs minus their means."""
@@ -62,40 +79,20 @@ class NormalEquations:
         """Rms error sqrt(sum v (y - y0 - r . m)^2 / sum v) of masses (n_q,) and an offset, output unit."""
         return float(np.sqrt(max(self.sum_of_squares(masses, offset), 0.0) / self.weight_sum))
 
-    def __add__(self, part: NormalEquations) -> NormalEquations:
-        """Sums over both sets of samples."""
-        return _combined(self, part, add)
 
-    def __sub__(self, part: NormalEquations) -> NormalEquations:
-        """Sums over the samples that are not in ``part``."""
-        return _combined(self, part, sub)
-
-
-@dataclass(frozen=True, slots=True)
-class NodeSums:
+class NodeSums(_Sums["scipy.sparse.csr_array"]):
     """Sums over samples in the coordinates of the Everett nodes.
 
-    v is the sample weight. Here a row rises from 0, all relays down, to 2 E(high, low), all up; the constant
-    -W is left out.
+    Here a row rises from 0, all relays down, to 2 E(high, low), all up; the constant -W is left out.
     """
 
-    plane: Plane
-    gram: scipy.sparse.csr_array  # (n_q, n_q) sum v r r'
-    moment: FloatArray  # (n_q,) sum v r y
-    row_sum: FloatArray  # (n_q,) sum v r
-    weight_sum: float  # sum v
-    output_sum: float  # sum v y
-    output_square: float  # sum v y^2
+    __slots__ = ()
 
     @classmethod
     def nothing(cls, plane: Plane) -> NodeSums:
         """Sums over no samples."""
         zero = np.zeros(plane.n_q)
         return cls(plane, scipy.sparse.csr_array((plane.n_q, plane.n_q)), zero, zero, 0.0, 0.0, 0.0)
-
-    def __add__(self, other: NodeSums) -> NodeSums:
-        """Sums over both sets of samples."""
-        return _combined(self, other, add)
 
     def dense(self) -> NormalEquations:
         """Carry the sums to the cells: two cumulative sums on each side."""
@@ -113,16 +110,6 @@ class NodeSums:
             self.output_sum,
             self.output_square,
         )
-
-
-_Sums = TypeVar("_Sums", NormalEquations, NodeSums)
-
-
-def _combined(one: _Sums, other: _Sums, how: Callable[[Any, Any], Any]) -> _Sums:
-    """Put the sums over two sets of samples on one plane together, each by itself."""
-    names = [field.name for field in fields(one) if field.name != "plane"]
-    sums: dict[str, Any] = {name: how(getattr(one, name), getattr(other, name)) for name in names}
-    return replace(one, **sums)
 
 
 def _part_sums(

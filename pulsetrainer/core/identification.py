@@ -23,7 +23,7 @@ from pulsetrainer.core.equations import NormalEquations, node_sums, normal_equat
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.core.record import Record, levelled
-from pulsetrainer.core.smoothing import LEAST_SIGNED, choose, smoothed
+from pulsetrainer.core.smoothing import LEAST_SIGNED, Choice, choose, smoothed
 from pulsetrainer.core.stiffness import choose_stiffness, stiffness_penalty
 from pulsetrainer.errors import ArgumentError, ConvergenceError
 
@@ -141,23 +141,20 @@ def identify(
         return _signed(records, plane, reading, method, smoothing, samples)
     sign = polarity_of(records, plane, reading) if polarity is None else polarity
     turned, zero = levelled(records, sign)
-    tried: tuple[tuple[float, float], ...] = ()
-    if smoothing == "auto":
-        choice = choose(turned, plane, reading)
-        smoothing, tried = choice.smoothing, choice.tried
-    stiffness = 0.0
+    choice = choose(turned, plane, reading) if smoothing == "auto" else Choice(smoothing, ())
+    length, stiffness = choice.smoothing, 0.0
     if not fits_dense(plane):
-        masses, offset, iterations, kkt = _fit_large(turned, plane, reading, method, smoothing)
+        masses, offset, iterations, kkt = _fit_large(turned, plane, reading, method, length)
     else:
         equations = normal_equations(plane, turned, reading)
-        masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, 0.0)
-        if tried and equations.rms(masses, offset) > _POOR * _span(turned):
+        masses, offset, iterations, kkt = _fit_dense(equations, method, length, 0.0)
+        if choice.tried and equations.rms(masses, offset) > _POOR * _span(turned):
             stiffness = choose_stiffness(turned, plane, reading)
         if stiffness:
-            smoothing = 0.0  # a density that is alike along the diagonal needs no other smoothing
-            masses, offset, iterations, kkt = _fit_dense(equations, method, smoothing, stiffness)
+            length = 0.0  # a density that is alike along the diagonal needs no other smoothing
+            masses, offset, iterations, kkt = _fit_dense(equations, method, length, stiffness)
     operator = Preisach(plane, masses / plane.areas, sign * (offset + zero), reading, polarity=sign)
-    return Identified(operator, method, iterations, kkt, smoothing, tried, stiffness, samples)
+    return Identified(operator, method, iterations, kkt, length, choice.tried, stiffness, samples)
 
 
 def _signed(
@@ -176,16 +173,13 @@ def _signed(
             hint="leave method and reading out, and use fewer levels",
         )
     upright, zero = levelled(records)
-    tried: tuple[tuple[float, float], ...] = ()
-    if smoothing == "auto":
-        choice = choose(upright, plane, reading, signed=True)
-        smoothing, tried = choice.smoothing, choice.tried
-    length = max(float(smoothing), LEAST_SIGNED)
+    choice = choose(upright, plane, reading, signed=True) if smoothing == "auto" else Choice(smoothing, ())
+    length = max(float(choice.smoothing), LEAST_SIGNED)
     equations = normal_equations(plane, upright, reading)
     masses = nnls.solve_signed(*smoothed(equations, length))
     offset = equations.offset(masses) + zero
     operator = Preisach(plane, masses / plane.areas, offset, reading, signed=True)
-    return Identified(operator, method, 1, 0.0, length, tried, 0.0, samples)
+    return Identified(operator, method, 1, 0.0, length, choice.tried, 0.0, samples)
 
 
 def _most_dense() -> int:
