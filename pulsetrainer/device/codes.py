@@ -12,9 +12,8 @@ from typing import Self
 MAGIC = 0x52545031  # "1PTR" on the wire: tells our firmware from whatever else sits behind a port
 PROTOCOL_MAJOR = 2
 PROTOCOL_MINOR = 2
-FIRMWARE_MAJOR = (
-    0  # of the firmware that comes with this program; below 1.0.0 each minor version is another one
-)
+# Of the firmware that comes with this program; below 1.0.0 each minor version is another one.
+FIRMWARE_MAJOR = 0
 FIRMWARE_MINOR = 2
 FIRMWARE_PATCH = 2
 

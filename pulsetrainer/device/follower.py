@@ -50,7 +50,7 @@ class Follower:
                 player.taken_at_s = self._monotonic()
                 if any(b.count for b in fresh):
                     block = Block.from_wire(fresh, player.decimation)
-                    watch.add(block.time_s(self._tick_rate_Hz), block.current_A, block.force_N)
+                    watch.add(block.tick / self._tick_rate_Hz, block.current_A, block.force_N)
                     if watch.fault:
                         player.stop(watch.fault, FORCE_REMEDY)
                     if on_block is not None:

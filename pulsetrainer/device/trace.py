@@ -46,23 +46,14 @@ class Block:
             duty=items[:, 3] / DUTY_FULL if told else np.full(len(items), np.nan),
         )
 
-    def time_s(self, tick_rate_Hz: float) -> FloatArray:
-        """Time since the first sample of the reference, s."""
-        return self.tick / tick_rate_Hz
-
 
 @dataclass(frozen=True, slots=True)
-class Trace:
+class Trace(Block):
     """All that a play brought back; lost samples are counted, never filled.
 
     The arrays are empty where the play was asked not to keep what it handed over.
     """
 
-    tick: Int64Array
-    reference_A: FloatArray
-    current_A: FloatArray
-    force_N: FloatArray
-    duty: FloatArray
     tick_rate_Hz: float
     dropped_samples: int
     complete: bool  # the reference was played to its end
