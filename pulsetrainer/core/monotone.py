@@ -19,12 +19,9 @@ from pulsetrainer.errors import ArgumentError
 class Range(NamedTuple):
     """An input range in which the operator can be inverted, and the operator held within it."""
 
-    low: float
-    high: float
     operator: Preisach  # on the range; it starts after ``lead``
-    lead: tuple[
-        float, float, float
-    ]  # inputs to go through first: low end of all, then ``high``, then ``low``
+    # inputs to go through first: the low end of all, then the high and the low end of the range
+    lead: tuple[float, float, float]
 
 
 def invertible_range(whole: Preisach, tolerance: float) -> Range:
@@ -63,12 +60,7 @@ def invertible_range(whole: Preisach, tolerance: float) -> Range:
     rest = float(whole(np.asarray(lead))[-1])
     raw = Preisach(plane, sign * whole.weights[inside], signed=True)
     offset = rest + sign * raw.total
-    return Range(
-        float(edges[0]),
-        float(edges[-1]),
-        Preisach(plane, raw.weights, offset, polarity=sign, signed=True),
-        lead,
-    )
+    return Range(Preisach(plane, raw.weights, offset, polarity=sign, signed=True), lead)
 
 
 def _turning_back(rises: FloatArray) -> FloatArray:

@@ -13,14 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pulsetrainer.core import excitations
 from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.steps.invert import RAMP_S
-from pulsetrainer.steps.invertible import CONDITIONING_TIME_S
-from pulsetrainer.steps.invertible import REST_S as LEAD_REST_S
+from pulsetrainer.steps.invertible import major_loop
 
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.extended import Extended
@@ -144,7 +142,7 @@ class Conductor:
     def part(self, longest_s: float) -> Iterator[FloatArray]:
         """Yield the currents (n,) in A of a part of at most ``longest_s``; it ends at rest."""
         until = self._samples + round((longest_s - MARGIN_S) * RATE_HZ)
-        yield self._played(major_loop(self._static.low, self._static.high))
+        yield self._played(major_loop(self._static.low, self._static.high, RATE_HZ))
         place: _Place | None = None  # None: at rest
         while True:
             decision = self._decide(self._number, place.start_s if place else self.time_s + RAMP_S)
@@ -264,12 +262,6 @@ class Conductor:
         then = _Place(place.number + 1, end_s, end, play.pulse, at)
         beat = Beat(place.start_s, end_s - place.start_s, first, since.size, play, at, strength)
         return force(since), beat, then
-
-
-def major_loop(low: float, high: float) -> FloatArray:
-    """Input (n,) that wipes out whatever came before and ends at its low end."""
-    speed = (high - low) / CONDITIONING_TIME_S
-    return excitations.conditioning(low, high, speed=speed, rate_Hz=RATE_HZ, rest_s=LEAD_REST_S)
 
 
 def _smooth(share: FloatArray) -> FloatArray:

@@ -46,9 +46,7 @@ class Report:
     false_reversals: int
     input_noise: float | None  # standard deviation, input unit; None where the record cannot tell
     coverage_percent: float  # cells of 48 levels over its own range, switched on and off
-    minor_percent: (
-        float  # of those within the range, told apart by minor loops: the rest by the major loop only
-    )
+    minor_percent: float  # of those within the range, told apart by minor loops, not the major one alone
     every: int  # the last six figures are those of every so many samples: 1 below a million
 
 

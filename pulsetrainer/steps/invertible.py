@@ -20,9 +20,8 @@ from pulsetrainer.errors import ArgumentError, DataError
 
 CONDITIONING_TIME_S = 0.5  # for each way of the major loop that comes first
 REST_S = 0.2
-_TURNS_BACK = (
-    2.0  # times the rms error of the fit: a branch of a signed model that turns back less is monotone
-)
+# Times the rms error of the fit: a branch of a signed model that turns back less is monotone.
+_TURNS_BACK = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,16 +53,16 @@ class Invertible:
         return f"; before and after the pulse the drive goes over all of {ends}, to wipe out what came before"
 
 
+def major_loop(low: float, high: float, rate_Hz: float) -> FloatArray:
+    """Input (n,) that wipes out whatever came before and ends at its low end."""
+    speed = (high - low) / CONDITIONING_TIME_S
+    return excitations.conditioning(low, high, speed=speed, rate_Hz=rate_Hz, rest_s=REST_S)
+
+
 def invertible(model: Model, rate_Hz: float) -> Invertible:
     """Return the part of a model that can be inverted; DataError where branches of a signed one never are."""
     whole = operator_of(model)
-    loop = excitations.conditioning(
-        whole.low,
-        whole.high,
-        speed=(whole.high - whole.low) / CONDITIONING_TIME_S,
-        rate_Hz=rate_Hz,
-        rest_s=REST_S,
-    )
+    loop = major_loop(whole.low, whole.high, rate_Hz)
     inverse: Callable[[FloatArray], inversion.Inverse]
     if isinstance(whole, Dual):
         inverse = partial(whole.inverse, lead=loop)
@@ -85,9 +84,7 @@ def _within(whole: Preisach, model: Model, loop: FloatArray, rate_Hz: float) -> 
     held = found.operator
     speed = (whole.high - whole.low) / CONDITIONING_TIME_S
     way = excitations.through(found.lead, speed, rate_Hz)
-    back = (
-        excitations.through((found.low, whole.low), speed, rate_Hz) if found.low > whole.low else np.zeros(0)
-    )
+    back = excitations.through((held.low, whole.low), speed, rate_Hz) if held.low > whole.low else np.zeros(0)
     low, high = sorted(held.saturation)
     lead, inverse = np.concatenate((loop, way)), partial(inversion.invert, held, monotone=True)
-    return Invertible(whole, found.low, found.high, (low, high), held.polarity, lead, back, inverse)
+    return Invertible(whole, held.low, held.high, (low, high), held.polarity, lead, back, inverse)

@@ -15,8 +15,9 @@ from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.device.device import Device
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
-from pulsetrainer.steps.conductor import RATE_HZ, Decide, Play, Reach, major_loop
+from pulsetrainer.steps.conductor import RATE_HZ, Decide, Play, Reach
 from pulsetrainer.steps.heat import rest_force, take_temperature, thermometer_of
+from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.performance import Now, Performance, Performed, Sink
 from pulsetrainer.steps.programme import Change, Programme
@@ -74,7 +75,7 @@ def reach_of(model: Model, pulses: Sequence[Pulse], rates: Sequence[float | None
     low, high = float(model.edges[0]), float(model.edges[-1])
     slow = [p.value for e in model.extensions for p in e.parameters if p.unit == "s"]
     seconds = min(_SETTLED * max(slow, default=0.0) + 4.0, _LONGEST_SETTLING_S)
-    lead = major_loop(low, high)
+    lead = major_loop(low, high, RATE_HZ)
     lows, highs = [], []
     for pulse in pulses:
         asked = {rate or pulse.own_bpm for rate in rates}

@@ -107,7 +107,7 @@ def test_a_signed_operator_is_inverted_where_it_is_monotone(operator, data):
     low, high = sorted(found.operator.saturation)
     target = low + (high - low) * data.draw(inputs_of_share())
     u = invert(found.operator, target, monotone=True).input
-    assert np.all((u >= found.low) & (u <= found.high))
+    assert np.all((u >= found.operator.low) & (u <= found.operator.high))
     lead = np.array(found.lead)
     y = operator(np.concatenate((lead, u)))[lead.size :]
     size = np.abs(operator.masses).sum() + abs(operator.offset)
