@@ -70,7 +70,7 @@ class Fitted:
     def evenly_spaced(self) -> bool:
         """True where the levels lie evenly."""
         steps = np.diff(self.identified.operator.plane.edges)
-        return bool(np.allclose(steps, steps[0]))
+        return bool(np.allclose(steps, steps[0], atol=0.0))  # in whatever unit
 
 
 def fit(

@@ -69,7 +69,8 @@ def extend(
             hint="give the model that was diagnosed, or diagnose this one: pulsetrainer diagnose",
         )
     # the levels of a dual model lie on the output, and a refit moves them
-    same_range = model.form == "dual" or np.allclose(extended.edges[[0, -1]], model.edges[[0, -1]])
+    ends = model.edges[[0, -1]]
+    same_range = model.form == "dual" or np.allclose(extended.edges[[0, -1]], ends, atol=1e-8 * np.ptp(ends))
     if not same_range or (extended.input_unit, extended.output_unit) != (model.input_unit, model.output_unit):
         raise DataError(
             f"{diagnosis_name} is of a model over {extended.edges[0]:.4g} .. {extended.edges[-1]:.4g} "

@@ -319,7 +319,8 @@ def _stretched(
 ) -> list[str]:
     """Say it where the values of a pulse are not those that are played; one from 0 to 1 is only a shape."""
     own = float(shape.value.min()), float(shape.value.max())
-    if None not in asked or np.allclose(own, (0.0, 1.0), atol=_NORMALISED) or np.allclose(own, forces):
+    as_it_is = np.allclose(own, forces, atol=1e-8 * (forces[1] - forces[0]))
+    if None not in asked or np.allclose(own, (0.0, 1.0), atol=_NORMALISED) or as_it_is:
         return []
     ends = with_unit(f"{forces[0]:.4g} .. {forces[1]:.4g}", model.output_unit)
     said = f"the values of {shape.name} go from {own[0]:.4g} to {own[1]:.4g}; they are stretched to {ends}"

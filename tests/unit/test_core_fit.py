@@ -29,21 +29,29 @@ def test_residual_and_misfit_are_of_the_samples_that_count():
     assert found.misfit == pytest.approx(np.sqrt(np.mean(left[counted] ** 2)) / np.ptp(spoilt[counted]))
 
 
-def test_levels_crowd_only_where_that_fits():
-    """A steep loop has crowded levels, relays even ones; what no operator follows falls back to even ones."""
+@pytest.mark.parametrize("unit", [1.0, 1e-9])
+def test_levels_crowd_only_where_that_fits(unit):
+    """A steep loop has crowded levels, relays even ones; what no operator follows falls back to even ones.
+
+    In any unit of the input.
+    """
     plane = Plane.uniform(-1.0, 1.0, 60)
     i, j = plane.cell_indices
     steep = Preisach(plane, np.exp(-(((i - 32.0) / 1.5) ** 2) - ((j - 28.0) / 1.5) ** 2))(U)
-    assert not fit([(U, steep)], -1.0, 1.0, 12).evenly_spaced
-    assert fit([(U, steep)], -1.0, 1.0, 12, reading="relay", smoothing=0.0).evenly_spaced
-    assert fit([(U, Y)], -1.0, 1.0, 12).evenly_spaced
+
+    def fitted(y, **how):
+        return fit([(unit * U, y)], -unit, unit, 12, **how)
+
+    assert not fitted(steep).evenly_spaced
+    assert fitted(steep, reading="relay", smoothing=0.0).evenly_spaced
+    assert fitted(Y).evenly_spaced
     jumps = np.sign(np.sin(40.0 * np.arange(U.size) / U.size)) * (np.abs(U) < 0.05)
-    lost = fit([(U, jumps)], -1.0, 1.0, 12)
+    lost = fitted(jumps)
     assert lost.evenly_spaced
     assert lost.misfit > CROWDED_MISFIT
     steep /= np.ptp(steep)
     for share, even in ((0.08, False), (0.12, True)):  # crowded levels leave 1.9 % and 2.5 % of the span
-        assert fit([(U, steep + share * jumps)], -1.0, 1.0, 12).evenly_spaced is even
+        assert fitted(steep + share * jumps).evenly_spaced is even
 
 
 def test_records_shifted_against_each_other_have_offsets():

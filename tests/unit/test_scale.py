@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import pulsetrainer as pt
 from pulsetrainer.core import excitations
+from pulsetrainer.core.pulses import Shape
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.unlisted import STATES
 from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
+from pulsetrainer.errors import DataError
 
 SIGNAL = excitations.diagnostic(0.0, 1.5, rate_Hz=200.0).value
 FACTORS = st.floats(-9, 6).map(lambda power: 10.0**power)
@@ -106,3 +111,25 @@ def test_there_and_back():
     assert back.dt_s == pytest.approx(0.1)
     np.testing.assert_allclose(scale.places(np.asarray([0.0, 1.0]), "{u}"), [2.0, 4.0])
     np.testing.assert_allclose(scale.places(np.asarray([7.0]), "1/s"), [1.0])
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-12])
+def test_a_pulse_that_is_stretched_is_said_to_be_in_any_unit(unit):
+    """One that goes from a quarter of the reach to three quarters, not one that goes over all of it."""
+    u = np.concatenate((np.linspace(0, 1, 200), np.linspace(1, 0, 200)))
+    model = pt.identify(pt.Run(time_s=np.arange(400) / 100, input=u, output=100 * unit * u), levels=8)
+    level = unit * (25.0 + 50.0 * np.sin(np.linspace(0.0, np.pi, 100, endpoint=False)))
+    pulse = Shape("tall", np.arange(100) / 100, level)
+    whole = Shape("whole", pulse.time_s, 100 * unit * pulse.normalised)
+    assert [len(pt.invert(one, model).notes) for one in (pulse, whole)] == [1, 0]
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-9])
+def test_a_diagnosis_over_another_range_extends_no_model_in_any_unit(unit):
+    """Twice the range of the model."""
+    model, found = (pt.load(f"tests/data/files-0.1/{name}.h5") for name in ("model", "diagnosis"))
+    mine = replace(model, edges=unit * model.edges)
+    others = replace(found, model="", extended=replace(mine, edges=2.0 * mine.edges))
+    with pytest.raises(DataError):
+        pt.extend(mine, others)
+    assert pt.extend(mine, replace(others, extended=mine)).edges is mine.edges
