@@ -66,6 +66,8 @@ MESSAGES = {
         "not a number", "separator of thousands", got="{cell!r} in column {column}, line {line}"
     ),
     "not a number": Message("not a number", "line", "{file}", got="'abc' in column current_A, line 3"),
+    "bad rows": Message("not a number", "--skip-bad-rows", "{file}", got="{place}: not a number ({where})"),
+    "too many bad rows": Message("too many to leave", "export", "{count} of {file}", got="{where}"),
     "time goes back": Message("does not increase", "sort", "{file}, column t_s", got="line 4: 1 s after 2 s"),
     "time repeats": Message(
         "does not increase", "more digits", "{file}, column t_s", got="line 4: 0.1 s after 0.1 s"

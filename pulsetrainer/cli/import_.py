@@ -61,7 +61,10 @@ def import_(
     ] = None,
     skip_bad_rows: Annotated[
         bool,
-        typer.Option("--skip-bad-rows", help="Leave out rows with a blank cell or NaN; they are counted."),
+        typer.Option(
+            "--skip-bad-rows",
+            help="Leave out rows with a blank cell, NaN or text, or too few cells; they are counted.",
+        ),
     ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,

@@ -27,19 +27,20 @@ class Rows:
 
     columns: tuple[FloatArray, ...]  # each (n,)
     shifts: tuple[tuple[int, int], ...]  # (row, line) wherever comments or blank lines change the distance
+    misfit: str  # what is wrong with the first row that cannot be read; empty where all can
 
 
 def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece: int = PIECE) -> Rows:
     """Return the columns whose numbers are in ``keep``, in that order; all by default. Text becomes NaN.
 
-    Text in other columns, a remark for instance, is passed over. A ``piece`` has so many characters, and the
-    rest of its last line.
+    Text in other columns, a remark for instance, is passed over. A row that is too short or too long, or has
+    text in a kept column of numbers, is a misfit: what it lacks is NaN. A ``piece`` has so many characters,
+    and the rest of its last line.
 
     Raises
     ------
     DataError
-        A row is too short or too long, a cell in a kept column of numbers is text, or the decimal sign
-        changes: line and column are named.
+        The decimal sign changes, or thousands are separated: line and column are named.
     OSError
         The file cannot be read.
     """
@@ -54,7 +55,7 @@ def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece
             values = reader.read(text)
             # a character is a byte, or, in UTF-16, two of them
             kept.append(values, expected=len(values) * size / len(text))
-    return Rows(kept.finished(), tuple(reader.shifts))
+    return Rows(kept.finished(), tuple(reader.shifts), reader.misfit)
 
 
 class _Kept:
@@ -97,6 +98,7 @@ class _Reader:
     row: int = 0
     point: str = ""  # where the first decimal point was, and the first decimal comma
     comma: str = ""
+    misfit: str = ""
 
     def __post_init__(self) -> None:
         self.line = self.dialect.first_line
@@ -169,11 +171,11 @@ class _Reader:
             if dialect.text_columns.issuperset(range(len(cells), len(dialect.names))):
                 cells += [""] * (len(dialect.names) - len(cells))  # no remark
             if len(cells) != len(dialect.names):
-                raise DataError(
+                self.misfit = self.misfit or (
                     f"{self.path} has {len(cells)} columns in line {count}, expected {len(dialect.names)}: "
-                    f"{', '.join(dialect.names)}",
-                    hint="correct or remove that line, or export the recording again",
+                    f"{', '.join(dialect.names)}"
                 )
+                continue
             for k, cell in enumerate(cells):
                 if k in dialect.text_columns or cell.lower() in MISSING:
                     continue
@@ -181,12 +183,11 @@ class _Reader:
                 if value is None and k not in self.needed:
                     continue
                 if value is None:
-                    raise DataError(
-                        f"{self.path} has {self._place(cell, k, count)}: not a number",
-                        hint="export it without the separator of thousands"
-                        if has_thousands(cell)
-                        else "correct or remove that line",
-                    )
+                    said = f"{self.path} has {self._place(cell, k, count)}: not a number"
+                    if has_thousands(cell):  # all large values are so: without them the record is another
+                        raise DataError(said, hint="export it without the separator of thousands")
+                    self.misfit = self.misfit or said
+                    continue
                 values[row, k] = value
             self._look_for_signs(count, cells)
         if self.comma and not dialect.decimal_comma:

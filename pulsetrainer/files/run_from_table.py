@@ -55,7 +55,8 @@ def run_from_table(
     first column where that is neither input, output nor reference; otherwise the run has no time and only
     its order counts. A first column that just counts its rows is not used as time. Time may be in ms or us.
 
-    ``skip_bad_rows`` leaves out rows in which a number is missing or not finite; the notes say how many.
+    ``skip_bad_rows`` leaves out rows in which a number is missing, not finite or text, or that have too few
+    or too many cells; the notes say how many, and where the first ones are.
 
     Raises
     ------
@@ -63,13 +64,18 @@ def run_from_table(
         More than one of a time column, a rate and ``no_time`` is given, the rate is not positive, or one
         column is given two meanings.
     DataError
-        The file is no table, a column is missing or not finite, a unit is not known, there are fewer than
-        two rows, or time does not increase (the line is named).
+        The file is no table, a column is missing or not finite, nearly all rows would be left out, a unit is
+        not known, there are fewer than two rows, or time does not increase (the line is named).
     """
     check_timing(time, rate_Hz, no_time=no_time)
     wanted = [name for name in (input, output, reference) if name is not None]
     automatic = rate_Hz is None and not no_time
-    table = read_table(path, lambda head: _needed(head, wanted, time, automatic=automatic))
+    table = read_table(
+        path,
+        lambda head: _needed(head, wanted, time, automatic=automatic),
+        bad_rows=skip_bad_rows,
+        remedy=_LEAVE_OUT,
+    )
     _check_distinct(table, input=input, output=output, reference=reference)
     notes: tuple[str, ...] = ()
     if skip_bad_rows:
@@ -162,20 +168,27 @@ def _check_distinct(table: Table, **meanings: str | None) -> None:
 def _without_bad_rows(table: Table, *, counted: bool) -> tuple[Table, tuple[str, ...]]:
     """Return a table without the rows in which a number is missing, and a note of how many there were.
 
-    UsageError where the rows are ``counted`` to tell the time: none may be left out.
+    UsageError where the rows are ``counted`` to tell the time: none may be left out. DataError where hardly
+    any row would be left.
     """
-    bad = ~np.all([np.isfinite(column) for column in table.columns.values()], axis=0)
-    count = int(np.count_nonzero(bad))
-    if count == 0:
+    bad = table.bad_rows()
+    if bad.size == 0:
         return table, ()
+    said = f"{bad.size} of {table.rows} rows of {table.path} lack a number"
+    if table.mostly(bad):
+        raise DataError(
+            f"{said}: too many to leave them out ({table.places(bad)})",
+            hint="export the recording again as plain numbers, or name other columns",
+        )
     if counted or table.rate_Hz is not None:
         raise UsageError(
-            f"{count} rows of {table.path} lack a number, and its rows are counted to tell the time",
+            f"{said}, and its rows are counted to tell the time",
             hint="name a `time` column, or give `no_time`, so that rows can be left out",
         )
-    columns = {name: column[~bad] for name, column in table.columns.items()}
-    note = f"{count} of {bad.size} rows of {table.path} lack a number and were left out"
-    return replace(table, columns=columns, shifts=_shifts_of(table, np.flatnonzero(~bad))), (note,)
+    kept = np.delete(np.arange(table.rows), bad)
+    columns = {name: column[kept] for name, column in table.columns.items()}
+    note = f"{said} and were left out: {table.places(bad)}"
+    return replace(table, columns=columns, shifts=_shifts_of(table, kept)), (note,)
 
 
 def _shifts_of(table: Table, kept: NDArray[np.int64]) -> Sequence[tuple[int, int]]:

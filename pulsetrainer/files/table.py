@@ -17,7 +17,7 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.artefacts import FloatArray, beyond_all_quantities
 from pulsetrainer.artefacts.units import split_unit, symbol_of
@@ -29,6 +29,9 @@ from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
 
 _WRITTEN_ROWS = 1 << 14
+_NAMED = 5  # bad rows
+_MOST_BAD = 0.9  # of the rows: with more of them bad, the table is another than it was taken for
+_AGAIN = "export the recording again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +74,22 @@ class Table:
         first_row, line = self.shifts[bisect_right(self.shifts, row, key=lambda shift: shift[0]) - 1]
         return line + row - first_row
 
-    def check_finite(self, name: str, *, remedy: str = "export the recording again") -> FloatArray:
+    def bad_rows(self) -> NDArray[np.int64]:
+        """Return the rows in which a number is missing or not finite, in a column that was kept."""
+        finite = [np.isfinite(column) for column in self.columns.values()]
+        return np.flatnonzero(~np.logical_and.reduce(finite))
+
+    def mostly(self, bad: NDArray[np.int64]) -> bool:
+        """Whether so many rows (k,) are bad that there is no use in leaving them out."""
+        return bad.size > _MOST_BAD * self.rows
+
+    def places(self, rows: NDArray[np.int64]) -> str:
+        """Say where the first of these rows (k,) are: ``lines 7, 9, 11``."""
+        word = "line" if self.shifts else "row"
+        where = [self.place(int(row)).removeprefix(word) for row in rows[:_NAMED]]
+        return f"{word}{'s' if rows.size > 1 else ''}{','.join(where)}{', ...' if rows.size > _NAMED else ''}"
+
+    def check_finite(self, name: str, *, remedy: str = _AGAIN) -> FloatArray:
         """Return a column in which every value is finite; ``remedy`` is what may be done but removing rows.
 
         Raises
@@ -91,8 +109,8 @@ class Table:
             value = missing if np.isnan(values[bad[0]]) else values[bad[0]]
             raise DataError(
                 f"{self.path} has {value} in {column_words(name)}, {self.place(int(bad[0]))} "
-                f"({bad.size} of {values.size} rows lack a number)",
-                hint=f"remove those rows, or {remedy}",
+                f"({bad.size} of {values.size} rows lack a number: {self.places(bad)})",
+                hint=f"remove those rows, or {_AGAIN if self.mostly(bad) else remedy}",
             )
         if said := beyond_all_quantities(values):
             raise DataError(f"{self.path}, {column_words(name)}, {said}", hint="correct or remove those rows")
@@ -148,17 +166,24 @@ def numbered(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None = None) -> Table:
+def read_table(
+    path: Path | str,
+    keep: Callable[[Table], Collection[int]] | None = None,
+    *,
+    bad_rows: bool = False,
+    remedy: str = _AGAIN,
+) -> Table:
     """Read a table of numbers, a text of any size piece by piece.
 
     ``keep`` gets the table without its numbers and returns the places of the columns that are to stay in
-    memory; all by default.
+    memory; all by default. With ``bad_rows`` a row of too few or too many cells, or with text in a column of
+    numbers, lacks numbers; without, ``remedy`` is what may be done but removing such rows.
 
     Raises
     ------
     DataError
-        The file cannot be read, is empty or no table, or holds text in a column of numbers or two
-        decimal signs (line and column are named).
+        The file cannot be read, is empty or no table, has bad rows, or two decimal signs (line and column
+        are named).
     """
     path = Path(path)
     try:
@@ -181,7 +206,14 @@ def read_table(path: Path | str, keep: Callable[[Table], Collection[int]] | None
             f"{path} is not a table of numbers: {error}", hint="export it as CSV, one column per quantity"
         ) from error
     columns = {table.names[k]: column for k, column in zip(kept, rows.columns, strict=True)}
-    return replace(table, columns=columns, shifts=rows.shifts)
+    table = replace(table, columns=columns, shifts=rows.shifts)
+    if rows.misfit and not bad_rows:
+        bad = table.bad_rows()
+        raise DataError(
+            f"{rows.misfit} ({bad.size} of {table.rows} rows lack a number: {table.places(bad)})",
+            hint=f"correct or remove those rows, or {_AGAIN if table.mostly(bad) else remedy}",
+        )
+    return table
 
 
 def _head(path: Path, dialect: Dialect) -> Table:

@@ -8,6 +8,7 @@ import pytest
 from program import pulsetrainer
 from pulsetrainer.artefacts import Run
 from pulsetrainer.files import store
+from wording import refusal
 
 TRIANGLE = np.abs((np.arange(300) % 100) - 50.0)
 COLUMNS = ("--input", "u", "--output", "y")
@@ -40,6 +41,56 @@ def test_rows_with_a_blank_cell_are_left_out_when_asked_and_counted(tmp_path):
     # where rows are counted to tell the time, none may go
     words = ("--rate", "1000", "--skip-bad-rows")
     assert pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, *words, "-o", "b.h5").code == 2
+
+
+def _with_bad_rows(path, bad: dict[int, str]) -> None:
+    """Write the table with these rows instead of its own; row 0 is line 2."""
+    _written(path, _rows())
+    lines = path.read_text().split("\n")
+    for row, text in bad.items():
+        lines[row + 1] = text
+    path.write_text("\n".join(lines))
+
+
+def test_text_and_rows_of_the_wrong_length_are_left_out_when_asked(tmp_path):
+    """The count and the first five lines are named, with the option and without."""
+    bad = {
+        5: "1e-7,ERR,1",
+        6: "1.2e-7,2",
+        9: "1.8e-7,1,2,3",
+        100: "2e-6,1,",
+        200: "4e-6,over,over",
+        299: "6e-6",
+    }
+    _with_bad_rows(tmp_path / "a.csv", bad)
+    where = "6 of 300 rows lack a number: lines 7, 8, 11, 102, 202, ..."
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
+    refusal(done, 3, "bad rows", file="a.csv", place="'ERR' in column u (kOhm), line 7", where=where)
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "--skip-bad-rows", "-o", "a.h5")
+    assert done.code == 0, done
+    assert where.removeprefix("6 of 300 rows lack a number: ") in done.err
+    run = store.read(tmp_path / "a.h5", Run)
+    np.testing.assert_array_equal(run.output, np.delete([row[2] for row in _rows()], list(bad)))
+
+
+def test_a_table_of_bad_rows_is_refused_with_the_option_too(tmp_path):
+    """Nobody is told to leave out nearly all there is."""
+    _with_bad_rows(tmp_path / "a.csv", dict.fromkeys(range(20, 300), "1,ERR,1"))
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
+    assert done.code == 3
+    assert "--skip-bad-rows" not in done.err
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "--skip-bad-rows", "-o", "a.h5")
+    refusal(
+        done, 3, "too many bad rows", file="a.csv", count="280 of 300 rows", where="22, 23, 24, 25, 26, ..."
+    )
+    assert not (tmp_path / "a.h5").exists()
+
+
+def test_thousands_are_never_left_out(tmp_path):
+    """Every large value has the separator: without these rows it would be another record."""
+    _with_bad_rows(tmp_path / "a.csv", {50: '1e-6,"1,021.5",1'})
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "--skip-bad-rows", "-o", "a.h5")
+    refusal(done, 3, "separator of thousands", cell="1,021.5", column="u (kOhm)", line=52)
 
 
 def test_a_line_is_still_named_when_rows_were_left_out(tmp_path):
