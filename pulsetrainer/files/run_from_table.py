@@ -23,7 +23,7 @@ from pulsetrainer.files.timing import check_timing
 _TIME_NAMES = frozenset(
     ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
 )
-_LEAVE_OUT = "leave them out with `skip_bad_rows`"
+_LEAVE_OUT = "leave bad rows out with `skip_bad_rows`"
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
 _BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 

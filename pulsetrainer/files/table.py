@@ -211,7 +211,8 @@ def read_table(
         bad = table.bad_rows()
         raise DataError(
             f"{rows.misfit} ({bad.size} of {table.rows} rows lack a number: {table.places(bad)})",
-            hint=f"correct or remove those rows, or {_AGAIN if table.mostly(bad) else remedy}",
+            hint=f"correct or remove {'that line' if bad.size == 1 else 'those lines'}, or "
+            f"{_AGAIN if table.mostly(bad) else remedy}",
         )
     return table
 
