@@ -12,7 +12,7 @@ from typer.core import TyperCommand
 
 from pulsetrainer.cli.next_step import MAKES
 from pulsetrainer.errors import AbsentError, ExistsError
-from pulsetrainer.files.input_file import near_names
+from pulsetrainer.files.input_file import is_sound, near_names
 
 # what the file of an argument holds; others take any artefact, or a table
 _HOLDS = {
@@ -83,7 +83,7 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     typed = option or f"argument {word}"
     error.message = error.message.replace(f"{error.path} ", f"{error.path} ({typed}) ", 1)
     if isinstance(error, AbsentError) and name in _TABLES:
-        tables = sorted(path.name for path in folder.glob("*.csv"))
+        tables = sorted(path.name for path in folder.glob("*.csv") if is_sound(path))
         near = difflib.get_close_matches(error.path.name, tables, n=1, cutoff=_NEAR)
         error.hint = (f"did you mean {error.path.with_name(near[0])}? " if near else "") + _TABLES[name]
         return

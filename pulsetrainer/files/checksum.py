@@ -11,9 +11,6 @@ import re
 import zlib
 from pathlib import Path
 
-from pulsetrainer.errors import DamagedFileError
-from pulsetrainer.files.input_file import unreadable
-
 _FORMAT = b"\npulsetrainer crc32 %08x\n"
 _PATTERN = re.compile(rb"\npulsetrainer crc32 ([0-9a-f]{8})\n")
 CHECKSUM_LENGTH = len(_FORMAT % 0)
@@ -27,20 +24,15 @@ def append_checksum(path: Path) -> None:
         stream.write(_FORMAT % crc)
 
 
-def check_checksum(path: Path) -> None:
-    """Raise DataError where a file is not what it was; one without a checksum passes."""
-    try:
-        length = path.stat().st_size - CHECKSUM_LENGTH
-        if length < 0:
-            return
-        with path.open("rb") as stream:
-            stream.seek(length)
-            found = _PATTERN.fullmatch(stream.read())
-        if found is None or int(found[1], 16) == _crc(path, length):
-            return
-    except OSError as error:
-        raise unreadable(path, error) from error
-    raise DamagedFileError(f"{path} is damaged: its checksum is not the one it was written with", path=path)
+def is_as_written(path: Path) -> bool:
+    """Whether a file is what it was; one without a checksum is. OSError where it cannot be read."""
+    length = path.stat().st_size - CHECKSUM_LENGTH
+    if length < 0:
+        return True
+    with path.open("rb") as stream:
+        stream.seek(length)
+        found = _PATTERN.fullmatch(stream.read())
+    return found is None or int(found[1], 16) == _crc(path, length)
 
 
 def _crc(path: Path, length: int) -> int:

@@ -8,11 +8,14 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 
 from pulsetrainer.errors import AbsentError, DamagedFileError, DataError, NotAnArtefactError, UsageError
+from pulsetrainer.files.checksum import is_as_written
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
+_END = {0: 40, 1: 44, 2: 28, 3: 28}  # byte at which an HDF5 file says its length, by its version
 JOURNAL = b"pulsetrainer journal 1\n"  # what a recording under way begins with
 _FIRST_TEXT = re.compile(rb"GCOL.{28}([a-z]+)", re.DOTALL)  # our first text attribute is the kind
 
@@ -66,9 +69,10 @@ def _names_in(folder: Path, path: Path) -> str:
     if not folder.is_dir():
         return f"the folder {folder} does not exist either"
     names = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
-    near = difflib.get_close_matches(path.name, names, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(path.name, names, n=10, cutoff=0.5)
     near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
-    near = near or [name for name in names if name.endswith(path.suffix or ".h5")][:5]
+    near = near or [name for name in names if name.endswith(path.suffix or ".h5")]
+    near = list(islice((name for name in near if is_sound(folder / name)), 5))
     where = "here" if folder == Path() else f"in {folder}"
     return f"files {where}: {', '.join(near)}" if near else f"no file {where} has a similar name"
 
@@ -76,7 +80,8 @@ def _names_in(folder: Path, path: Path) -> str:
 def near_names(path: Path, kinds: Sequence[str]) -> list[str]:
     """Return the artefacts of these kinds in the folder of ``path``, those with the nearest names first.
 
-    No kinds: every artefact. The kind is read off the first bytes, without HDF5: it is a hint, no check.
+    No kinds: every artefact. The kind is read off the first bytes, without HDF5; those that are damaged, or
+    cannot be read, are left out.
     """
     try:
         names = [
@@ -87,7 +92,22 @@ def near_names(path: Path, kinds: Sequence[str]) -> list[str]:
     except OSError:
         return []
     near = difflib.get_close_matches(path.name, names, n=5, cutoff=0.5)
-    return [*near, *(name for name in names if name not in near)][:5]
+    near += [name for name in names if name not in near]
+    return list(islice((name for name in near if is_sound(path.with_name(name))), 5))
+
+
+def is_sound(path: Path) -> bool:
+    """Whether a file may be offered to be read: it can be, holds something, and if it is ours, all of it."""
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(64)
+        if not start.startswith(_HDF5):
+            return bool(start) and (path.suffix != ".h5" or start.startswith(JOURNAL))
+        end = _END.get(start[8], 0)
+        whole = path.stat().st_size >= int.from_bytes(start[end : end + 8], "little")
+        return whole and is_as_written(path)
+    except (OSError, IndexError):
+        return False
 
 
 def _likely_kind(path: Path) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from pulsetrainer.artefacts import KINDS
 from pulsetrainer.errors import DamagedFileError, DataError, NotAnArtefactError, WrongKindError
 from pulsetrainer.files.atomic_write import replacing
-from pulsetrainer.files.checksum import append_checksum, check_checksum
+from pulsetrainer.files.checksum import append_checksum, is_as_written
 from pulsetrainer.files.decode import Origin, decode, text_of
 from pulsetrainer.files.encode import Later, encode, values_of
 from pulsetrainer.files.input_file import check_artefact, is_journal, unreadable
@@ -211,7 +211,12 @@ def _opened(path: Path | str) -> Iterator[h5py.File]:
     """Open a file for reading; whatever HDF5 finds wrong with it is a DataError."""
     path = Path(path)
     check_artefact(path)
-    check_checksum(path)
+    try:
+        if not is_as_written(path):
+            said = f"{path} is damaged: its checksum is not the one it was written with"
+            raise DamagedFileError(said, path=path)
+    except OSError as error:
+        raise unreadable(path, error) from error
     try:
         with h5py.File(path, "r", locking="best-effort") as file:
             yield file

@@ -16,6 +16,8 @@ import pytest
 from program import PROGRAM, Ran, pulsetrainer
 from wording import refusal
 
+MODEL = ("--model", "model.h5", "-o", "x.h5")
+
 
 @pytest.fixture
 def ready(small_chain, tmp_path) -> Path:
@@ -48,6 +50,23 @@ def test_the_wrong_kind_of_file_names_both_kinds_and_the_next_step(ready, words,
 def test_an_absent_file_is_named_with_those_that_are_there(ready):
     """A name that was mistyped."""
     refused(ready, ["identify", "absent.h5", "-o", "x.h5"], 3, "absent", file="absent.h5", near="run.h5")
+
+
+def test_no_damaged_file_is_offered(ready):
+    """Cut, flipped, empty, junk: none of them is a next step, whether by kind or by name."""
+    whole = (ready / "run.h5").read_bytes()
+    middle = len(whole) // 2
+    flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
+    for name, content in {"cut": whole[:middle], "flipped": flipped, "empty": b"", "junk": b"junk"}.items():
+        (ready / f"run-{name}.h5").write_bytes(content)
+    (ready / "run-x.csv").touch()
+    for words in (["identify", "run-.h5", "-o", "x.h5"], ["show", "run-.h5"], ["diagnose", "run-.h5", *MODEL],
+                  ["import", "run-.h5", "--input", "u", "--output", "y", "-o", "x.h5"],
+                  ["capture", "run-.csv", "-o", "x.h5"]):  # fmt: skip
+        done = pulsetrainer(ready, *words)
+        assert done.code == 3, done
+        assert not [file.name for file in ready.glob("run-*") if file.name in done.err], done.err
+    assert "run.h5" in pulsetrainer(ready, "show", "run-.h5").err
 
 
 def test_an_existing_output_is_refused_and_kept(ready):
