@@ -166,6 +166,7 @@ MESSAGES = {
     "force reading": Message("force", "sensor"),
     "tick-overrun": Message("missed its tick", "cause", "during the capture", got=KEPT),
     "reset": Message("restarted in mid-play (cause: external)", "power supply", got=KEPT),
+    "no whole repeat": Message("no repeat was whole", "power supply", got="{file} was not written"),
     "hang": Message("restarted in mid-play (cause: watchdog)", "power supply", got=KEPT),
     "port is gone": Message("is gone", "cable", "/dev/", got=KEPT),
     "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),

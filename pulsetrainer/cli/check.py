@@ -16,6 +16,12 @@ from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Overwrite
 if TYPE_CHECKING:
     from pulsetrainer.steps.check import Checked, Estimate
 
+_VERDICTS = {
+    "true": "still true",
+    "shifted": "shifted (zero, gain or temperature)",
+    "changed": "changed (the hysteresis has another shape)",
+}
+
 
 def check(
     context: typer.Context,
@@ -79,7 +85,7 @@ def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, 
         rows["next"] = f"pulsetrainer check {shlex.quote(str(model))} --update -o updated.h5"
     elif found.verdict == "changed" or (found.verdict == "shifted" and not updatable):
         rows["next"] = "identify again: pulsetrainer capture identification, then pulsetrainer identify"
-    job.screen.facts(f"{model} on {serial}: {found.verdict}", rows)
+    job.screen.facts(f"{model} on {serial}: {_VERDICTS[found.verdict]}", rows)
     job.wrote(out)
 
 

@@ -10,8 +10,10 @@ import typer
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.options import AsJson, Port
 from pulsetrainer.files import settings
+from pulsetrainer.report.tables import folded
 
 _MARKS = {"ok": "ok", "warning": "warning", "problem": "PROBLEM"}
+_WIDTH = 100
 
 
 def doctor(
@@ -44,7 +46,11 @@ def doctor(
     if not json:
         width = max(len(one.name) for one in result.findings)
         for one in result.findings:
-            screen.line(f"{_MARKS[one.state]:<8} {one.name:<{width}}  ", one.found)
+            lead = f"{_MARKS[one.state]:<8} {one.name:<{width}}  "
+            if one.name == "versions":  # a list of words that nobody copies
+                screen.whole(folded(lead, one.found, min(_WIDTH, screen.width)))
+            else:
+                screen.line(lead, one.found)
             if one.fix and one.state != "ok":
                 screen.whole(f"{'':<8} fix: {one.fix}")
     screen.end(failed)

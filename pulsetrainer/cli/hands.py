@@ -70,8 +70,12 @@ class Hands:
         """Return a quiz on the screen: a letter answers, Q stops."""
         steering = Steering(quiz, [])
 
+        choices = LETTERS[: len(self.names)]
+        wrong = ""
+
         def press(key: str, at_s: float) -> None:
-            choices = LETTERS[: len(self.names)]
+            nonlocal wrong
+            wrong = "" if key in choices or key == "Q" else key
             if key in choices:
                 self._answers[:] = [(self.names[choices.index(key)], at_s)]
             elif key == "Q":
@@ -81,5 +85,6 @@ class Hands:
         live.status = lambda: (
             f"question {min(quiz.question + 1, quiz.questions)} of {quiz.questions}"
             + (", answered" if self._answers else "")
+            + (f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops" if wrong else "")
         )
         return Steered(steering, live, live.on_screen(), lambda _s: 0.0, False)

@@ -55,7 +55,7 @@ def play(
     """
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.device.limits import Limits
-    from pulsetrainer.errors import PulsetrainerError
+    from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
     from pulsetrainer.steps.play import plan
 
     waveform, limits = job.load(drive, pt.Waveform), Limits(limit_current_A, limit_force_N)
@@ -79,6 +79,8 @@ def play(
             )
         except PulsetrainerError as error:
             if not isinstance(error.kept, pt.Playback):
+                if isinstance(error, DeviceError | Interrupted):
+                    error.message += f"; no repeat was whole, {out} was not written"
                 raise
             stopped, played = error, error.kept
     whole = played.compensated.output.shape[0]

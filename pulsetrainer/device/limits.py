@@ -67,8 +67,13 @@ def checked_wire(
 
 
 def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str) -> None:
-    """Raise ArgumentError where a reference (n,) in A goes beyond the limit in force."""
+    """Raise ArgumentError where a reference (n,) in A goes beyond the limit in force.
+
+    ``hint`` says what else to play; to raise the limit is a way out only where the device allows the current.
+    """
     peak = float(np.max(reference_A, initial=0.0))
+    if limit_A < CURRENT_A and peak <= CURRENT_A + codes.CURRENT_UNIT_A / 2:
+        hint += f", or raise `limit_current_A` to {peak:.4g} where it was lowered"
     if peak > limit_A + codes.CURRENT_UNIT_A / 2:
         raise ArgumentError(
             f"the current goes up to {peak:.4g} A; the limit in force is {limit_A:g} A", hint=hint

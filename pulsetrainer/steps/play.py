@@ -189,7 +189,8 @@ def _check(drive: Waveform, repeats: int) -> None:
 
 
 def _check_peak(drive: Waveform, limit_A: float) -> None:
-    hint = "invert again with a lower `force_max`, or raise `limit_current_A` where it was lowered"
+    # the scaled drive spans the range of the model, whatever force is asked for
+    hint = f"invert with a model that was captured with `current_max_A` at most {limit_A:g}"
     check_peak(np.concatenate((drive.compensated, drive.scaled)), limit_A, hint=hint)
 
 

@@ -273,8 +273,10 @@ def parts_of(course: Course, at: int, longest_s: float) -> Iterator[Part]:
 def check_top(signal: excitations.Signal, limit_A: float) -> None:
     """Raise ArgumentError for a signal that goes beyond the limit in force."""
     ours = signal.name in EXCITATIONS
-    lower = f"give `current_max_A` at most {limit_A:g}" if ours else "scale the table into the range"
-    check_peak(signal.value, limit_A, hint=f"{lower}, or raise `limit_current_A` where it was lowered")
+    lower = (
+        f"give `current_max_A` at most {limit_A:g}" if ours else f"scale the table to at most {limit_A:g} A"
+    )
+    check_peak(signal.value, limit_A, hint=lower)
 
 
 def decimation_for(tick_rate_Hz: float, rate_Hz: float) -> int:

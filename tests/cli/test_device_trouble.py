@@ -211,6 +211,13 @@ def test_a_play_whose_force_reading_is_dead_stuck_or_half_never_ends_well(tmp_pa
     )
 
 
+def test_a_play_that_ends_in_its_first_repeat_says_that_nothing_was_written(tmp_path):
+    """Both drives belong to a repeat; half of one is no playback."""
+    words = ["play", str(DRIVE), "-o", "played.h5", "--port", "bench:?break=reset@1", "--json"]
+    refusal(pulsetrainer(tmp_path, *words), 4, "no whole repeat", file="played.h5")
+    assert not (tmp_path / "played.h5").exists()
+
+
 def test_losses_on_a_bad_wire_are_in_the_file(folder):
     """A capture through a bad wire is complete, and says how many samples it lacks."""
     done = pulsetrainer(folder, *capture("bench:?wire=0.0005&wire-seed=4", "--json"))

@@ -77,6 +77,10 @@ def test_limits_are_in_force_on_the_device(run, tmp_path):
     capture = ("capture", "identification", "--json")
     lowered = run(*capture, "--limit-current", "0.4", "--current-max", "0.5", "-o", "a.h5")
     refusal(lowered, 3, "beyond the limit", limit="0.4", got="0.5")
+    assert "--limit-current to 0.5" in lowered.err
+    never = run(*capture, "--current-max", "12", "-o", "a.h5")
+    refusal(never, 3, "beyond the limit", limit="1.5", got="12")
+    assert "--limit-current" not in never.err, "no device allows 12 A"
     refusal(run(*capture, "--limit-force", "5", "-o", "b.h5"), 4, "tripped while conditioning")
     refusal(run(*capture, "--limit-current", "9", "-o", "c.h5"), 3, "limit raised")
 
