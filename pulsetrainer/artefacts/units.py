@@ -157,6 +157,9 @@ def shown(unit: str) -> str:
     # brackets around one word, as in N/(A)^2, are for machines
     head, *powers = re.sub(r"\((\w+)\)", r"\1", unit).replace("**", "^").split("^")
     for power in powers:
+        if "." in power:  # there is no raised point
+            head += f"^{power}"
+            continue
         digits = len(power) - len(power.lstrip("-0123456789"))
         head += power[:digits].translate(_POWERS) + power[digits:]
     return head.replace("*", "·")

@@ -35,8 +35,8 @@ TEXTS: Mapping[str, str] = {
         "The smallest effects that these recordings would have shown, rms, % of the span: {limits}"
     ),
     "not whole": (
-        "{names} explain only a part of it: {rest:.2g} % of the span is something else, which noise and "
-        "levels do not account for"
+        "Only a part of it is explained by {names}: {rest:.2g} % of the span is something else, which noise "
+        "and levels do not account for"
     ),
     "slow noise": (
         "What is taken for noise here is slow: short averages have {white:.2g} % of the span of it, "

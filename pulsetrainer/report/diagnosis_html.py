@@ -31,7 +31,7 @@ def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header
 
 
 def headline(found: Diagnosis) -> str:
-    """Return the verdict as one sentence for a technician."""
+    """Return the verdict in few words; what each cause found means stands below them."""
     if found.verdict == "none":
         limits = ", but they could not have shown everything: see what they lack" if found.lacks else ""
         return f"These recordings show nothing wrong with the model{limits}."
@@ -40,11 +40,12 @@ def headline(found: Diagnosis) -> str:
     if found.verdict == "unknown":
         return "Something is wrong that no known cause explains."
     cause = next(one for one in found.causes if one.cause == found.verdict)
-    also = [one.text for one in found.found if one.cause != found.verdict]
-    words = f"In doubt: {cause.text}" if in_doubt(found) else f"{cause.text[:1].upper()}{cause.text[1:]}"
+    also = [one.cause for one in found.found if one.cause != found.verdict]
+    words = "In doubt" if in_doubt(found) else "Found"
     tied = f" (could equally be {' or '.join(cause.confounded_with)})" if cause.confounded_with else ""
-    rest = "" if found.left.whole else ". That explains only a part: something else is left"
-    return f"{words}{tied}{'; in addition, ' + '; '.join(also) if also else ''}{rest}."
+    rest = "" if found.left.whole else ". Something else is left"
+    named = ", ".join([cause.cause + tied, *also]).replace("unlisted", "a dependence in no list")
+    return f"{words}: {named}{rest}."
 
 
 def _course(found: Diagnosis) -> Picture:

@@ -339,6 +339,8 @@ def test_nothing_gives_a_question_away(tmp_path):
     assert journal.count(b'"asked"') == journal.count(b'"pulse"') == 0
     under_way = read(tmp_path / "s.h5.partial", Session)
     assert (under_way.quiz, under_way.beats.start_s.size) == (None, 0)
+    terminal.press("x")
+    terminal.until(lambda: b"a to b answer" in terminal.seen)
     # an answer for each question, whenever it is its turn
     terminal.press("a")
     terminal.until(lambda: b"question 2 of 2" in terminal.seen)

@@ -12,8 +12,10 @@ from itertools import pairwise
 
 import pytest
 import report_examples as examples
+import store_examples
 
 from pulsetrainer.artefacts import Evaluation
+from pulsetrainer.report.diagnosis_html import headline
 from pulsetrainer.report.html import render_evaluation
 
 PUBLISHED = {
@@ -298,3 +300,11 @@ def test_evaluation_of_nothing_says_so():
     text = render(Evaluation())
     assert "neither played waveforms nor models" in text
     assert Page(text).of("figure") == []
+
+
+def test_the_heading_of_a_diagnosis_is_short():
+    """It names what was found; what that means stands below, once for each cause."""
+    found = store_examples.diagnosis()
+    said = headline(found)
+    assert found.verdict in said
+    assert not any(one.text and one.text in said for one in found.found)

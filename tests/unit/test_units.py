@@ -11,6 +11,7 @@ from pulsetrainer.artefacts.units import (
     SECONDS,
     check_unit,
     is_unit,
+    shown,
     split_unit,
     symbol_of,
     unit_of,
@@ -145,3 +146,11 @@ def test_a_unit_behind_a_slash_stands_in_brackets(template, u, unit):
 def test_a_time_is_told_in_the_unit_that_fits(seconds, said):
     """From nanoseconds to days."""
     assert with_seconds(seconds) == said
+
+
+@pytest.mark.parametrize(
+    ("unit", "printed"), [("N/A^2", "N/A²"), ("(V s)^0.5", "(V s)^0.5"), ("Hz^-0.5", "Hz^-0.5")]
+)
+def test_a_power_is_raised_whole_or_not_at_all(unit, printed):
+    """There is no raised point."""
+    assert shown(unit) == printed
