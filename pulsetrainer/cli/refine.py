@@ -10,7 +10,7 @@ import typer
 import pulsetrainer as pt
 from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port
+from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port
 
 
 def refine(
@@ -23,6 +23,7 @@ def refine(
     ] = 5,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
+    dry_run: DryRun = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
@@ -35,11 +36,19 @@ def refine(
     """
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
     from pulsetrainer.device.limits import Limits
-    from pulsetrainer.steps.refine import check
+    from pulsetrainer.steps.refine import check, plan
 
     waveform = job.load(drive, pt.Waveform)
     check(waveform, passes)
     limits = Limits(limit_current_A, limit_force_N)
+    if dry_run:
+        planned = plan(waveform, passes=passes, limits=limits)
+        rows = {
+            "passes": f"at most {passes}, {planned.seconds:.1f} s in all",
+            "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
+        }
+        job.would(f"refine {waveform.name}", planned, port, out, rows, name=waveform.name, passes=passes)
+        return
     with job.working(f"refining {drive.name}") as progress, job.open_device(port, limits) as device:
         refined = pt.refine(waveform, device, passes=passes, progress=progress)
         info = device.info

@@ -10,11 +10,13 @@ import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Model, RefinePass, Waveform
 from pulsetrainer.core import inversion, learning, metrics
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.device.limits import Limits, Rehearsal
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
-from pulsetrainer.steps.play import check_current, play_once
+from pulsetrainer.steps.play import Plan, check_current, play_once
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -139,6 +141,24 @@ def refine(
     )
 
 
+def plan(drive: Waveform, *, passes: int = 5, limits: Limits | None = None) -> Plan:
+    """Return what ``refine`` would play at most, on a cold device as it is delivered; fails as it.
+
+    Its first pass is rehearsed, and its currents are those of the drive: what is learnt nobody knows before.
+    """
+    check(drive, passes)
+    rehearsal = Rehearsal(limits or Limits())
+    for _ in range(FEWEST):
+        rehearsal.play(drive.compensated, drive.rate_Hz, drive.predicted)
+    return Plan(
+        samples=drive.time_s.size,
+        seconds=drive.time_s.size / drive.rate_Hz * (FEWEST + MOST * (passes - 1)),
+        rate_Hz=drive.rate_Hz,
+        peak_current_A=float(np.abs(drive.compensated).max()),
+        rms_current_A=root_mean_square(drive.compensated),
+    )
+
+
 def check(drive: Waveform, passes: int) -> Model:
     """Return the model of a drive; refuse what cannot be refined, before any device is opened.
 
@@ -188,7 +208,7 @@ def _press(
     for number in range(repeats):
         _LOG.info("pass %d, repeat %d of %d", len(tried) + 1, number + 1, repeats)
         once = play_once(drive, device, current, expected=expected, earlier=forces)
-        raise_if_stopped(once.fault, once.remedy, f"pass {len(tried) + 1}")
+        raise_if_stopped(once.fault, once.remedy, f"pass {len(tried) + 1} (nothing was kept)")
         forces.append(once.rows[2])
     measured, scored = np.stack(forces), drive.scored
     output = metrics.mean_over_repeats(measured)

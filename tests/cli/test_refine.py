@@ -54,6 +54,24 @@ def test_what_cannot_be_refined_writes_nothing(tmp_path, words, code):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [((), 0), (("--passes", "0"), 2), (("--limit-current", "1"), 3), (("--limit-force", "5"), 4)],
+)
+def test_a_dry_run_says_what_refining_would_play_and_fails_as_it(tmp_path, words, code):
+    """No port is opened: that it is absent does not matter; nothing is written."""
+    words = ("refine", KEPT / "drive.h5", "-o", "refined.h5", *words)
+    done = pulsetrainer(tmp_path, *words, "--dry-run", "--port", "/dev/absent", "--json")
+    assert done.code == code, done
+    if code:
+        assert pulsetrainer(tmp_path, *words).code == code
+    else:
+        drive = pt.load(KEPT / "drive.h5")
+        assert done.json["dry_run"] is True
+        assert done.json["peak_current_A"] == pytest.approx(float(drive.compensated.max()))
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_what_was_learnt_is_asked_for_in_another_pulse(tmp_path):
     """A refined drive gives its share: the error of another pulse, noise included, falls by a third."""
     port, model = ("--port", "bench:"), ("--model", KEPT / "model.h5")
