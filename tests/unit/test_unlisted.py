@@ -207,6 +207,9 @@ class _Pieces:
     def pieces(self, fitted, count):
         return np.asarray(self.errors[fitted.name], dtype=float)
 
+    def rates(self, fitted, count):
+        return np.zeros(0)  # too few blocks
+
 
 class _Fit:
     def __init__(self, name, squares):
