@@ -128,6 +128,7 @@ class Thresholds:
     wander_pieces: int = 10  # of the time: a gain and an offset of each show that the record wanders ...
     wander_left: float = 0.33  # ... if they take away so much of what is left (true drifts: up to 0.15) ...
     wander_fall: float = 0.1  # ... and so much of what a drift took away
+    gain_in_use: float = 0.6  # of what causes gain in the search: true ones keep 0.68 and more
     begin_share: float = 0.2  # of a record: what went on before it has decayed by then
     slow_share: float = 0.4  # of what is left: so much that may be slow noise is sought in the bank too
 

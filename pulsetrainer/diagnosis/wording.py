@@ -74,8 +74,9 @@ TEXTS: Mapping[str, str] = {
         "proposed."
     ),
     "no gain": (
-        "Extended by {names}, the model would predict these recordings no better than as it was given "
-        "({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it."
+        "Extended by {names} and used from rest, the model would predict these recordings little or no "
+        "better than as it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is "
+        "added to it."
     ),
     "overshadowed": (
         "The change accounts for {share:.2f} % of the squared error. Adding {names} would only reduce the "

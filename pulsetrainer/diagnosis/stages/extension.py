@@ -1,8 +1,9 @@
 """Extension: the model with the causes that repeat, as it will be used.
 
 The search judges a model on averages, with a free offset and begin. What is used is a model on levels of its
-own, from rest. It is made here, and must predict the very records better than the model as given; else
-nothing is added to that.
+own, from rest. It is made here, and must predict the very records better than the model as given, by at least
+three fifths of what the causes gain in the search; else nothing is added to that. What gains less was already
+under way before the record, and begins otherwise in the next.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import replace
 from pulsetrainer.diagnosis.answered import extended_model, rms_of
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import PERCENT
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 
 def stage(state: State) -> State:
@@ -22,7 +23,9 @@ def stage(state: State) -> State:
     given = state.question.given.model
     extended = extended_model(state, given)
     before, after = rms_of(state, given), rms_of(state, extended)
-    if after < before:
+    assert state.repeated is not None
+    gained = (state.baseline.squares - state.repeated.squares) / state.floor.count
+    if before**2 - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
         return replace(state, extended=extended)
     figures = {"given": PERCENT * before / state.scale.span, "extended": PERCENT * after / state.scale.span}
     names = tuple(term.cause.id for term in state.extensions)
