@@ -1092,7 +1092,7 @@ def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, la
 
 @pytest.mark.parametrize(("after", "better"), [(9.81, True), (9.82, False), (10.01, False)])
 def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, better):
-    """By three fifths of the 6 that its causes gain in the search: else nothing is added, and that is said."""
+    """By three fifths of the 6 that its causes gain in the search: else nothing is added, and it is said."""
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
     monkeypatch.setattr(extension, "rms_of", lambda state, model: after if model == "extended" else 10.0)
     state = _state(_fit(500.0, "creep"))
