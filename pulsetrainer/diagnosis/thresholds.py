@@ -113,7 +113,7 @@ class Thresholds:
     nearly: float = 0.75  # of the relevant fall: a candidate that gains so much is refitted to its end first
     held_out_least: float = 0.05  # of the reducible part: a smaller fall of the held-out error is no gain
     held_out_kept: float = 0.33  # of that part: on foreign plants true causes reach 0.43, false ones 0.28
-    least_share: float = 0.01  # of what all causes explain: less is what the formulas of the others miss
+    least_share: float = 0.002  # of what all causes explain: less is what the formulas of the others miss
     blocks: int = 20  # of a record, cut where its memory is wiped out
     jackknife: int = 10  # parts left out in turn for the intervals
     rows_per_unknown: int = 2  # averages that must stay for each unknown when blocks are left out

@@ -454,11 +454,11 @@ def test_beside_a_learned_curve_nothing_is_dropped_for_predicting_little(monkeyp
 
 
 @pytest.mark.parametrize(("step", "kept"), [(410.6, ("creep",)), (410.8, ("creep", "step"))])
-def test_a_hundredth_of_what_all_explain_is_an_imperfect_formula(monkeypatch, step, kept):
-    """Of 1472 less 400 a hundredth is 10.7: more than the nine that are relevant."""
+def test_a_five_hundredth_of_what_all_explain_is_an_imperfect_formula(monkeypatch, step, kept):
+    """Of 5760 less 400 it is 10.72: more than the nine that are relevant."""
     _refitting(monkeypatch, fitting, squares={frozenset({"creep"}): step, frozenset({"step"}): 600.0})
     monkeypatch.setattr(screened, "stage", lambda state: state)
-    state = _state(_fit(400.0, "creep", "step"), _fit(1472.0), p_values={"creep": 0.006, "step": 0.007})
+    state = _state(_fit(400.0, "creep", "step"), _fit(5760.0), p_values={"creep": 0.006, "step": 0.007})
     assert elimination.stage(state).current.names == kept
 
 

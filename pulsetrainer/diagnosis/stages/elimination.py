@@ -1,8 +1,8 @@
 """Backward elimination: no cause that the others have made superfluous.
 
 From the model with all causes each is taken out in turn. While the one that is missed least makes no relevant
-difference, or makes less than a hundredth of the difference of all together (the formulas of the others are
-not that exact), it is dropped. So is one without which time that was left out is predicted better: it was
+difference, or less than a five hundredth of that of all together (the formulas of the others are not that
+exact), it is dropped. So is one without which time that was left out is predicted better: it was
 accepted before the others, and does harm beside them. So is one that takes away less than a third of what
 can be lowered on blocks that were left out: it fits a device that is no Preisach operator, as anything does.
 A single cause has proved itself against the baseline, and goes only for the last two reasons.
