@@ -67,6 +67,9 @@ MESSAGES = {
     ),
     "not a number": Message("not a number", "line", "{file}", got="'abc' in column current_A, line 3"),
     "bad rows": Message("not a number", "--skip-bad-rows", "{file}", got="{place}: not a number ({where})"),
+    "too short a pulse": Message(
+        "samples of it", "stretch the pulse", "{pulse}", "at least 20", "{period}, and a drive of {rate}"
+    ),
     "too many bad rows": Message("too many to leave", "export", "{count} of {file}", got="{where}"),
     "time goes back": Message("does not increase", "sort", "{file}, column t_s", got="line 4: 1 s after 2 s"),
     "time repeats": Message(

@@ -80,7 +80,7 @@ def _is_symbol(text: str) -> bool:
 
 
 def check_unit(text: str, what: str, where: str = "") -> str:
-    """Return a unit as it is written.
+    """Return a unit as it is written; the two letters that look like a micro are one.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def check_unit(text: str, what: str, where: str = "") -> str:
         It is not a unit.
     """
     if is_unit(text):
-        return text.strip()
+        return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same
     near = difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
     meant = f"did you mean {' or '.join(repr(n) for n in near)}? " if near else ""
     raise DataError(

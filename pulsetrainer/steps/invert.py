@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pulsetrainer.artefacts import Model, Waveform
-from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.artefacts.units import with_seconds, with_unit
 from pulsetrainer.core import inversion
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.learning import BAND_HZ
@@ -27,6 +27,7 @@ Inversion = Literal["continuous", "closest-match", "extended"]
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
 _NORMALISED = 0.02  # how far the ends of a mere shape may lie from 0 and 1
+FEWEST = 20  # samples of a period: with fewer a drive does not follow the pulse
 RAMP_S = 0.4  # from rest to the first target, and back after the last
 
 
@@ -79,7 +80,8 @@ def invert(
         The method does not suit the model, ``beat`` is none, or the force range is empty.
     DataError
         The force range is beyond the model's reach or, of a signed model, beyond the range in which it has an
-        inverse; the recording holds no such beat; or the model does not describe its own record.
+        inverse; the recording holds no such beat; a period has too few samples; or the model does not
+        describe its own record.
 
     Source: Tan, Venkataraman, Krishnaprasad 2001 (closest match); docs/theory.md (the other inverses).
 
@@ -94,6 +96,7 @@ def invert(
     """
     notes: list[str] = []
     shape = _one_beat(pulse, beat, notes)
+    _check_sampled(shape, rate_Hz)
     _check_describes(model, name, despite_warning=despite_warning)
     chosen = _method(method, model, name)
     part = invertible(model, rate_Hz)
@@ -149,6 +152,18 @@ def _check_describes(model: Model, name: str, *, despite_warning: bool) -> None:
         raise DataError(
             f"{name} does not describe the record it was identified on. {warning}",
             hint="give `despite_warning` to invert it all the same",
+        )
+
+
+def _check_sampled(shape: Shape, rate_Hz: float) -> None:
+    """Refuse a pulse that is over within a few samples of the drive."""
+    samples = shape.period_s * rate_Hz
+    if samples < FEWEST:
+        raise DataError(
+            f"one period of {shape.name} lasts {with_seconds(shape.period_s)}, and a drive of {rate_Hz:g} "
+            f"samples a second has {samples:.2g} samples of it: it takes at least {FEWEST}",
+            hint=f"stretch the pulse to {with_seconds(FEWEST / rate_Hz)} or more; or in Python, for a faster "
+            f"driver of your own: pt.invert(..., rate_Hz={FEWEST / shape.period_s:.2g})",
         )
 
 

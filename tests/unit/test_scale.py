@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pulsetrainer as pt
+import wording
 from pulsetrainer.core import excitations
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.core.record import Record
@@ -122,6 +123,18 @@ def test_a_pulse_that_is_stretched_is_said_to_be_in_any_unit(unit):
     pulse = Shape("tall", np.arange(100) / 100, level)
     whole = Shape("whole", pulse.time_s, 100 * unit * pulse.normalised)
     assert [len(pt.invert(one, model).notes) for one in (pulse, whole)] == [1, 0]
+
+
+def test_a_pulse_that_is_over_within_a_few_samples_is_refused():
+    """Of 19 ms at 1 kHz; twenty samples are taken, and so are 19 ms of a faster driver."""
+    u = np.concatenate((np.linspace(0, 1, 200), np.linspace(1, 0, 200)))
+    model = pt.identify(pt.Run(time_s=np.arange(400) / 100, input=u, output=2.0 * u), levels=8)
+    level = np.sin(np.linspace(0.0, np.pi, 100, endpoint=False))
+    short, enough = (Shape("quick", seconds * np.arange(100) / 100, level) for seconds in (0.019, 0.0201))
+    with wording.raises(DataError, "too short a pulse", pulse="quick", period="19 ms", rate="1000 samples"):
+        pt.invert(short, model)
+    assert pt.invert(enough, model).period_s == pytest.approx(0.0201)
+    assert pt.invert(short, model, rate_Hz=1060.0).period_s == pytest.approx(0.019)
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-9])

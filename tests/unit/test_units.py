@@ -154,3 +154,10 @@ def test_a_time_is_told_in_the_unit_that_fits(seconds, said):
 def test_a_power_is_raised_whole_or_not_at_all(unit, printed):
     """There is no raised point."""
     assert shown(unit) == printed
+
+
+def test_the_two_letters_that_look_like_micro_are_one_unit():
+    """A keyboard gives one, a character table the other."""
+    assert check_unit("\N{GREEK SMALL LETTER MU}m", "input unit") == check_unit(
+        "\N{MICRO SIGN}m", "input unit"
+    )
