@@ -114,6 +114,7 @@ MESSAGES = {
     "has no time": Message("no time", ""),
     "does not repeat": Message("does not repeat", "diagnose"),
     "another model": Message("is not the model", "pulsetrainer diagnose"),
+    "delay too long": Message("is only", "seconds", expected="{length}", got="a delay of {given}"),
     "another run": Message("is not a diagnosis", "pulsetrainer diagnose"),
     "nothing to draw": Message("nothing to draw", ""),
     "no figure of it": Message("no figure", "", got="{got}"),

@@ -39,8 +39,8 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     Raises
     ------
     DataError
-        The diagnosis is of another run, found nothing beyond doubt that can be corrected, or the run has no
-        time and a delay.
+        The diagnosis is of another run, found nothing beyond doubt that can be corrected, or there is a
+        delay and the run has no time or is shorter.
 
     Source: Ljung, System Identification, 1999, section 14.1: what is done to data before a fit.
 
@@ -66,6 +66,14 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
             f"{run_name} has no time, so no delay can be taken out of it",
             hint="import it again with --time COLUMN or --rate HZ",
         )
+    for _, part in parts:
+        length_s = (part.output.size - 1) * (run.dt_s or 0.0)
+        if delay_s >= length_s > 0.0 and part.fingerprint in known:
+            raise DataError(
+                f"a delay of {delay_s:g} s was given, but {run_name} is only {length_s:g} s long"
+                + ("" if len(parts) == 1 else " in one of its parts"),
+                hint="give the delay of the output's recorder in seconds",
+            )
     faults = _faults(diagnosis)
     if not faults and not delay_s:
         raise DataError(_nothing(diagnosis, diagnosis_name), hint=_instead(diagnosis))

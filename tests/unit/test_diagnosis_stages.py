@@ -1176,6 +1176,19 @@ def test_a_model_of_the_wrong_kind(monkeypatch, wrong, direction, name):
         assert after.findings[0].explains_percent == pytest.approx(100.0 * (1.0 - wrong**2))
 
 
+@pytest.mark.parametrize("wrong", [None, 0.4])
+def test_an_output_that_falls_where_the_model_rises_is_reversed(monkeypatch, wrong):
+    """Also where a function of the velocity would describe it better than the model as given."""
+    wave = np.where(np.arange(RAMP.size) % 2, 0.05, -0.05)
+    after = _given(monkeypatch, 20.0 - 2.0 * RAMP + wave, refitted=3.0, wrong=wrong)
+    assert after.verdict == "condition-change"
+    assert _found(after) == ["condition-change", "outliers"]
+    assert [one.kind for one in after.evidence] == ["reversed", "static"]
+    offset, gain = after.findings[0].parameters
+    assert (offset.value, gain.value) == pytest.approx((10.0, -1.5), abs=0.01)
+    assert advice._advice(after).kind == "identify anew"
+
+
 @pytest.mark.parametrize("polarity", [1, -1])
 def test_another_condition_comes_first(monkeypatch, polarity):
     """Twice the gain, shifted by one: with the sign of the output as it was measured."""

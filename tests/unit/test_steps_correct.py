@@ -155,6 +155,15 @@ def test_a_recorders_delay_is_taken_out_only_when_told(clean):
         pt.correct(late, nothing)
 
 
+def test_a_delay_longer_than_the_record_is_refused(clean):
+    """Nothing of the output would be left."""
+    found = _diagnosis(clean, "offset-drift", rate=0.1)
+    length_s = float(clean.time_s[-1] - clean.time_s[0])
+    for delay_s in (1.001 * length_s, 1e5):
+        with raises(DataError, "delay too long", given=f"{delay_s:g} s", length=f"{length_s:g} s"):
+            pt.correct(clean, found, delay_s=delay_s)
+
+
 def test_a_diagnosis_of_another_run_is_refused(clean):
     """One sample that differs is another run; a corrected run is another one too."""
     found = _diagnosis(clean, "offset-drift", rate=0.1)

@@ -61,6 +61,11 @@ class ConditionChange(Cause):
             "{shift:.2g}{in_y} on average, has {times:.3f} times the gain of the model, and differs in "
             "shape by {left:.2g}{in_y} rms. Identify it again in this condition"
         ),
+        "reversed": (
+            "the {output} falls where the model rises: {times:.3f} times what the model says, shifted by "
+            "{shift:.2g}{in_y} on average, describes these recordings to {left:.2g}{in_y} rms. The sensor or "
+            "the coil is connected the other way round, or the model is of another device. Identify it again"
+        ),
     }
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
@@ -93,6 +98,8 @@ class Change:
     @property
     def kind(self) -> str:
         """Which text says it: gain and shape within 1 % of the span are unchanged."""
+        if self.gain < -1.0:
+            return "reversed"
         return "shifted" if abs(self.gain) <= _GAIN and self.left <= _FAR * self.span else "changed"
 
 
@@ -118,6 +125,24 @@ def against_model(
     given = left_by(measured, predicted, noise_rms)
     if given < _FAR * np.ptp(measured) or refitted_rms > _REFITTED * given:
         return None
+    return _carried_over(measured, predicted, refitted_rms, given)
+
+
+def turned_over(measured: FloatArray, predicted: FloatArray, noise_rms: float) -> Change | None:
+    """Return the change of a device whose output (n,) falls where the model rises, or None if it does not.
+
+    Weights are not negative, so refitted ones cannot describe it: a negative gain stands in their place.
+    """
+    gain, offset = _fit(measured, predicted)
+    left = left_by(measured, gain * predicted + offset, noise_rms)
+    if gain >= 0.0 or left > _REFITTED * float(np.std(measured)):
+        return None
+    return _carried_over(measured, predicted, left, left_by(measured, predicted, noise_rms))
+
+
+def _carried_over(
+    measured: FloatArray, predicted: FloatArray, refitted_rms: float, given_rms: float
+) -> Change:
     gain, offset = _fit(measured, predicted)
     parts = np.array_split(np.arange(measured.size), _BLOCKS)
     without = np.stack([_fit(np.delete(measured, p), np.delete(predicted, p)) for p in parts])
@@ -127,7 +152,7 @@ def against_model(
         float(spread[0]),
         float(offset),
         float(spread[1]),
-        1.0 - (refitted_rms / given) ** 2,
+        1.0 - (refitted_rms / given_rms) ** 2,
         root_mean_square(measured - gain * predicted - offset),
         float(np.mean(measured - predicted)),
         float(np.ptp(measured)),

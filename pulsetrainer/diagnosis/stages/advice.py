@@ -19,7 +19,12 @@ from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 # What the evidence says of the model as given, and the advice
-_ANOTHER_MODEL = {"wrong kind": "other model", "shifted": "identify anew", "changed": "identify anew"}
+_ANOTHER_MODEL = {
+    "wrong kind": "other model",
+    "shifted": "identify anew",
+    "changed": "identify anew",
+    "reversed": "identify anew",
+}
 
 
 def stage(state: State) -> State:

@@ -3,6 +3,8 @@
 So far the weights were refitted; now the model is judged as it was given, by what it predicts for these
 records.
 
+- If the output falls where the model rises, the polarity is reversed: `condition-change`, and all else is
+  withdrawn.
 - If a mere function of the velocity describes the output much better, the model is of the wrong kind: causes
   sought on top of it are withdrawn. If the speed matters and not only the direction, the force is `viscous`;
   else the cause is `unknown`.
@@ -27,7 +29,7 @@ from pulsetrainer.core.initial_state import estimated_start, reaches_an_end, sta
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import velocity
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.condition_change import Change, against_model, left_by
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Estimate, Finding
@@ -61,6 +63,10 @@ def stage(state: State) -> State:
         said.append(Evidence("untimed", names=told))
     span = state.scale.span
     noise = span * state.floor_left.noise
+    turned = condition_change.turned_over(judged.measured, judged.predicted, noise)
+    if turned is not None and turned.left < judged.speed.velocity:
+        state, more = _in_another_condition(withdrawn(state), turned, judged.polarity)
+        return replace(state, evidence=(*said, *more, *state.evidence))
     if judged.speed.wrong:
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
