@@ -122,6 +122,11 @@ MESSAGES = {
     "no such cause": Message("does not know", "update", got="'{named}'"),
     "does not vary": Message("the {constant} does not vary", "capture diagnostic"),
     "names it": Message("", "", "{named}"),
+    "no beat of a session": Message("has no whole beat", "pulsetrainer session", "{file}"),
+    "not such a row": Message("", "", "{file}, {row}", "expected {expected}", "{got}"),
+    "too few answers": Message("answers to", "one pulse name on each line", "{file}", "{expected}", "{got}"),
+    "a run that was diagnosed": Message("to verify with is one that", "not diagnosed", "{file}"),
+    "nothing to extend by": Message("nothing to extend", "{next}", "{file}", got="{verdict}"),
     # --- words -------------------------------------------------------------------------------------------
     "option missing": Message("is missing", "pulsetrainer identify run.h5", expected="--out"),
     "no such command": Message("there is no command", "--help", got="frobnicate"),
@@ -175,6 +180,13 @@ MESSAGES = {
     "port is gone": Message("is gone", "cable", "/dev/", got=KEPT),
     "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),
     "interrupted": Message("stopped by you", None, got=KEPT),
+    "no beat was pressed": Message("no beat was pressed", "pulsetrainer tune", "{file}"),
+    "another supply": Message("does not fit the voltage", "the supply", "during {during}"),
+    "limit below the model's range": Message(
+        "the current goes up", "--limit-current", expected="the limit in force is {limit} A", got="{got} A"
+    ),
+    "tuning is no play": Message("force", "off the device while it is tuned", "during"),
+    "a supply that sags": Message("cannot follow the pulses (voltage)", "a supply", got="sags"),
     # --- gates and bugs ----------------------------------------------------------------------------------
     "no such metric": Message("does not have", "it has", "{metric}"),
     "out of bounds": Message("1 of 1 bounds", "the bound", "{metric}", "[99, 100]", " = "),

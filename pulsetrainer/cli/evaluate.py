@@ -79,12 +79,17 @@ def evaluate(
 
 def _of_session(job: Job, path: Path, session: pt.Session, html: Path | None, *, alone: bool) -> None:
     from pulsetrainer.cli.score import say
-    from pulsetrainer.errors import UsageError
+    from pulsetrainer.errors import DataError, UsageError
 
     if not alone:
         raise UsageError(
             f"{path} is a session, which keeps its own errors: it has no models, no bounds and no evaluation",
             hint=f"pulsetrainer evaluate {path} --html sheet.html",
+        )
+    if not session.beats.start_s.size:
+        raise DataError(
+            f"{path} has no whole beat: {session.fault or 'it ended before the first was over'}",
+            hint="press it again: pulsetrainer session",
         )
     say(job, path, html, session)
 

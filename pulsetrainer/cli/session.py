@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pulsetrainer.cli.hands import Hands
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.session_recorder import SessionRecorder
-    from pulsetrainer.steps.performance import Now
+    from pulsetrainer.steps.performance import Now, Performed
     from pulsetrainer.steps.programme import Programme
     from pulsetrainer.steps.quiz import Blind
 
@@ -119,9 +119,9 @@ def session(
         amplitude=amplitude,
         minutes=minutes,
         beats=beats,
-        changes=[Change(*row) for row in read_changes(changes)] if changes else (),
+        changes=[Change(*row) for row in read_changes(changes, hands.names)] if changes else (),
         quiz=quiz,
-        answers=read_answers(answers) if answers else hands.answer,
+        answers=read_answers(answers, hands.names, quiz) if answers else hands.answer,
         seed=seed,
     )
     asked = {
@@ -181,12 +181,26 @@ def _press(
                 watch=watch,
                 **asked,
             )
+            if done.fault and not done.beats.start_s.size:
+                recorder.forget()
+                _raise_without_a_beat(done, out)
             quiz = blind.quiz(out.stem) if blind else None
             job.know("seed", seed)
             header = job.header(f"Session on {info.serial}", device=job.device(info))
             recorder.keep(done.fields | {"quiz": quiz}, header)
             recorder.finish(complete=not done.fault, dropped_samples=done.dropped)
     tell(job, out, html, done, quiz, info)
+
+
+def _raise_without_a_beat(done: Performed, out: Path) -> None:
+    from pulsetrainer.errors import PulsetrainerError
+    from pulsetrainer.steps.stopped import raise_if_stopped
+
+    try:
+        raise_if_stopped(done.fault, done.remedy, "the session")
+    except PulsetrainerError as error:
+        error.message += f"; no beat was pressed, so {out} was not written"
+        raise
 
 
 class _Sink:

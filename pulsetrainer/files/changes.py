@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
+from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.errors import DataError
 
 _COLUMNS = ("t_s", "rate", "amplitude", "pulse")
 
 
-def read_changes(path: Path) -> list[tuple[float, float | None, float | None, str | None]]:
+def read_changes(
+    path: Path, pulses: Sequence[str]
+) -> list[tuple[float, float | None, float | None, str | None]]:
     """Return time (s), rate, amplitude (%) and pulse of each line; None where nothing changes.
 
     Raises
     ------
     DataError
-        The file cannot be read, or a line is not one of these.
+        The file cannot be read, or a line is not one of these, comes before the line above it, or asks for
+        what a session of these ``pulses`` cannot press.
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
@@ -29,13 +34,22 @@ def read_changes(path: Path) -> list[tuple[float, float | None, float | None, st
                     "of rate, amplitude, pulse",
                     hint="write a header such as: t_s,rate,amplitude,pulse",
                 )
-            return [_change(path, rows.line_num, row) for row in rows]
+            found: list[tuple[float, float | None, float | None, str | None]] = []
+            for row in rows:
+                found.append(_change(path, rows.line_num, row, pulses))
+                if len(found) > 1 and found[-1][0] < found[-2][0]:
+                    raise DataError(
+                        f"{path}, line {rows.line_num}: t_s is {found[-1][0]:g} after {found[-2][0]:g} s, "
+                        "expected times that rise",
+                        hint="sort the lines by t_s",
+                    )
+            return found
     except (OSError, UnicodeError, csv.Error) as error:
         raise DataError(f"{path} cannot be read: {error}", hint="give a table of text") from error
 
 
 def _change(
-    path: Path, line: int, row: dict[str, str | None]
+    path: Path, line: int, row: dict[str, str | None], pulses: Sequence[str]
 ) -> tuple[float, float | None, float | None, str | None]:
     said = {name: (value or "").strip() for name, value in row.items() if name in _COLUMNS}
     numbers: list[float | None] = []
@@ -50,15 +64,50 @@ def _change(
     time_s, rate, amplitude = numbers
     if time_s is None or time_s < 0:
         raise DataError(f"{path}, line {line}: t_s must not be negative or empty", hint="give a time in s")
-    return time_s, rate, amplitude, said.get("pulse") or None
+    if rate is not None and not SLOWEST_BPM <= rate <= FASTEST_BPM:
+        raise DataError(
+            f"{path}, line {line}: rate is {rate:g}, expected {SLOWEST_BPM:g} to {FASTEST_BPM:g} beats a "
+            "minute",
+            hint="75 is usual",
+        )
+    if amplitude is not None and not 0.0 < amplitude <= 100.0:
+        raise DataError(
+            f"{path}, line {line}: amplitude is {amplitude:g}, expected more than 0 and at most 100 %",
+            hint="100 % is all that the model reaches",
+        )
+    pulse = said.get("pulse") or None
+    if pulse is not None and pulse not in pulses:
+        raise DataError(
+            f"{path}, line {line}: pulse is {pulse!r}, expected one of {', '.join(pulses)}",
+            hint="correct it, or add the pulse to `pulses`",
+        )
+    return time_s, rate, amplitude, pulse
 
 
-def read_answers(path: Path) -> list[str]:
-    """Return the answers of a quiz, one pulse name a line, or raise DataError; empty lines do not count."""
+def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str]:
+    """Return the answers of a quiz, one pulse name a line; empty lines do not count.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read, a line is none of the ``choices``, or there are fewer than ``questions``.
+    """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeError) as error:
         raise DataError(
             f"{path} cannot be read: {error}", hint="give a text file, one name a line"
         ) from error
-    return [line.strip() for line in lines if line.strip()]
+    answers = [(number, line.strip()) for number, line in enumerate(lines, 1) if line.strip()]
+    for number, said in answers:
+        if said not in choices:
+            raise DataError(
+                f"{path}, line {number}: the answer is {said!r}, expected one of {', '.join(choices)}",
+                hint="write one of these names on each line",
+            )
+    if len(answers) < questions:
+        raise DataError(
+            f"{path} has {len(answers)} answers to {questions} questions",
+            hint="write one pulse name on each line, as many as questions",
+        )
+    return [said for _, said in answers]

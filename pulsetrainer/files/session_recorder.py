@@ -37,5 +37,9 @@ class SessionRecorder(RunRecorder):
         """Take in what the whole session was, and what the artefact says about itself."""
         self._fields, self._header = fields, header
 
+    def forget(self) -> None:
+        """Take what was recorded for nothing: a block that ends with an error then leaves no file."""
+        self._samples = 0
+
     def _known_fields(self) -> dict[str, Any]:
         return dict(self._fields)

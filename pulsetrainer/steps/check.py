@@ -14,6 +14,7 @@ from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.temperature import COPPER_PER_K
+from pulsetrainer.device.limits import check_peak
 from pulsetrainer.diagnosis.causes.base import low_pass
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError
@@ -104,7 +105,7 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     Raises
     ------
     DataError
-        The model is of another device, or of another kind of device.
+        The model is of another device, of another kind of device, or goes beyond the limit in force.
     DeviceError, Interrupted
         The measurement could not be finished.
 
@@ -126,6 +127,10 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     check_same_device(model, device)
     operator = operator_of(model)  # the edges of a dual model are forces
     low, high = operator.low, operator.high
+    hint = (
+        "a check plays the whole range of the model: raise `limit_current_A`, or check a model of less range"
+    )
+    check_peak(np.asarray([low, high]), device.info.current_limit_A, hint=hint)
     condition(device, high, RATE_HZ)
     progress(0.2)
     reference = signal(max(low, 0.0), high)

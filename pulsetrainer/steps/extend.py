@@ -33,8 +33,8 @@ def extend(
     Raises
     ------
     DataError
-        The diagnosis found nothing that extends a model, is of another model, or no cause helps to predict
-        the run that is to verify it.
+        The diagnosis found nothing that extends a model, is of another model or of the very run that is
+        to verify it, or no cause helps to predict that run.
 
     Source: Della Torre, Magnetic Hysteresis, 1999, chapters 3 to 5: the classical model and its extensions.
 
@@ -60,8 +60,12 @@ def extend(
             hint = (
                 "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis diagnosis.h5 -o corrected.h5"
             )
+        elif diagnosis.quick:
+            hint = "diagnose without `quick`"
+        elif diagnosis.verdict == "none" or not diagnosis.next_experiment:
+            hint = "use the model as it is"
         else:
-            hint = "diagnose without `quick`, on a run of `pulsetrainer capture diagnostic`"
+            hint = f"follow the advice of the diagnosis: {diagnosis.next_experiment}"
         raise DataError(f"{diagnosis_name} {why}: there is nothing to extend the model by", hint=hint)
     if diagnosis.model not in ("", model.fingerprint):  # files of 0.1 do not name theirs
         raise DataError(
@@ -77,6 +81,12 @@ def extend(
             f"{extended.input_unit}, but {model_name} spans {model.edges[0]:.4g} .. {model.edges[-1]:.4g} "
             f"{model.input_unit}",
             hint="give the model that was diagnosed",
+        )
+    diagnosed = {one.fingerprint for one in diagnosis.records}
+    if verify is not None and any(verify.cut(part).fingerprint in diagnosed for part in verify.slices):
+        raise DataError(
+            f"the run to verify with is one that {diagnosis_name} was made from: it cannot tell what repeats",
+            hint="give a run that was not diagnosed",
         )
     extended = replace(extended, coil=model.coil)
     return extended if verify is None else _verified(model, extended, verify)

@@ -10,6 +10,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, Fault
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.trace import Trace
+from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.loop_gains import OPEN_LOOP
 from pulsetrainer.steps.progress import Progress
@@ -32,6 +33,23 @@ _MOVES_N = 0.25  # of means over 50 ms at rest: a finger trembles, a table does 
 _SHIFTED_N = 1.2  # from the first rest to the last
 _TOO_MUCH = {Fault.OVER_CURRENT, Fault.COMPARATOR}
 MEAN_S = 0.05
+_SENSOR = "check the force sensor and its plug, and keep the finger off the device while it is tuned"
+# Nobody presses here: what a play advises about fingers and forces does not apply.
+_REMEDY: dict[int, str] = {
+    Fault.OVER_FORCE: "keep everything off the device while it is tuned, and check its force and current "
+    "sensors; or raise `limit_force_N` where it was lowered",
+    Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor",
+    **dict.fromkeys(
+        (
+            Fault.NO_FORCE,
+            Fault.FORCE_FROZEN,
+            Fault.FORCE_IMPLAUSIBLE,
+            Fault.FORCE_ZERO,
+            Fault.FORCE_RAIL,
+        ),
+        _SENSOR,
+    ),
+}
 
 
 class Measurement:
@@ -99,7 +117,7 @@ class Measurement:
             raise _no_coil(duty)
         if trace.fault_code in _TOO_MUCH:
             raise _shorted(f"{100 * duty:.0f} % of the supply drove more than the device permits")
-        raise_if_stopped(trace.fault, trace.remedy, "the first look at the coil")
+        _raise_if_stopped(trace, "the first look at the coil")
 
     def coil(self) -> Coil:
         """Return the coil by holds up to most of the range, each by what is known so far."""
@@ -112,7 +130,7 @@ class Measurement:
             hold, trace = self._hold(coil.duty_at(share * top))
             if trace.fault_code in _TOO_MUCH:
                 raise _shorted(f"{share * top:.2f} A were asked for and more than the device permits flowed")
-            raise_if_stopped(trace.fault, trace.remedy, "the measurement of the coil")
+            _raise_if_stopped(trace, "the measurement of the coil")
             holds.append(hold)
             coil = electrical.identify_coil(holds, self._dt_s, start=coil)
             self._progress(0.1 + 0.3 * (number + 1) / len(_HOLDS))
@@ -126,10 +144,15 @@ class Measurement:
     def play(self, reference_A: FloatArray, what: str, decimation: int = 10) -> Trace:
         """Play a current (n,) in A to its end, and return what was measured."""
         trace = self._device.play(reference_A, RATE_HZ, decimation=decimation)
-        raise_if_stopped(trace.fault, trace.remedy, what)
+        _raise_if_stopped(trace, what)
         if trace.samples == 0:
             raise DeviceError("the device told no samples", hint="check the line to it")
         return trace
+
+
+def _raise_if_stopped(trace: Trace, what: str) -> None:
+    remedy = _SENSOR if trace.remedy == FORCE_REMEDY else trace.remedy
+    raise_if_stopped(trace.fault, _REMEDY.get(trace.fault_code, remedy), what)
 
 
 def _shorted(why: str) -> DeviceError:

@@ -183,6 +183,11 @@ class _Tuning:
             what = f"the coil of {ohm:.2f} ohm and {1e3 * henry:.1f} mH cannot follow the pulses"
             if not coil.duty_at(top) < 1.0:
                 said = f"{what} (voltage): {top:.2f} A need {steady:.1f} V and the supply gives {volts:.1f} V"
+                if steady < volts:  # the duty says so all the same: the voltage falls as the current rises
+                    said = (
+                        f"{what} (voltage): {top:.2f} A need {steady:.1f} V, and the supply, {volts:.1f} V "
+                        "without a load, sags below that under this one"
+                    )
             else:
                 way = "rise" if error[at] > 0 else "fall"
                 said = (
@@ -190,7 +195,9 @@ class _Tuning:
                     f"cannot {way} as fast as they do, by {1e3 * abs(error[at]):.0f} mA"
                 )
             raise DeviceError(
-                said, hint="use a supply of more voltage, a coil of fewer turns, or a lower current limit"
+                said,
+                hint="use a supply of more voltage that holds it, a coil of fewer turns, or a lower current "
+                "limit",
             )
 
     # --- verifying -------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import pulsetrainer as pt
-from wording import tells
+from wording import refusal, tells
 
 KEYS = {"verdict", "offset", "gain", "shape_percent", "temperature_K", "error_percent"}
 
@@ -52,6 +52,18 @@ def test_another_device_is_not_updated(run, calibrated, tmp_path):
     refused = run(*words, "--json", "--update", "-o", "updated.h5")
     assert (refused.code, refused.json["error"]["kind"]) == (3, "data")
     assert not (tmp_path / "updated.h5").exists()
+
+
+def test_a_supply_that_does_not_fit_is_named(run, calibrated):
+    """Half the voltage: exit 4, and what to look at."""
+    done = run("check", calibrated / "model.h5", "--port", "bench:?supply=6", "--json")
+    refusal(done, 4, "another supply", during="conditioning")
+
+
+def test_a_limit_below_the_models_range_is_named(run, calibrated):
+    """It is the limit that is too low, as a check plays the whole range."""
+    done = run("check", calibrated / "model.h5", "--limit-current", 0.5, "--json")
+    refusal(done, 3, "limit below the model's range", limit="0.5", got="1.5")
 
 
 @pytest.mark.parametrize("words", [("--update",), ("-o", "updated.h5")])

@@ -21,6 +21,7 @@ from program import PROGRAM, pulsetrainer
 from pulsetrainer.artefacts import Session
 from pulsetrainer.files.store import read, read_any
 from pulsetrainer.steps.conductor import SLEW_A_PER_S
+from wording import refusal
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 MODEL = str(KEPT / "model-extended.h5")
@@ -62,6 +63,47 @@ def test_a_session_in_a_file_has_its_sheet_made_again(run, tmp_path):
     assert (tmp_path / "again.html").read_text() == (tmp_path / "s.html").read_text()
     refused = run("evaluate", "s.h5", "-o", "e.h5")
     assert (refused.code, (tmp_path / "e.h5").exists()) == (2, False)
+
+
+def test_a_session_that_fails_before_its_first_beat_leaves_no_file(run, tmp_path):
+    """The next try needs no --overwrite; what was there before stays."""
+    words = (*SHORT, "--beats", 3, "--port", "bench:?supply=6", "--json")
+    refusal(run(*words), 4, "no beat was pressed", file="s.h5")
+    assert not list(tmp_path.glob("s.h5*"))
+    (tmp_path / "s.h5").write_text("mine")
+    refusal(run(*words, "--overwrite"), 4, "no beat was pressed", file="s.h5")
+    assert (tmp_path / "s.h5").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "name", "named"),
+    [
+        ("--changes", "t_s,rate\n5,80\n6,500\n", "not such a row", ("line 3: rate", "20 to 240", "500")),
+        (
+            "--changes",
+            "t_s,rate\n5,80\n3,90\n",
+            "not such a row",
+            ("line 3: t_s", "times that rise", "3 after 5"),
+        ),
+        ("--changes", "t_s,amplitude\n5,0\n", "not such a row", ("line 2: amplitude", "more than 0", "is 0")),
+        (
+            "--changes",
+            "t_s,pulse\n5,bifd\n",
+            "not such a row",
+            ("line 2: pulse", "one of normal, bifid", "'bifd'"),
+        ),
+        ("--answers", "normal\n\nfoo\n", "not such a row", ("line 3", "one of normal, bifid", "'foo'")),
+        ("--answers", "normal\n", "too few answers", ("", "2 questions", "1 answers")),
+    ],
+)
+def test_a_bad_row_is_named_with_its_file(run, tmp_path, option, text, name, named):
+    """Exit 3 before anything moves: the file, the line, what was expected and what was got."""
+    (tmp_path / "rows.txt").write_text(text)
+    quiz = ("--quiz", 2) if option == "--answers" else ("--beats", 3)
+    done = run(*SHORT, "--pulses", "normal,bifid", *quiz, option, "rows.txt", "--json")
+    row, expected, got = named
+    refusal(done, 3, name, file="rows.txt", row=row, expected=expected, got=got)
+    assert not list(tmp_path.glob("s.h5*"))
 
 
 def test_changes_of_a_script_come_at_the_next_beat(run, tmp_path):
@@ -126,7 +168,7 @@ def test_a_quiz_by_file(run, tmp_path):
         (("--quiz", "2", "--pulses", "normal,bifid", "--answers", "wrong.txt"), 3, "stiff"),
         (("--changes", "bad.csv"), 3, "line 2"),
         (("--changes", "other.csv"), 3, "columns"),
-        (("--changes", "unknown.csv"), 2, "bifd"),
+        (("--changes", "unknown.csv"), 3, "bifd"),
         (("--changes", "absent.csv"), 3, "absent.csv"),
     ],
 )
@@ -224,6 +266,9 @@ def _check_cut_off(tmp_path: Path, after: int) -> None:
     shown = pulsetrainer(tmp_path, "show", "s.h5.partial", "--json")
     assert (shown.json["kind"], shown.json["facts"]["complete"]) == ("session", False)
     done = pulsetrainer(tmp_path, "evaluate", "s.h5.partial", "--html", "s.html", "--json")
+    if not kept.beats.start_s.size:
+        refusal(done, 3, "no beat of a session", file="s.h5.partial")
+        return
     assert done.json["beats"] == kept.beats.start_s.size
     assert kept.fault in (tmp_path / "s.html").read_text()
 

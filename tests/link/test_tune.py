@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from pulsetrainer.device.codes import State
 from pulsetrainer.device.gains import DELIVERED
 from pulsetrainer.device.limits import Limits
 from pulsetrainer.errors import ArgumentError, DeviceError
+from wording import raises
 
 RANGE_A = 1.5
 DATA = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
@@ -74,6 +76,23 @@ def test_what_cannot_be_tuned_is_named_and_off(port, names):
         assert device.gains == DELIVERED
         assert device._status().state in {State.IDLE, State.FAULT}
         assert device._status().current < 200
+
+
+@pytest.mark.parametrize("broken", ["force-high@0", "shunt-half@0.5", "force-zero@0"])
+def test_a_fault_while_tuning_calls_for_no_finger_and_no_other_force(broken):
+    """Nobody presses anything, and nobody's finger should be there."""
+    with (
+        pt.open_device(f"bench:?break={broken}") as device,
+        raises(DeviceError, "tuning is no play") as raised,
+    ):
+        pt.tune(device)
+    assert not re.search("force_max|rests on the finger", raised.value.hint)
+
+
+def test_a_supply_that_sags_is_told_from_one_of_too_little_voltage():
+    """12 V without a load are more than the 7.5 V that the coil needs."""
+    with pt.open_device("bench:?supply-sag=5") as device, raises(DeviceError, "a supply that sags"):
+        pt.tune(device)
 
 
 def test_a_coil_is_judged_by_the_drives_that_it_is_to_follow():

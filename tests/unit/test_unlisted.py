@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Extension, Parameter
+from pulsetrainer.artefacts.diagnosis import Recorded
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
@@ -178,6 +179,38 @@ def test_a_run_of_its_own_decides(dipping):
         pt.extend(model, found, verify=_run(u, _static(u)))
     with raises(DataError, "has no time"):
         pt.extend(model, found, verify=replace(_run(u, _dip(u)), time_s=None))
+
+
+def test_a_run_that_was_diagnosed_verifies_nothing(dipping):
+    """Told by its samples; also where it is one part of several."""
+    model, found = dipping
+    u = excitations.identification(0.0, 1.5, n_h=10, speed=4.0, rate_Hz=RATE_HZ).value
+    run = _run(u, _dip(u))
+    known = replace(found, records=(Recorded(run.fingerprint, DT_S),))
+    seam = np.zeros(2 * u.size, dtype=bool)
+    seam[u.size] = True
+    part = run.time_s + run.time_s[-1] + 1.0
+    both = replace(
+        run, time_s=np.append(run.time_s, part), input=np.tile(u, 2), output=np.tile(run.output, 2), seam=seam
+    )
+    for verify in (run, both):
+        with raises(DataError, "a run that was diagnosed", file="d.h5"):
+            pt.extend(model, known, verify=verify, names=("m.h5", "d.h5"))
+
+
+@pytest.mark.parametrize(
+    ("verdict", "quick", "advised"),
+    [("none", False, "use the model as it is"), ("unknown", False, "Repeat it."), ("creep", True, "`quick`")],
+)
+def test_what_to_do_where_there_is_nothing_to_extend_by(dipping, verdict, quick, advised):
+    """The diagnosis knows: it says what to do next."""
+    model, found = dipping
+    empty = replace(
+        found, extended=None, correctable=(), verdict=verdict, quick=quick, next_experiment="Repeat it."
+    )
+    said = "only screened" if quick else verdict
+    with raises(DataError, "nothing to extend by", next=advised, file="d.h5", verdict=said):
+        pt.extend(model, empty, names=("m.h5", "d.h5"))
 
 
 def test_of_two_causes_the_one_that_harms_is_left_out(dipping):
