@@ -13,6 +13,7 @@ from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.diagnosis.extended import Extended
+from wording import tells
 
 RATE_HZ = 100.0
 LAG_S = 0.04
@@ -57,6 +58,17 @@ def _diagnose(folder, *runs, model="model.h5", out="diagnosis.h5", more=()):
     return pulsetrainer(
         folder, "diagnose", *runs, "--model", model, "-o", out, "--overwrite", "--json", *more
     )
+
+
+def test_a_device_connected_the_other_way_round_is_told_as_such(bench):
+    """Its output falls where the model's rises: no velocity, no extension, but identify again."""
+    u = excitations.identification(0.0, 1.5, n_h=16, speed=ONE_SPEED, rate_Hz=RATE_HZ).value
+    _write(bench, "reversed", u, 9.0 - _device(u))
+    done = _diagnose(bench, "reversed.h5", out="reversed-diagnosis.h5", more=("--quick",))
+    assert done.code == 0, done
+    assert done.json["verdict"] == "condition-change"
+    tells(done.json["evidence"][0], "reversed")
+    assert done.json["causes"][0]["parameters"]["gain"]["value"] == pytest.approx(-2.0, abs=0.05)
 
 
 @pytest.mark.slow

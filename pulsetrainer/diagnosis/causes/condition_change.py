@@ -62,9 +62,9 @@ class ConditionChange(Cause):
             "shape by {left:.2g}{in_y} rms. Identify it again in this condition"
         ),
         "reversed": (
-            "the {output} falls where the model rises: {times:.3f} times what the model says, shifted by "
-            "{shift:.2g}{in_y} on average, describes these recordings to {left:.2g}{in_y} rms. The sensor or "
-            "the coil is connected the other way round, or the model is of another device. Identify it again"
+            "the {output} falls where the model rises: {times:.3f} times what the model says, and an offset, "
+            "leave {left:.2g}{in_y} rms. The sensor or the coil is connected the other way round, or the "
+            "model is of another device. Identify it again"
         ),
     }
 
