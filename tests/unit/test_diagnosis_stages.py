@@ -443,6 +443,15 @@ def test_a_cause_that_predicts_little_or_worse_is_dropped(monkeypatch, gain, pie
     assert after.current.names == kept
 
 
+@pytest.mark.parametrize(("left", "kept"), [(136.0, ("creep", "step")), (137.0, ())])
+def test_where_only_noise_is_left_little_need_be_predicted(monkeypatch, left, kept):
+    """The floor is 100, and 36 more are not worth a word: what blocks leave is then mostly noise."""
+    _refitting(monkeypatch, fitting, squares={frozenset({"step"}): 440.0, frozenset({"creep"}): 450.0})
+    monkeypatch.setattr(screened, "stage", lambda state: state)
+    state = _state(_fit(left, "creep", "step"), p_values={"creep": 0.006, "step": 0.007})
+    assert elimination.stage(replace(state, held_out=HeldOut(0.32))).current.names == kept
+
+
 @pytest.mark.parametrize(("gain", "kept"), [(-0.01, ("creep", "unlisted")), (0.32, ("creep", "unlisted"))])
 def test_beside_a_learned_curve_nothing_is_dropped_for_predicting_little(monkeypatch, gain, kept):
     """The curve can do what a listed cause does: that is then no better, and may yet be true."""
