@@ -173,7 +173,7 @@ def test_it_can_be_read_while_it_grows(tmp_path):
             assert time.monotonic() < deadline
             time.sleep(0.05)
         counts = []
-        while len(counts) < 2:
+        while not counts or counts[-1] == counts[0]:  # two looks may fall between two blocks
             done = pulsetrainer(tmp_path, "show", "run.h5.partial", "--json")
             if done.code == 0 and done.json["facts"]["samples"]:
                 counts.append(done.json["facts"]["samples"])
