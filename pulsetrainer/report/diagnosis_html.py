@@ -44,7 +44,8 @@ def headline(found: Diagnosis) -> str:
     words = "In doubt" if in_doubt(found) else "Found"
     tied = f" (could equally be {' or '.join(cause.confounded_with)})" if cause.confounded_with else ""
     rest = "" if found.left.whole else ". Something else is left"
-    named = ", ".join([cause.cause + tied, *also]).replace("unlisted", "a dependence in no list")
+    named = ", ".join(dict.fromkeys([cause.cause + tied, *also]))  # each once
+    named = named.replace("unlisted", "a dependence in no list")
     return f"{words}: {named}{rest}."
 
 
