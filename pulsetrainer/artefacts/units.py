@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Sequence
 
 from pulsetrainer.errors import DataError
 
@@ -51,6 +52,8 @@ _NO_UNIT_ALONE = frozenset(["min", "second"])  # the least, the next one
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "d": 86400.0, "ns": 1e-9}
 SECONDS |= dict.fromkeys(["us", "µs", "μs"], 1e-6)
 
+_OF_MICRO = "|".join(sorted(_PREFIXED, key=len, reverse=True))
+_MICRO = re.compile(rf"(?<![A-Za-zΩµ])u(?=(?:{_OF_MICRO})(?![A-Za-zΩµ]))|\N{{GREEK SMALL LETTER MU}}")
 _EXPONENT = re.compile(r"(?:\^|\*\*)?(?P<exponent>[-+]?\d)$|(?P<raised>[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹])$")
 _SEPARATOR = re.compile(r"\s*[*·/×]\s*|\s+|(?<=[A-Za-zΩµ])\.(?=[A-Za-zΩµ])")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*/?\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*$")
@@ -102,6 +105,15 @@ def check_unit(text: str, what: str, where: str = "") -> str:
         f"the {what} {text!r}{where and ' in '}{where} is not a known unit",
         hint=f"{meant}give the {what}, such as N or mm/s^2; 1 stands for a pure number",
     )
+
+
+def same_units(ours: Sequence[str], theirs: Sequence[str]) -> bool:
+    """Tell whether units are one by one the same; ``um`` is ``µm``."""
+    return [_with_micro(one) for one in ours] == [_with_micro(one) for one in theirs]
+
+
+def _with_micro(unit: str) -> str:
+    return _MICRO.sub("\N{MICRO SIGN}", unit)
 
 
 def symbol_of(text: str) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Model, Run
+from pulsetrainer.artefacts.units import same_units
 from pulsetrainer.core.initial_state import first_stroke_words, known_from
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
@@ -59,7 +60,7 @@ def question_of(
 
 def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
     """Raise DataError unless run and model can be of one device."""
-    if (run.input_unit, run.output_unit) != (model.input_unit, model.output_unit):
+    if not same_units((run.input_unit, run.output_unit), (model.input_unit, model.output_unit)):
         raise DataError(
             f"{name} is in {run.input_unit} and {run.output_unit}, but {model_name} was identified in "
             f"{model.input_unit} and {model.output_unit}",

@@ -17,6 +17,7 @@ from pulsetrainer.artefacts import (
     Run,
     WaveformEvaluation,
 )
+from pulsetrainer.artefacts.units import same_units
 from pulsetrainer.core import metrics
 from pulsetrainer.core.initial_state import estimated_start, first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray
@@ -159,7 +160,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
     found: list[ModelEvaluation] = []
     notes: list[str] = []
     for title, model in zip(model_names, models, strict=True):
-        if (model.input_unit, model.output_unit) != (run.input_unit, run.output_unit):
+        if not same_units((model.input_unit, model.output_unit), (run.input_unit, run.output_unit)):
             raise DataError(
                 f"{title} was identified in {model.input_unit} and {model.output_unit}, "
                 f"but {name} is in {run.input_unit} and {run.output_unit}",

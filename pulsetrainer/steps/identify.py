@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Fit, Model, Run
-from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.artefacts.units import same_units, with_unit
 from pulsetrainer.core import input_noise, metrics, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
 from pulsetrainer.core.dual import exchanged
@@ -229,7 +229,7 @@ def _check_units(names: Sequence[str], runs: Sequence[Run]) -> None:
         raise DataError("there is no run to identify a model from", hint="give at least one run")
     first = runs[0]
     for name, run in zip(names, runs, strict=True):
-        if (run.input_unit, run.output_unit) != (first.input_unit, first.output_unit):
+        if not same_units((run.input_unit, run.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
                 f"{name} is in {run.input_unit} and {run.output_unit}, "
                 f"but {names[0]} is in {first.input_unit} and {first.output_unit}",

@@ -10,7 +10,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.time_steps import GAP, gaps_of, steps_of
-from pulsetrainer.artefacts.units import with_seconds
+from pulsetrainer.artefacts.units import same_units, with_seconds
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage, minor_coverage
 from pulsetrainer.core.excitations import MOST_SAMPLES
@@ -189,7 +189,7 @@ def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
     if len(parts) == 1:
         return first, ()
     for part in parts[1:]:
-        if (part.input_unit, part.output_unit) != (first.input_unit, first.output_unit):
+        if not same_units((part.input_unit, part.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
                 f"{part.signal} is in {part.input_unit} and {part.output_unit}, but {first.signal} is in "
                 f"{first.input_unit} and {first.output_unit}",

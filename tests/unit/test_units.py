@@ -11,6 +11,7 @@ from pulsetrainer.artefacts.units import (
     SECONDS,
     check_unit,
     is_unit,
+    same_units,
     shown,
     split_unit,
     symbol_of,
@@ -161,3 +162,20 @@ def test_the_two_letters_that_look_like_micro_are_one_unit():
     assert check_unit("\N{GREEK SMALL LETTER MU}m", "input unit") == check_unit(
         "\N{MICRO SIGN}m", "input unit"
     )
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "same"),
+    [
+        ("um", "\N{MICRO SIGN}m", True),
+        ("um", "\N{GREEK SMALL LETTER MU}m", True),
+        ("uN/um", "\N{MICRO SIGN}N/\N{MICRO SIGN}m", True),
+        ("um^2", "\N{MICRO SIGN}m^2", True),
+        ("um", "mm", False),
+        ("emu", "em\N{MICRO SIGN}", False),
+        ("um", "m", False),
+    ],
+)
+def test_micro_is_one_prefix_however_it_is_spelled(ours, theirs, same):
+    """A record and a model in `um` and `µm` are of one device."""
+    assert same_units(("A", ours), ("A", theirs)) is same
