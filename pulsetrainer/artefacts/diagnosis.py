@@ -122,7 +122,8 @@ class Diagnosis(Shown):
     extended_rms_percent: Annotated[
         float, Data("percent", "rms error of the extended model over single samples, of the span")
     ] = float("nan")  # NaN where nothing was extended
-    polarity: int = 1  # of the model: parameters are of the output times it
+    polarity: int = 1  # of the model
+    as_measured: bool = False  # signs of parameters are those of the output; False: of output times polarity
     empty: Annotated[float, Data("@output_unit", "output of the empty memory, times the polarity")] = float(
         "nan"
     )

@@ -139,6 +139,7 @@ class Model(Shown):
     fit: Fit | None = None
     extensions: tuple[Extension, ...] = ()
     form: str = "direct"  # "direct" | "dual" | "signed"
+    as_measured: bool = False  # signs of parameters are those of the output; files of 0.1: of a rising one
     captured: bool = True  # on our own device; files of 0.1 do not say, and were
     coil: Coil | None = None  # of the first run that has one
     edges_unit: str = ""  # of the input, of a dual model of the output: follows from the form

@@ -22,6 +22,7 @@ from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
+from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
@@ -102,6 +103,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         ),
         correctable=tuple(state.correctable),
         polarity=sign,
+        as_measured=True,
         empty=float(scale.outputs(np.asarray(extended.simulator.frames[0].zero))),
     )
 
@@ -147,20 +149,20 @@ def _noise_of(state: State) -> float:
 
 
 def _parameters(
-    state: State, cause: Asked, estimates: Sequence[Estimate], words: Words
+    state: State, cause: Asked, estimates: Sequence[Estimate], words: Words, *, measured: bool = False
 ) -> tuple[Parameter, ...]:
+    """Return estimates as parameters of the output as measured; ``measured``: they are that already."""
+    assert state.question.given is not None
+    polarity = 1 if measured else state.question.given.model.polarity
     meanings = {q.name: q.meaning for q in cause.quantities(state.problem.frames[0])} | {"size": cause.size}
-    return tuple(
-        Parameter(
-            e.name,
-            e.value,
-            unit_of(e.unit, words["u"], words["y"]),
-            e.lower,
-            e.upper,
-            meanings.get(e.name, "").format(**words),
-        )
-        for e in estimates
-    )
+
+    def told(e: Estimate) -> Parameter:
+        unit, meaning = unit_of(e.unit, words["u"], words["y"]), meanings.get(e.name, "").format(**words)
+        sign = cause.sign(e.name, polarity)
+        low, high = (e.lower, e.upper) if sign > 0 else (-e.upper, -e.lower)
+        return Parameter(e.name, sign * e.value, unit, low, high, meaning)
+
+    return tuple(told(e) for e in estimates)
 
 
 def _causes(state: State, finding: Finding, words: Words, dependences: Sequence[Dependence]) -> list[Cause]:
@@ -178,13 +180,15 @@ def _causes(state: State, finding: Finding, words: Words, dependences: Sequence[
 
 
 def _cause(state: State, finding: Finding, words: Words) -> Cause:
+    # what tells the record from the model as given is told of the output as it was measured
+    measured = finding.cause.id == ConditionChange.id and finding.seen is not None
     return Cause(
         cause=finding.cause.id,
         found=finding.found,
         p_value=finding.p_value,
         explains_percent=finding.explains_percent,
         held_out_gain_percent=finding.held_out_gain_percent,
-        parameters=_parameters(state, finding.cause, finding.parameters, words),
+        parameters=_parameters(state, finding.cause, finding.parameters, words, measured=measured),
         confounded_with=finding.confounded_with,
         text=wording.cause_text(finding, words),
         doubts=tuple(wording.DOUBTS[one] for one in finding.doubts),
@@ -233,6 +237,8 @@ def extended_model(state: State, model: Model) -> Model:
         output_quantity=model.output_quantity,
         reading="continuous",
         polarity=found.polarity,
+        as_measured=True,
+        captured=model.captured,
         extensions=tuple(_extension(state, term, words) for term in lasting),
     )
 

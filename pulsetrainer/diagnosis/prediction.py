@@ -52,9 +52,11 @@ def extended_of(model: Model) -> Extended:
         The model was extended by causes that this version does not know.
     """
     # scipy.signal and scipy.stats come with it: a static model need not wait for them
+    from pulsetrainer.diagnosis.causes import upright_values  # noqa: PLC0415
     from pulsetrainer.diagnosis.extended import Extended  # noqa: PLC0415
 
-    named = [(one.cause, tuple(p.value for p in one.parameters)) for one in model.extensions]
+    polarity = model.polarity if model.as_measured else 1
+    named = [(one.cause, upright_values(one, polarity)) for one in model.extensions]
     return Extended.of(operator_of(model), named)
 
 

@@ -11,7 +11,7 @@ from pulsetrainer.artefacts import Diagnosis, Run
 from pulsetrainer.core import wild
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.asked import measured_of
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import library, upright_values
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
 from pulsetrainer.diagnosis.raw import Raw
 from pulsetrainer.errors import DataError
@@ -91,8 +91,9 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
 
 def _faults(diagnosis: Diagnosis) -> list[tuple[Cause, Values]]:
     """Faults of the measurement that can be taken out, in the order in which they are undone."""
+    polarity = diagnosis.polarity if diagnosis.as_measured else 1
     found = [
-        (library()[one.cause], tuple(p.value for p in one.parameters))
+        (library()[one.cause], upright_values(one, polarity))
         for one in diagnosis.found
         if one.cause in diagnosis.correctable
     ]

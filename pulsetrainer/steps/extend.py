@@ -88,7 +88,7 @@ def extend(
             f"the run to verify with is one that {diagnosis_name} was made from: it cannot tell what repeats",
             hint="give a run that was not diagnosed",
         )
-    extended = replace(extended, coil=model.coil)
+    extended = replace(extended, coil=model.coil, captured=model.captured)
     return extended if verify is None else _verified(model, extended, verify)
 
 

@@ -7,7 +7,9 @@ import inspect
 import pkgutil
 from functools import cache
 
-from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.artefacts import Cause as Found
+from pulsetrainer.artefacts import Extension
+from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.errors import DataError
 
 
@@ -37,3 +39,15 @@ def cause_named(name: str) -> Cause:
             hint="update pulsetrainer, or extend the model again",
         )
     return library()[name]
+
+
+def upright_values(one: Found | Extension, polarity: int) -> Values:
+    """Return the values that were kept of a cause, for the output times the polarity.
+
+    Raises
+    ------
+    DataError
+        As ``cause_named``.
+    """
+    cause = cause_named(one.cause)
+    return tuple(cause.sign(p.name, polarity) * p.value for p in one.parameters)

@@ -154,6 +154,11 @@ class Cause:
         """Return the cause and its parameters, from the constants and parameters that a model kept."""
         return self, values
 
+    def sign(self, name: str, polarity: int) -> int:
+        """Return by what a parameter is multiplied when the output is, by its polarity; sizes stay."""
+        own = [q for q in self.parameters if q.name == name]
+        return polarity if any("{y}" in q.unit and q.low < 0 for q in own) else 1
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try; the columns of a block are fitted together.
 

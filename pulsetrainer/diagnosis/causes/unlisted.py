@@ -217,6 +217,10 @@ class Unlisted(Cause):
             )
         )
 
+    def sign(self, name: str, polarity: int) -> int:
+        """Return by what a parameter is multiplied when the output is: the curve is added to it."""
+        return polarity if name.startswith("f") else 1
+
     def restored(self, values: Values) -> tuple[Cause, Values]:
         """Return the cause with its states, and its parameters, for the constants and parameters kept."""
         count = len(values) // (_CONSTANTS + KNOTS)
