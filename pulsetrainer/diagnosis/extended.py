@@ -15,10 +15,12 @@ import numpy as np
 
 from pulsetrainer.core import inversion, learning
 from pulsetrainer.core.dual import Dual
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.causes import cause_named
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
+from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -124,7 +126,8 @@ class Extended:
     ) -> Tracked:
         """Input (n,) whose output is ``target`` (n,), after the input ``lead`` (m,) has been played.
 
-        The best iterate is kept; where none is better than the static inverse, that one is.
+        The best iterate is kept; where none is better than the static inverse, that one is. What a delay
+        makes late is asked for, and compared, earlier by as much.
 
         Parameters
         ----------
@@ -146,11 +149,18 @@ class Extended:
             def static_inverse(wanted: FloatArray) -> inversion.Inverse:
                 return within(self.polarity * wanted)
 
+        late = min(self._late(dt_s), target.size - 1)
+        hold = np.zeros(late, dtype=np.intp)
+
+        def respond(u: FloatArray, later: int = late) -> FloatArray:
+            whole = upright(np.concatenate((lead, u, u[-1:][hold])), dt_s)[lead.size :]
+            return whole[later : later + u.size]
+
         best = None
         for tried in learning.passes(
-            target,
+            np.concatenate((target[late:], target[-1:][hold])),
             static_inverse,
-            lambda u: upright(np.concatenate((lead, u)), dt_s)[lead.size :],
+            respond,
             smooth=learning.LowPass(band_Hz, dt_s),
         ):
             if best is None or tried.rms < best.rms:
@@ -163,7 +173,11 @@ class Extended:
             if tried.number == steps:
                 break
         assert best is not None
-        return best
+        return best if late == 0 else _in_time(best, static_inverse(target), target, respond)
+
+    def _late(self, dt_s: float) -> int:
+        """Whole steps by which delays make the output late."""
+        return round(sum(t.values[0] for t in self.terms if t.cause.id == Delay.id) / dt_s)
 
     def _inverse(self, lead: FloatArray) -> Callable[[FloatArray], inversion.Inverse]:
         """Return the inverse of the static part after a lead (m,)."""
@@ -172,6 +186,20 @@ class Extended:
             return lambda wanted: static.inverse(wanted, lead)
         state = static.run(lead)[1] if lead.size else None
         return lambda wanted: inversion.invert(static, wanted, state)
+
+
+def _in_time(
+    best: Tracked,
+    static: inversion.Inverse,
+    target: FloatArray,
+    respond: Callable[[FloatArray, int], FloatArray],
+) -> Tracked:
+    """Return what was found by playing earlier, with its errors at their own time; or the static inverse."""
+    tried = [(best.input, best.clipped, best.steps + 1), (static.input, static.clipped, 0)]
+    made = [respond(u, 0) for u, _, _ in tried]
+    rms = [root_mean_square(target - y) for y in made]
+    k = int(rms[1] <= rms[0])
+    return Tracked(tried[k][0], made[k], *tried[k][1:], rms[k], rms[1])
 
 
 def _upright(static: Preisach | Dual) -> Preisach | Dual:

@@ -133,6 +133,23 @@ def test_the_one_inverse_compensates_every_extension(extensions, polarity):
     )
 
 
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_a_long_delay_is_undone_by_playing_earlier(polarity):
+    """A delay of a part of the beat, beside a lag: the error is a hundredth of the static inverse's."""
+    upright = _operator()
+    static = Preisach(upright.plane, upright.weights, upright.offset, polarity=polarity)
+    model = Extended.of(static, [("delay", (0.0613,)), ("output-lag", (0.005,))])
+    t = np.arange(4000) * DT
+    rest = model(np.zeros(1), DT)[-1]
+    target = rest + np.sin(np.pi * np.minimum(t / 2, 1) / 2) ** 4 * (6.0 - 4.0 * np.cos(6 * np.pi * t) - rest)
+    found = model.invert(target, DT, lead=np.zeros(1), band_Hz=30.0)
+    assert found.steps > 0
+    assert found.rms < 0.01 * found.rms_static
+    np.testing.assert_allclose(
+        polarity * model(np.append(0.0, found.input), DT)[1:], found.predicted, atol=1e-12
+    )
+
+
 def test_the_diagnostic_signal_has_what_the_causes_need():
     """Ninety seconds, in range, every cell switched, four rates over ten to one, holds, a rest."""
     from pulsetrainer.core.coverage import coverage
