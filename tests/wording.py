@@ -70,6 +70,7 @@ MESSAGES = {
     "too short a pulse": Message(
         "samples of it", "stretch the pulse", "{pulse}", "at least 20", "{period}, and a drive of {rate}"
     ),
+    "no output in reach": Message("that every beat reaches", "{other} pulse", "force", got="output-lag"),
     "too many bad rows": Message("too many to leave", "export", "{count} of {file}", got="{where}"),
     "time goes back": Message("does not increase", "sort", "{file}, column t_s", got="line 4: 1 s after 2 s"),
     "time repeats": Message(

@@ -104,7 +104,7 @@ def invert(
 
 
 def _show(job: Job, out: Path, drive: pt.Waveform) -> None:
-    from pulsetrainer.artefacts.units import with_unit
+    from pulsetrainer.artefacts.units import with_seconds, with_unit
 
     job.notes(drive.notes)
     force = float(drive.target[drive.scored].min()), float(drive.target[drive.scored].max())
@@ -113,6 +113,7 @@ def _show(job: Job, out: Path, drive: pt.Waveform) -> None:
         (drive.model.input_quantity, drive.model.output_quantity) if drive.model else ("current", "force")
     )
     seconds = drive.time_s.size / drive.rate_Hz
+    length = f"{seconds:.2f} s" if seconds >= 1 else with_seconds(seconds)
     job.screen.result(
         {
             "output": out,
@@ -127,7 +128,7 @@ def _show(job: Job, out: Path, drive: pt.Waveform) -> None:
     job.screen.facts(
         f"{out}: {drive.name} by {drive.inversion} inversion",
         {
-            "length": f"{seconds:.2f} s, {drive.time_s.size} samples",
+            "length": f"{length}, {drive.time_s.size} samples",
             made: with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
             given: with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
             "out of reach": f"{drive.clipped_samples} samples",

@@ -27,7 +27,10 @@ Inversion = Literal["continuous", "closest-match", "extended"]
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
 _NORMALISED = 0.02  # how far the ends of a mere shape may lie from 0 and 1
+DEVICE_RATE_HZ = 1000.0  # as our own device plays; the parts around the beats have samples for it
 FEWEST = 20  # samples of a period: with fewer a drive does not follow the pulse
+_FEW, _MANY = 50, 100_000  # samples of a period: outside, the drive of any other device has its own rate
+_OWN = (200, 5000)  # samples of a period then: as many as the pulse has, within these
 RAMP_S = 0.4  # from rest to the first target, and back after the last
 
 
@@ -43,7 +46,7 @@ def invert(
     periods: int = 4,
     slew: float | None = None,
     despite_warning: bool = False,
-    rate_Hz: float = 1000.0,
+    rate_Hz: float | None = None,
     name: str = "the model",
     progress: Progress = silent,
 ) -> Waveform:
@@ -71,6 +74,9 @@ def invert(
         that our own device recorded, no limit for any other.
     despite_warning
         Invert a model although its fit says that its form does not describe the record.
+    rate_Hz
+        Samples of the drive a second. None: 1000, as our own device plays; for a model of any other, where
+        a period would have fewer than 50 samples or more than 100 000, as many as the pulse itself has.
     name
         Name of the model, for messages.
 
@@ -96,20 +102,22 @@ def invert(
     """
     notes: list[str] = []
     shape = _one_beat(pulse, beat, notes)
+    own_Hz = DEVICE_RATE_HZ if rate_Hz is None else rate_Hz  # of what comes before and after the beats
+    rate_Hz = _rate_for(shape, model, notes) if rate_Hz is None else rate_Hz
     _check_sampled(shape, rate_Hz)
     _check_describes(model, name, despite_warning=despite_warning)
     chosen = _method(method, model, name)
-    part = invertible(model, rate_Hz)
+    part = invertible(model, own_Hz)
     if model.form == "signed":
         notes.append(part.limits(model) + part.around(model))
     forces = _force_range(part, model, force_min, force_max, name)
     if chosen == "extended":
-        forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz)
+        forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz, own_Hz)
     notes += _stretched(shape, forces, (force_min, force_max), model)
     progress(0.2)
-    layout = _laid_out(shape, part, forces, periods, rate_Hz)
+    layout = _laid_out(shape, part, forces, periods, rate_Hz, own_Hz)
     if chosen == "extended":
-        exact, clipped = _tracked(model, part, layout, notes)
+        exact, clipped = _tracked(model, part, layout, notes, BAND_HZ * (rate_Hz / own_Hz))
     else:
         exact, clipped = _compensated(part, chosen, layout)
     if clipped:
@@ -153,6 +161,20 @@ def _check_describes(model: Model, name: str, *, despite_warning: bool) -> None:
             f"{name} does not describe the record it was identified on. {warning}",
             hint="give `despite_warning` to invert it all the same",
         )
+
+
+def _rate_for(shape: Shape, model: Model, notes: list[str]) -> float:
+    """Return the samples a second of a drive: our own device's, or of another one those the pulse needs."""
+    samples = shape.period_s * DEVICE_RATE_HZ
+    if model.captured or _FEW <= samples <= _MANY:
+        return DEVICE_RATE_HZ
+    own = int(np.clip(shape.time_s.size, *_OWN))
+    period = with_seconds(shape.period_s)
+    notes.append(
+        f"one period of {shape.name} lasts {period}: the drive has {own} samples in it, "
+        f"one every {with_seconds(shape.period_s / own)}"
+    )
+    return own / shape.period_s
 
 
 def _check_sampled(shape: Shape, rate_Hz: float) -> None:
@@ -300,6 +322,7 @@ def _within_beats(
     forces: tuple[float, float],
     asked: tuple[float | None, float | None],
     rate_Hz: float,
+    own_Hz: float,
 ) -> tuple[float, float]:
     """Return the force range, its free ends moved to what every beat reaches with the range of the input.
 
@@ -309,7 +332,7 @@ def _within_beats(
     inputs = train(shape, periods=4, rate_Hz=rate_Hz, low=low, high=high)
     if part.polarity < 0:
         inputs = low + high - inputs
-    settle = np.full(round(rate_Hz), inputs[0])
+    settle = np.full(round(own_Hz), inputs[0])
     lead = part.lead
     made = predict(model, np.concatenate((lead, settle, inputs)), 1.0 / rate_Hz)[lead.size + settle.size :]
     period = round(shape.period_s * rate_Hz)
@@ -321,10 +344,12 @@ def _within_beats(
     )
     if not within[0] < within[1]:
         named = ", ".join(one.cause for one in model.extensions)
+        moved = float(np.median([np.ptp(b) for b in beats]))
+        other = "a slower pulse" if moved < 0.5 * (forces[1] - forces[0]) else "a faster pulse"
         raise DataError(
             f"there is no {model.output_quantity} that every beat reaches: with {named} the output wanders "
             "further from beat to beat than the pulse moves it",
-            hint="give `force_min` and `force_max`, a faster pulse, or the model without extensions",
+            hint=f"give `force_min` and `force_max`, {other}, or the model without extensions",
         )
     return within
 
@@ -367,11 +392,11 @@ class _Layout:
 
 
 def _laid_out(
-    shape: Shape, part: Invertible, forces: tuple[float, float], periods: int, rate_Hz: float
+    shape: Shape, part: Invertible, forces: tuple[float, float], periods: int, rate_Hz: float, own_Hz: float
 ) -> _Layout:
     beats = train(shape, periods=periods, rate_Hz=rate_Hz, low=forces[0], high=forces[1])
     rest = float(part.whole(part.lead)[-1])
-    ramp = np.linspace(0.0, 1.0, round(RAMP_S * rate_Hz), endpoint=False)
+    ramp = np.linspace(0.0, 1.0, round(RAMP_S * own_Hz), endpoint=False)
     wanted = np.concatenate(
         (rest + (beats[0] - rest) * ramp, beats, beats[0] + (rest - beats[0]) * ramp, [rest])
     )
@@ -404,14 +429,16 @@ def _compensated(part: Invertible, method: Inversion, layout: _Layout) -> tuple[
     return inversion.smoothed(matched.input, time_s, step, plane.low, plane.high), matched.clipped
 
 
-def _tracked(model: Model, part: Invertible, layout: _Layout, notes: list[str]) -> tuple[FloatArray, int]:
+def _tracked(
+    model: Model, part: Invertible, layout: _Layout, notes: list[str], band_Hz: float
+) -> tuple[FloatArray, int]:
     """Return the input that makes the extended model give what is wanted, and what was clipped."""
     found = extended_of(model).invert(
         layout.wanted,
         1.0 / layout.rate_Hz,
         lead=layout.lead,
         inverse=part.inverse if model.form == "signed" else None,
-        band_Hz=BAND_HZ,
+        band_Hz=band_Hz,
     )
     left, static = (with_unit(f"{rms:.3g}", model.output_unit) for rms in (found.rms, found.rms_static))
     notes.append(

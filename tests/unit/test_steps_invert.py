@@ -1,0 +1,61 @@
+"""Invert: the rate of a drive, and what is said of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pulsetrainer as pt
+from pulsetrainer.artefacts import Extension, Parameter
+from pulsetrainer.core.pulses import Shape
+from pulsetrainer.errors import DataError
+from wording import raises
+
+ROWS = 1200
+
+
+def _model(*, captured: bool = False, lag_s: float = 0.0) -> pt.Model:
+    edges = np.linspace(0.0, 1.5, 25)
+    lag = (Extension("output-lag", (Parameter("tau", lag_s, "s", lag_s, lag_s),)),) if lag_s else ()
+    return pt.Model(edges, np.ones(300), 7.0, np.ones(300, bool), captured=captured, extensions=lag)
+
+
+def _pulse(period_s: float) -> Shape:
+    share = np.arange(ROWS) / ROWS
+    return Shape("mine", period_s * share, np.sin(np.pi * share) ** 2 + 0.2 * np.sin(3 * np.pi * share) ** 2)
+
+
+@pytest.mark.parametrize("period_s", [6e-4, 6 * 3600.0])
+def test_a_pulse_of_another_time_scale_is_followed_like_one_of_a_second(period_s):
+    """A drive of another device has the samples of the pulse, and the values of the usual time scale."""
+    drive, usual = (
+        pt.invert(_pulse(length), _model(lag_s=0.01 * length)) for length in (period_s, 0.001 * ROWS)
+    )
+    assert drive.rate_Hz == pytest.approx(ROWS / period_s)
+    assert usual.rate_Hz == pytest.approx(1000.0)
+    np.testing.assert_allclose(drive.compensated, usual.compensated, atol=1e-6)
+    assert drive.predicted_max_error_percent < 1.0
+    assert len(drive.notes) == len(usual.notes) + 1
+
+
+@pytest.mark.parametrize(("period_s", "captured"), [(0.06, False), (1.0, False), (99.0, False), (0.03, True)])
+def test_usual_pulses_and_our_own_device_keep_their_rate(period_s, captured):
+    """A thousand samples a second, wherever they serve, and always on our own device."""
+    shape, model = _pulse(period_s), _model(captured=captured)
+    drive = pt.invert(shape, model, periods=1)
+    assert drive.rate_Hz == pytest.approx(1000.0)
+    np.testing.assert_array_equal(
+        drive.compensated, pt.invert(shape, model, periods=1, rate_Hz=1000.0).compensated
+    )
+
+
+def test_our_own_device_refuses_what_it_cannot_follow():
+    """Its drives have a thousand samples a second, and no more."""
+    with raises(DataError, "too short a pulse", pulse="mine", period="600 µs", rate=1000):
+        pt.invert(_pulse(6e-4), _model(captured=True))
+
+
+def test_a_pulse_too_fast_for_the_device_is_told_to_be_slower():
+    """Where the lag leaves no output that every beat reaches, a faster pulse would be worse."""
+    with raises(DataError, "no output in reach", other="slower"):
+        pt.invert(_pulse(0.2), _model(lag_s=5.0))
