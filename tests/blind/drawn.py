@@ -175,7 +175,7 @@ def draw(
         "path": rng.uniform(15, 60),
     }
     y, strength, size = healthy, 0.0, 0.0
-    if effect:
+    if effect and percent != 0.0:
         strength, wanted = _USUAL[effect], 1.0 if percent is None else percent
         for _ in range(3):  # nearly linear: a few proportional corrections reach the size
             y = _put(effect, static, u, dt, strength, more)
