@@ -33,8 +33,6 @@ from pulsetrainer.core.smoothing import penalty
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 
-_ALL = slice(None)
-
 
 @dataclass(frozen=True)
 class Bins:
@@ -177,7 +175,9 @@ class Design:
 
     plane: Plane
     bins: Bins
-    nodes: sparse.csr_array | FloatArray  # B (count, n_q) in node space; not sparse where causes filter it
+    nodes: (
+        sparse.csr_array | FloatArray
+    )  # B (count, n_q) in node space, or B A in cells where causes filter it
     smoothing: float
 
     @classmethod
@@ -200,38 +200,54 @@ class Design:
             anchor = path.trace.anchor[inside]
             of_nodes = sparse.csr_array((share, (where, anchor)), shape=(bins.count, base.shape[0]))
             packed = packed + of_samples @ own + of_nodes @ base
-        return cls(plane, bins, packed if shown is None else shown(packed.toarray()), smoothing)
+        if shown is None:
+            return cls(plane, bins, packed, smoothing)
+        dense = shown(packed.toarray())
+        for first in range(0, bins.count, LIMITS.rows_at_once):
+            part = slice(first, first + LIMITS.rows_at_once)
+            dense[part] = plane.adjoint(dense[part])
+        return cls(plane, bins, dense, smoothing)
 
     @cached_property
     def taken(self) -> FloatArray:
         """Coordinates F'B A (k, n_q) of offset and start."""
-        return self.plane.adjoint((self.nodes.T @ self.bins.free).T)
+        return self._summed(self.bins.free).T
 
     def output(self, masses: FloatArray) -> FloatArray:
         """Averaged outputs B A m (count, ...) of masses (n_q, ...); all rise from 0."""
+        if isinstance(self.nodes, np.ndarray):
+            return np.asarray(self.nodes @ masses)
         return np.asarray(self.nodes @ self.plane.everett_nodes(masses.T).T)
 
-    def across(self, columns: FloatArray, own: slice | NDArray[np.bool_] = _ALL) -> FloatArray:
-        """Products D'c (n_q, m) with columns (count, m), over all rows or ``own`` of them."""
-        of_starts = self.bins.free[own].T @ columns[own]
-        return self.plane.adjoint((self.nodes[own].T @ columns[own]).T).T - self.taken.T @ of_starts
+    def columns(self, cells: IntArray) -> FloatArray:
+        """Columns (count, k) of D: what a mass of one in each of these cells gives."""
+        if isinstance(self.nodes, np.ndarray):
+            return self.bins.settled(self.nodes[:, cells])
+        masses = np.zeros((self.plane.n_q, cells.size))
+        masses[cells, np.arange(cells.size)] = 1.0
+        return self.bins.settled(self.output(masses))
+
+    def across(self, columns: FloatArray) -> FloatArray:
+        """Products D'c (n_q, m) with columns (count, m)."""
+        return self._summed(columns) - self.taken.T @ (self.bins.free.T @ columns)
+
+    def _summed(self, columns: FloatArray) -> FloatArray:
+        """Products (B A)'c (n_q, m) with columns (count, m)."""
+        if isinstance(self.nodes, np.ndarray):
+            return np.asarray(self.nodes.T @ columns)
+        return self.plane.adjoint((self.nodes.T @ columns).T).T
 
     @cached_property
     def squares(self) -> FloatArray:
         """Products D'D (n_q, n_q); zero for cells that only offset and start see."""
-        found = self.squares_of(_ALL)
+        if isinstance(self.nodes, np.ndarray):
+            whole = self.nodes.T @ self.nodes
+        else:
+            whole = self.plane.adjoint(self.plane.adjoint((self.nodes.T @ self.nodes).toarray()).T)
+        found = whole - self.taken.T @ self.taken
         still = np.diagonal(found) <= LIMITS.rounding * np.sum(self.taken**2, axis=0)
         found[still], found[:, still] = 0.0, 0.0
         return found
-
-    def squares_of(self, own: slice | NDArray[np.bool_]) -> FloatArray:
-        """Products D'D (n_q, n_q) over ``own`` rows."""
-        nodes, free = self.nodes[own], self.bins.free[own]
-        product = nodes.T @ nodes
-        dense = product if isinstance(product, np.ndarray) else product.toarray()
-        mixed = self.plane.adjoint((nodes.T @ free).T).T @ self.taken
-        whole = self.plane.adjoint(self.plane.adjoint(dense).T)
-        return whole - mixed - mixed.T + self.taken.T @ (free.T @ free) @ self.taken
 
     @cached_property
     def gram(self) -> FloatArray:
@@ -301,6 +317,8 @@ class Projector:
         if free.size == 0:
             free = np.asarray([int(np.argmax(np.diagonal(design.gram)))], dtype=np.int64)
         self.design, self.cells = design, free
+        # filtered nodes are not sparse: then the columns of the few positive cells are faster than all
+        self._columns = None if sparse.issparse(design.nodes) else design.columns(free)
         block = design.gram[np.ix_(free, free)]
         block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max())
         self.factor = linalg.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
@@ -309,8 +327,16 @@ class Projector:
         """Columns (count, k) without their fitted part."""
         bins, design = self.design.bins, self.design
         settled = bins.settled(columns)
+        if self._columns is not None:
+            along = linalg.cho_solve(self.factor, self._columns.T @ settled, check_finite=False)
+            return np.asarray(settled - self._columns @ along)
         masses = np.zeros((design.plane.n_q, columns.shape[1]))
         masses[self.cells] = linalg.cho_solve(
             self.factor, design.across(settled)[self.cells], check_finite=False
         )
         return settled - bins.settled(design.output(masses))
+
+    @property
+    def columns(self) -> FloatArray:
+        """Columns (count, k) of its cells."""
+        return self.design.columns(self.cells) if self._columns is None else self._columns

@@ -89,7 +89,8 @@ class Floor:
         """Return the floor with the noise that is heard in what a fit leaves, coloured as it is."""
         problem = fitted.problem
         quiet = quiet_square(fitted.residual, problem.bins, problem.measured, np.abs(residual.rates(problem)))
-        square = max(quiet.square, self.sampled)
+        whole = float(np.mean(fitted.residual**2))  # elsewhere it may be less than where it is heard
+        square = max(min(quiet.square, whole), self.sampled)
         return replace(
             self,
             white=float(np.sqrt(square + self.held)),

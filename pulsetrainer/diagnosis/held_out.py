@@ -31,6 +31,7 @@ class HeldOut:
         self.block = _blocks_of(problem)
         self._by_rate = _sorted_by_rate(problem, self.block)
         self._errors: list[tuple[Fitted, float]] = []
+        self._rows: list[tuple[Fitted, FloatArray]] = []  # of the last two: they are large
 
     def error(self, fitted: Fitted) -> float:
         """Sum of squares on both halves of the blocks, each predicted from the other; NaN for few blocks."""
@@ -81,25 +82,14 @@ class HeldOut:
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
         """For each fold its errors, and the changes (p,) of the parameters, when it is left out."""
         fold_of = _fold_of(folds, whole=whole)
-        design, free = fitted.design, np.flatnonzero(fitted.passive)
-        extra = design.bins.settled(fitted.slopes)
-        more = np.hstack((extra, design.bins.free))
+        design, free = fitted.design, fitted.projector.cells
+        extra, starts = fitted.slopes.shape[1], design.bins.free.shape[1]
         test = fold_of[self.block if block is None else block][:, None] == np.arange(folds)  # (count, folds)
-        size, starts = free.size + more.shape[1], design.bins.free.shape[1]
+        size = free.size + extra + starts
         if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | ~test.any(axis=0)):
             return
-        beside = np.hstack((more, fitted.residual[:, None]))
-        # of each fold: what is left when it is taken off all is what the fold is predicted from
-        inner = np.ix_(free, free)
-        parts = [
-            (design.squares_of(own)[inner], design.across(beside, own).T[:, free], beside[own].T @ more[own])
-            for own in test.T[1:]
-        ]
-        total = (design.squares[inner], design.across(beside).T[:, free], beside.T @ more)
-        parts = [
-            tuple(all_ - sum(some) for all_, some in zip(total, zip(*parts, strict=True), strict=True)),
-            *parts,
-        ]
+        rows = self._rows_of(fitted)
+        parts = [own.T @ own for own in (rows[one] for one in test.T)]
         masses = (fitted.simulator.operator.weights * design.plane.areas)[free]
         smooth, pull = np.zeros((size, size)), np.zeros(size)  # pull: of the smoothing at the joint fit
         smooth[: free.size, : free.size] = design.smooth[np.ix_(free, free)]
@@ -108,26 +98,25 @@ class HeldOut:
         smooth[-starts:, -starts:] = LIMITS.start_kept * np.eye(starts)
         told = LIMITS.piece_told if whole else 0.0  # what the rest cannot tell stays as all of it said
         share = 1.0 - (1.0 - told) / folds
-        changes = np.empty((folds, size))
-        for fold in range(folds):
-            gram, cross, own = (
-                whole - (1.0 - told) * part for whole, part in zip(total, parts[fold], strict=True)
-            )
-            normal = share * smooth
-            normal[: free.size, : free.size] += gram
-            normal[free.size :, : free.size] += cross[:-1]
-            normal[free.size :, free.size :] += own[:-1]
+        total = sum(parts)
+        for own, part in zip(test.T, parts, strict=True):
+            left = total - (1.0 - told) * part
+            normal = share * smooth + left[:-1, :-1]
             normal[np.diag_indices(size)] *= 1.0 + LIMITS.ridge_held_out
             normal[np.diag_indices(size)] += TINY
-            rhs = np.concatenate((cross[-1], own[-1])) - share * pull
             factor = linalg.cho_factor(normal, lower=True, check_finite=False, overwrite_a=True)
-            changes[fold] = linalg.cho_solve(factor, rhs, check_finite=False)
-        moved = np.zeros((design.plane.n_q, folds))
-        moved[free] = changes[:, : free.size].T
-        told_all = design.bins.settled(design.output(moved)) + more @ changes[:, free.size :].T
-        for fold in range(folds):
-            error = (fitted.residual - told_all[:, fold])[test[:, fold]]
-            yield error, changes[fold, free.size : free.size + extra.shape[1]]
+            change = linalg.cho_solve(factor, left[:-1, -1] - share * pull, check_finite=False)
+            yield rows[own] @ np.append(-change, 1.0), change[free.size : free.size + extra]
+
+    def _rows_of(self, fitted: Fitted) -> FloatArray:
+        """Rows (count, k + 1) of all that is fitted, with the residual beside them."""
+        for known, rows in self._rows:
+            if known is fitted:
+                return rows
+        bins, cells = fitted.design.bins, fitted.projector.columns
+        rows = np.hstack((cells, bins.settled(fitted.slopes), bins.free, fitted.residual[:, None]))
+        self._rows = [*self._rows[-1:], (fitted, rows)]
+        return rows
 
 
 def _fold_of(folds: int, *, whole: bool) -> IntArray:

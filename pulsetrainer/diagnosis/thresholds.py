@@ -32,6 +32,7 @@ class Thresholds:
     least_inside: float = 0.5  # share of the input: with less inside it is another device
     bin_s: float = 0.005  # length of an average: short enough for a resonance of 70 Hz ...
     enough_rows: int = 4000  # ... and for so many averages, where there are as many samples
+    rows_at_once: int = 2000  # turned from nodes to cells: more take more memory, and no less time
     most_rows: int = 20_000  # averages: longer records get longer averages, so that the fit fits in memory
     least_rows: int = 100  # averages: fewer tell no causes apart
     start_tau_s: tuple[float, ...] = (0.2, 0.8, 3.2)  # decays fitted from a record's start (decision 040)

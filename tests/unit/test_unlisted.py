@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -281,3 +282,29 @@ def test_the_bank_is_scored_as_piece_by_piece(seed):
             before = signals[piece == left_out]
             naive[k] += np.sum(before**2 - (before - own @ curve) ** 2, axis=0)
     np.testing.assert_allclose(dependence._falls(states, signals, piece), naive, rtol=1e-4, atol=1e-3)
+
+
+def _triangles(turns, rates):
+    """Triangles through these turns, ten ranges at each of these rates, without a rest."""
+    pieces = []
+    way = float(np.sum(np.abs(np.diff(turns))))
+    for rate in rates:
+        for _ in range(round(10.0 * rate / way)):
+            pieces += [
+                np.linspace(a, b, max(round(abs(b - a) / rate * RATE_HZ), 3), endpoint=False)
+                for a, b in pairwise(turns)
+            ]
+    return np.concatenate(pieces)
+
+
+@pytest.mark.parametrize("turns", [(0.0, 1.5, 0.5, 1.1, 0.3, 1.3, 0.0), (0.0, 1.5, 0.0)])
+def test_an_input_that_never_rests_does_not_make_it_noise(turns):
+    """What is slow is heard as noise where nothing rests; a dependence is sought in it all the same."""
+    u = _triangles(turns, (1.5, 3.0, 6.0))
+    run = _run(u, _dip(u, tau_s=0.3))
+    model = pt.identify(run)
+    found = pt.diagnose([run], model, seed=0)
+    assert found.verdict == "unlisted"
+    assert [one.tau_s for one in found.dependences] == [pytest.approx(0.3, rel=0.1)]
+    assert model.fit.rms > 0.008 * SPAN
+    assert found.left.percent < 0.15  # the noise is 0.1 % of the span

@@ -63,6 +63,7 @@ def stage(state: State) -> State:
         said.append(Evidence("untimed", names=told))
     span = state.scale.span
     noise = span * state.floor_left.noise
+    quick = span * state.floor.quick.noise  # what averages do not have: slow noise is in both
     turned = condition_change.turned_over(judged.measured, judged.predicted, noise)
     if turned is not None and turned.left < judged.speed.velocity:
         state, more = _in_another_condition(withdrawn(state), turned, judged.polarity)
@@ -70,7 +71,7 @@ def stage(state: State) -> State:
     if judged.speed.wrong:
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
-    elif (left := left_by(judged.measured, judged.predicted, noise)) <= span * state.left_rms:
+    elif (left := left_by(judged.measured, judged.predicted, quick)) <= span * state.left_rms:
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
         if state.verdict in ("none", "inconclusive") and _unexplained(state, left):

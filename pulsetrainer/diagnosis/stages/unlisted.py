@@ -44,12 +44,13 @@ def stage(state: State) -> State:
     if found is None:
         said = (Evidence("not repeated", _ID),) if doubtful else ()
         return replace(begun, evidence=(*begun.evidence, *said))
-    state = replace(state, current=found, p_values={**state.p_values, _ID: p_value})
+    state = _heard_again(replace(state, current=found, p_values={**state.p_values, _ID: p_value}))
     if begun.current.squares <= found.squares:  # listed causes explain as much
         return begun
     if begun.unexplained:
         state = search.stage(state)
     state = elimination.stage(state)
+    state = _heard_again(state)
     replaced = set(begun.current.names) - set(state.current.names)
     return begun if replaced and _keep_their_names(begun, state.current) else state
 
@@ -71,34 +72,42 @@ def _predicts(state: State, found: Fitted) -> bool:
 def _more_is_left(state: State) -> bool:
     """Tell whether more is left than noise, or much that is slow: that may be either, and this finds out."""
     left, floor = state.current.squares, state.floor_left
-    slow = left - floor.sure_squares > LIMITS.slow_share * left
-    return left - floor.squares > floor.relevant or (slow and left - floor.sure_squares > floor.relevant)
+    more = left - floor.quick.squares
+    slow = more > LIMITS.slow_share * left
+    return left - floor.squares > floor.relevant or (slow and more > floor.relevant)
 
 
 def _learned(state: State) -> tuple[Fitted | None, float, bool]:
     """Return the model with the dependences that repeat, its p-value, and whether one did not."""
-    current, largest = state.current, 0.0
+    listed = LIMITS.imperfect * (state.baseline.squares - state.current.squares)
+    largest = 0.0
     parts: list[Part] = []
     values: list[float] = []
-    while len(parts) < LIMITS.most_states:
+    doubtful = False
+    while len(parts) < LIMITS.most_states and _more_is_left(state):
+        current = state.current
         best = best_dependence(current, state.held_out, Unlisted.order, state.question.rng)
         if (
             best is None
             or best.p_value > LIMITS.p_max
             or best.gain < LIMITS.linearised * state.floor.relevant
         ):
-            return (current if parts else None), largest, False
+            break
         trial = _refitted(state, current, [*parts, best.part], [*values, *best.values])
-        listed = LIMITS.imperfect * (state.baseline.squares - state.current.squares)
         falls = current.squares - trial.squares > max(state.floor.relevant, listed)
         if not falls or not repeats(state.held_out, current, trial):
-            return (current if parts else None), largest, falls and not parts
+            doubtful = falls and not parts
+            break
         parts.append(best.part)
         values = list(next(term.values for term in trial.terms if term.cause.id == _ID))
-        current, largest = trial, max(largest, best.p_value)
-        if current.squares - state.floor.sure_squares <= state.floor.relevant:
-            break
-    return current, largest, False
+        largest = max(largest, best.p_value)
+        state = _heard_again(replace(state, current=trial))
+    return (state.current if parts else None), largest, doubtful
+
+
+def _heard_again(state: State) -> State:
+    """Return the state with the noise under its model: what was heard before holds the dependence."""
+    return replace(state, floor=state.floor.heard(state.current).at(state.coarse, state.current))
 
 
 def _refitted(state: State, current: Fitted, parts: list[Part], values: list[float]) -> Fitted:
