@@ -174,6 +174,10 @@ class Cause:
         """Return whether its parameters make it a part of the noise: told, but no verdict."""
         return False
 
+    def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
+        """Return whether so small a cause differs from what the moments of sampling do."""
+        return True
+
     def choices(self, frames: Sequence[Frame]) -> float:
         """Return from how many independent values ``starts`` chooses by the residual; 0 where it does not."""
         return 0.0

@@ -10,6 +10,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
 _TRIED = (1e-5, 1e-4)  # a good crystal's, a bad one's
+_SLIP = 0.5  # time steps over the longest record: with less, one is merely sampled after the other
 
 
 class ClockSkew(Cause):
@@ -31,6 +32,10 @@ class ClockSkew(Cause):
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
         return [[(one,)] for one in _TRIED]
+
+    def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
+        """Return whether the clocks part by more than the moments of sampling do."""
+        return any(abs(values[0]) * f.input.size >= _SLIP for f in frames)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

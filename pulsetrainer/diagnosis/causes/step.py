@@ -11,6 +11,8 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Va
 
 _TRIED = 0.003  # of the span, and of the gain
 _MOMENTS = (0.05, 0.95, 25)  # of the record, from, to, how many: a side with less holds no loops to compare
+_LOOP = 2.0  # ranges of path on either side: the first stroke of a device that was never cycled is no step
+_SIDE = 0.25  # of all its path: no side needs more
 _BESIDE = 1.5  # distances of two moments on either side: a refit cannot move far, so it must begin near
 _SHARED = 20.0  # samples over which the change is shared out, so that the error falls smoothly with the time
 _EDGE = 20  # of a window: splits within one such part of its ends are left out
@@ -43,17 +45,16 @@ class Step(Cause):
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try: the same moments, whatever the residual."""
         size = _TRIED * frames[0].span
-        end = frames[-1].begin_s + frames[-1].input.size * frames[-1].dt_s
-        times = (np.linspace(*_MOMENTS) * end).tolist()
+        first, last = _sides(frames)
+        times = np.linspace(first, last, _MOMENTS[2]).tolist()
         return [[(size, 0.0, t), (0.0, _TRIED, t)] for t in times]
 
     def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:
         """Return the moment around that of ``values`` where the residual on both sides differs most."""
         one = max((f for f in frames if f.begin_s <= values[2]), key=lambda f: f.begin_s, default=frames[0])
         left = residual[one.record]
-        total = frames[-1].begin_s + frames[-1].input.size * frames[-1].dt_s
-        near = _BESIDE * total * (_MOMENTS[1] - _MOMENTS[0]) / (_MOMENTS[2] - 1)
-        first, last = (edge * total for edge in _MOMENTS[:2])
+        first, last = _sides(frames)
+        near = _BESIDE * (last - first) / (_MOMENTS[2] - 1)
         begin, end = (
             int(min(max((at - one.begin_s) / one.dt_s, 0.0), left.size))
             for at in (max(values[2] - near, first), min(values[2] + near, last))
@@ -73,6 +74,18 @@ class Step(Cause):
         before = (y - offset + gain * taken.empty) / (1.0 + gain)
         unsure = np.abs(since) < 0.5 * _SHARED * taken.step_s
         return np.where(unsure, np.nan, np.where(since > 0, before, y))
+
+
+def _sides(frames: Sequence[Frame]) -> tuple[float, float]:
+    """First and last moment (s) with enough of the records, and a loop, before and after it."""
+    time = np.concatenate([frame.begin_s + frame.time_s for frame in frames])
+    begun = np.cumsum([0.0, *(frame.path[-1] for frame in frames[:-1])])
+    path = np.concatenate([frame.path + b for frame, b in zip(frames, begun, strict=True)])
+    least = min(_LOOP * frames[0].reach, _SIDE * path[-1])
+    inside = np.searchsorted(path, (least, path[-1] - least))
+    first, last = (float(time[min(k, time.size - 1)]) for k in inside)
+    end = frames[-1].begin_s + frames[-1].input.size * frames[-1].dt_s
+    return max(first, _MOMENTS[0] * end), min(last, _MOMENTS[1] * end)
 
 
 def _split(residual: FloatArray, begin: int, end: int) -> int:

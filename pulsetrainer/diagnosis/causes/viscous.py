@@ -64,3 +64,8 @@ class Viscous(Cause):
         remember(frame.past, self.id, frame.input[-1:])
         speed = np.diff(frame.input, prepend=before) / frame.dt_s
         return y + values[0] * low_pass(speed, values[1], frame.dt_s, frame.past, self.id)
+
+    def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
+        """Outputs (n,) of an output cause under formulas that are as plausible as its own: for intervals."""
+        around = np.gradient(frame.input, frame.dt_s)
+        return [y + values[0] * low_pass(around, values[1], frame.dt_s)]

@@ -32,6 +32,8 @@ def stage(state: State) -> State:
         if np.isfinite(gain) and gain < LIMITS.held_out_least:
             continue
         accepted = settled(state.problem, trial)
+        if not all(t.cause.can_be_told(t.values, state.problem.frames) for t in accepted.terms):
+            continue
         return replace(
             state,
             current=accepted,
