@@ -1,4 +1,4 @@
-"""From the records of one device to one operator: its form, its levels, offsets between records, the weights.
+"""From the records of one device to one operator: its form, where its levels lie, offsets, the weights.
 
 ``identification`` solves for weights on given levels. Here it is decided what it is given: which form the
 records ask for (``forms``), the levels lie evenly, or closer where the loop is steep (``edges``), and records
