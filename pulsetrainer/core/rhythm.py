@@ -70,9 +70,12 @@ class Rhythm:
 
     def _premature(self, number: int) -> bool:
         """Whether a beat is premature: never the first, and never two in a row."""
-        if self.ectopic == 0.0 or number < 1:
-            return False
-        return self._drawn(number) and not self._premature(number - 1)
+        if self.ectopic == _MOST_ECTOPIC:  # all are drawn
+            return number % 2 == 1
+        run = 0  # of beats drawn up to this one, of which every second is premature
+        while number > run and self._drawn(number - run):
+            run += 1
+        return run % 2 == 1
 
     def _drawn(self, number: int) -> bool:
         # of a share e of all beats, given that none follows another: e / (1 - e) of those that may be

@@ -56,6 +56,12 @@ def test_premature_beats_are_early_weak_and_followed_by_a_full_pause():
         assert not timings[k - 1].premature
 
 
+def test_every_second_beat_may_be_premature_for_hours():
+    """Half of all beats, the most there is: each odd one, however long it has gone on."""
+    rhythm = Rhythm(ectopic=0.5, seed=2)
+    assert [rhythm.timing(k, 0.0).premature for k in (0, 1, 2, 3, 9000, 9001)] == [False, True] * 3
+
+
 @given(seed=st.integers(0, 10**6), number=st.integers(0, 10**5))
 def test_a_beat_asked_for_twice_is_the_same(seed, number):
     """It depends on seed, number and time alone."""
