@@ -8,12 +8,12 @@ is the alternating sequence of remembered extremes and nothing else).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pulsetrainer.core.excitations import Signal, check_size, through
-from pulsetrainer.core.memory import State, negative_saturation, trace
+from pulsetrainer.core.memory import State, negative_saturation, trace, turning_points
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import ArgumentError
 
@@ -43,7 +43,10 @@ class Course:
     @property
     def reversals(self) -> int:
         """Number of times the input turns, where one repeat goes over into the next included."""
-        return self.signal.reversals * self.repeats + self.repeats - 1
+        one = self.signal.value
+        turns = one[np.append(0, turning_points(one))]
+        once, twice = (replace(self.signal, value=np.tile(turns, k)).reversals for k in (1, 2))
+        return once + (twice - once) * (self.repeats - 1)
 
     def values(self, start: int, stop: int) -> FloatArray:
         """Samples ``start`` to ``stop``, (stop - start,)."""

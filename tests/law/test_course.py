@@ -41,6 +41,13 @@ def test_values_are_those_of_the_repeated_signal(course, data):
     np.testing.assert_array_equal(course.values(start, stop), whole[start:stop])
 
 
+@given(course=courses())
+def test_reversals_are_those_of_the_repeated_signal(course):
+    """Also where one repeat goes over into the next: none, one or two."""
+    whole = Signal(np.tile(course.signal.value, course.repeats), RATE_HZ, "whole")
+    assert course.reversals == whole.reversals
+
+
 @given(course=courses(), data=st.data())
 def test_the_memory_is_that_of_all_samples_so_far(course, data):
     """However many repeats came before: the same state as tracing every sample."""
