@@ -62,7 +62,9 @@ def loop_area(x: ArrayLike, y: ArrayLike) -> float:
 
 
 def repeat_spread(measured: ArrayLike) -> float:
-    """Standard deviation of single measurements around their mean over repeats (r, n); 0 for one repeat.
+    """Standard deviation of single measurements around their mean over repeats (r, n).
+
+    A sample that only one repeat has tells nothing; 0 where all are such.
 
     Raises
     ------
@@ -74,9 +76,8 @@ def repeat_spread(measured: ArrayLike) -> float:
         raise ArgumentError(
             f"measured must have shape (r, n), got {repeats.shape}", hint="one row for each repeat"
         )
-    if repeats.shape[0] < 2:
-        return 0.0
-    return float(np.sqrt(np.nanmean(np.nanvar(repeats, axis=0, ddof=1))))
+    told = repeats[:, np.isfinite(repeats).sum(axis=0) > 1]
+    return float(np.sqrt(np.mean(np.nanvar(told, axis=0, ddof=1)))) if told.size else 0.0
 
 
 def mean_over_repeats(measured: FloatArray) -> FloatArray:

@@ -37,6 +37,7 @@ def test_the_area_of_a_loop():
 
 def test_the_spread_of_repeats():
     """Unbiased, over two repeats and over more, samples that were lost left out; none for one repeat."""
+    assert metrics.repeat_spread([[1.0, 5.0, np.nan], [3.0, np.nan, np.nan]]) == pytest.approx(np.sqrt(2.0))
     assert metrics.repeat_spread([[1.0, 5.0], [3.0, 5.0]]) == pytest.approx(1.0)
     three = [[1.0, 2.0], [4.0, np.nan], [7.0, 4.0]]
     assert metrics.repeat_spread(three) == pytest.approx(np.sqrt((9.0 + 2.0) / 2))
