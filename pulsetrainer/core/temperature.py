@@ -147,11 +147,10 @@ def _least_squares(design: FloatArray, told: FloatArray, weight: FloatArray) -> 
 
 @dataclass(frozen=True, slots=True)
 class Thermal:
-    """A model's thermal term: the force falls by ``coefficient`` h, tau h' = (i - low)^2 - h."""
+    """A captured model's thermal term: the force falls by ``coefficient`` h, tau h' = i^2 - h."""
 
     coefficient: float  # 1/A^2
     tau_s: float
-    low_A: float = 0.0
 
 
 class Thermometer:

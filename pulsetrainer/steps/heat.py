@@ -32,7 +32,7 @@ def thermal_of(model: Model) -> Thermal | None:
     for extension in model.extensions:
         if extension.cause == "thermal-drift":
             value = {parameter.name: parameter.value for parameter in extension.parameters}
-            return Thermal(value["coefficient"], value["tau"], operator_of(model).low)
+            return Thermal(value["coefficient"], value["tau"])
     return None
 
 
