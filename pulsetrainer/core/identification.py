@@ -204,6 +204,11 @@ def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = 
     ConvergenceError
         The fit did not settle.
     """
+    told = np.asarray([np.any(r.sample_weight > 0) for r in records])
+    if not told.all():  # what has no sample that counts has no offset
+        offsets = np.zeros(len(records))
+        offsets[told] = offsets_between([records[k] for k in np.flatnonzero(told).tolist()], plane, reading)
+        return offsets
     if len(records) < 2:
         return np.zeros(len(records))
     coarse = thinned(plane, _SIGN_LEVELS)

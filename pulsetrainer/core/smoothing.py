@@ -217,7 +217,7 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
     Raises
     ------
     ArgumentError
-        Too few samples with weight to hold any out.
+        All samples with weight lie in one block, so that none can be held out.
     """
     coarse = thinned(plane, CHOICE_LEVELS)
     memory = _memory_of_residual(records, coarse, reading, signed=signed)
@@ -230,8 +230,8 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
     held_out = {fold: part for fold, part in enumerate(sums) if part.weight_sum > 0}
     if len(held_out) < 2:
         raise ArgumentError(
-            f"smoothing='auto' needs at least {2 * FOLDS} samples to hold some out, "
-            f"got {sum(r.input.size for r in records)}",
+            "smoothing='auto' holds out blocks of a record, but the "
+            f"{sum(np.count_nonzero(r.sample_weight) for r in records)} samples that count lie in one block",
             hint="give smoothing as a number",
         )
     error = _HeldOut(held_out, reading, signed=signed)

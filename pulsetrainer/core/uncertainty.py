@@ -23,6 +23,7 @@ from pulsetrainer.core import nnls
 from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.equations import NodeSums, parted_sums
 from pulsetrainer.core.identification import Identified, fits_dense, penalised
+from pulsetrainer.core.memory import State
 from pulsetrainer.core.operator import Preisach, outputs
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.record import Record, levelled
@@ -57,10 +58,10 @@ class Ensemble:
         """Ends () of the interval of the offset."""
         return _interval(self.offsets, level)
 
-    def output_band(self, values: ArrayLike, level: float = 0.9) -> Interval:
-        """Ends (n,) of the band of the predicted output for an input (n,), output unit.
+    def output_band(self, values: ArrayLike, level: float = 0.9, *, start: State | None = None) -> Interval:
+        """Ends (n,) of the band of the predicted output for an input (n,) from ``start``, output unit.
 
-        It holds the output without the noise of a measurement.
+        It holds the output without the noise of a measurement. None: from negative saturation.
 
         Raises
         ------
@@ -73,6 +74,7 @@ class Ensemble:
             self.weights,
             operator.polarity * self.offsets,
             values,
+            start=start,
             reading=operator.reading,
         )
         return _interval(operator.polarity * rising, level)

@@ -1,4 +1,4 @@
-"""Identify: from one or several runs to a Preisach model."""
+"""Identify: from one or several runs to a Preisach model, of as many levels as they support."""
 
 from __future__ import annotations
 
@@ -321,7 +321,7 @@ def _model(
         None,
         max(1, first.input.size // TRACE_SAMPLES),
     )
-    band = None if ensemble is None else ensemble.output_band(first.input)
+    band = None if ensemble is None else ensemble.output_band(first.input, start=record.start)
     weights = None if ensemble is None else ensemble.weight_interval()
     sigmas = [clean.sigma for clean in cleaned if np.isfinite(clean.sigma)]
     units = (first.output_unit, first.input_unit)

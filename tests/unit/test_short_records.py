@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import pulsetrainer as pt
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
 from pulsetrainer.errors import ArgumentError, DataError
 from wording import raises
 
@@ -69,3 +71,37 @@ def test_time_that_stands_or_goes_back_is_refused(step):
     time[20] = time[19] + step
     with raises(DataError, "names it", named="sample 20"):
         pt.Run(time_s=time, input=u, output=y)
+
+
+def _swings(*turns, each=60):
+    """An input through some turns, ``each`` samples from one to the next, and what a device makes of it."""
+    u = np.interp(np.arange((len(turns) - 1) * each + 1) / each, np.arange(len(turns)), turns)
+    plane = Plane.uniform(0.0, 1.0, 12)
+    return u, Preisach(plane, np.ones(plane.n_q))(u)
+
+
+def test_a_memory_that_is_known_late_leaves_few_samples_that_count():
+    """They may all lie in one block, so that no form can be held against another."""
+    turns = (0.5, 0.6, 0.4, 0.6, 0.4, 0.6, 0.4, 0.6, 0.4, 0.5)
+    u, _ = _swings(*turns, each=110)
+    u = np.concatenate((u, np.linspace(0.5, 0.0, 10)[1:], np.linspace(0.0, 1.0, 12)[1:]))
+    plane = Plane.uniform(0.0, 1.0, 12)
+    model = pt.identify(pt.Run(None, u, Preisach(plane, np.ones(plane.n_q))(u)), levels=8)
+    assert (model.form, model.fit.rms_percent) == ("direct", pytest.approx(0.0, abs=0.5))
+
+
+def test_a_part_without_a_sample_that_counts_does_not_spoil_the_others():
+    """Its memory becomes known only where its samples are masked."""
+    whole, late = _swings(0, 1, 0, 1, 0.3, 0.9, 0.2, 1, 0.4, 0.6, 0), _swings(0.5, 0.6, 0.4, 0.7, 0.3, 1, 0.2)
+    masked = np.arange(late[0].size) > 260
+    model = pt.identify([pt.Run(None, *whole), pt.Run(None, *late, masked=masked)], levels=12)
+    assert model.fit.rms_percent < 0.01
+
+
+def test_the_band_of_a_record_within_the_range_is_around_its_prediction():
+    """Such a record is followed from a state of its own; the bootstrap follows it from there too."""
+    within, whole = _swings(0.5, 0.2, 0.8, 0.3, 0.7, 0.2, 0.8), _swings(0, 1, 0, 1, 0.3, 0.9, 0.2, 1, 0)
+    noise = np.random.default_rng(0)
+    runs = [pt.Run(None, u, y + noise.normal(0.0, 1e-3, y.size)) for u, y in (within, whole)]
+    fit = pt.identify(runs, levels=12, bootstrap=20).fit
+    np.testing.assert_allclose(0.5 * (fit.predicted_lower + fit.predicted_upper), fit.predicted, atol=0.02)
