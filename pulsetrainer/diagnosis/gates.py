@@ -11,14 +11,19 @@ from pulsetrainer.diagnosis.raw import Firing, Raw
 
 
 def check(
-    record: Record, low: float, high: float, second: float = 1.0, stamps: FloatArray | None = None
+    record: Record,
+    low: float,
+    high: float,
+    second: float = 1.0,
+    stamps: FloatArray | None = None,
+    polarity: int = 1,
 ) -> list[Firing]:
     """Ask every gate about a record as it was measured; ``low`` and ``high`` are the identified range.
 
     Wild samples are found first and taken out for the others; a gate is not asked where one has fired that
     blinds it.
     """
-    raw = Raw(record, low, high, second, stamps)
+    raw = Raw(record, low, high, second, stamps, polarity=polarity)
     causes = [cause for cause in library().values() if cause.stage == "record"]
     fired: dict[str, Firing] = {}
     for cause in sorted(causes, key=lambda one: not one.wild):

@@ -24,7 +24,7 @@ _TEXT = (
 
 @dataclass(frozen=True)
 class _Curve:
-    """One learned dependence, in the units of the record, its mean over the record taken off."""
+    """One learned dependence of the output as measured, its mean over the record taken off."""
 
     part: Part
     tau: float
@@ -50,14 +50,12 @@ def learned(state: State, words: Mapping[str, str]) -> tuple[Dependence, ...]:
         curve = _curve(state, bank, part, term.values[own], rows[own])
         found.append(
             Dependence(
-                text=_text(curve, state, words),
+                text=_text(curve, words),
                 state=_said(curve, words),
                 unit="s" if part.kind.saturates else unit_of(part.kind.unit, words["u"], words["y"]),
                 tau_s=curve.tau,
                 at=curve.at,
-                value=state.question.given.model.polarity * curve.value
-                if state.question.given
-                else curve.value,
+                value=curve.value,
                 half=curve.half,
                 output_unit=words["y"],
             )
@@ -80,13 +78,15 @@ def _curve(
         at = -tau * scale.second * np.log1p(-np.minimum(places, 1.0 - LIMITS.same_value))
     shift = {"u": scale.low, "y": scale.zero + scale.span * bank.fitted.simulator.frames[0].zero}
     at = at + (shift[_OFFSETS[part.kind.name]] if part.kind.name in _OFFSETS else 0.0)
-    return _Curve(part, tau * scale.second, at, scale.span * value, half)
-
-
-def _text(curve: _Curve, state: State, words: Mapping[str, str]) -> str:
-    """Return the dependence in words: where the output is farthest from its mean, and by how much."""
     sign = state.question.given.model.polarity if state.question.given else 1
-    value, unit = sign * curve.value, unit_of(curve.part.kind.unit, words["u"], words["y"])
+    if sign < 0 and part.kind.unit == "{y}":
+        at, value, half = -at[::-1], value[::-1], half[::-1]
+    return _Curve(part, tau * scale.second, at, sign * scale.span * value, half)
+
+
+def _text(curve: _Curve, words: Mapping[str, str]) -> str:
+    """Return the dependence in words: where the output is farthest from its mean, and by how much."""
+    value, unit = curve.value, unit_of(curve.part.kind.unit, words["u"], words["y"])
     k = int(np.argmax(np.abs(value - np.median(value))))
     first, last = LIMITS.curve_end * LIMITS.curve_places, (1.0 - LIMITS.curve_end) * LIMITS.curve_places
     if first <= k <= last:

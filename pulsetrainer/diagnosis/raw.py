@@ -28,6 +28,7 @@ class Raw:
     second: float = 1.0  # s: what a second is for the search of causes, see ``scale``
     stamps: FloatArray | None = None  # s, (n,) times of the samples; None: even steps
     wild: BoolArray | None = None  # samples that are wrong one by one
+    polarity: int = 1  # the output is that as measured times this
 
     @property
     def reach(self) -> float:

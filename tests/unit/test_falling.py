@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Extension, Parameter
@@ -94,3 +95,29 @@ def test_a_falling_loop_runs_the_way_of_its_mirror_image(form):
     y = Preisach(plane, np.ones(plane.n_q))(u)
     loops = [pt.identify(pt.Run(None, u, s * y), levels=8, form=form).fit.loop for s in (1, -1)]
     assert loops == ["counterclockwise"] * 2
+
+
+def test_a_falling_output_is_clipped_where_it_was_measured():
+    """The end of the converter's range is told as it was read, and not turned over."""
+    rising = _run(0.0, 0.0)
+    cut = np.minimum(np.round(rising.output, 3), 11.0)
+    for sign in (1, -1):
+        model = pt.identify(replace(rising, output=sign * rising.output), levels=24, form="direct")
+        found = pt.diagnose(replace(rising, output=sign * cut), model, quick=True).found
+        (one,) = [cause for cause in found if cause.cause == "saturation"]
+        assert one.parameters[0].value == pytest.approx(sign * 11.0)
+        assert f"exactly {sign * 11} N" in one.text
+
+
+def test_a_dependence_on_a_falling_output_is_drawn_over_what_was_measured():
+    """Places and words are those of the record, and the places rise."""
+    rising = _run(0.0, 0.0)
+    average = signal.lfilter([0.01], [1.0, -0.99], rising.output)  # of the last 0.4 s
+    dip = 0.5 * np.exp(-0.5 * ((average - 5.0) / 1.2) ** 2)
+    run = replace(rising, output=dip - rising.output)
+    (one,) = pt.diagnose(run, pt.identify(run, levels=32, form="direct")).dependences
+    assert (one.unit, one.state[:18]) == ("N", "the average force ")
+    assert np.all(np.diff(one.at) > 0)
+    assert one.at[np.argmax(one.value)] == pytest.approx(-5.0, abs=0.5)
+    assert "is higher by 0." in one.text
+    assert "is near -" in one.text

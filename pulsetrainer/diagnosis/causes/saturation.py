@@ -61,9 +61,10 @@ class Saturation(Cause):
         mean = ndimage.uniform_filter1d(y, _AROUND)
         for sign, rail in zip(rails, ends, strict=True):
             mask |= sign * mean > sign * rail - _NEAR * noise
-        figures = {"count": float(np.count_nonzero(at)), "rail": ends[0], "other": ends[-1]}
+        one, other = raw.polarity * ends[0], raw.polarity * ends[-1]
+        figures = {"count": float(np.count_nonzero(at)), "rail": one, "other": other}
         kind = "gate" if len(ends) == 1 else "both"
-        return Firing(self.id, kind, ends[0], "{y}", figures, mask, spread=step)
+        return Firing(self.id, kind, one, "{y}", figures, mask, spread=step)
 
 
 def _clipped(y: FloatArray, step: float) -> bool:

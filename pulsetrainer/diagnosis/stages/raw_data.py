@@ -46,8 +46,9 @@ def stage(question: Question) -> Masked:
     low, high = question.low, question.high
     stamps = question.stamps or [None] * len(question.records)
     second = second_of(question.records, stamps, low, high)
+    polarity = 1 if question.given is None else question.given.model.polarity
     found = [
-        gates.check(record, low, high, second, times)
+        gates.check(record, low, high, second, times, polarity)
         for record, times in zip(question.records, stamps, strict=True)
     ]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
