@@ -116,9 +116,10 @@ def _restored(
     begun = even if stamps is None else stamps
     # the first average lies in the middle of its samples
     late = 0.5 * (step_s - record.step) if record.timed else 0.0
-    taken = Taken(
-        Raw(record, low, high, stamps=stamps), begun - late, step_s, diagnosis.empty, number, begin_s
-    )
+    raw = Raw(record, low, high, stamps=stamps)
+    for firing in [cause.gate(raw) for cause, _ in faults if cause.wild]:
+        raw = raw if firing is None else replace(raw, wild=firing.mask)
+    taken = Taken(raw, begun - late, step_s, diagnosis.empty, number, begin_s)
     y = record.output
     if delay_s:
         y = np.interp(begun + delay_s, begun, y, right=np.nan)

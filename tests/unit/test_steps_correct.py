@@ -115,6 +115,25 @@ def test_wild_and_clipped_samples_are_masked_and_no_fit_counts_them(clean):
     assert pt.evaluate(seen, models).models[1].gain_percent > 50
 
 
+def test_clipped_samples_are_masked_where_wild_ones_lie_beyond_them(clean):
+    """A wild sample above the rail does not hide it."""
+    rail, bad = 0.75 * SPAN, np.arange(50, 6000, 97)
+    output = np.round(np.minimum(clean.output, rail), 3)
+    output[bad] = 1.5 * SPAN
+    run = replace(clean, output=output)
+    found = [_diagnosis(run, name, size=rail) for name in ("saturation", "outliers")]
+    both = replace(
+        found[0],
+        causes=found[0].causes + found[1].causes,
+        correctable=("saturation", "outliers"),
+    )
+    done = pt.correct(run, both)
+    assert done.masked is not None
+    assert np.all(done.masked[clean.output >= rail])
+    assert np.all(done.masked[bad])
+    assert done.masked.mean() < 0.25
+
+
 def test_a_masked_sample_is_no_error(clean):
     """Evaluate counts what was measured only."""
     model = pt.identify(clean, levels=12)
