@@ -81,6 +81,8 @@ class Bank:
         """
         pieces = [z[self.piece == k] for k in range(LIMITS.pieces)]
         reached = np.sort([np.quantile(one, LIMITS.state_ends) for one in pieces if one.size], axis=0)
+        if len(reached) == 1:  # all that counts lies in one piece
+            return 0.0, 0.0
         return float(reached[1, 0]), float(reached[-2, 1])
 
     def curve(self, free: FloatArray) -> FloatArray:

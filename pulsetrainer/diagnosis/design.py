@@ -116,6 +116,8 @@ class Bins:
         result = np.empty_like(columns)
         for k, (width, step) in enumerate(zip(self.width, dt_s, strict=True)):
             own = np.flatnonzero(self.record == k)
+            if own.size == 0:
+                continue
             at = np.floor(self.time_s[own] / (width * step)).astype(np.int64)
             last = np.maximum(np.searchsorted(at, np.arange(at[-1] + 1), side="right") - 1, 0)
             result[own] = through(columns[own[last]], k, width * step)[at]

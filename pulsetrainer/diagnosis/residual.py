@@ -74,8 +74,8 @@ def rms_by(group: Group, residual: FloatArray) -> FloatArray:
 
 def spectrum(problem: Problem, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Frequencies (Hz) and the rms of the residual in third-octave bands around them, first record."""
-    one = residual[problem.bins.record == 0]
-    time = problem.bins.time_s[problem.bins.record == 0]
+    first = problem.bins.record == problem.bins.record[0]  # one may hold no sample that counts
+    one, time = residual[first], problem.bins.time_s[first]
     step = float(np.median(np.diff(time)))
     frequency, density = signal.welch(one, 1.0 / step, nperseg=min(one.size, LIMITS.welch))
     edges = frequency[1] * 2.0 ** (np.arange(0.0, np.log2(frequency[-1] / frequency[1]) + THIRD, THIRD))

@@ -12,7 +12,7 @@ from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import experiment, gates, raw
+from pulsetrainer.diagnosis import experiment, gates, raw, residual
 from pulsetrainer.diagnosis.causes import cause_named, library
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass
 from pulsetrainer.diagnosis.extended import Extended, Term
@@ -352,6 +352,17 @@ def test_a_step_in_the_second_record_is_found_there():
     assert (answer.verdict, [f.cause.id for f in answer.findings if f.found]) == ("step", ["step"])
     values = {e.name: e.value for e in answer.findings[0].parameters}
     assert values["time"] == pytest.approx(20.0 + 6.4, abs=0.05)
+
+
+def test_a_record_of_which_no_sample_counts_is_passed_over():
+    """Where its sensor was lost, for instance: neither a filter of rows nor a spectrum needs it."""
+    record = _lagging()
+    lost = replace(record, sample_weight=np.zeros(record.input.size))
+    both, one = (problem_for(some, 0.0, 1.5) for some in ([lost, record], [record]))
+    left = one.measured - one.measured.mean()
+    np.testing.assert_array_equal(residual.spectrum(both, left), residual.spectrum(one, left))
+    columns, steps = left[:, None], [r.step for r in both.records]
+    np.testing.assert_array_equal(both.bins.filtered(columns, lambda x, _k, _dt: x, steps), columns)
 
 
 def test_noise_is_measured_without_a_model():

@@ -232,6 +232,16 @@ def test_another_model_is_refused(dipping):
         pt.extend(replace(model, offset=model.offset + 1.0), found)
 
 
+def test_nothing_is_learned_where_all_that_counts_lies_in_one_piece(dipping):
+    """The memory becomes known near the end: no other piece could show that a dependence repeats."""
+    model, _ = dipping
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    late = round(0.85 * u.size)
+    t = np.arange(late) * DT_S
+    moved = np.concatenate((0.75 + 0.2 * np.sin(20.0 * t) * np.sin(3.0 * t), u[: u.size - late]))
+    assert pt.diagnose(_run(moved, 2.0 * _dip(moved) - _static(moved)), model).dependences == ()
+
+
 class _Pieces:
     """Errors on pieces of a fit that is known by its squares alone."""
 
