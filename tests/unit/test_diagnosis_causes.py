@@ -16,7 +16,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import causes, wording
-from pulsetrainer.diagnosis.causes import library, rate_widening
+from pulsetrainer.diagnosis.causes import condition_change, library, rate_widening
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass, settled
 from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.raw import Raw, coarse_step, noise_of, spacing_of
@@ -289,6 +289,29 @@ def test_coarse_steps_are_a_two_hundred_and_fiftieth_and_come_again(values, time
         firing = CAUSE["quantisation"].gate(_raw(y))
         assert (firing.value, firing.figures["percent"]) == pytest.approx((0.1, 10.0 / 24.9))
         assert firing.spread == pytest.approx(0.0, abs=1e-9)
+
+
+def test_steps_that_only_rounding_tells_apart_are_one():
+    """As after a conversion of units that went through several sums."""
+    y = np.tile(np.arange(100) * 0.1, 20)
+    firing = CAUSE["quantisation"].gate(_raw(y + 1e-12 * np.random.default_rng(0).standard_normal(y.size)))
+    assert firing is not None
+    assert (firing.value, firing.spread) == pytest.approx((0.1, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-12])
+def test_a_changed_condition_is_told_in_any_unit(scale):
+    """Gain and offset of forces of an atomic force microscope are those of newtons."""
+    said = 5.0 + 5.0 * np.sin(np.arange(50_000) / 50.0)
+    changed = condition_change.against_model(scale * (1.3 * said - 2.0), scale * said, 0.0, 0.0)
+    assert changed is not None
+    assert (changed.gain, changed.offset / scale) == pytest.approx((0.3, -2.0))
+
+
+def test_the_sign_of_a_hum_is_that_of_the_output_in_every_record():
+    """Sine and cosine turn over with it, those of later records too."""
+    names = [q.name for q in CAUSE["periodic"].quantities(_frame(records=2))]
+    assert [CAUSE["periodic"].sign(name, -1) for name in names] == [-1, -1, -1, -1, 1]
 
 
 @pytest.mark.parametrize(

@@ -161,5 +161,8 @@ def _carried_over(
 
 def _fit(measured: FloatArray, predicted: FloatArray) -> FloatArray:
     """Gain and offset (2,) that carry the prediction over to the measurement."""
-    columns = np.stack((predicted, np.ones(predicted.size)), axis=1)
-    return np.asarray(np.linalg.lstsq(columns, measured, rcond=None)[0], dtype=np.float64)
+    middle = float(predicted.mean())
+    about = predicted - middle
+    squares = float(about @ about)
+    gain = float(about @ measured) / squares if squares > 0.0 else 0.0
+    return np.asarray((gain, float(measured.mean()) - gain * middle))

@@ -13,7 +13,7 @@ from pulsetrainer.core.coarse import between_steps
 from pulsetrainer.core.initial_state import known_from
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
-from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of
+from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of, values_of
 from pulsetrainer.diagnosis.thresholds import PERCENT
 
 _COARSE = 0.004  # of the span: finer steps hurt no fit
@@ -46,7 +46,7 @@ class Quantisation(Cause):
         """Distinct values that are far apart, and come again."""
         y = raw.record.output
         step, span = spacing_of(y), float(np.ptp(y))
-        values = np.unique(y)
+        values = values_of(y)
         if span == 0 or step < _COARSE * span or _USED * values.size > y.size:
             return None
         figures = {"step": step, "percent": PERCENT * step / span}
