@@ -15,7 +15,7 @@ from pulsetrainer.errors import ArgumentError
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """The largest region of the plane that the signal never switched: alpha > ``alpha``, beta < ``beta``...
+    """The largest region of the plane that the signal never switched.
 
     The region is a rectangle cut by the diagonal: relays switching up in ``alpha_low`` .. ``alpha_high`` and
     down in ``beta_low`` .. ``beta_high``, input unit.
