@@ -137,10 +137,11 @@ class State:
     @property
     def left_rms(self) -> float:
         """Rms error with the causes found; a cause that was only screened counts with its linearised gain."""
-        if not (self.question.quick and self.findings and self.findings[0].found):
+        found = {one.cause.id for one in self.findings if one.found} if self.question.quick else set()
+        gains = [one.gain for one in self.scores.scores if one.cause.id in found]
+        if not gains:
             return self.current.rms
-        left = max(self.current.squares - self.scores.scores[0].gain, self.floor.squares)
-        return float(np.sqrt(left / self.floor.count))
+        return float(np.sqrt(max(self.current.squares - gains[0], self.floor.squares) / self.floor.count))
 
     def is_whole(self, fitted: Fitted) -> bool:
         """Whether what a fit leaves is noise, as far as it matters."""

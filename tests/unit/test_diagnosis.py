@@ -365,6 +365,15 @@ def test_a_record_of_which_no_sample_counts_is_passed_over():
     np.testing.assert_array_equal(both.bins.filtered(columns, lambda x, _k, _dt: x, steps), columns)
 
 
+def test_a_quick_look_counts_with_what_was_found_only():
+    """The steps of a converter are found on the raw data: no cause that was screened takes anything away."""
+    record = _lagging()
+    steps = replace(record, output=np.round(record.output, 1))
+    answer = diagnose(Question([steps], 0.0, 1.5, np.random.default_rng(0), quick=True))
+    assert [one.cause.id for one in answer.findings if one.found] == ["quantisation"]
+    assert answer.left_rms == answer.current.rms
+
+
 def test_noise_is_measured_without_a_model():
     """Third differences see the noise on any smooth course."""
     rng = np.random.default_rng(2)
