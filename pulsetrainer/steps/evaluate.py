@@ -211,12 +211,19 @@ def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> Mod
         second_half_percent=_second_half(measured, predicted),
         start=state,
         outside_percent=100.0 * float(np.mean(outside)),
-        gain_percent=0.0 if first_rms is None else 100.0 * (1.0 - errors.rms / first_rms),
+        gain_percent=_gain_percent(errors.rms, errors.rms if first_rms is None else first_rms),
         time_s=_times(parts, known, thinned),
         output=measured[thinned],
         predicted=predicted[thinned],
         output_unit=run.output_unit,
     )
+
+
+def _gain_percent(rms: float, first_rms: float) -> float:
+    """How much smaller an error is than the first one, percent; NaN where only the first is nothing."""
+    if rms == first_rms:
+        return 0.0
+    return 100.0 * (1.0 - rms / first_rms) if first_rms > 0 else float("nan")
 
 
 def _second_half(measured: FloatArray, predicted: FloatArray) -> float:

@@ -51,6 +51,16 @@ def test_a_second_model_gains_on_the_first():
     assert second.gain_percent > 0
 
 
+def test_over_a_model_without_any_error_no_gain_can_be_told():
+    """As on a record that the first model itself made."""
+    model, other = examples.model(), replace(examples.model(), offset=examples.model().offset + 0.5)
+    u = np.concatenate((np.linspace(model.edges[0], model.edges[-1], 200), [model.edges[0]]))
+    exact = Run(None, u, model.predict(u, None))
+    first, same, worse = evaluate(exact, [model, model, other]).models
+    assert (first.rms, first.gain_percent, same.gain_percent) == (0.0, 0.0, 0.0)
+    assert np.isnan(worse.gain_percent)
+
+
 def test_samples_outside_the_model_are_counted():
     """A little noise beyond the range is none; at both ends."""
     u = U.copy()
