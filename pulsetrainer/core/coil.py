@@ -65,6 +65,11 @@ class Coil:
         ohm = supply_V / (self.gain_A - self.diode_A)
         return ohm, self.tau_s * ohm
 
+    @property
+    def most_A(self) -> float:
+        """Current at full duty: gain - sag i = i + diode."""
+        return (self.gain_A - self.diode_A) / (1.0 + self.sag)
+
     def duty_at(self, current_A: float) -> float:
         """Duty that holds a current: gain d - sag d^2 i = i + diode; infinite where the supply cannot."""
         needed, bent = current_A + self.diode_A, 4.0 * self.sag * current_A
@@ -192,12 +197,14 @@ def tuned_gains(
 
     The controller's zero cancels the coil's pole; what is left is an integrator with a delay theta, of gain
     margin pi and phase margin 90 - 180/(2 pi) = 61 degrees. Feed-forward is the coil itself, exact at no
-    current and at ``top_A``. Where the coil asks for more than ``most_proportional``, lambda is longer.
+    current and at ``top_A``, or at full duty where that is less. Where the coil asks for more than
+    ``most_proportional``, lambda is longer.
 
     Source: Rivera, Morari, Skogestad, Internal model control 4: PID controller design, Ind. Eng. Chem.
     Process Des. Dev. 25 (1986) 252; lambda = theta: Skogestad, J. Process Control 13 (2003) 291.
     """
     theta = delay_s(dt_s)
+    top_A = min(top_A, coil.most_A)
     proportional = min(coil.tau_s / (coil.gain_A * 2.0 * theta), most_proportional)
     return LoopGains(
         proportional=proportional,

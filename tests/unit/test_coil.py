@@ -93,6 +93,15 @@ def test_the_held_duty_holds():
     assert coil_of(5, 0.012, 12, sag_ohm=5.0).duty_at(2.2) == math.inf
 
 
+def test_the_feed_is_that_of_full_duty_where_the_supply_ends():
+    """A supply that sags so far that no duty holds the whole range has gains all the same."""
+    coil = coil_of(5, 0.012, 12, sag_ohm=5.0)
+    assert coil.duty_at(coil.most_A) == pytest.approx(1.0)
+    gains = tuned_gains(coil, DT_S, top_A=2.2)
+    assert gains.feed_offset + gains.feed_resistance * coil.most_A == pytest.approx(1.0)
+    assert to_wire(gains, DT_S).feed_resistance > 0
+
+
 @given(COILS)
 def test_the_rule_keeps_its_margins_on_every_coil(coil):
     """Internal-model control with lambda = theta: gain margin above pi, phase margin above 61 degrees."""
