@@ -304,12 +304,14 @@ def _force_range(
     high = reach[1] if force_max is None else force_max
     slack = 1e-9 * (reach[1] - reach[0])
     if low < reach[0] - slack or high > reach[1] + slack:
+        step = 10.0 ** (np.floor(np.log10(max(reach[1] - reach[0], np.finfo(float).tiny))) - 2.0)
         raise DataError(
             f"{model.output_quantity} from {low:g} to {with_unit(f'{high:g}', unit)} is asked for, but "
             f"{name} reaches {reach[0]:.4g} to {with_unit(f'{reach[1]:.4g}', unit)}"
             + (f": {part.limits(model)}" if model.form == "signed" else ""),
             hint=f"choose `force_min` and `force_max` inside, such as "
-            f"`force_min` {np.ceil(reach[0] * 10) / 10:g} `force_max` {np.floor(reach[1] * 10) / 10:g}",
+            f"`force_min` {np.ceil(reach[0] / step) * step:g} "
+            f"`force_max` {np.floor(reach[1] / step) * step:g}",
         )
     check_force_range(low, high)
     return low, high

@@ -7,6 +7,7 @@ import pytest
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Extension, Parameter
+from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
 from wording import raises
@@ -59,3 +60,16 @@ def test_a_pulse_too_fast_for_the_device_is_told_to_be_slower():
     """Where the lag leaves no output that every beat reaches, a faster pulse would be worse."""
     with raises(DataError, "no output in reach", other="slower"):
         pt.invert(_pulse(0.2), _model(lag_s=5.0))
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-4, 1e4])
+def test_forces_that_are_proposed_are_within_reach(unit):
+    """In whatever unit: they can be asked for as they are said."""
+    plane = Plane.uniform(0.0, 1.0, 8)
+    model = pt.Model(plane.edges, np.full(plane.n_q, 7.0 * unit), 7.2345 * unit, np.ones(plane.n_q, bool))
+    with pytest.raises(DataError) as refused:
+        pt.invert("normal", model, force_max=100.0 * unit)
+    words = refused.value.hint.split()
+    low, high = (float(words[words.index(name, 5) + 1]) for name in ("`force_min`", "`force_max`"))
+    assert high - low > 0.95 * 7.0 * unit
+    assert pt.invert("normal", model, force_min=low, force_max=high).clipped_samples == 0
