@@ -21,6 +21,7 @@ _SHOWN = (
     "max_percent",
     "right_percent",
     "response_s",
+    "pressed.mean_abs_error_percent",
 )
 _LINES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
 
@@ -45,8 +46,9 @@ def draw(labels: Sequence[str], values: Mapping[str, Sequence[float | None]]) ->
                 place, known, color=next(colours), linestyle=line, marker=marker, markersize=4, label=stem
             )
         axes.set_title(str(split(metric)[1]))
-        top = max((v for row in rows.values() for v in row if v is not None), default=1.0)
-        axes.set_ylim(0.0, 1.1 * top if top > 0 else 1.0)
+        sizes = [v for row in rows.values() for v in row if v is not None and np.isfinite(v)]
+        low, top = min(sizes, default=0.0), max(sizes, default=0.0)
+        axes.set_ylim(min(1.1 * low, 0.0), 1.1 * top if top > 0 else 0.1 * abs(low) or 1.0)
         axes.yaxis.set_major_locator(MaxNLocator(5))
         axes.margins(x=0.08)
     axes_of[0].legend(loc="best")

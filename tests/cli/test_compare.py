@@ -119,3 +119,7 @@ def test_learners_side_by_side(tmp_path):
     assert low < 50.0 < high
     assert found["session.pressed.mean_abs_error_percent"]["values"] == [1.0, 1.0]
     assert pulsetrainer(tmp_path, "compare", "anna.h5", "other.h5").code == 3
+    for name in ("carl", "dora"):
+        pt.save(replace(plain, quiz=None), tmp_path / f"{name}.h5")
+    done = pulsetrainer(tmp_path, "compare", "carl.h5", "dora.h5", "-o", "pressed.svg")
+    assert done.code == 0, done.err

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Evaluation, Run, units
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import figures
+from pulsetrainer.report import comparison_figure, figures
 from pulsetrainer.report.directions import directions, turns
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
@@ -384,3 +384,12 @@ def test_an_input_that_only_rises_has_one_arrow():
         axes = Figure().subplots()
         directions(axes, u, u)
         assert len(axes.texts) == count
+
+
+def test_a_comparison_shows_what_became_worse_than_nothing():
+    """A reduction below zero lies within its panel, as do panels of which no figure is known."""
+    rows = {"normal.mean_error_reduction_percent": (-30.0, 20.0), "run.rms_percent": (None, float("nan"))}
+    first, second = comparison_figure.draw(["before", "after"], rows).axes
+    low, high = first.get_ylim()
+    assert low < -30.0 < 20.0 < high
+    assert second.get_ylim() == (0.0, 1.0)
