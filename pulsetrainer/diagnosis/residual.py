@@ -73,9 +73,9 @@ def rms_by(group: Group, residual: FloatArray) -> FloatArray:
 
 
 def spectrum(problem: Problem, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (Hz) and the rms of the residual in third-octave bands around them, first record."""
-    first = problem.bins.record == problem.bins.record[0]  # one may hold no sample that counts
-    one, time = residual[first], problem.bins.time_s[first]
+    """Frequencies (Hz) and the rms of the residual in third-octave bands around them, longest record."""
+    own = problem.bins.record == np.argmax(np.bincount(problem.bins.record))
+    one, time = residual[own], problem.bins.time_s[own]
     step = float(np.median(np.diff(time)))
     frequency, density = signal.welch(one, 1.0 / step, nperseg=min(one.size, LIMITS.welch))
     edges = frequency[1] * 2.0 ** (np.arange(0.0, np.log2(frequency[-1] / frequency[1]) + THIRD, THIRD))

@@ -354,14 +354,16 @@ def test_a_step_in_the_second_record_is_found_there():
     assert values["time"] == pytest.approx(20.0 + 6.4, abs=0.05)
 
 
-def test_a_record_of_which_no_sample_counts_is_passed_over():
+@pytest.mark.parametrize("counts", [0, 1])
+def test_a_record_of_which_hardly_a_sample_counts_is_passed_over(counts):
     """Where its sensor was lost, for instance: neither a filter of rows nor a spectrum needs it."""
     record = _lagging()
-    lost = replace(record, sample_weight=np.zeros(record.input.size))
+    lost = replace(record, sample_weight=1.0 * (np.arange(record.input.size) < counts))
     both, one = (problem_for(some, 0.0, 1.5) for some in ([lost, record], [record]))
     left = one.measured - one.measured.mean()
-    np.testing.assert_array_equal(residual.spectrum(both, left), residual.spectrum(one, left))
-    columns, steps = left[:, None], [r.step for r in both.records]
+    also = np.append(np.zeros(counts), left)
+    np.testing.assert_array_equal(residual.spectrum(both, also), residual.spectrum(one, left))
+    columns, steps = also[:, None], [r.step for r in both.records]
     np.testing.assert_array_equal(both.bins.filtered(columns, lambda x, _k, _dt: x, steps), columns)
 
 
