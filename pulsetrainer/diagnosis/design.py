@@ -322,7 +322,8 @@ class Projector:
         # filtered nodes are not sparse: then the columns of the few positive cells are faster than all
         self._columns = None if sparse.issparse(design.nodes) else design.columns(free)
         block = design.gram[np.ix_(free, free)]
-        block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max())
+        # where no cell is seen at all, any ridge does
+        block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max()) or 1.0
         self.factor = linalg.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
 
     def __call__(self, columns: FloatArray) -> FloatArray:

@@ -105,3 +105,16 @@ def test_the_band_of_a_record_within_the_range_is_around_its_prediction():
     runs = [pt.Run(None, u, y + noise.normal(0.0, 1e-3, y.size)) for u, y in (within, whole)]
     fit = pt.identify(runs, levels=12, bootstrap=20).fit
     np.testing.assert_allclose(0.5 * (fit.predicted_lower + fit.predicted_upper), fit.predicted, atol=0.02)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("swing", [1e-4, 1e-8])
+def test_a_record_of_a_device_at_rest_gets_an_answer(swing, seed):
+    """Its output is all noise, which by chance falls as often as it rises."""
+    u, y = _swings(0, 1, 0, 1, 0.3, 0.9, 0.2, 1, 0.4, 0.6, 0)
+    model = pt.identify(pt.Run(None, u, y), levels=12)
+    time_s = np.arange(2000) / 100.0
+    noise = 0.01 * np.random.default_rng(seed).standard_normal(time_s.size)
+    rest = 0.5 + swing * np.sin(3.0 * time_s) ** 2
+    run = pt.Run(time_s, rest, model.predict(rest, None) + noise)
+    assert pt.diagnose(run, model, quick=True).verdict != "condition-change"

@@ -103,8 +103,8 @@ class Change:
         return "shifted" if abs(self.gain) <= _GAIN and self.left <= _FAR * self.span else "changed"
 
 
-def left_by(measured: FloatArray, predicted: FloatArray, noise_rms: float) -> float:
-    """Rms error of a prediction (n,) without the white noise of single samples, output unit."""
+def left_by(measured: FloatArray, predicted: FloatArray | float, noise_rms: float) -> float:
+    """Rms error of a prediction (n,) or () without the white noise of single samples, output unit."""
     return float(np.sqrt(max(float(np.mean((measured - predicted) ** 2)) - noise_rms**2, 0.0)))
 
 
@@ -135,7 +135,8 @@ def turned_over(measured: FloatArray, predicted: FloatArray, noise_rms: float) -
     """
     gain, offset = _fit(measured, predicted)
     left = left_by(measured, gain * predicted + offset, noise_rms)
-    if gain >= 0.0 or left > _REFITTED * float(np.std(measured)):
+    # of an output that is all noise nothing is left, and nothing can be told
+    if gain >= 0.0 or left >= _REFITTED * left_by(measured, measured.mean(), noise_rms):
         return None
     return _carried_over(measured, predicted, left, left_by(measured, predicted, noise_rms))
 
