@@ -6,6 +6,7 @@ import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 from typing import Any
 
 from pulsetrainer.report.names import NAMES, split
@@ -96,8 +97,8 @@ def label(name: str) -> str:
 
 
 def text(value: Any) -> str:
-    """Return a value as a cell of a table."""
-    if value is None:
+    """Return a value as a cell of a table; what is not known, None or NaN, is a dash."""
+    if value is None or (isinstance(value, float) and isnan(value)):
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
