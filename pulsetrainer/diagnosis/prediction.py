@@ -61,7 +61,9 @@ def extended_of(model: Model) -> Extended:
 
 
 def predict(model: Model, inputs: FloatArray, dt_s: float | None, start: State | None = None) -> FloatArray:
-    """Output (n,) that a model predicts for an input (n,) at even steps of ``dt_s``, from ``start``.
+    """Output (n,) that a model predicts for an input (n,) at even steps of ``dt_s``.
+
+    It goes on from ``start``, None: negative saturation. A model with extensions begins there, at rest.
 
         y_t = y0 + sum_k mu_k A_k r_k(u_0 .. u_t)    (Carneiro 2018, eq. 2), then the extensions in order
 

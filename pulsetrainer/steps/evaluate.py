@@ -193,6 +193,8 @@ def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> Mod
         Record(part.input, part.output, k.astype(np.float64)) for part, k in zip(parts, known, strict=True)
     ]
     start, state = estimated_start(operator, records)
+    if model.extensions and start is not None:  # these are predicted from rest
+        state = "negative saturation, as for every extended model"
     predicted = np.concatenate(
         [predict(model, part.input, run.dt_s, start)[k] for part, k in zip(parts, known, strict=True)]
     )

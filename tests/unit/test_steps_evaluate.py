@@ -10,7 +10,9 @@ import report_examples
 import store_examples as examples
 from core_jobs import curves
 
-from pulsetrainer.artefacts import Evaluation, Run
+from pulsetrainer.artefacts import Evaluation, Extension, Parameter, Run
+from pulsetrainer.core.memory import positive_saturation
+from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.compare import compare
 from pulsetrainer.steps.evaluate import breaches, evaluate
@@ -59,6 +61,21 @@ def test_over_a_model_without_any_error_no_gain_can_be_told():
     first, same, worse = evaluate(exact, [model, model, other]).models
     assert (first.rms, first.gain_percent, same.gain_percent) == (0.0, 0.0, 0.0)
     assert np.isnan(worse.gain_percent)
+
+
+def test_the_state_before_a_record_is_the_one_that_was_predicted_from():
+    """A static model tries several; one with extensions begins at rest, and says so."""
+    static = examples.model()
+    late = Extension("delay", (Parameter("delay", 0.01, "s", 0.01, 0.01),))
+    low, high = static.edges[[0, -1]]
+    u = high - (high - low) * (0.3 + 0.2 * np.cos(np.arange(600) / 40.0))
+    y = operator_of(static)(u, positive_saturation(low, high))
+    run = Run(np.arange(600) / 100.0, u, y)
+    found = evaluate(run, [static, replace(static, extensions=(late,))])
+    assert [one.start for one in found.models] == [
+        "positive saturation, estimated",
+        "negative saturation, as for every extended model",
+    ]
 
 
 def test_samples_outside_the_model_are_counted():
