@@ -144,7 +144,7 @@ def test_a_feedback_is_brought_back_to_the_range():
 
 def test_start_values_are_inside_the_bounds_and_scale_with_the_device():
     """Every block of every cause; strengths in proportion to span and reach."""
-    u = 2.0 + 2.0 * np.sin(T)
+    u = 2.0 + 2.0 * np.sin(6.0 * T)
     residual = [np.sin(2 * np.pi * 5 * T) + (T > 2.0)]
     frames = [_frame(u), _frame(u)]
     for cause in CAUSE.values():
@@ -266,6 +266,23 @@ def test_where_the_input_turns_within_a_few_samples_none_is_wild(samples):
     wild = [200, 1200, 2200, 5000]
     y[wild] += 0.7
     np.testing.assert_array_equal(np.flatnonzero(CAUSE["outliers"].gate(_raw(y, u)).mask), wild)
+
+
+def test_the_first_and_the_last_stroke_are_no_step():
+    """One range and a half on either side, or a quarter of what the input went."""
+    u = np.interp(np.linspace(0.0, 10.0, 1000), np.arange(11), np.arange(11) % 2)
+    for strokes, sides in ((10, (1.5, 8.5)), (4, (1.0, 3.0))):
+        frame = Frame(0.01, u[: 100 * strokes], 1.0, 1.0)
+        times = [block[0][2] for block in CAUSE["step"].starts([frame], [])]
+        assert (times[0], times[-1]) == pytest.approx(sides, abs=0.03)
+
+
+def test_clocks_that_part_by_less_than_half_a_sample_are_not_told():
+    """One converter after the other does as much."""
+    frames = [Frame(0.01, np.zeros(n), 1.0, 1.0) for n in (100, 10_000)]
+    skew = CAUSE["clock-skew"]
+    assert skew.can_be_told((-5.1e-5,), frames)
+    assert not skew.can_be_told((4.9e-5,), frames)
 
 
 def test_a_step_has_loops_on_both_sides():

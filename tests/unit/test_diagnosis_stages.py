@@ -119,7 +119,7 @@ class StillFloor(Floor):
         return self
 
 
-FLOOR = StillFloor(count=100, span=1.0, noise=1.0, white=1.0)
+FLOOR = StillFloor(count=100, span=1.0, noise=1.0, white=1.0, sampled=1.0)
 PROBLEM = SimpleNamespace(
     records=("one",),
     frames=(Frame(1e-3, np.zeros(10_000), 1.0, 1.0),),
@@ -527,6 +527,15 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
     assert after.current.names == (("unlisted",) if learned else ())
     assert after.p_values == ({"unlisted": p_value} if learned else {})
     assert tuple(one.kind for one in after.evidence) == said
+
+
+@pytest.mark.parametrize(("sampled", "sought"), [(0.65, False), (0.55, True), (0.0, True)])
+def test_a_dependence_is_sought_in_what_may_be_slow_noise(monkeypatch, sampled, sought):
+    """Where two fifths of what is left are more than the noise from sample to sample."""
+    asked = []
+    monkeypatch.setattr(unlisted, "best_dependence", lambda *_: asked.append(1))
+    unlisted.stage(_state(_fit(100.0), floor=replace(FLOOR, sampled=sampled)))
+    assert bool(asked) is sought
 
 
 @pytest.mark.parametrize(

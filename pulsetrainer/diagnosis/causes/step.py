@@ -11,7 +11,7 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Va
 
 _TRIED = 0.003  # of the span, and of the gain
 _MOMENTS = (0.05, 0.95, 25)  # of the record, from, to, how many: a side with less holds no loops to compare
-_LOOP = 2.0  # ranges of path on either side: the first stroke of a device that was never cycled is no step
+_LOOP = 1.5  # ranges of path on either side: the first stroke of a device that was never cycled is no step
 _SIDE = 0.25  # of all its path: no side needs more
 _BESIDE = 1.5  # distances of two moments on either side: a refit cannot move far, so it must begin near
 _SHARED = 20.0  # samples over which the change is shared out, so that the error falls smoothly with the time
@@ -82,8 +82,8 @@ def _sides(frames: Sequence[Frame]) -> tuple[float, float]:
     begun = np.cumsum([0.0, *(frame.path[-1] for frame in frames[:-1])])
     path = np.concatenate([frame.path + b for frame, b in zip(frames, begun, strict=True)])
     least = min(_LOOP * frames[0].reach, _SIDE * path[-1])
-    inside = np.searchsorted(path, (least, path[-1] - least))
-    first, last = (float(time[min(k, time.size - 1)]) for k in inside)
+    first = float(time[np.searchsorted(path, least)])
+    last = float(time[np.searchsorted(path, path[-1] - least, side="right") - 1])
     end = frames[-1].begin_s + frames[-1].input.size * frames[-1].dt_s
     return max(first, _MOMENTS[0] * end), min(last, _MOMENTS[1] * end)
 
