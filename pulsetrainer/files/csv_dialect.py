@@ -2,7 +2,7 @@
 
 Every rule is explicit: the delimiter is the one that makes most cells numbers; a comma is a decimal sign
 only where something else separates; the first line is a header if it has text where the next one has a
-number; a column that starts with text is a column of text; text behind numbers is a remark, no heading;
+number; a column that is text in most rows is a column of text; text behind numbers is a remark, no heading;
 what an instrument writes about itself above the table is a comment. Times of day and ISO 8601 time stamps
 are numbers: seconds. The rows themselves are read by ``csv_rows``.
 """
@@ -224,13 +224,13 @@ def _above(rows: list[list[str]]) -> int:
 def _is_row(row: list[str], last: list[str]) -> bool:
     """Whether a line is a row as the last one is: text in it stands above text or nothing, or is a remark.
 
-    A remark is in the minority and behind a number; where the others have none, theirs may lack a cell.
+    A remark, or a reading that failed, stands behind a number; where the others have none, theirs may lack a
+    cell.
     """
     text = [_is_text(cell) for cell in row]
     if len(row) != len(last):
         return len(row) > len(last) and not any(text[: len(last)]) and all(text[len(last) :])
-    remarks = not text[0] and 2 * sum(text) < len(text)
-    return remarks or not any(here and _is_number(below) for here, below in zip(text, last, strict=True))
+    return not text[0] or not any(here and _is_number(below) for here, below in zip(text, last, strict=True))
 
 
 def _is_heading(row: list[str]) -> bool:
@@ -253,7 +253,8 @@ def _with_header(
     heads = _heading_lines(text, rows)
     if heads == len(rows):
         raise DataError(f"{path} has no rows below its header", hint="export the recording again")
-    first = rows[heads]
+    body = rows[heads:]
+    first = _usual_row(rows[0], body) if heads else body[0]
     comments = tuple(comment for count, comment in commented if count < lines[heads][0])
     names = rows[0] if heads else _commented_names(comments, delimiter, len(first))
     names, first = _without_end(names, first)
@@ -262,7 +263,9 @@ def _with_header(
             f"{path} has {len(names)} column names, but {len(first)} columns in line {lines[heads][0]}",
             hint="correct the header; decimal commas need another delimiter, such as a semicolon",
         )
-    if all(text[heads][: len(first)]):
+    columns = [_filled(k, body) for k in range(len(names))]
+    of_text = frozenset(k for k, cells in enumerate(columns) if _mostly_text(cells))
+    if len(of_text) == len(names):
         raise DataError(
             f"{path} has no column of numbers: line {lines[heads][0]} is {lines[heads][1][:60]!r}",
             hint="export the recording as CSV, one column per quantity",
@@ -276,11 +279,34 @@ def _with_header(
         tuple(units) if len(units) == len(names) else ("",) * len(names),
         comments,
         lines[heads][0],
-        frozenset(k for k, is_text in enumerate(text[heads][: len(first)]) if is_text),
-        frozenset(k for k, cell in enumerate(first) if stamps.seconds(cell) is not None),
+        of_text,
+        frozenset(k for k, cells in enumerate(columns) if _is_stamped(cells)),
         rate_Hz=rate,
         day_first=stamps.day_first(_columns(rows[heads:], delimiter, _last_lines(path, encoding))),
     )
+
+
+def _usual_row(names: list[str], body: list[list[str]]) -> list[str]:
+    """Return the first row, or the first that fits the names if most rows do: the first may be a bad one."""
+    fitting = [row for row in body if len(_without_end(names, row)[1]) == len(_without_end(names, row)[0])]
+    return fitting[0] if 2 * len(fitting) > len(body) else body[0]
+
+
+def _filled(column: int, body: list[list[str]]) -> list[str]:
+    """Return the cells of a column in which something stands."""
+    cells = (row[column] for row in body if len(row) > column)
+    return [cell for cell in cells if cell.lower() not in MISSING]
+
+
+def _mostly_text(cells: list[str]) -> bool:
+    """Whether most cells are text; of as many of either kind the first decides."""
+    text = list(map(_is_text, cells))
+    return 2 * sum(text) + sum(text[:1]) > len(text)
+
+
+def _is_stamped(cells: list[str]) -> bool:
+    """Whether the first cell that is no text is a time of day or a time stamp."""
+    return stamps.seconds(next((cell for cell in cells if not _is_text(cell)), "")) is not None
 
 
 def _columns(rows: list[list[str]], delimiter: str | None, last: list[str]) -> list[tuple[str, ...]]:

@@ -75,7 +75,7 @@ def first_two(path: Path, what: str, *, names: str) -> tuple[Table, FloatArray, 
     from pulsetrainer.files.run_from_table import seconds  # noqa: PLC0415
     from pulsetrainer.files.table import read_table  # noqa: PLC0415
 
-    table = read_table(path)
+    table = read_table(path, lambda head: range(min(2, len(head.names))))
     if len(table.names) < 2:
         raise DataError(f"{path} has {len(table.names)} column; {what}", hint=f"write two columns: {names}")
     return table, seconds(table, table.names[0]), table.check_finite(table.names[1])

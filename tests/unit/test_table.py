@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +32,10 @@ COLUMNS = {"input": "u", "output": "y"}
 def table(tmp_path):
     """Return a function that reads a text as a table."""
 
-    def read(text, encoding="utf-8"):
+    def read(text, encoding="utf-8", keep=None):
         path = tmp_path / "t.csv"
         path.write_bytes(text.encode(encoding) if isinstance(text, str) else text)
-        return read_table(path)
+        return read_table(path, keep)
 
     return read
 
@@ -172,11 +173,35 @@ def test_a_line_of_units_below_the_header(table, rows, remark):
 def test_a_remark_in_the_first_row_makes_no_heading_of_it(table, header, first, other):
     """The row counts, and so do the names above it; a remark may be all that is there of its column."""
     rows = "".join(f"{k / 100},{k % 7},{k % 5}{other}\n" for k in range(1, 30))
-    read = table(f"{header}0.00,0.5,0.25,{first}\n{rows}")
+    read = table(f"{header}0.00,0.5,0.25,{first}\n{rows}", keep=lambda head: range(3))
     assert read.names[:2] == (("t_s", "u_V") if header else ("column1", "column2"))
     run = read_run(read.path, input=read.names[1], output=read.names[2])
     np.testing.assert_array_equal(run.time_s[:2], [0, 0.01])
     np.testing.assert_array_equal(run.input[:2], [0.5, 1])
+
+
+@pytest.mark.parametrize(
+    ("header", "first"),
+    [
+        *product(
+            ["t_s,u_V,y_N\n", "t,u,y\ns,V,N\n"], ["0,OVER,0.1", "0,OVER,OVER", "0,,0.1", "0,1", "0,1,2,3"]
+        ),
+        *product(["rig 7\nt_s,u_V,y_N\n"], ["0,OVER,0.1", "0,OVER,OVER", "0,,0.1", ",,"]),
+    ],
+)
+def test_a_bad_first_row_is_a_bad_row(table, header, first):
+    """The names and the columns are those of the rows below; the row is named, or left out and counted."""
+    rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(1, 30))
+    path = table(f"{header}{rows}").path
+    path.write_text(f"{header}{first}\n{rows}")
+    line = header.count("\n") + 1
+    with pytest.raises(DataError) as caught:
+        read_run(path, **COLUMNS)
+    assert f"line {line}" in caught.value.message
+    read = run_from_table(path, skip_bad_rows=True, **COLUMNS)
+    assert read.notes == (f"1 of 30 rows of {path} lack a number and were left out: line {line}",)
+    assert (read.run.input_unit, read.run.output_unit) == ("V", "N")
+    np.testing.assert_array_equal(read.run.time_s, np.arange(1, 30) / 100)
 
 
 @pytest.mark.parametrize(
@@ -253,7 +278,7 @@ def test_a_line_of_text_above_numbers_is_a_comment(table):
 def test_a_header_of_another_count_is_still_an_error(table):
     """However many rows follow."""
     _refused(table, "t,u\n" + _POINT, "2 column names", "3 columns in line 2")
-    _refused(table, "t,u,y\n" + 3 * "1,2\n" + _POINT, "3 column names", "2 columns in line 2")
+    _refused(table, "t,u,y\n" + 3 * "1,2\n" + _POINT, "2 columns in line 2", "expected 3")
 
 
 @pytest.mark.parametrize(
