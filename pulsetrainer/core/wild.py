@@ -257,10 +257,13 @@ def _fits_better(
     found: Sequence[tuple[BoolArray, BoolArray]],
 ) -> bool:
     """Tell whether the repaired ``inputs`` leave less than the measured ones, of weights of either sign."""
-    low, high = min(float(u.min()) for u, _ in signals), max(float(u.max()) for u, _ in signals)
-    plane = Plane.uniform(low, high, _QUICK_LEVELS)
 
     def left(given: Sequence[FloatArray]) -> float:
+        # one input that is far off would leave all others in one cell of a common plane
+        low, high = min(float(u.min()) for u in given), max(float(u.max()) for u in given)
+        if not high > low:
+            return float("inf")
+        plane = Plane.uniform(low, high, _QUICK_LEVELS)
         records = [
             Record(u, y, np.where(in_output & ~in_input, 0.0, 1.0))
             for u, (_, y), (in_input, in_output) in zip(given, signals, found, strict=True)

@@ -119,6 +119,20 @@ def test_wild_samples_do_not_move_the_fit(share, where):
     assert np.median(ratios) <= 1.1
 
 
+@pytest.mark.parametrize("times", [1e1, 1e3, -1e6, 1e30])
+@pytest.mark.parametrize("where", ["input", "output"])
+def test_one_sample_far_off_is_found_however_far(where, times):
+    """An overflow of the recorder costs its sample and nothing else."""
+    _, u, y, _ = clean(0, n=1000)
+    at = 500
+    spoilt_one = u.copy() if where == "input" else y.copy()
+    spoilt_one[at] = times * np.ptp(spoilt_one)
+    model = fitted(spoilt_one, y) if where == "input" else fitted(u, spoilt_one)
+    assert model.fit.masked_samples == 1
+    np.testing.assert_allclose(model.edges[[0, -1]], fitted(u, y).edges[[0, -1]], rtol=1e-3)
+    assert model.fit.rms_percent < 0.4
+
+
 def test_wild_samples_that_lie_close_together_are_found():
     """Four among eleven look like motion; all that are far off are found, and none that is true."""
     _, u, _, rng = clean(523)
