@@ -126,7 +126,7 @@ def _time(table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float 
         if _just_counts(table.columns[time]):
             note = (
                 f"the column {time} of {table.path} just counts the rows, so it is not used as time: the "
-                f"samples have an order only (if it is in seconds, give `time` {time})"
+                f"samples have an order only (if it is in seconds, give `time` {time!r})"
             )
             return _Time(None, "no time", (note,))
     heading, unit = table.names[table.index(time)], _unit_of_time(table, time)

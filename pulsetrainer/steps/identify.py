@@ -148,6 +148,8 @@ def identify(
     notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
     warning = fit_notes.warning(fitted, measured, form)
     notes += [] if warning else fit_notes.of_rest(fitted)
+    if way := _only_way(measured):
+        notes.append(f"the {measured[0].input_quantity} only {way}: a loop, if there is one, is not seen")
     progress(1.0)
     first = wild_ones[0]
     said = {
@@ -303,6 +305,14 @@ def _of_gaps(plane: Plane, covered: BoolArray, unit: str) -> list[str]:
     return [] if gap is None or float(np.mean(covered)) >= WELL_COVERED else [gap.words(plane, unit)]
 
 
+def _only_way(runs: Sequence[Run]) -> str:
+    """Say which way the input goes where it never turns back; empty where it does."""
+    steps = np.concatenate([np.diff(run.input) for run in runs])
+    if steps.min() < 0 < steps.max():
+        return ""
+    return "rises" if steps.max() > 0 else "falls"
+
+
 def _model(
     fitted: Fitted,
     runs: Sequence[Run],
@@ -368,7 +378,7 @@ def _model(
             offsets=tuple(float(shift) for shift in fitted.offsets),
             spacing="even" if fitted.evenly_spaced else "crowded",
             stiffness=found.stiffness,
-            loop=loop_of(operator, errors.rms),
+            loop="none" if _only_way(runs) else loop_of(operator, errors.rms),
             **said,
         ),
     )

@@ -317,3 +317,17 @@ def test_a_single_valued_curve_has_no_loop():
     assert loop_of(Preisach(plane, np.where(i == j, 1.0, 0.0))) == "none"
     assert loop_of(Preisach(plane, np.where(i == j, 1.0, 0.3))) == "counterclockwise"
     assert loop_of(Preisach(plane, np.where(i == j, 1.0, 0.3)), doubt=1.0) == "none"
+
+
+@pytest.mark.parametrize("way", ["rises", "falls"])
+def test_one_stroke_shows_no_loop(way):
+    """A loop takes both ways; two records of one stroke each show it."""
+    u = np.linspace(0.0, 1.0, 300)
+    one = run_of(u, u**2) if way == "rises" else run_of(u[::-1], u[::-1] ** 0.5)
+    fit = pt.identify(one, levels=12).fit
+    assert fit.loop == "none"
+    assert [way in note for note in fit.notes if "only" in note] == [True]
+    other = run_of(u[::-1], u[::-1] ** 0.5) if way == "rises" else run_of(u, u**2)
+    both = pt.identify([one, other], levels=12).fit
+    assert both.loop == "counterclockwise"
+    assert not any("only" in note for note in both.notes)
