@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pulsetrainer.artefacts import BoolArray, Fit, Model, Run
+from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
 from pulsetrainer.artefacts.units import same_units, with_unit
 from pulsetrainer.core import input_noise, metrics, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
@@ -100,7 +100,7 @@ def identify(
     whole = [runs] if isinstance(runs, Run) else list(runs)
     titles = list(names) or [f"run {number}" for number in range(1, len(whole) + 1)]
     notes: list[str] = []
-    _check_units(titles, whole)
+    _check_runs(titles, whole)
     for title, run in zip(titles, whole, strict=True):
         if not run.complete:
             notes.append(f"{title} is incomplete; fitting the {run.input.size} samples it has")
@@ -226,7 +226,8 @@ def input_range(run: Run) -> tuple[float, float]:
     return low, high
 
 
-def _check_units(names: Sequence[str], runs: Sequence[Run]) -> None:
+def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
+    """Raise DataError where there is no run, units differ, or values have no squares."""
     if not runs:
         raise DataError("there is no run to identify a model from", hint="give at least one run")
     first = runs[0]
@@ -236,6 +237,14 @@ def _check_units(names: Sequence[str], runs: Sequence[Run]) -> None:
                 f"{name} is in {run.input_unit} and {run.output_unit}, "
                 f"but {names[0]} is in {first.input_unit} and {first.output_unit}",
                 hint="import the runs again with the same --input-unit and --output-unit",
+            )
+    for what in ("input", "output"):
+        largest = float(max(np.fmax.reduce(np.abs(getattr(run, what)), initial=0.0) for run in runs))
+        if 0 < largest < 1.0 / LARGEST:
+            raise DataError(
+                f"the {what} of {', '.join(dict.fromkeys(names))} is within {largest:g} of zero, closer than "
+                f"the limit of {1.0 / LARGEST:g}",
+                hint="write it in a smaller unit, and import it again",
             )
 
 

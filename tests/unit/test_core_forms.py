@@ -331,3 +331,18 @@ def test_one_stroke_shows_no_loop(way):
     both = pt.identify([one, other], levels=12).fit
     assert both.loop == "counterclockwise"
     assert not any("only" in note for note in both.notes)
+
+
+@pytest.mark.parametrize("size", [1e-101, 1e-300, 1e-320])
+@pytest.mark.parametrize("what", ["input", "output"])
+def test_a_record_whose_squares_are_no_numbers_is_refused(what, size):
+    """Down to 1e-100 the unit does not matter."""
+    u = np.concatenate([np.linspace(0.0, 1.0, 100), np.linspace(1.0, 0.0, 100)])
+    scales = {"input": 1.0, "output": 1.0, what: size}
+    with pytest.raises(DataError) as caught:
+        pt.identify(run_of(scales["input"] * u, scales["output"] * u**2), levels=8)
+    assert what in caught.value.message
+    scales[what] = 1e-99
+    usual = pt.identify(run_of(u, u**2), levels=8).fit.rms_percent
+    small = pt.identify(run_of(scales["input"] * u, scales["output"] * u**2), levels=8).fit.rms_percent
+    assert small == pytest.approx(usual, rel=1e-6)
