@@ -74,8 +74,10 @@ def stage(state: State) -> State:
     elif (left := left_by(judged.measured, judged.predicted, quick)) <= span * state.left_rms:
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
-        if state.verdict in ("none", "inconclusive") and _unexplained(state, left):
+        if state.verdict == "none" and _unexplained(state, left):
             state = replace(state, verdict="unknown")
+        elif state.verdict == "none" and state.blind and not state.question.quick:
+            state = replace(state, verdict="inconclusive")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
     if changed is not None:
         state, more = _in_another_condition(state, changed, judged.polarity)
