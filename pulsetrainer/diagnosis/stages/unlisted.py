@@ -23,6 +23,7 @@ from pulsetrainer.diagnosis.dependence import best_dependence
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.repeats import repeats
 from pulsetrainer.diagnosis.stages import elimination, search
 from pulsetrainer.diagnosis.state import State
@@ -65,16 +66,22 @@ def _predicts(state: State, found: Fitted) -> bool:
     """Whether learned dependences predict most of what can be lowered on blocks that were left out.
 
     The loops of a device that is no Preisach operator look like a dependence on the last turn, but by halves.
+    What may all be slow noise must be predicted down to the noise from sample to sample.
     """
-    return state.held_out.gain(state.current, found, state.floor) >= LIMITS.learned_predicts
+    floor = state.floor if _is_above(state, state.floor) else state.floor.quick
+    return state.held_out.gain(state.current, found, floor) >= LIMITS.learned_predicts
+
+
+def _is_above(state: State, floor: Floor) -> bool:
+    """Whether what is left is more than a floor, by what matters."""
+    return state.current.squares - floor.squares > floor.relevant
 
 
 def _more_is_left(state: State) -> bool:
     """Tell whether more is left than noise, or much that is slow: that may be either, and this finds out."""
-    left, floor = state.current.squares, state.floor_left
-    more = left - floor.quick.squares
-    slow = more > LIMITS.slow_share * left
-    return left - floor.squares > floor.relevant or (slow and more > floor.relevant)
+    left, quick = state.current.squares, state.floor.quick
+    slow = left - quick.squares > LIMITS.slow_share * left
+    return _is_above(state, state.floor_left) or (slow and _is_above(state, quick))
 
 
 def _learned(state: State) -> tuple[Fitted | None, float, bool]:
