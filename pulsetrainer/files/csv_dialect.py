@@ -2,9 +2,9 @@
 
 Every rule is explicit: the delimiter is the one that makes most cells numbers; a comma is a decimal sign
 only where something else separates; the first line is a header if it has text where the next one has a
-number; a column that is text in most rows is a column of text; text behind numbers is a remark, no heading;
-what an instrument writes about itself above the table is a comment. Times of day and ISO 8601 time stamps
-are numbers: seconds. The rows themselves are read by ``csv_rows``.
+number; a column that begins with text, as in most rows, is one of text; text behind numbers is a remark,
+no heading; what an instrument writes about itself above the table is a comment. Times of day and ISO 8601
+time stamps are numbers: seconds. The rows themselves are read by ``csv_rows``.
 """
 
 from __future__ import annotations
@@ -299,9 +299,9 @@ def _filled(column: int, body: list[list[str]]) -> list[str]:
 
 
 def _mostly_text(cells: list[str]) -> bool:
-    """Whether most cells are text; of as many of either kind the first decides."""
+    """Whether cells begin with text, and half of them or more are."""
     text = list(map(_is_text, cells))
-    return 2 * sum(text) + sum(text[:1]) > len(text)
+    return any(text[:1]) and 2 * sum(text) >= len(text)
 
 
 def _is_stamped(cells: list[str]) -> bool:

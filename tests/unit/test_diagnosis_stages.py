@@ -538,6 +538,21 @@ def test_a_dependence_is_sought_in_what_may_be_slow_noise(monkeypatch, sampled, 
     assert bool(asked) is sought
 
 
+@pytest.mark.parametrize(("instead", "names"), [(120.0, ("unlisted",)), (190.0, ("creep",))])
+def test_where_nothing_is_found_beside_listed_causes_it_is_sought_without_them(monkeypatch, instead, names):
+    """They give way where it explains clearly more."""
+    term = Term(unlisted.Unlisted([unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
+    curve = Fit(instead, (term,))
+    monkeypatch.setattr(
+        unlisted, "_learned", lambda state: (None if state.current.names else curve, 0.001, False)
+    )
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+    left = _state(_fit(200.0, "creep"), _fit(700.0))
+    assert not left.unexplained
+    assert unlisted.stage(left).current.names == names
+
+
 @pytest.mark.parametrize(
     ("left", "instead", "kept"),
     [(400.0, 324.0, True), (400.0, 321.0, False), (199.0, 100.0, True), (201.0, 100.0, False)],

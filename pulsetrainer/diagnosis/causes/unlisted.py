@@ -23,7 +23,7 @@ from pulsetrainer.diagnosis.causes.base import (
 KNOTS = 8  # of each curve: even between the ends of the state; its first value is 0
 _STILL = 0.004  # of the range: an input that stays within it rests
 _BACK = 0.02  # of the range: a turn of the input is known when it has come back so far
-_STEEPEST = 1e6  # of a curve
+_STEEPEST = 1.0  # of the span: a curve that goes further at one of its points has no samples there
 _SMALL_CHANGE = 1e-4  # of the span: steps of the derivatives, of the curve ...
 _SMALL_TIME_S = 1e-3  # ... and of a time constant
 _CONSTANTS = 3  # of a part: its state, and the ends of its curve
@@ -195,8 +195,9 @@ class Unlisted(Cause):
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """A constant and the values of the curve, of each part."""
+        most = _STEEPEST * frame.span
         curve = tuple(
-            Quantity(f"f{k}", "{y}", -_STEEPEST, _STEEPEST, _SMALL_CHANGE * frame.span, "point of the curve")
+            Quantity(f"f{k}", "{y}", -most, most, _SMALL_CHANGE * frame.span, "point of the curve")
             for k in range(2, KNOTS + 1)
         )
         longest = max(frame.length_s, 2.0 * frame.dt_s)

@@ -36,24 +36,27 @@ def stage(state: State) -> State:
     """Return the state with learned dependences in the model, where they repeat."""
     if not _more_is_left(state) or not state.question.timed or state.jagged:
         return state
-    begun = state
-    if state.unexplained:
-        state = replace(state, current=state.baseline, p_values={}, without={})
-    found, p_value, doubtful = _learned(state)
-    if found is not None and not _predicts(state, found):
-        found, doubtful = None, True
-    if found is None:
-        said = (Evidence("not repeated", _ID),) if doubtful else ()
-        return replace(begun, evidence=(*begun.evidence, *said))
-    state = _heard_again(replace(state, current=found, p_values={**state.p_values, _ID: p_value}))
-    if begun.current.squares <= found.squares:  # listed causes explain as much
-        return begun
-    if begun.unexplained:
-        state = search.stage(state)
-    state = elimination.stage(state)
-    state = _heard_again(state)
-    replaced = set(begun.current.names) - set(state.current.names)
-    return begun if replaced and _keep_their_names(begun, state.current) else state
+    alone = replace(state, current=state.baseline, p_values={}, without={})
+    doubts = []
+    for begun in [alone] if state.unexplained else [state, alone] if state.current.terms else [state]:
+        found, p_value, doubtful = _learned(begun)
+        if found is not None and _predicts(begun, found):
+            return _compared(state, begun, found, p_value)
+        doubts.append(doubtful or found is not None)
+    said = (Evidence("not repeated", _ID),) if any(doubts) else ()
+    return replace(state, evidence=(*state.evidence, *said))
+
+
+def _compared(state: State, begun: State, found: Fitted, p_value: float) -> State:
+    """Return the state with dependences ``found`` from ``begun``; as it was where listed ones do as well."""
+    if state.current.squares <= found.squares:
+        return state
+    after = _heard_again(replace(begun, current=found, p_values={**begun.p_values, _ID: p_value}))
+    if begun is not state:
+        after = search.stage(after)
+    after = _heard_again(elimination.stage(after))
+    replaced = set(state.current.names) - set(after.current.names)
+    return state if replaced and _keep_their_names(state, after.current) else after
 
 
 def _keep_their_names(state: State, instead: Fitted) -> bool:
