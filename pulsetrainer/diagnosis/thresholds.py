@@ -134,6 +134,7 @@ class Thresholds:
     slow_share: float = 0.4  # of what is left: so much that may be slow noise is sought in the bank too
 
     # Unlisted
+    other_tau: float = 1.5  # of the time constant: two of one state that are nearer are the same
     most_states: int = 3  # learned one after another
     learned_rounds: int = 4  # Gauss-Newton steps of the joint refit with each
     fastest_state_s: float = 0.05  # time constants of the bank from here: what is faster mends a lag ...

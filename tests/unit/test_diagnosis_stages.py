@@ -516,7 +516,7 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
     monkeypatch, left, p_value, gain, fall, again, learned, said
 ):
     """Sought where more is left than noise; one that does not predict other pieces of the record is said."""
-    term = Term(unlisted.Unlisted([part := unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
+    term = Term(unlisted.Unlisted([part := unlisted.Part(0, 0.0, 1.0)]), (0.1,) * 9)
     best = SimpleNamespace(p_value=p_value, gain=gain, part=part, values=term.values)
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: best)
     monkeypatch.setattr(unlisted, "refit", lambda *_, **__: Fit(left - fall, (term,)))
@@ -527,6 +527,16 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
     assert after.current.names == (("unlisted",) if learned else ())
     assert after.p_values == ({"unlisted": p_value} if learned else {})
     assert tuple(one.kind for one in after.evidence) == said
+
+
+@pytest.mark.parametrize(
+    ("state", "tau", "there"), [(0, 1.49, True), (0, 0.67, True), (0, 1.51, False), (1, 1.0, False)]
+)
+def test_two_of_one_state_that_are_nearly_the_same_are_one(state, tau, there):
+    """Within a factor of one and a half of the time constant."""
+    known = [unlisted.Part(2, 0.0, 1.0), unlisted.Part(0, 0.0, 1.0)]
+    values = [5.0, *[0.0] * 7, 1.0, *[0.0] * 7]
+    assert unlisted._is_there(unlisted.Part(state, 0.0, 1.0), tau, known, values) is there
 
 
 @pytest.mark.parametrize(("sampled", "sought"), [(0.65, False), (0.55, True), (0.0, True)])

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.causes.unlisted import Part, Unlisted
+from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
 from pulsetrainer.diagnosis.dependence import best_dependence
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
@@ -101,6 +101,7 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
             best is None
             or best.p_value > LIMITS.p_max
             or best.gain < LIMITS.linearised * state.floor.relevant
+            or _is_there(best.part, best.values[0], parts, values)
         ):
             break
         trial = _refitted(state, current, [*parts, best.part], [*values, *best.values])
@@ -113,6 +114,12 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
         largest = max(largest, best.p_value)
         state = _heard_again(replace(state, current=trial))
     return (state.current if parts else None), largest, doubtful
+
+
+def _is_there(part: Part, tau: float, parts: list[Part], values: list[float]) -> bool:
+    """Whether a dependence on the same state over nearly the same time is in the model: they would cancel."""
+    known = [values[k * KNOTS] for k, one in enumerate(parts) if one.state == part.state]
+    return any(max(tau / one, one / tau) < LIMITS.other_tau for one in known)
 
 
 def _heard_again(state: State) -> State:
