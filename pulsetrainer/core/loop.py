@@ -30,8 +30,7 @@ def loop_of(operator: Preisach | Dual, doubt: float = 0.0) -> Loop:
     up = np.linspace(operator.low, operator.high, _POINTS)
     y = operator(np.concatenate((up, up[::-1])))
     rising, falling = y[:_POINTS], y[_POINTS:][::-1]
-    low, high = operator.saturation
-    wide = falling - rising if high >= low else rising - falling  # weights of either sign have no polarity
+    wide = operator.polarity * (falling - rising)
     if np.abs(wide).max() <= max(OPEN * float(np.ptp(y)), doubt):
         return "none"
     lags, leads = float(np.maximum(wide, 0.0).sum()), float(np.maximum(-wide, 0.0).sum())

@@ -87,16 +87,6 @@ def test_a_file_from_before_keeps_its_meaning():
     assert np.abs(said(0.3, as_measured=False) - said(0.3, as_measured=True)).max() > 0.1
 
 
-@pytest.mark.parametrize("form", ["direct", "signed"])
-def test_a_falling_loop_runs_the_way_of_its_mirror_image(form):
-    """In every form: what lags is said to lag."""
-    plane = Plane.uniform(0.0, 1.0, 8)
-    u = np.concatenate([np.linspace(a, b, 50) for a, b in ((0, 1), (1, 0.2), (0.2, 0.8), (0.8, 0))])
-    y = Preisach(plane, np.ones(plane.n_q))(u)
-    loops = [pt.identify(pt.Run(None, u, s * y), levels=8, form=form).fit.loop for s in (1, -1)]
-    assert loops == ["counterclockwise"] * 2
-
-
 def test_a_falling_output_is_clipped_where_it_was_measured():
     """The end of the converter's range is told as it was read, and not turned over."""
     rising = _run(0.0, 0.0)
