@@ -76,8 +76,6 @@ def stage(state: State) -> State:
         state = withdrawn(state, state.by_contrast)
         if state.verdict == "none" and _unexplained(state, left):
             state = replace(state, verdict="unknown")
-        elif state.verdict == "none" and state.blind and not state.question.quick:
-            state = replace(state, verdict="inconclusive")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
     if changed is not None:
         state, more = _in_another_condition(state, changed, judged.polarity)
