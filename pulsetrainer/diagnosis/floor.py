@@ -40,11 +40,6 @@ class Floor:
         return float(self.count * (self.white**2 + self.discretisation**2))
 
     @property
-    def sure_squares(self) -> float:
-        """Sum of squares that no cause can lower, without what may be a slow error of the model."""
-        return self.squares - self.count * min(self.doubtful, self.white**2)
-
-    @property
     def rms(self) -> float:
         """Rms of what is left in an average when nothing is wrong."""
         return float(np.hypot(self.white, self.discretisation))

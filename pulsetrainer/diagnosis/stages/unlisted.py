@@ -6,12 +6,15 @@ and speeds, how far each is from its average, the last turn, the way and the tim
 input has rested. The state is taken that best predicts whole pieces of the time that were left out, if noise
 alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if it matters and is more
 than the formulas of listed causes may miss (8 % of what they explain), and if, refitted with all weights, it
-repeats (`repetition`). The next one is sought in what is left, up to three.
+repeats (`repetition`). The noise is heard again beside it, and the next one is sought in what is left, up to
+three. What may be slow noise is searched too; a curve that is found there must predict three quarters of all
+that is left above the noise from sample to sample (decision 105).
 
-Where the listed causes found leave more than half unexplained, the search begins without them: they may have
-been taken for what they are not. They are then asked for again, beside the curve; and every cause, listed or
-not, must be missed when it is taken out. But a curve that only takes the place of listed causes which explain
-nearly as much is a better formula for them, and no dependence of its own.
+Where the listed causes found leave more than half unexplained, or nothing is found beside them, the
+search begins without them: they may have been taken for what they are not. They are then asked for again,
+beside the curve; and every cause, listed or not, must be missed when it is taken out. But a curve that
+only takes the place of listed causes which explain nearly as much is a better formula for them, and no
+dependence of its own.
 """
 
 from __future__ import annotations
