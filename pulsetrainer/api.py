@@ -23,7 +23,7 @@ from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.tuning import read_tuned
 from pulsetrainer.steps.import_ import import_parts
 from pulsetrainer.steps.invert import invert as _invert
-from pulsetrainer.steps.invert import shape_of
+from pulsetrainer.steps.one_beat import shape_of
 from pulsetrainer.steps.session import session as _session
 from pulsetrainer.steps.tune import Tuned
 from pulsetrainer.steps.tune import tune as _tune

@@ -17,7 +17,7 @@ from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
-from pulsetrainer.steps.invert import RAMP_S
+from pulsetrainer.steps.drive_layout import RAMP_S
 from pulsetrainer.steps.invertible import major_loop
 
 if TYPE_CHECKING:

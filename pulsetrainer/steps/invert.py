@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -10,15 +10,16 @@ import numpy as np
 from pulsetrainer.artefacts import Model, Waveform
 from pulsetrainer.artefacts.units import with_seconds, with_unit
 from pulsetrainer.core import inversion
-from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.diagnosis.prediction import extended_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
-from pulsetrainer.steps.asked import check_beat, check_force_range
+from pulsetrainer.steps.asked import check_force_range
+from pulsetrainer.steps.drive_layout import Layout, laid_out
 from pulsetrainer.steps.invertible import Invertible, invertible
+from pulsetrainer.steps.one_beat import one_beat
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -31,7 +32,6 @@ DEVICE_RATE_HZ = 1000.0  # as our own device plays; the parts around the beats h
 FEWEST = 20  # samples of a period: with fewer a drive does not follow the pulse
 _FEW, _MANY = 50, 100_000  # samples of a period: outside, the drive of any other device has its own rate
 _OWN = (200, 5000)  # samples of a period then: as many as the pulse has, within these
-RAMP_S = 0.4  # from rest to the first target, and back after the last
 
 
 @one_thread
@@ -101,7 +101,7 @@ def invert(
     ('continuous', True)
     """
     notes: list[str] = []
-    shape = _one_beat(pulse, beat, notes)
+    shape = one_beat(pulse, beat, notes)
     own_Hz = DEVICE_RATE_HZ if rate_Hz is None else rate_Hz  # of what comes before and after the beats
     rate_Hz = _rate_for(shape, model, notes) if rate_Hz is None else rate_Hz
     _check_sampled(shape, rate_Hz)
@@ -115,7 +115,7 @@ def invert(
         forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz, own_Hz)
     notes += _stretched(shape, forces, (force_min, force_max), model)
     progress(0.2)
-    layout = _laid_out(shape, part, forces, periods, rate_Hz, own_Hz)
+    layout = laid_out(shape, part, forces, periods, rate_Hz, own_Hz)
     if chosen == "extended":
         exact, clipped = _tracked(model, part, layout, notes, BAND_HZ * (rate_Hz / own_Hz))
     else:
@@ -128,9 +128,9 @@ def invert(
     progress(0.9)
     drive = Waveform(
         time_s=np.arange(compensated.size) / rate_Hz,
-        target=_target(part, layout),
+        target=layout.target(part),
         compensated=compensated,
-        scaled=_scaled(layout, current, part, forces),
+        scaled=layout.scaled(current, part, forces),
         predicted=predict(model, compensated, 1.0 / rate_Hz),
         scored=layout.scored(compensated.size, shape, periods),
         name=shape.name,
@@ -144,13 +144,6 @@ def invert(
         notes=tuple(notes),
     )
     return replace(drive, notes=(*notes, *_expected(drive, float(np.abs(current - exact).max()), limit)))
-
-
-def _target(part: Invertible, layout: _Layout) -> FloatArray:
-    """Target (n,): what the lead and the tail give by themselves, and what is wanted between them."""
-    before = part.whole(part.lead)
-    after = np.full(part.tail.size, layout.wanted[-1])
-    return np.concatenate((before, layout.wanted, after))
 
 
 def _check_describes(model: Model, name: str, *, despite_warning: bool) -> None:
@@ -220,51 +213,6 @@ def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
     else:
         why = "the model's output does not follow the pulse even without a limit"
     return [f"warning: the model itself expects errors of up to {error:.1f} % of {full}: {why}"]
-
-
-def shape_of(drive: Waveform) -> Shape:
-    """Return the pulse of a drive: one scored period of its target.
-
-    DataError where it was made by a version that did not keep the length of its beats.
-    """
-    if not np.isfinite(drive.period_s):
-        raise DataError(
-            f"the drive {drive.name} does not say how long its beats are",
-            hint="make it again from the pulse",
-        )
-    first = int(np.flatnonzero(drive.scored)[0])
-    one = slice(first, first + round(drive.period_s * drive.rate_Hz))
-    return Shape(drive.name, drive.time_s[one], drive.target[one], drive.source)
-
-
-def _one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Shape:
-    """Return the beat that is asked for, out of a recording of several."""
-    check_beat(beat)
-    if beat is None:
-        _say_if_several(recording, notes)
-        return recording
-    found = find_beats(recording)
-    lengths = found.periods_s
-    notes.append(
-        f"{recording.name} holds {found.count} whole beat{'s' if found.count > 1 else ''} of "
-        f"{lengths.min():.3f} to {lengths.max():.3f} s ({60.0 / float(np.mean(lengths)):.0f} a minute)"
-    )
-    return found.mean() if beat == "mean" else found.single(int(beat))
-
-
-def _say_if_several(recording: Shape, notes: list[str]) -> None:
-    """Say it where a recording of several beats is about to be played as one period."""
-    if len(recording.feet_s) > 1:  # it says itself where its beats begin
-        return
-    try:
-        count = find_beats(recording).count
-    except DataError:  # it holds no whole beat
-        return
-    if count > 1:
-        notes.append(
-            f"{recording.name} holds {count} whole beats, and all of it is played as one period of "
-            f"{recording.period_s:.3g} s: give `beat` 1 .. {count} or mean to play a single one"
-        )
 
 
 def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
@@ -369,55 +317,7 @@ def _stretched(
     return [f"{said}: give `force_min` and `force_max` for other ends"]
 
 
-@dataclass(frozen=True, slots=True)
-class _Layout:
-    """What is to be played: the major loop as an input, then ramp, beats, ramp back and rest as an output."""
-
-    lead: FloatArray
-    ramp: FloatArray  # 0..1
-    beats: FloatArray
-    wanted: FloatArray
-    rate_Hz: float
-
-    @property
-    def body(self) -> slice:
-        """The beats within ``wanted``."""
-        return slice(self.ramp.size, self.ramp.size + self.beats.size)
-
-    def scored(self, size: int, shape: Shape, periods: int) -> np.ndarray:
-        """True (size,) in the beats after the first one, where there is more than one."""
-        period = round(shape.period_s * self.rate_Hz)
-        at = self.lead.size + self.ramp.size
-        scored = np.zeros(size, dtype=bool)
-        scored[at + (period if periods > 1 else 0) : at + self.beats.size] = True
-        return scored
-
-
-def _laid_out(
-    shape: Shape, part: Invertible, forces: tuple[float, float], periods: int, rate_Hz: float, own_Hz: float
-) -> _Layout:
-    beats = train(shape, periods=periods, rate_Hz=rate_Hz, low=forces[0], high=forces[1])
-    rest = float(part.whole(part.lead)[-1])
-    ramp = np.linspace(0.0, 1.0, round(RAMP_S * own_Hz), endpoint=False)
-    wanted = np.concatenate(
-        (rest + (beats[0] - rest) * ramp, beats, beats[0] + (rest - beats[0]) * ramp, [rest])
-    )
-    return _Layout(part.lead, ramp, beats, wanted, rate_Hz)
-
-
-def _scaled(
-    layout: _Layout, current: FloatArray, part: Invertible, forces: tuple[float, float]
-) -> FloatArray:
-    """Drive (n,) that is the target itself, scaled to the extremes of the compensated one."""
-    body, ramp, low = layout.body, layout.ramp, part.low
-    ends = sorted((float(current[body].min()), float(current[body].max())), reverse=part.polarity < 0)
-    beats = ends[0] + (ends[1] - ends[0]) * (layout.beats - forces[0]) / (forces[1] - forces[0])
-    up = low + (beats[0] - low) * ramp
-    down = beats[-1] + (low - beats[-1]) * ramp
-    return np.concatenate((layout.lead, up, beats, down, [low], part.tail))
-
-
-def _compensated(part: Invertible, method: Inversion, layout: _Layout) -> tuple[FloatArray, int]:
+def _compensated(part: Invertible, method: Inversion, layout: Layout) -> tuple[FloatArray, int]:
     """Return the input that gives what is wanted after the major loop, and what was clipped."""
     if method == "continuous":
         exact = part.inverse(layout.wanted)
@@ -432,7 +332,7 @@ def _compensated(part: Invertible, method: Inversion, layout: _Layout) -> tuple[
 
 
 def _tracked(
-    model: Model, part: Invertible, layout: _Layout, notes: list[str], band_Hz: float
+    model: Model, part: Invertible, layout: Layout, notes: list[str], band_Hz: float
 ) -> tuple[FloatArray, int]:
     """Return the input that makes the extended model give what is wanted, and what was clipped."""
     found = extended_of(model).invert(
