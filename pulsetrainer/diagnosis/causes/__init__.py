@@ -1,4 +1,4 @@
-"""The library of causes: every module of this folder that defines a ``Cause`` is in it."""
+"""The library of causes: every ``Cause`` with an id that a module of this folder defines is in it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def library() -> dict[str, Cause]:
     for module in pkgutil.iter_modules(__path__):
         loaded = importlib.import_module(f"{__name__}.{module.name}")
         for _, kind in inspect.getmembers(loaded, inspect.isclass):
-            if issubclass(kind, Cause) and kind is not Cause and kind.__module__.endswith(f".{module.name}"):
+            if issubclass(kind, Cause) and hasattr(kind, "id") and kind.__module__ == loaded.__name__:
                 found.append(kind())
     return {cause.id: cause for cause in sorted(found, key=lambda c: c.order)}
 

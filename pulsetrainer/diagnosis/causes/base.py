@@ -200,6 +200,23 @@ class Cause:
         return []
 
 
+class Late(Cause):
+    """A cause by which something is late, with one time constant or delay."""
+
+    family = "lag"
+    widens = True
+    common = True
+    _tried_s: ClassVar[tuple[float, ...]] = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
+
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        """Return the parameters with the bounds that a record sets."""
+        return sampled(self.parameters, frame)
+
+    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
+        """Blocks of parameter values to try, none shorter than a time step."""
+        return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in self._tried_s})]
+
+
 def sampled(quantities: Sequence[Quantity], frame: Frame) -> tuple[Quantity, ...]:
     """Return times that may be as long as some time steps, where these are longer than their bounds."""
     return tuple(replace(one, high=max(one.high, _STEPS * frame.dt_s)) for one in quantities)

@@ -7,25 +7,14 @@ of the two: an input interpolated between samples loses the tips of its loops, w
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import (
-    Cause,
-    Frame,
-    Quantity,
-    Values,
-    remember,
-    remembered,
-    sampled,
-)
-
-_TRIED_S = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's; no shorter than a time step
+from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values, remember, remembered
 
 
-class Delay(Cause):
+class Delay(Late):
     """A pure transport delay."""
 
     id = "delay"
@@ -38,18 +27,7 @@ class Delay(Cause):
     source = "Ljung, System Identification, 1999, section 4.2"
     stage = "output"
     order = 45
-    family = "lag"
-    widens = True
-    common = True
     parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005, "by which the {output} is late"),)
-
-    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        """Return the parameters with the bounds that a record sets."""
-        return sampled(self.parameters, frame)
-
-    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
-        return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in _TRIED_S})]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass, sampled
-
-_TRIED_S = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's; no shorter than a time step
+from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values, low_pass
 
 
-class FieldLag(Cause):
+class FieldLag(Late):
     """A first-order lag before the hysteresis."""
 
     id = "field-lag"
@@ -21,18 +17,7 @@ class FieldLag(Cause):
     source = "Bertotti, Hysteresis in Magnetism, 1998, chapter 12"
     stage = "input"
     order = 20
-    family = "lag"
-    widens = True
-    common = True
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the lag"),)
-
-    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        """Return the parameters with the bounds that a record sets."""
-        return sampled(self.parameters, frame)
-
-    def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
-        return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in _TRIED_S})]
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Input (n,) that the hysteresis sees."""
