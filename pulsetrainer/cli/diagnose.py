@@ -65,7 +65,13 @@ def _commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path) -> 
     if found.next_command == "extend":
         words.append(["extend", out, "--model", model, "-o", "extended.h5"])
     if found.next_command and found.correctable:
-        words += [["correct", run, "--diagnosis", out, "-o", f"{run.stem}-corrected.h5"] for run in runs]
+        corrected = [f"{run.stem}-corrected.h5" for run in runs]
+        pairs = zip(runs, corrected, strict=True)
+        words += [["correct", run, "--diagnosis", out, "-o", made] for run, made in pairs]
+        if found.next_command == "correct":
+            again = ["--model", "model-corrected.h5", "-o", f"{out.stem}-corrected.h5"]
+            words.append(["identify", *corrected, "-o", "model-corrected.h5"])
+            words.append(["diagnose", *corrected, *again])
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
 
 

@@ -285,10 +285,11 @@ def _blocks(problem: Problem, fitted: Fitted, changed: Fitted) -> list[_Block]:
     parts = _at_full_rate(problem, fitted)
     timed = all(record.timed for record in problem.records)
     tried: list[tuple[Cause, list[Values]]] = [
-        (cause, values)
+        (kind, values)
         for cause in library().values()
         if cause.stage != "record" and cause.id not in changed.names and (timed or not cause.needs_time)
-        for values in cause.starts(problem.frames, parts)
+        for kind in cause.kinds()
+        for values in kind.starts(problem.frames, parts)
     ]
     if not tried:
         return []

@@ -170,11 +170,14 @@ class State:
 
     @property
     def correctable(self) -> list[str]:
-        """Ids of the faults of the measurement that can be taken out of a record: found, and not in doubt."""
+        """Ids of the faults of the measurement that can be taken out of a record: found, and not in doubt.
+
+        Where most of the error is unexplained, a fault that was fitted may be a part of something else.
+        """
         if self.question.quick:
             return []
-        found = [one for one in self.findings if one.found and one.cause.corrects]
-        return [one.cause.id for one in found if not one.in_doubt]
+        found = [one for one in self.findings if one.found and one.cause.corrects and not one.in_doubt]
+        return [one.cause.id for one in found if one.cause.stage == "record" or not self.unexplained]
 
     def explains(self, gain: float) -> float:
         """Per cent of what can be explained."""

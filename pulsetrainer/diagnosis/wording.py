@@ -139,6 +139,11 @@ ADVICE: Mapping[str, str] = {
         "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
         "correct), and identify the model from what that gives, or diagnose it again."
     ),
+    "correct, extend": (
+        "The measurement is at fault, and the device does something that the model lacks. First take {names} "
+        "out of the recording (pulsetrainer correct), and identify the model from what that gives; then "
+        "diagnose the corrected recording with that model, and extend it."
+    ),
     "repair": "No model can hold this: put right what was found, and record again.",
     "other model": (
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."

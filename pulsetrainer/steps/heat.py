@@ -28,10 +28,10 @@ _NEW = 3e-4  # of the force: a change of the loss that is worth another inverse
 
 
 def thermal_of(model: Model) -> Thermal | None:
-    """Return the thermal term of a model, None where it has none."""
+    """Return the thermal term of a model, None where it has none, or one of a device driven both ways."""
     for extension in model.extensions:
-        if extension.cause == "thermal-drift":
-            value = {parameter.name: parameter.value for parameter in extension.parameters}
+        value = {parameter.name: parameter.value for parameter in extension.parameters}
+        if extension.cause == "thermal-drift" and "cold" not in value:
             return Thermal(value["coefficient"], value["tau"])
     return None
 

@@ -168,6 +168,14 @@ def test_a_fault_in_doubt_is_not_taken_out_of_a_record(doubts, kept):
     assert state.correctable == (["step"] if kept else [])
 
 
+@pytest.mark.parametrize(("name", "kept"), [("step", False), ("offset-drift", False), ("outliers", True)])
+def test_a_fitted_fault_beside_an_unexplained_rest_is_left_in(name, kept):
+    """It may be a part of what nothing explains; samples that a gate found are wild all the same."""
+    state = _state(_fit(700.0), _fit(1100.0), findings=(Finding(CAUSE[name], found=True),))
+    assert state.unexplained
+    assert state.correctable == ([name] if kept else [])
+
+
 # --- what the state knows
 @pytest.mark.parametrize(("left", "unknown"), [(600.0, False), (601.0, True), (100.0, False)])
 def test_more_than_half_is_unexplained(left, unknown):
@@ -577,6 +585,27 @@ def test_a_curve_takes_the_place_of_a_listed_cause_where_it_is_clearly_better(
         monkeypatch.setattr(one, "stage", lambda state: state)
     after = unlisted.stage(_state(_fit(left, "creep")))
     assert after.current.names == (("creep",) if kept else ("unlisted",))
+
+
+@pytest.mark.parametrize(("fits", "named"), [(102.0, True), (110.0, False)])
+@pytest.mark.parametrize("superfluous", [0, 1])
+def test_of_several_curves_one_gives_its_place_to_a_listed_cause(monkeypatch, fits, named, superfluous):
+    """Where that fits as well as both curves, by what matters: 9."""
+    parts = [unlisted.Part(k, 0.0, 1.0) for k in (0, 1)]
+    both = unlisted.Term(unlisted.Unlisted(parts), tuple(map(float, range(2 * unlisted.KNOTS))))
+    monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(100.0, (both,)), 0.001, False))
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+
+    def refit(problem, terms, begun, rounds):
+        (kept,) = terms[-1].cause.parts
+        first = unlisted.KNOTS * kept.state
+        assert terms[-1].values == tuple(range(first, first + unlisted.KNOTS))
+        return Fit(fits if kept.state != superfluous else 300.0, tuple(terms))
+
+    monkeypatch.setattr(unlisted, "refit", refit)
+    after = unlisted.stage(_state(_fit(400.0, "creep")))
+    assert after.current.names == (("creep", "unlisted") if named else ("unlisted",))
 
 
 @pytest.mark.parametrize("again", [None, FIRED])
@@ -1015,6 +1044,10 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
         ({"verdict": "creep"}, "again"),
         ({"verdict": "out-of-range"}, "repair"),
         ({"verdict": "step", "findings": (_finding("step", 20.0),)}, "correct"),
+        (
+            {"verdict": "step", "findings": (_finding("step", 20.0), _finding("creep", 9.0))},
+            "correct, extend",
+        ),
         ({"verdict": "step", "findings": (_finding("step", 20.0),), "lacks": ("rates",)}, "correct"),
         ({"verdict": "creep", "lacks": ("rates",)}, "lacks"),
         ({"findings": (TIED,), "lacks": ("rates",)}, "tied"),

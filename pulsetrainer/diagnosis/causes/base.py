@@ -142,6 +142,10 @@ class Cause:
         """Return what a fit with all other causes leaves of a cause of stage ``record``."""
         return None
 
+    def kinds(self) -> tuple[Cause, ...]:
+        """Return the causes of this id to be tried: what a formula leaves open, one or the other."""
+        return (self,)
+
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""
         return self.parameters

@@ -1,13 +1,15 @@
 """the output falls with heat: y - k h (y - y0), tau h' = (u - u0)^2 - h.
 
-u0 is the lower end of the input's range and y0 the output of empty memory, so that the zeros of both do not
-matter.
+Neither zero is taken from the data's own, which may lie anywhere. Two kinds are tried: of a device that is
+driven one way, u0 is the lower end of the input's range and y0 the output of empty memory; of one that is
+driven both ways, u0 is the middle of the range and y0 that of the output.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -20,6 +22,7 @@ _SLOWEST = 0.43  # of the record: what is slower is drift
 _RATIO = 3.0  # from one time constant to the next: a wire's, a coil's, an iron core's
 _BOUNDS = (0.01, 3.2)  # of the record
 _NOT_COLD = 0.05  # of the heat that the largest input would lead to
+_BOTH_WAYS = 0.5  # of the range: the input at which a device that is driven both ways stays cold
 
 
 class ThermalDrift(Cause):
@@ -46,11 +49,35 @@ class ThermalDrift(Cause):
         Quantity("tau", "s", 1.0, 300.0, 0.5, "time constant of the heat"),
     )
 
+    def __init__(self, cold: float = 0.0) -> None:
+        self.cold = cold  # share of the input's range at which nothing heats
+
+    @cached_property
+    def _kinds(self) -> tuple[Cause, ...]:
+        return (self,) if self.cold else (self, ThermalDrift(_BOTH_WAYS))
+
+    def kinds(self) -> tuple[Cause, ...]:
+        """Return the causes of this id to be tried."""
+        return self._kinds
+
+    def constants(self) -> tuple[tuple[str, float, str], ...]:
+        """Return what a model must keep of it besides its parameters: name, value and unit."""
+        return (("cold", self.cold, "1"),) if self.cold else ()
+
+    def restored(self, values: Values) -> tuple[Cause, Values]:
+        """Return the cause and its parameters; a device that is driven one way keeps no constant."""
+        *cold, strength, tau = values
+        return ThermalDrift(*cold), (strength, tau)
+
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""
         strength, tau = self.parameters
+        hottest = (1.0 - self.cold) ** 2  # heat of the largest input, squared ranges
         low, high = (share * frame.length_s for share in _BOUNDS)
-        return strength, replace(tau, low=min(tau.low, low), high=high)
+        return (
+            replace(strength, low=strength.low / hottest, high=strength.high / hottest),
+            replace(tau, low=min(tau.low, low), high=high),
+        )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
@@ -61,22 +88,21 @@ class ThermalDrift(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return _weakened(y, values, frame, 0.0)
+        return self._weakened(y, values, frame, 0.0)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """A coil that was not quite cold: no record tells what was played before it."""
-        return [_weakened(y, values, frame, _NOT_COLD * float(np.max(_power(frame))))]
+        return [self._weakened(y, values, frame, _NOT_COLD * float(np.max(self._power(frame))))]
 
+    def _weakened(self, y: FloatArray, values: Values, frame: Frame, begin: float) -> FloatArray:
+        """Output of a coil whose heat begins at ``begin``."""
+        squared = self._power(frame)
+        if frame.past is None or not frame.past.before:  # the first sample already heats
+            squared = np.append(begin, squared)
+        heat = low_pass(squared, values[1], frame.dt_s, frame.past, "heat")[-y.size :]
+        about = frame.zero + self.cold * (frame.ends[1] - frame.ends[0])
+        return np.asarray(y - values[0] * heat * (y - about))
 
-def _weakened(y: FloatArray, values: Values, frame: Frame, begin: float) -> FloatArray:
-    """Output of a coil whose heat begins at ``begin``."""
-    squared = _power(frame)
-    if frame.past is None or not frame.past.before:  # the first sample already heats
-        squared = np.append(begin, squared)
-    heat = low_pass(squared, values[1], frame.dt_s, frame.past, "heat")[-y.size :]
-    return np.asarray(y - values[0] * heat * (y - frame.zero))
-
-
-def _power(frame: Frame) -> FloatArray:
-    """What heats: (n,) squared input above the lower end of its range, input unit squared."""
-    return np.asarray((frame.input - frame.low) ** 2)
+    def _power(self, frame: Frame) -> FloatArray:
+        """What heats: (n,) squared input, from where it is cold, input unit squared."""
+        return np.asarray((frame.input - frame.low - self.cold * frame.reach) ** 2)

@@ -60,7 +60,8 @@ def _after_verdict(state: State) -> Evidence:
     if state.verdict in ("unknown", "none"):
         return Evidence("lacks", names=state.lacks) if state.lacks else Evidence(state.verdict)
     if state.verdict in state.correctable:
-        return Evidence("correct", names=tuple(state.correctable))
+        device = any(one.found and one.cause.lasting for one in state.findings)
+        return Evidence("correct, extend" if device else "correct", names=tuple(state.correctable))
     if state.lacks:
         return Evidence("lacks", names=state.lacks)
     if not library()[state.verdict].lasting:

@@ -14,7 +14,7 @@ Where the listed causes found leave more than half unexplained, or nothing is fo
 search begins without them: they may have been taken for what they are not. They are then asked for again,
 beside the curve; and every cause, listed or not, must be missed when it is taken out. But a curve that
 only takes the place of listed causes which explain nearly as much is a better formula for them, and no
-dependence of its own.
+dependence of its own. So is one of several in whose place the listed causes fit as well.
 """
 
 from __future__ import annotations
@@ -58,8 +58,29 @@ def _compared(state: State, begun: State, found: Fitted, p_value: float) -> Stat
     if begun is not state:
         after = search.stage(after)
     after = _heard_again(elimination.stage(after))
-    replaced = set(state.current.names) - set(after.current.names)
-    return state if replaced and _keep_their_names(state, after.current) else after
+    replaced = [term for term in state.current.terms if term.cause.id not in after.current.names]
+    if not replaced:
+        return after
+    return state if _keep_their_names(state, after.current) else _with_names(state, after, replaced)
+
+
+def _with_names(state: State, after: State, listed: list[Term]) -> State:
+    """Return the model ``after`` with listed causes in the place of one curve, where they fit as well."""
+    learned = next((term for term in after.current.terms if term.cause.id == _ID), None)
+    if learned is None or not isinstance(learned.cause, Unlisted) or len(learned.cause.parts) == 1:
+        return after
+    parts, values, trials = learned.cause.parts, learned.values, []
+    others = [term for term in after.current.terms if term is not learned]
+    for k in range(len(parts)):
+        fewer = Unlisted(parts[:k] + parts[k + 1 :])
+        curves = Term(fewer, values[: k * KNOTS] + values[(k + 1) * KNOTS :])
+        terms = (*others, *listed, curves)
+        trials.append(refit(state.problem, terms, after.current, rounds=LIMITS.learned_rounds))
+    best = min(trials, key=lambda fitted: fitted.squares)
+    if best.squares > after.current.squares + after.floor.relevant:
+        return after
+    p_values = {**after.p_values, **{t.cause.id: state.p_values[t.cause.id] for t in listed}}
+    return _heard_again(elimination.stage(replace(after, current=best, p_values=p_values)))
 
 
 def _keep_their_names(state: State, instead: Fitted) -> bool:
