@@ -75,6 +75,23 @@ def test_a_coil_heats_with_the_square_of_the_input(cold):
     np.testing.assert_allclose(found, y - k * heat * (y - 0.5), atol=1e-12)
 
 
+def test_a_coil_that_is_driven_both_ways_is_cold_in_the_middle():
+    """At 1 of -1 to 3, of outputs from -3 to 5 about 1; the constant goes into the model and comes back."""
+    one_way, both_ways = CAUSE["thermal-drift"].kinds()
+    frame = _frame(np.full(T.size, 3.0), low=-1.0, ends=(-3.0, 5.0), zero=-3.0)
+    y, k, tau = 2.0 + T, 0.02, 0.7
+    heat = 4.0 * (1.0 - tau / DT * (1.0 - np.exp(-DT / tau)) * np.exp(-T / tau))
+    found = both_ways.on_output(y, (k, tau), frame)
+    np.testing.assert_allclose(found, y - k * heat * (y - 1.0), atol=1e-12)
+    kept = tuple(value for _, value, _ in both_ways.constants())
+    again, values = CAUSE["thermal-drift"].restored((*kept, k, tau))
+    assert values == (k, tau)
+    np.testing.assert_array_equal(again.on_output(y, values, frame), found)
+    assert one_way.constants() == ()
+    assert both_ways.quantities(frame)[0].high == 4.0 * one_way.quantities(frame)[0].high
+    assert CAUSE["thermal-drift"].kinds()[1] is both_ways  # of two refits the terms are the same
+
+
 def test_a_widening_trails_by_the_root_of_the_rate():
     """On a steady ramp u - v = k sqrt(u'), falling as rising; a vanishing coefficient changes nothing."""
     cause, k, frame = CAUSE["rate-widening"], 0.05, _frame()

@@ -253,6 +253,18 @@ def test_the_best_three_are_fitted_but_none_of_a_family_that_is_there(monkeypatc
     assert asked == [(("field-lag", name), 3, False) for name in names[1:4]]
 
 
+def test_a_refit_that_lowers_nothing_leaves_its_turn_to_the_next(monkeypatch):
+    """Three causes of a kind that cannot be what leads: the fourth to sixth are tried as well."""
+    names = ("delay", "field-lag", "output-lag", "creep", "viscous", "step", "resonance")
+    squares = (510.0, 500.0, 520.0, 450.0, 300.0, 499.0, 0.0)
+    known = {frozenset({name}): value for name, value in zip(names, squares, strict=True)}
+    _refitting(monkeypatch, joint_fit, squares=known)
+    scores = Screen(tuple(_score(name, 100.0 - k) for k, name in enumerate(names)))
+    found = joint_fit.stage(_state(_fit(500.0), scores=scores))
+    assert [score.cause.id for _, score in found.trials[:3]] == ["viscous", "creep", "step"]
+    assert len(found.trials) == 6
+
+
 def test_the_first_that_is_not_promising_ends_the_trials(monkeypatch):
     """Scores are sorted: none behind it can be."""
     _refitting(monkeypatch, joint_fit, squares={frozenset({"creep"}): 1.0})
@@ -604,7 +616,7 @@ def test_of_several_curves_one_gives_its_place_to_a_listed_cause(monkeypatch, fi
         return Fit(fits if kept.state != superfluous else 300.0, tuple(terms))
 
     monkeypatch.setattr(unlisted, "refit", refit)
-    after = unlisted.stage(_state(_fit(400.0, "creep")))
+    after = unlisted.stage(replace(_state(_fit(400.0, "creep")), p_values={"creep": 0.001}))
     assert after.current.names == (("creep", "unlisted") if named else ("unlisted",))
 
 

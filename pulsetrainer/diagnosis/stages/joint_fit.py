@@ -1,7 +1,8 @@
 """Joint fit: the best candidates are refitted together with the weights.
 
 The weights have swallowed most of any effect, so that its fit to their residual comes out too small. The
-best three candidates are therefore fitted jointly: parameters of all causes and all weights at once. A
+best three candidates are therefore fitted jointly: parameters of all causes and all weights at once. One
+whose refit lowers nothing (a lag where the output leads) leaves its turn to the next. A
 candidate must be significant, and its linearised score half of what is relevant, since the score shows less
 than a refit does. Of a family that is in the model already none is tried: what a cause of its own kind
 leaves is its imperfect formula, not a second cause. The best fit comes first; but one with fewer parameters
@@ -24,7 +25,8 @@ def stage(state: State) -> State:
     """Return the state with joint refits of the best candidates, the best fit first."""
     trials: list[tuple[Fitted, Score]] = []
     for score in state.scores.scores:
-        if len(trials) == LIMITS.tried or not promising(state, score):
+        lower = [trial for trial, _ in trials if trial.squares < state.current.squares]
+        if len(lower) == LIMITS.tried or not promising(state, score):
             break
         if score.cause.family not in state.families:
             terms = (*state.current.terms, Term(score.cause, score.start))
