@@ -100,6 +100,11 @@ class Bench:
     coloured: float  # coefficient of AR(1)
     noisy_input: float  # of the range
 
+    @property
+    def middle(self) -> float:
+        """Where no input is, as a share of the range of a device that is driven both ways; else 0."""
+        return max(-self.low, 0.0) / (self.high - self.low)
+
 
 def bench_of(rng: np.random.Generator) -> Bench:
     """Draw a laboratory."""
@@ -154,14 +159,17 @@ def put(
     dt_s: float,
     strength: float,
     tau: float,
+    middle: float = 0.0,
 ) -> np.ndarray:
-    """Output (n,) of a plant with an effect; ``tau`` in (0, 1) draws its time."""
+    """Output (n,) of a plant with an effect; ``tau`` in (0, 1) draws its time; ``middle`` is no input."""
     t = np.arange(u.size) * dt_s
     y = plant(lagged(u, strength, dt_s) if effect == "field-lag" else u)
     shown = {
         "output-lag": lambda: lagged(y, strength, dt_s),
         "creep": lambda: y + strength * lagged(y, 0.4 + 2 * tau, dt_s),
-        "thermal-drift": lambda: y * (1 - strength * lagged(u**2, 8 + 15 * tau, dt_s, 0.0)),
+        "thermal-drift": lambda: (
+            y - strength * lagged((u - middle) ** 2, 8 + 15 * tau, dt_s, 0.0) * (y - middle * y.max())
+        ),
         "viscous": lambda: y + strength * np.gradient(u, dt_s),
         "offset-drift": lambda: y + strength * t / t[-1],
         "step": lambda: y + strength * (t > (0.3 + 0.4 * tau) * t[-1]),
@@ -190,11 +198,11 @@ def records_of(seed: int) -> tuple[dict, Bench, list[np.ndarray]]:
     still = plant(inputs[0])
     strength = _FIRST.get(effect, 0.02) if effect else 0.0
     for _ in range(3 if effect else 0):
-        apart = put(effect, plant, inputs[0], dt, strength, tau) - still
+        apart = put(effect, plant, inputs[0], dt, strength, tau, bench.middle) - still
         strength *= percent / float(100 * np.std(apart) / np.ptp(still))
     tables = []
     for fine in inputs:
-        y = put(effect, plant, fine, dt, strength, tau)
+        y = put(effect, plant, fine, dt, strength, tau, bench.middle)
         u, y = fine[::FINER], (y[::FINER] - still.min()) / np.ptp(still)
         noise = signal.lfilter([1.0], [1.0, -bench.coloured], rng.standard_normal(y.size))
         y = y + bench.noise * noise / np.std(noise)

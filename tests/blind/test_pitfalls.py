@@ -11,9 +11,11 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import foreign
 import hidden
 
-import pulsetrainer.simulation  # noqa: F401 - announces bench: and qemu:
+import pulsetrainer as pt
+import pulsetrainer.simulation
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.device.opening import open_device
@@ -158,3 +160,31 @@ def test_a_hum_is_not_taken_for_sticking_as_well():
     assert np.count_nonzero(np.abs(stick_slip._jumps(record.output, wide))[resting] > white) > 0
     answer = diagnose(Question(data.records, 0.0, data.high, np.random.default_rng(0)))
     assert [f.cause.id for f in answer.findings if f.found] == ["periodic"]
+
+
+@pytest.mark.slow
+def test_heat_of_a_device_that_is_driven_both_ways_is_no_step():
+    """A current of either sign heats: cold is the middle of its range. The extension predicts another run."""
+    rng = np.random.default_rng(8)
+    tables = []
+    for seconds in (40.0, 20.0):
+        u = foreign.drive(200.0, rng, seconds) - 0.5
+        at, static = np.full(8, -0.5), np.empty_like(u)
+        widths = np.linspace(0.02, 0.3, 8)
+        for k, one in enumerate(u.tolist()):
+            at = np.clip(at, one - widths, one + widths)
+            static[k] = at.mean()
+        heat = foreign.lagged((u / 0.5) ** 2, 9.0, 1 / 200.0 / foreign.FINER, 0.0)
+        y = (static * (1 - 0.15 * heat))[:: foreign.FINER]
+        y += 0.001 * rng.standard_normal(y.size)
+        t = np.arange(y.size) / 200.0
+        tables.append(pt.Run(time_s=t, input=150.0 * u[:: foreign.FINER], output=80.0 * y, input_unit="V"))
+    seen, unseen = tables
+    model = pt.identify(seen)
+    found = pt.diagnose([seen], model)
+    assert [one.cause for one in found.found] == ["thermal-drift"]
+    tau = next(p for p in found.found[0].parameters if p.name == "tau")
+    assert tau.value == pytest.approx(9.0, rel=0.15)
+    better = pt.extend(model, found)
+    plain, extended = (one.rms_percent for one in pt.evaluate(unseen, [model, better]).models)
+    assert extended < 0.5 * plain
