@@ -69,7 +69,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         noise_percent=_noise_of(state) * of_samples,
         static_percent=state.baseline.rms * percent,
         extended_percent=extended.rms * percent,
-        floor_percent=state.floor.rms * percent,
+        floor_percent=state.floor_rms * percent,
         causes=tuple(
             one for finding in state.findings for one in _causes(state, finding, words, dependences)
         ),

@@ -44,9 +44,9 @@ class HeldOut:
         return total
 
     def gain(self, before: Fitted, after: Fitted, floor: Floor) -> float:
-        """Share of the reducible held-out error that the extension removes."""
+        """Share of the reducible held-out error that the extension removes, at most all of it."""
         first, second = self.error(before), self.error(after)
-        return (first - second) / max(first - floor.squares, floor.relevant)
+        return min((first - second) / max(first - floor.squares, floor.relevant), 1.0)
 
     def pieces(self, fitted: Fitted, count: int) -> FloatArray:
         """Sums of squares (count,) on whole pieces of the time, each predicted from the others; or empty.

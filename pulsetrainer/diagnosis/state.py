@@ -118,6 +118,11 @@ class State:
         return self.floor.quick if self.in_bursts else self.floor
 
     @property
+    def floor_rms(self) -> float:
+        """What noise and levels leave, rms: no more than is left with the causes found."""
+        return min(self.floor.rms, self.current.rms)
+
+    @property
     def unexplained(self) -> bool:
         """Whether more than half of what can be explained is left, and enough to matter."""
         floor = self.floor_left
@@ -172,12 +177,17 @@ class State:
     def correctable(self) -> list[str]:
         """Ids of the faults of the measurement that can be taken out of a record: found, and not in doubt.
 
-        Where most of the error is unexplained, a fault that was fitted may be a part of something else.
+        A fault that was fitted is in doubt too where most of the error is unexplained, and where it could
+        equally be something that the device does.
         """
         if self.question.quick:
             return []
         found = [one for one in self.findings if one.found and one.cause.corrects and not one.in_doubt]
-        return [one.cause.id for one in found if one.cause.stage == "record" or not self.unexplained]
+        return [one.cause.id for one in found if one.cause.stage == "record" or not self._of_device(one)]
+
+    def _of_device(self, fault: Finding) -> bool:
+        """Whether a fault of the measurement may be something that the device does."""
+        return self.unexplained or any(library()[name].lasting for name in fault.confounded_with)
 
     def explains(self, gain: float) -> float:
         """Per cent of what can be explained."""

@@ -176,6 +176,13 @@ def test_a_fitted_fault_beside_an_unexplained_rest_is_left_in(name, kept):
     assert state.correctable == ([name] if kept else [])
 
 
+@pytest.mark.parametrize(("tied", "kept"), [((), True), (("step",), True), (("accommodation",), False)])
+def test_a_fault_that_could_be_the_device_is_left_in(tied, kept):
+    """A drift that is tied with another fault of the measurement is one of them in any case."""
+    found = Finding(CAUSE["offset-drift"], found=True, confounded_with=tied)
+    assert _state(_fit(1.0), findings=(found,)).correctable == (["offset-drift"] if kept else [])
+
+
 # --- what the state knows
 @pytest.mark.parametrize(("left", "unknown"), [(600.0, False), (601.0, True), (100.0, False)])
 def test_more_than_half_is_unexplained(left, unknown):
@@ -1002,12 +1009,14 @@ def test_slow_noise_that_comes_in_bursts_is_no_noise(monkeypatch, kurtosis, time
     assert ("bursts" in told) is said
 
 
-def test_the_account_says_what_is_left_before_and_after(monkeypatch):
-    """Per cent of a span of 1: the static model, the floor, and with the causes."""
-    static, extended = _accounted(monkeypatch, extended=True, verdict="creep")
+@pytest.mark.parametrize(("sampled", "told"), [(1e-4, 1.0), (1.0, 2.0)])
+def test_the_account_says_what_is_left_before_and_after(monkeypatch, sampled, told):
+    """Per cent of a span of 1: the static model, the floor, which is no more than is left, and the causes."""
+    floor = replace(FLOOR, sampled=sampled)
+    static, extended = _accounted(monkeypatch, extended=True, verdict="creep", floor=floor)
     assert (static.kind, static.figures) == (
         "static",
-        {"left": pytest.approx(5.0), "floor": pytest.approx(100.0)},
+        {"left": pytest.approx(5.0), "floor": pytest.approx(told)},
     )
     assert (extended.kind, extended.figures) == ("extended", {"left": pytest.approx(2.0)})
 

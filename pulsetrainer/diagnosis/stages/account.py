@@ -23,7 +23,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 def stage(state: State) -> State:
     """Return the state with its evidence."""
     percent = PERCENT / float(np.ptp(state.problem.measured))
-    levels = {"left": percent * state.baseline.rms, "floor": percent * state.floor.rms}
+    levels = {"left": percent * state.baseline.rms, "floor": percent * state.floor_rms}
     said = [Evidence("static", figures=levels)]
     beyond = state.baseline.squares > state.floor.squares
     said += [_of(finding, beyond=beyond) for finding in state.findings if finding.found]
