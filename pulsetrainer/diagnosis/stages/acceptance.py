@@ -3,7 +3,8 @@
 That a candidate is significant at all was asked before it was refitted (``joint_fit``). Of the candidates,
 best fit first, the first one is taken whose refit lowers the squares by a relevant amount and the error on
 blocks that were left out by at least a twentieth of what can be lowered. One that falls just short is
-refitted to its end before it is refused. Where too few blocks are left to ask, the fit alone decides. With
+refitted to its end before it is refused. One of several parameters that all run into their bounds is no
+longer the cause that it is named after, and refused. Where too few blocks are left to ask, the fit alone decides. With
 a new cause in the model the error of the levels is estimated again: a missing cause makes that estimate too
 large, never too small.
 """
@@ -14,6 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.state import State
@@ -32,7 +35,10 @@ def stage(state: State) -> State:
         if np.isfinite(gain) and gain < LIMITS.held_out_least:
             continue
         accepted = settled(state.problem, trial)
-        if not all(t.cause.can_be_told(t.values, state.problem.frames) for t in accepted.terms):
+        frames = state.problem.frames
+        if not all(t.cause.can_be_told(t.values, frames) for t in accepted.terms):
+            continue
+        if any(_ran_away(t, frames[0]) for t in accepted.terms):
             continue
         return replace(
             state,
@@ -42,6 +48,13 @@ def stage(state: State) -> State:
             trials=(),
         )
     return replace(state, trials=())
+
+
+def _ran_away(term: Term, frame: Frame) -> bool:
+    """Whether all of several parameters lie at the ends of what is searched."""
+    bounds = term.cause.quantities(frame)
+    at_end = [value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)]
+    return len(at_end) > 1 and all(at_end)
 
 
 def _fall(state: State, trial: Fitted) -> float:
