@@ -158,6 +158,7 @@ DOUBTS: Mapping[str, str] = {
     "does not repeat": "it fits, but does not repeat: it is not added to the model",
     "wanders": "what is left wanders still, so it may be a piece of that: it is neither added nor taken out",
     "spans zero": "its strength may be nothing, as the interval spans zero",
+    "no equal loops": "no minor loop was traced three times in equal time, which alone would show it",
     "at bound": "a parameter is at the end of the range that was searched",
 }
 OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o diagnostic.h5."

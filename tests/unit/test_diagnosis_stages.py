@@ -814,21 +814,30 @@ def test_a_score_that_was_not_borne_out_is_explained_where_nothing_is_found(monk
     assert "not accepted" not in [e.kind for e in _accounted(monkeypatch, verdict="none", scores=scores)]
 
 
-def test_every_cause_gets_a_finding(monkeypatch):
-    """With p-value, share, interval, rivals and held-out gain; those only screened with their score."""
+@pytest.mark.parametrize("loops", [0, 3])
+@pytest.mark.parametrize("shown", [False, True])
+def test_every_cause_gets_a_finding(monkeypatch, shown, loops):
+    """With p-value, share, interval, rivals and held-out gain; those only screened with their score.
+
+    What equal loops showed has no rivals; what only they would show is in doubt where there are none.
+    """
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ("delay",))
+    monkeypatch.setattr(rivals, "loops_of", lambda *_: [None] * loops)
     state = _state(
         _fit(300.0, "field-lag", "load-dependence"),
         scores=Screen((_score("step", 50.0, 0.4), _score("field-lag", 1.0))),
         without={"field-lag": _fit(800.0), "load-dependence": _fit(301.0)},
         p_values={"field-lag": 0.006, "load-dependence": 0.002},
         estimates={"field-lag": (TAU,), "load-dependence": (TAU,)},
+        by_contrast={"load-dependence": (TAU,)} if shown else {},
         held_out=HeldOut(0.9),
     )
     lag, load, step = rivals.stage(state).findings
     assert (lag.cause.id, lag.found, lag.p_value, lag.parameters) == ("field-lag", True, 0.006, (TAU,))
     assert (lag.explains_percent, lag.held_out_gain_percent) == (pytest.approx(50.0), pytest.approx(90.0))
-    assert (lag.confounded_with, load.confounded_with) == (("delay",), ())
+    assert (lag.confounded_with, load.confounded_with) == (("delay",), () if shown else ("delay",))
+    assert ("no equal loops" in load.doubts) is (loops == 0)
+    assert lag.doubts == ()
     assert (step.cause.id, step.found, step.p_value, step.explains_percent) == (
         "step",
         False,

@@ -3,12 +3,13 @@
 A name is unique only if no other cause fits as well in its place. The three that score best without it are
 fitted jointly; one that comes as close as two fits of the same data may differ, by noise or by what happens
 between two samples, is named beside it. On a record of one single rate all causes that widen the loop with
-the rate are named together: there they are just a wider loop. Causes that equal loops show have no rivals
+the rate are named together: there they are just a wider loop. Causes that equal loops showed have no rivals
 here: equal loops differ by nothing else that is known.
 
 What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
-than the model without it, the interval of its strength spans zero, a parameter sits on its bound, or it is
-slow and what is left still wanders from one tenth of the time to the next.
+than the model without it, the interval of its strength spans zero, a parameter sits on its bound, it is
+slow and what is left still wanders from one tenth of the time to the next, or only equal loops would show it
+and there are none.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from dataclasses import replace
 
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.congruency import loops_of
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
@@ -26,7 +28,7 @@ from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
-WORSE, WANDERS = "predicts worse", "wanders"
+WORSE, WANDERS, NO_LOOPS = "predicts worse", "wanders", "no equal loops"
 
 
 def stage(state: State) -> State:
@@ -50,7 +52,7 @@ def _finding(state: State, term: Term) -> Finding:
         p_value=state.p_values[name],
         explains_percent=state.explains(without.squares - state.current.squares),
         parameters=state.estimates[name],
-        confounded_with=() if term.cause.by_contrast else rivals(state, term),
+        confounded_with=() if name in state.by_contrast else rivals(state, term),
         held_out_gain_percent=gain,
         doubts=tuple(_doubts(state, term, gain, without.squares - state.current.squares)),
     )
@@ -59,8 +61,10 @@ def _finding(state: State, term: Term) -> Finding:
 def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]:
     """Yield what speaks against a cause that was found: it is told, but with these words beside it."""
     cause, known = term.cause, state.estimates[term.cause.id]
-    if gain < 0 and not cause.by_contrast:  # the weights hold that: it predicts as well without
+    if gain < 0 and cause.id not in state.by_contrast:  # the weights hold that: it predicts as well without
         yield WORSE
+    if cause.by_contrast and not _equal_loops(state):
+        yield NO_LOOPS
     if cause.drifts:
         left = residual.wander(state.current.residual, state.problem.measured)
         if left > max(LIMITS.wander_left * state.current.squares, LIMITS.wander_fall * fall):
@@ -71,6 +75,12 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
     bounds = cause.quantities(state.problem.frames[0])
     if any(value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)):
         yield "at bound"
+
+
+def _equal_loops(state: State) -> bool:
+    """Whether the records hold minor loops that could show it."""
+    plane = state.problem.plane
+    return bool(loops_of(state.problem.records, plane.low, plane.high))
 
 
 def rivals(state: State, term: Term) -> tuple[str, ...]:
