@@ -48,11 +48,14 @@ def _walk(seed, size):
     return 0.75 + 0.6 * np.sin(np.cumsum(steps) / 20.0)
 
 
-@pytest.mark.parametrize("cause", LASTING, ids=lambda c: c.id)
+OTHER_KINDS = [("creep", (1.0, 0.1, 0.3)), ("thermal-drift", (0.5, 0.2, 3.0))]
+
+
+@pytest.mark.parametrize("extension", [*((c.id, VALUES[c.id]) for c in LASTING), *OTHER_KINDS])
 @given(seed=st.integers(0, 99), cuts=st.lists(st.integers(1, 900), max_size=4))
-def test_a_model_played_in_pieces_is_the_whole(cause, seed, cuts):
+def test_a_model_played_in_pieces_is_the_whole(extension, seed, cuts):
     """Whatever a cause remembers goes along, wherever the input is cut."""
-    extended = Extended.of(STATIC, [(cause.id, VALUES[cause.id])])
+    extended = Extended.of(STATIC, [extension])
     inputs = _walk(seed, 900)
     pieces = Piecewise(extended, DT_S, slew_per_s=30.0)
     played = np.concatenate([pieces.play(piece) for piece in _cut(inputs, cuts)])

@@ -111,6 +111,7 @@ def test_a_cause_without_strength_does_nothing(name):
         [("field-lag", (0.01,))],
         [("delay", (0.01,))],
         [("creep", (0.07, 1.0))],
+        [("creep", (1.0, 0.07, 1.0))],  # of one time constant
         [("thermal-drift", (0.02, 10.0))],
         [("thermal-drift", (0.5, 0.06, 10.0))],  # driven both ways
         [("field-lag", (0.003,)), ("creep", (0.03, 1.0)), ("thermal-drift", (0.006, 20.0))],

@@ -60,6 +60,23 @@ def test_creep_is_the_mean_of_three_lags():
     np.testing.assert_allclose(other, (T + a * slow) / (1 + a), atol=1e-12)
 
 
+def test_creep_of_one_time_constant_is_that_lag_alone():
+    """Tried beside the bank of three; the constant goes into the model and comes back."""
+    a, tau = 0.3, 0.4
+    bank, alone = CAUSE["creep"].kinds()
+    found = alone.on_output(T, (a, tau), _frame())
+    np.testing.assert_allclose(found, (T + a * _lagged(tau)) / (1 + a), atol=1e-12)
+    kept = tuple(value for _, value, _ in alone.constants())
+    again, values = CAUSE["creep"].restored((*kept, a, tau))
+    assert values == (a, tau)
+    np.testing.assert_array_equal(again.on_output(T, values, _frame()), found)
+    assert bank.constants() == ()
+    assert CAUSE["creep"].kinds()[1] is alone
+    (other,) = alone.variants(T, (a, tau), _frame())
+    slow = 0.75 * _lagged(tau) + 0.125 * (_lagged(0.25 * tau) + _lagged(4 * tau))
+    np.testing.assert_allclose(other, (T + a * slow) / (1 + a), atol=1e-12)
+
+
 @pytest.mark.parametrize("cold", [True, False])
 def test_a_coil_heats_with_the_square_of_the_input(cold):
     """From rest to 3 above the low end at once: h rises, then relaxes to 9; or it begins at a twentieth.

@@ -1,9 +1,14 @@
-"""the output creeps on under a constant input: a bank of low-passes."""
+"""the output creeps on under a constant input: a low-pass, or a bank of three.
+
+One time constant is that of a single process, such as air that passes a gap; three, a factor of four apart,
+stand for the many of a solid. Both kinds are tried.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,16 +22,16 @@ _SHORT = (3.0, 1.0 / 6.0)  # s, or of the record: ... but in a short one as slow
 _RATIO = 10**0.5  # from one to the next
 _BOUND = 0.2  # of the record
 _RATIOS = (0.25, 4.0)  # of the outer time constants to the middle one
-_EQUAL = 1.0 / 3.0  # share of each time constant
-_OTHER = 0.5  # share of the middle one that is as plausible
+_EQUAL, _ALONE = 1.0 / 3.0, 1.0  # share of the middle time constant: of three, or alone
+_OTHER = {_EQUAL: 0.5, _ALONE: 0.75}  # shares that are as plausible
 
 
 class Creep(Cause):
-    """Slow relaxation, as three low-passes on a logarithmic grid of time constants."""
+    """Slow relaxation, as a low-pass or as three on a logarithmic grid of time constants."""
 
     id = "creep"
     title = "the {output} creeps on under a constant {input}"
-    formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau"
+    formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau, or tau alone"
     signature = "relaxation towards a new value during holds, over several decades of time"
     excitation = "holds of three time constants after reversals, on several levels"
     source = "Kuhnen and Krejci, IEEE Trans. Automatic Control 54, 2009: creep as a bank of low-passes"
@@ -36,8 +41,28 @@ class Creep(Cause):
     common = True
     parameters = (
         Quantity("amplitude", "1", -0.3, 0.6, 0.002, "what follows slowly, per change at once"),
-        Quantity("tau", "s", 0.04, 20.0, 0.02, "time constant; others at a quarter and four times"),
+        Quantity("tau", "s", 0.04, 20.0, 0.02, "time constant; of three, the middle one"),
     )
+
+    def __init__(self, middle: float = _EQUAL) -> None:
+        self.middle = middle  # share of the middle time constant
+
+    @cached_property
+    def _kinds(self) -> tuple[Cause, ...]:
+        return (self, Creep(_ALONE)) if self.middle == _EQUAL else (self,)
+
+    def kinds(self) -> tuple[Cause, ...]:
+        """Return the causes of this id to be tried."""
+        return self._kinds
+
+    def constants(self) -> tuple[tuple[str, float, str], ...]:
+        """Return what a model must keep of it besides its parameters: name, value and unit."""
+        return () if self.middle == _EQUAL else (("middle", self.middle, "1"),)
+
+    def restored(self, values: Values) -> tuple[Cause, Values]:
+        """Return the cause and its parameters; a bank of three keeps no constant."""
+        *middle, strength, tau = values
+        return Creep(*middle), (strength, tau)
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""
@@ -52,17 +77,17 @@ class Creep(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return _crept(y, values, frame, _EQUAL)
+        return _crept(y, values, frame, self.middle)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
-        """Half of the creep in the middle time constant: no record tells the shares of all three."""
-        return [_crept(y, values, frame, _OTHER)]
+        """Another share of the middle time constant: no record tells the shares of all three."""
+        return [_crept(y, values, frame, _OTHER[self.middle])]
 
 
 def _crept(y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
     """Creep with a share ``middle`` of its amplitude in the middle time constant."""
     slow = middle * low_pass(y, values[1], frame.dt_s, frame.past, "creep")
-    for ratio in _RATIOS:
+    for ratio in _RATIOS if middle < _ALONE else ():
         part = low_pass(y, values[1] * ratio, frame.dt_s, frame.past, f"creep {ratio:g}")
         slow = slow + 0.5 * (1.0 - middle) * part
     return np.asarray((y + values[0] * slow) / (1.0 + values[0]))
