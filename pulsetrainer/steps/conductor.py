@@ -132,6 +132,7 @@ class Conductor:
         self._number = 0
         self.clipped = 0
         self.ended = False
+        self.idle = True  # the part holds neither a beat nor a rest
         self.notes: list[str] = []
 
     @property
@@ -142,6 +143,7 @@ class Conductor:
     def part(self, longest_s: float) -> Iterator[FloatArray]:
         """Yield the currents (n,) in A of a part of at most ``longest_s``; it ends at rest."""
         until = self._samples + round((longest_s - MARGIN_S) * RATE_HZ)
+        self.idle = True
         yield self._played(major_loop(self._static.low, self._static.high, RATE_HZ))
         place: _Place | None = None  # None: at rest
         while True:
@@ -154,8 +156,13 @@ class Conductor:
                     place = None
                 if decision is None or over:
                     return
-                yield self._rest(decision.seconds if isinstance(decision, Rest) else self._cooling())
+                self.idle = False
+                left_s = (until - self._samples) / RATE_HZ  # the next part decides anew
+                yield self._rest(
+                    min(decision.seconds, left_s) if isinstance(decision, Rest) else self._cooling(left_s)
+                )
                 continue
+            self.idle = False
             if place is None:
                 current, place = self._up(decision)
                 yield current
@@ -170,8 +177,8 @@ class Conductor:
             seconds += self._interval(decision, way)[1] + (0.0 if place else RAMP_S)
         return self._samples + seconds * RATE_HZ > until
 
-    def _cooling(self) -> float:
-        seconds = self._cooling_s * float(np.log(self._heat / COOL))
+    def _cooling(self, longest_s: float) -> float:
+        seconds = min(self._cooling_s * float(np.log(self._heat / COOL)), longest_s)
         self.notes.append(f"a pause of {seconds:.0f} s after {self.time_s:.0f} s, to let the coil cool")
         return seconds
 

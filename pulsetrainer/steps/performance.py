@@ -148,7 +148,7 @@ class Performance:
         decimation = round(device.info.tick_rate_Hz / RATE_HZ)
         self._sink.judge(self._so_far().fields)
         while not conductor.ended and not self._fault:
-            beats, dropped = self._ledger.count, self._dropped
+            dropped = self._dropped
             self._begun = self._next = round(conductor.time_s * RATE_HZ)
             if self._thermometer is not None:
                 self._thermometer.begin_part()
@@ -166,7 +166,7 @@ class Performance:
             if self._implausible:
                 self._fault, self._remedy = self._implausible, FORCE_REMEDY
             self._gap_s += PAUSE_S
-            if not self._fault and not conductor.ended and self._ledger.count == beats:
+            if not self._fault and not conductor.ended and conductor.idle:
                 self._fault = "the device stays on too short for one beat"
                 self._remedy = "raise its on-time limit"
         return self._so_far()

@@ -33,20 +33,24 @@ def model(request):
     return pt.load(KEPT / request.param)
 
 
-def _conducted(model, decide, *, rhythm=None, longest_s=900.0, heat=0.0, warms=0.0):
-    """Play everything; return the conductor, the pieces and the parts' currents."""
-    given, parts = [], []
-    conductor = Conductor(
+def _conductor(model, decide, give, *, rhythm=None, heat=0.0, warms=0.0):
+    return Conductor(
         extended_of(model),
         PULSES,
         reach_of(model, PULSES, (75.0,)),
         rhythm or Rhythm(),
         decide,
-        given.append,
+        give,
         heat=heat,
         heated=lambda current, rate: warms * np.cumsum(current**2) / rate,
         cooling_s=TAU_S,
     )
+
+
+def _conducted(model, decide, *, longest_s=900.0, **options):
+    """Play everything; return the conductor, the pieces and the parts' currents."""
+    given, parts = [], []
+    conductor = _conductor(model, decide, given.append, **options)
     while not conductor.ended:
         parts.append(np.concatenate(list(conductor.part(longest_s))))
         assert len(parts) < 100
@@ -174,6 +178,28 @@ def test_a_hot_coil_gets_a_pause_and_it_is_said(model):
     rests = [g for g in given if g.beat is None and np.all(g.input == model.edges[0]) and g.input.size > 2000]
     assert rests
     assert rests[0].input.size / RATE_HZ == pytest.approx(TAU_S * np.log(HOT / COOL), rel=0.2)
+
+
+@pytest.mark.parametrize("longest_s", [8.0, 12.0, 20.0])
+@pytest.mark.parametrize("heat", [0.0, 0.8])
+def test_no_rest_goes_beyond_the_end_of_a_part(model, longest_s, heat):
+    """Neither one that was decided nor one to let the coil cool: the device would stop for its on-time."""
+
+    def decide(number, time_s):
+        return Rest(30.0) if 3.0 < time_s < 20.0 else Play(0) if time_s < 40.0 else None
+
+    _, given, parts = _conducted(model, decide, longest_s=longest_s, heat=heat, warms=0.1)
+    assert all(part.size <= longest_s * RATE_HZ for part in parts)
+    assert any(g.beat is not None and g.first > 20.0 * RATE_HZ for g in given)
+
+
+def test_a_part_that_is_too_short_for_anything_is_idle(model):
+    """It is the loop alone: a session that went on like this would have no end."""
+    conductor = _conductor(model, Programme(NAMES[:1], beats=1), lambda _given: None)
+    list(conductor.part(3.0))
+    assert conductor.idle
+    list(conductor.part(30.0))
+    assert not conductor.idle
 
 
 def test_the_ledger_finds_what_was_done_to_a_force():
