@@ -33,7 +33,7 @@ def plain(value: Any) -> Any:
         return str(value)
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return value
+    return plain(value.tolist()) if hasattr(value, "tolist") else value  # an array: no numpy to ask here
 
 
 def picked(noun: Any, *names: str) -> dict[str, Any]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 import pulsetrainer as pt
+from pulsetrainer.artefacts import Extension, Parameter
 from wording import refusal, tells
 
 KEYS = {"verdict", "offset", "gain", "shape_percent", "temperature_K", "error_percent"}
@@ -72,3 +75,13 @@ def test_an_update_has_a_file_and_a_file_an_update(run, calibrated, tmp_path, wo
     done = run("check", calibrated / "model.h5", *words, "--json")
     assert (done.code, done.json["error"]["kind"]) == (2, "usage")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_play_tells_the_temperature_in_its_object(run, calibrated, tmp_path):
+    """``play --json`` where heat is tracked, as it is by default with a thermal term: a number a repeat."""
+    heat = Parameter("coefficient", 0.006, "1/A^2", 0.005, 0.007), Parameter("tau", 20.0, "s", 15.0, 25.0)
+    warm = replace(pt.load(calibrated / "model.h5"), extensions=(Extension("thermal-drift", heat),))
+    pt.save(pt.invert("normal", warm, periods=2), tmp_path / "drive.h5")
+    done = run("play", "drive.h5", "-o", "played.h5", "--repeats", 2, "--json")
+    assert done.code == 0, done.err
+    assert done.json["temperature_K"] == pytest.approx([0.0, 0.0], abs=2.0)
