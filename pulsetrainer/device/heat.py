@@ -40,14 +40,23 @@ def added(reference_A: NDArray[np.float64], rate_Hz: float) -> NDArray[np.float6
     return heat
 
 
+def peak(heat: float, reference_A: NDArray[np.float64], rate_Hz: float) -> float:
+    """Return the highest heat that a coil of this heat gets by a reference (n,) in A."""
+    return float(np.max(heat * _left(reference_A.size, rate_Hz) + added(reference_A, rate_Hz)))
+
+
+def _left(samples: int, rate_Hz: float) -> NDArray[np.float64]:
+    """Share (n,) of a heat that is left after each sample."""
+    return np.asarray(np.exp(-np.arange(1, samples + 1) / (rate_Hz * HEAT_TAU_S)))
+
+
 def wait_s(heat: float, reference_A: NDArray[np.float64], rate_Hz: float) -> float:
     """Return how long a coil has to cool before it bears a reference, s.
 
     That is h exp(-t / tau) + added(t) <= 1 throughout; 0 if it bears it now, infinite if even a cold one
     does not.
     """
-    left = np.exp(-np.arange(1, reference_A.size + 1) / (rate_Hz * HEAT_TAU_S))
-    bears = float(np.min((1.0 - added(reference_A, rate_Hz)) / left))
+    bears = float(np.min((1.0 - added(reference_A, rate_Hz)) / _left(reference_A.size, rate_Hz)))
     if heat <= bears:
         return 0.0
     return HEAT_TAU_S * math.log(heat / bears) if bears > 0 else math.inf

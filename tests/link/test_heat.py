@@ -133,6 +133,18 @@ def test_a_device_that_vanishes_in_mid_play_is_remembered_as_hot_as_it_can_be(tm
     assert memory.recall("SCRIPT", 5020.0 + HEAT_TAU_S) == pytest.approx(expected / math.e)
 
 
+def test_what_the_coil_had_before_a_play_that_nobody_saw_end_counts_too(tmp_path):
+    """The heat before, as far as it is left, and what the play adds."""
+    memory, reference = HeatMemory(tmp_path), np.full(20_000, 1.5)
+    script = ScriptedDevice()
+    script.status = {"heat": 500}
+    script.answer = lambda command, usual: None if script.session and script.tick > 5000 else usual
+    with _open(script, memory, lambda: 5000.0) as device:
+        assert "did not answer" in device.play(reference, RATE_HZ).fault
+    expected = cooled(0.5, 20.0) + float(added(reference, RATE_HZ)[-1])
+    assert memory.recall("SCRIPT", 5020.0) == pytest.approx(expected)
+
+
 def test_simulated_devices_are_told_that_they_are_cold_and_not_remembered(tmp_path, monkeypatch):
     """They were made a moment ago."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
