@@ -57,8 +57,14 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     else:
         return int(code or 0)
     with contextlib.suppress(OSError):  # nowhere to say it: the exit code still does
-        report(problem, command=next((w for w in words if w[:1] != "-"), ""), as_json="--json" in words)
+        report(problem, command=_command_in(words), as_json="--json" in words)
     return problem.exit_code
+
+
+def _command_in(words: Sequence[str]) -> str:
+    """Return the command: the first word that is no option, nor the file of settings that one names."""
+    pairs = zip(["", *words], words, strict=False)
+    return next((word for before, word in pairs if word[:1] != "-" and before != "--settings"), "")
 
 
 def hush_libraries(argv: Sequence[str]) -> None:

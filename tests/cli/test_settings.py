@@ -32,7 +32,9 @@ def test_a_file_can_be_named(run, tmp_path):
     assert run("--settings", "lab.toml", *PLAN).json["peak_current_A"] == pytest.approx(0.9)
     env = {"PULSETRAINER_SETTINGS": "lab.toml"}
     assert run(*PLAN, env=env).json["peak_current_A"] == pytest.approx(0.9)
-    refusal(run("--settings", "nowhere.toml", *PLAN), 2, "no file of settings", file="nowhere.toml")
+    lost = run("--settings", "nowhere.toml", *PLAN)
+    refusal(lost, 2, "no file of settings", file="nowhere.toml")
+    assert lost.json["command"] == "capture"
 
 
 @pytest.mark.parametrize(
