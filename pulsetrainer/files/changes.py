@@ -26,7 +26,8 @@ def read_changes(
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = csv.DictReader(line for line in stream if not line.startswith("#"))
+            lines = [(number, line) for number, line in enumerate(stream, 1) if not line.startswith("#")]
+            rows = csv.DictReader(line for _, line in lines)
             unknown = set(rows.fieldnames or ()) - set(_COLUMNS)
             if unknown or "t_s" not in (rows.fieldnames or ()):
                 raise DataError(
@@ -36,10 +37,11 @@ def read_changes(
                 )
             found: list[tuple[float, float | None, float | None, str | None]] = []
             for row in rows:
-                found.append(_change(path, rows.line_num, row, pulses))
+                number = lines[rows.line_num - 1][0]
+                found.append(_change(path, number, row, pulses))
                 if len(found) > 1 and found[-1][0] < found[-2][0]:
                     raise DataError(
-                        f"{path}, line {rows.line_num}: t_s is {found[-1][0]:g} after {found[-2][0]:g} s, "
+                        f"{path}, line {number}: t_s is {found[-1][0]:g} after {found[-2][0]:g} s, "
                         "expected times that rise",
                         hint="sort the lines by t_s",
                     )

@@ -79,6 +79,7 @@ def test_a_session_that_fails_before_its_first_beat_leaves_no_file(run, tmp_path
     ("option", "text", "name", "named"),
     [
         ("--changes", "t_s,rate\n5,80\n6,500\n", "not such a row", ("line 3: rate", "20 to 240", "500")),
+        ("--changes", "# a\nt_s,rate\n\n# b\n6,9\n", "not such a row", ("line 5: rate", "20 to 240", "9")),
         (
             "--changes",
             "t_s,rate\n5,80\n3,90\n",
