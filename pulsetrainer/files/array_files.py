@@ -46,7 +46,7 @@ def _read_npz(path: Path) -> Columns:
     try:
         with np.load(path, allow_pickle=False) as file:
             return _columns(path, {name: file[name] for name in file.files if not _holds_objects(file, name)})
-    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError) as error:
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, AttributeError, TypeError) as error:
         raise _unreadable(path, "an .npz archive of numbers", error) from error
 
 
@@ -67,7 +67,8 @@ def _holds_objects(file: Any, name: str) -> bool:
 
 def _read_npy(path: Path) -> Columns:
     try:
-        array = np.load(path, allow_pickle=False)
+        with path.open("rb") as stream:  # np.load would take an archive, too
+            array = np.lib.format.read_array(stream, allow_pickle=False)
     except (ValueError, EOFError) as error:
         raise _unreadable(path, "a .npy array of numbers", error) from error
     if array.dtype.names:

@@ -105,7 +105,9 @@ def test_what_is_no_such_file_is_said(tmp_path, suffix):
     savemat(f"{whole}.mat", {"u": U})
     wavfile.write(f"{whole}.wav", 250, U)
     content = (tmp_path / f"whole{suffix}").read_bytes()
-    for name, data in (("text", b"t,u\n0,1\n1,2\n"), ("cut", content[:60]), ("none", b"")):
+    other = (tmp_path / ("whole.npz" if suffix == ".npy" else "whole.npy")).read_bytes()
+    cases = (("text", b"t,u\n0,1\n1,2\n"), ("cut", content[:60]), ("none", b""), ("other", other))
+    for name, data in cases:
         path = tmp_path / f"{name}{suffix}"
         path.write_bytes(data)
         with raises(DataError, "names it", named=path.name):
