@@ -23,10 +23,12 @@ def check_output(path: Path | str, overwrite: bool = False) -> None:
     """
     path = Path(path)
     try:
-        _check_target(path, path.parent, overwrite=overwrite)
-    except OSError as error:  # a name too long, a folder that must not be looked into
+        folder = path.resolve().parent if path.is_symlink() else path.parent
+        _check_target(path, folder, overwrite=overwrite)
+    except (OSError, RuntimeError) as error:  # a name too long, a forbidden folder, a link to itself
+        reason = getattr(error, "strerror", None) or error
         raise UsageError(
-            f"the output {path} cannot be written: {error.strerror or error}", hint="name another output"
+            f"the output {path} cannot be written: {reason}", hint="name another output"
         ) from error
 
 

@@ -6,6 +6,7 @@ Nothing heavy is loaded here, so that a mistyped name is answered at once.
 from __future__ import annotations
 
 import difflib
+import glob
 import re
 from collections.abc import Sequence
 from itertools import islice
@@ -125,7 +126,7 @@ def _likely_kind(path: Path) -> str:
 
 def check_resumable(path: Path) -> None:
     """Raise UsageError where of a recording into ``path`` nothing is there, nor beside it, to be resumed."""
-    if not path.exists() and not any(path.parent.glob(f"{path.name}.partial*")):
+    if not path.exists() and not any(path.parent.glob(f"{glob.escape(path.name)}.partial*")):
         raise UsageError(
             f"there is nothing to resume: neither {path} nor {path.name}.partial exists",
             hint="leave --resume out to record from the beginning",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,7 +74,7 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
             source = path
     if source is None:
         cut_off = f"{path.name}.partial"
-        beside = min((entry.name for entry in path.parent.glob(f"{cut_off}*")), default=cut_off)
+        beside = min((one.name for one in path.parent.glob(f"{glob.escape(cut_off)}*")), default=cut_off)
         raise UsageError(
             f"{beside} is being written by another program, or cannot be read",
             hint=f"wait for it, or look: pulsetrainer show {beside}",

@@ -20,6 +20,7 @@ from pulsetrainer.files import recorder as recorder_module
 from pulsetrainer.files.journal import Journal, Recording, blocks
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.recorder import RunRecorder
+from pulsetrainer.files.resume import earlier_of
 from pulsetrainer.files.store import read, read_header, write
 from wording import raises
 
@@ -352,6 +353,14 @@ def test_a_cut_off_recording_goes_on(partial, tmp_path):
     assert np.flatnonzero(run.seam).tolist() == [300]
     assert run.complete
     assert _names(tmp_path) == ["a.h5"]
+
+
+def test_a_name_with_brackets_is_resumed(partial, tmp_path):
+    """What would be a pattern of names for a shell is one name here."""
+    partial.rename(tmp_path / "a[1].h5.partial")
+    earlier = earlier_of(tmp_path / "a[1].h5", {}, overwrite=False)
+    earlier.close()
+    assert earlier.path.name == "a[1].h5.partial"
 
 
 def test_an_artefact_that_a_fault_ended_goes_on(tmp_path):

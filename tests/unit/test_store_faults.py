@@ -322,8 +322,12 @@ def test_existing_output_is_not_overwritten_unasked(run_file):
 def test_outputs_that_cannot_be(tmp_path, monkeypatch):
     """A missing or read-only folder, a folder as name, a file as folder, an odd name: a usage error."""
     (tmp_path / "file").touch()
+    (tmp_path / "astray.h5").symlink_to(tmp_path / "no" / "a.h5")
+    (tmp_path / "itself.h5").symlink_to(tmp_path / "itself.h5")
     for path, words in [
         (tmp_path / "no" / "a.h5", "there is no folder"),
+        (tmp_path / "astray.h5", "there is no folder"),
+        (tmp_path / "itself.h5", "cannot be written"),
         (tmp_path, "is a folder"),
         (tmp_path / "file" / "a.h5", "is a file"),
         (Path("/dev/null"), "not an ordinary file"),
