@@ -41,7 +41,7 @@ class Ledger:
     _largest: float = 0.0
     _sum: float = 0.0
     _low: float = np.inf
-    high: float = -np.inf  # largest target
+    _high: float = -np.inf
 
     def give(self, given: Given) -> None:
         """Take in a piece that will be played."""
@@ -88,7 +88,7 @@ class Ledger:
             self._square += float((error**2).sum())
             self._largest = max(self._largest, float(error.max()))
             self._sum += float(x[there].sum())
-            self._low, self.high = min(self._low, float(x.min())), max(self.high, float(x.max()))
+            self._low, self._high = min(self._low, float(x.min())), max(self._high, float(x.max()))
         if error.size > max(_ENOUGH * x.size, 4):
             mean, most = float(error.mean()), float(error.max())
             slope = np.gradient(x) * RATE_HZ
@@ -127,6 +127,11 @@ class Ledger:
         return Beats(start, interval, pulse.astype(np.int64), amplitude, gain, late, mean, most, unit)
 
     @property
+    def full_force(self) -> float:
+        """Largest target of the beats."""
+        return self._high if self._count else np.nan
+
+    @property
     def mean_force(self) -> float:
         """Mean target of the beats."""
         return self._sum / self._count if self._count else np.nan
@@ -143,9 +148,9 @@ class Ledger:
             "rate_cv_percent": _cv_percent(pressed[joined]),
             "amplitude_cv_percent": _cv_percent(gain),
             "beat_timing_max_ms": 1e3 * _finite(np.abs(late), np.max),
-            "mean_abs_error_percent": 100.0 * self._absolute / self._count / self.high,
-            "max_abs_error_percent": 100.0 * self._largest / self.high,
-            "nrmse": float(np.sqrt(self._square / self._count)) / (self.high - self._low),
+            "mean_abs_error_percent": 100.0 * self._absolute / self._count / self._high,
+            "max_abs_error_percent": 100.0 * self._largest / self._high,
+            "nrmse": float(np.sqrt(self._square / self._count)) / (self._high - self._low),
             "augmentation_index_error_percent": _finite(
                 np.asarray([one.index_error_percent() for one in self._means.values()]), np.max
             ),

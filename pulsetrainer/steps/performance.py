@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -136,7 +136,7 @@ class Performance:
             loss=lambda: self._loss,
         )
         self._begun = 0  # sample at which the part began
-        self._gap_s = 0.0
+        self._begins_s: list[float] = []  # of the parts, without the pauses between them
         self._next = 0  # sample that comes, where none is lost
         self._parts = self._dropped = self._underruns = 0
         self._fault = self._remedy = self._implausible = ""
@@ -150,6 +150,7 @@ class Performance:
         while not conductor.ended and not self._fault:
             dropped = self._dropped
             self._begun = self._next = round(conductor.time_s * RATE_HZ)
+            self._begins_s.append(conductor.time_s)
             if self._thermometer is not None:
                 self._thermometer.begin_part()
             trace = device.stream(
@@ -165,7 +166,6 @@ class Performance:
             self._fault, self._remedy, self._underruns = trace.fault, trace.remedy, int(trace.underrun)
             if self._implausible:
                 self._fault, self._remedy = self._implausible, FORCE_REMEDY
-            self._gap_s += PAUSE_S
             if not self._fault and not conductor.ended and conductor.idle:
                 self._fault = "the device stays on too short for one beat"
                 self._remedy = "raise its on-time limit"
@@ -175,8 +175,8 @@ class Performance:
         ledger = self._ledger
         return Performed(
             figures=ledger.figures(),
-            beats=ledger.beats("N"),
-            full_force=ledger.high if ledger.count else float("nan"),
+            beats=self._beats(),
+            full_force=ledger.full_force,
             mean_force=ledger.mean_force,
             reach=self._reach,
             clipped=self._conductor.clipped,
@@ -190,18 +190,24 @@ class Performance:
             temperature=tuple(self._warmth),
         )
 
+    def _beats(self) -> Beats:
+        """Return the beats that are over, in the time of the samples: with the pauses between parts."""
+        beats = self._ledger.beats("N")
+        pauses = np.searchsorted(self._begins_s, beats.start_s, side="right") - 1
+        return replace(beats, start_s=beats.start_s + PAUSE_S * pauses)
+
     def _take(self, block: Block, decimation: int) -> None:
         sample = self._begun + block.tick // decimation
         self._dropped += int(sample[-1]) + 1 - self._next - sample.size
         self._next = int(sample[-1]) + 1
         target, done, measured = self._ledger.measure(sample, block.force_N)
-        measured_s = float(sample[-1]) / RATE_HZ
+        measured_s, paused_s = float(sample[-1]) / RATE_HZ, PAUSE_S * self._parts
         meter = self._thermometer
         if meter is not None and meter.add(sample / RATE_HZ, block.reference_A, block.current_A, block.duty):
             self._loss += _FOLLOW * (meter.extra - self._loss)
-            self._warmth.append((measured_s + self._gap_s, meter.temperature_K))
+            self._warmth.append((measured_s + paused_s, meter.temperature_K))
         self._sink.append(
-            sample / RATE_HZ + self._gap_s, target, block.reference_A, block.current_A, block.force_N
+            sample / RATE_HZ + paused_s, target, block.reference_A, block.current_A, block.force_N
         )
         for piece, force in zip(done, measured, strict=True):
             if piece.beat is not None:

@@ -107,8 +107,7 @@ class Blind:
     def told(self, beats: Beats) -> Beats:
         """Return the beats of the questions that are answered: one of the others would tell what is asked."""
         is_open = len(self._answers) < len(self._begun)
-        end_s = self._begun[len(self._answers)] if is_open else np.inf
-        told = beats.start_s < end_s - _ROUNDING_S
+        told = slice(self._first if is_open else None)
         names = [field.name for field in fields(beats) if field.name != "output_unit"]
         columns: dict[str, Any] = {name: getattr(beats, name)[told] for name in names}
         return Beats(**columns, output_unit=beats.output_unit)

@@ -172,3 +172,17 @@ def test_a_session_keeps_the_temperature_that_it_told(model, tmp_path):
     again = pt.load(tmp_path / "s.h5")
     np.testing.assert_array_equal(again.temperature_K, pressed.temperature_K)
     np.testing.assert_array_equal(again.temperature_s, pressed.temperature_s)
+
+
+def test_a_beat_starts_where_its_samples_are(model):
+    """In every part of a session: the error of the samples from its start on is the one told of the beat."""
+    with pt.open_device("bench:?seed=1") as device:
+        device.set_parameter("on_time", 6)
+        pressed = pt.session(model, device, beats=8)
+    beats = pressed.beats
+    assert np.diff(pressed.time_s).max() > 0.5
+    for start_s, interval_s, told in zip(beats.start_s, beats.interval_s, beats.mean_error, strict=True):
+        since_s = pressed.time_s - start_s
+        of_beat = (since_s > -1e-6) & (since_s < interval_s - 1e-6)
+        error = np.abs(pressed.output - pressed.target)[of_beat].mean()
+        assert error == pytest.approx(told, rel=1e-6)

@@ -250,6 +250,17 @@ def test_lost_samples_are_left_out():
     np.testing.assert_allclose(np.delete(found.gain, 2), 1.0, atol=1e-9)
 
 
+def test_beats_that_were_lost_as_a_whole_have_no_figures():
+    """Not even a full force."""
+    _, given, _ = _conducted(pt.load(KEPT / "model.h5"), Programme(NAMES[:1], beats=2))
+    ledger = Ledger(NAMES[:1])
+    for piece in given:
+        ledger.give(piece)
+    ledger.measure(np.asarray([given[-1].first]), np.zeros(1))
+    assert ledger.count == 2
+    assert np.isnan([ledger.full_force, ledger.mean_force, *ledger.figures().values()]).all()
+
+
 @pytest.mark.parametrize(
     "options",
     [

@@ -150,13 +150,13 @@ def test_a_beat_is_told_when_its_question_is_answered():
     blind = Blind(CHOICES, [2, 0], lambda _question: said.pop() if said else None, Play(0))
     start_s = np.arange(0.0, 40.0, 0.8)
     beats = Beats(start_s, *(np.ones(start_s.size) for _ in range(7)))
-    assert blind(0, 3.0) == Play(2, 1.0, None, 3.0 + QUESTION_S)
+    assert blind(4, 3.0) == Play(2, 1.0, None, 3.0 + QUESTION_S)
     assert blind.told(beats).start_s.max() < 3.0
     said.append((CHOICES[1], 9.0))
     assert blind(20, 3.0 + QUESTION_S + GAP_S) == Rest()
     assert blind.told(beats).start_s.size == start_s.size  # nothing is open
     second_s = 3.0 + QUESTION_S + 2 * GAP_S
-    assert isinstance(blind(20, second_s), Play)
+    assert isinstance(blind(24, second_s), Play)
     told = blind.told(beats)
     assert told.start_s.max() < second_s <= start_s[told.start_s.size]
     assert told.gain.size == told.start_s.size
