@@ -50,6 +50,7 @@ def evaluate(
         evaluation = pt.evaluate(
             measured, models, names=list(map(str, inputs)), model_names=list(map(str, model))
         )
+        broken = breaches(evaluation, limits)
         progress(0.6)
         pulses = dict.fromkeys(w.name for w in evaluation.waveforms) or [path.name for path in inputs]
         header = job.save(out, evaluation, f"Evaluation of {', '.join(pulses)}")
@@ -57,7 +58,6 @@ def evaluate(
             from pulsetrainer.report.html import render_evaluation
 
             job.page(html, render_evaluation, evaluation, header)
-    broken = breaches(evaluation, limits)
     failed = None
     if broken:
         listed = "; ".join(f"{b.metric} = {b.value:.4g} is outside [{b.low:g}, {b.high:g}]" for b in broken)

@@ -14,6 +14,7 @@ import typer
 
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.next_step import as_options
+from pulsetrainer.errors import UsageError
 from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
 
@@ -64,14 +65,18 @@ class Job:
             from pulsetrainer.simulation.options import check_port
 
             check_port(context.params["port"])
-        for path in outputs:
-            if path is not None:
-                check_output(path, overwrite)
+        written = [path for path in outputs if path is not None]
+        for path in written:
+            check_output(path, overwrite)
+        if len({path.resolve() for path in written}) < len(written):
+            raise UsageError(
+                f"{written[0]} was named for two outputs", hint="name another file for one of them"
+            )
         for path in inputs:
             check_artefact(path)
-        for path in tables:
-            if path is not None:
-                check_file(path)
+        for table in tables:
+            if table is not None:
+                check_file(table)
         self.seconds = 0.0
 
     @contextmanager

@@ -328,7 +328,7 @@ def _reasons(
         reasons.append(f"offset: the zero moved by {offset.value:+.2f} N (limit {OFFSET_N:g} N)")
     if abs(gain.value - 1.0) > GAIN and not gain.interval[0] <= 1 <= gain.interval[1]:
         moved = 100 * (gain.value - 1.0)
-        reasons.append(f"gain: the force is {moved:+.1f} % of what it was (limit {100 * GAIN:g} %)")
+        reasons.append(f"gain: the force moved by {moved:+.1f} % (limit {100 * GAIN:g} %)")
     if temperature is not None and abs(temperature.value) > TEMPERATURE_K:
         warmer = f"{temperature.value:+.0f} K from calibration (limit {TEMPERATURE_K:g} K)"
         reasons.append(f"temperature: the coil is {warmer}")

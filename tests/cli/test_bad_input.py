@@ -77,6 +77,8 @@ def test_an_existing_output_is_refused_and_kept(ready):
     refused(ready, ["play", "drive.h5", "-o", "model.h5"], 2, "exists", file="model.h5")
     refused(ready, ["plot", "run.h5", "-o", "model.h5"], 2, "no such figure", file="model.h5")
     assert (ready / "model.h5").read_bytes() == before
+    page = ["evaluate", "played.h5", "-o", "x.h5", "--html", "./x.h5", "--overwrite"]
+    refused(ready, page, 2, "two outputs", file="x.h5")
     assert (
         pulsetrainer(ready, "identify", "run.h5", "--levels", "12", "-o", "model.h5", "--overwrite").code == 0
     )

@@ -46,6 +46,13 @@ def test_the_contract_and_the_update(run, calibrated, tmp_path):
     assert again.json["verdict"] == "true"
 
 
+def test_a_stronger_force_is_told_by_how_much(run, calibrated):
+    """By which share it moved, and what the limit is."""
+    done = run("check", calibrated / "model.h5", "--port", "bench:?condition-gain=0.052")
+    assert done.code == 0, done.err
+    tells(done.out, "stronger")
+
+
 def test_another_device_is_not_updated(run, calibrated, tmp_path):
     """A changed density: exit 3, nothing written; the verdict alone is no error. The limit is told."""
     words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9")

@@ -104,8 +104,9 @@ def test_a_broken_bound_is_exit_1_and_names_the_metric(built_small):
     refusal(done, 1, "out of bounds", metric="normal.continuous.mean_error_reduction_percent")
     assert done.json["breaches"][0]["metric"] == "normal.continuous.mean_error_reduction_percent"
     (built_small / "mistyped.toml").write_text("[normal.continuous]\nmean_eror = [0.0, 1.0]\n")
-    done = pulsetrainer(built_small, "evaluate", words[1], "--bounds", "mistyped.toml", "--json")
-    refusal(done, 2, "no such metric", metric="normal.continuous.mean_eror")
+    words = ("evaluate", words[1], "--bounds", "mistyped.toml", "-o", "unknown.h5", "--json")
+    refusal(pulsetrainer(built_small, *words), 2, "no such metric", metric="normal.continuous.mean_eror")
+    assert not (built_small / "unknown.h5").exists()
 
 
 def test_the_report_shows_what_the_file_holds(built_small):
