@@ -249,7 +249,7 @@ def _rails(recording: Trace, top: float) -> Iterator[Finding]:
         yield _finding("saturation", f"none up to {top:g} A and {recording.force_N.max():.3g} N")
     worst = float(np.abs(recording.current_A - recording.reference_A).max()) / top
     tune = "measure the coil and set the gains for it: pulsetrainer tune -o pulsetrainer.toml"
-    said = f"{100 * worst:.2g} % of the range at worst"
+    said = f"{100 * worst:.2g} % of {top:.3g} A at worst"
     yield _finding("current tracking", said, warning=tune if worst > _TRACKING_SHARE else None)
     fired.pop("current-tracking", None)
     for cause, one in fired.items():

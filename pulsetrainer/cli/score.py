@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,14 +82,23 @@ def tell(
         "error": f"{done.figures['mean_abs_error_percent']:.2f} % mean, "
         f"{done.figures['max_abs_error_percent']:.2f} % at most, of full force",
         "timing": f"beats begin within {done.figures['beat_timing_max_ms']:.2g} ms of their time",
-        "as asked": f"rate within {done.figures['rate_cv_percent']:.2g} %, "
-        f"height within {done.figures['amplitude_cv_percent']:.2g} % (standard deviation)",
+        "as asked": _spread(done.figures),
         "underruns": done.underruns,
     }
     if kelvins:
         rows["coil"] = warmth_words(kelvins)
     job.screen.result(payload)
     job.screen.facts(f"{out}: a session on {info.serial}", rows | right)
+
+
+def _spread(figures: Mapping[str, float]) -> str | None:
+    """Say how far rate and height went from what was asked; None where one beat alone tells nothing."""
+    known = [
+        f"{what} within {figures[name]:.2g} %"
+        for what, name in (("rate", "rate_cv_percent"), ("height", "amplitude_cv_percent"))
+        if math.isfinite(figures[name])
+    ]
+    return f"{', '.join(known)} (standard deviation)" if known else None
 
 
 def _quizzed(quiz: Quiz | None) -> tuple[dict[str, Any], dict[str, str]]:

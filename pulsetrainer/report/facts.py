@@ -39,6 +39,7 @@ def _playback(played: Playback) -> dict[str, Any]:
 
 
 def _span(values: FloatArray, unit: str) -> str:
+    values = values[np.isfinite(values)]  # a lost sample is none
     if values.size == 0:
         return "no samples"
     low, high = float(np.min(values)), float(np.max(values))

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from program import pulsetrainer
+from wording import tells
 
 
 def _named(done):
@@ -23,6 +24,7 @@ def test_a_sound_bench_has_no_findings(run):
     assert done.json["problems"] == 0
     assert "numpy" in found["versions"]["found"]
     assert "firmware" in found["device"]["found"]
+    tells(found["current tracking"]["found"], "follows half the range")
 
 
 @pytest.mark.parametrize(

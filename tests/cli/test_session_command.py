@@ -107,6 +107,13 @@ def test_a_bad_row_is_named_with_its_file(run, tmp_path, option, text, name, nam
     assert not list(tmp_path.glob("s.h5*"))
 
 
+def test_one_beat_has_no_spread(run):
+    """What one beat does not tell is a dash."""
+    done = run(*SHORT, "--beats", 1)
+    assert done.code == 0, done.err
+    assert "nan" not in done.out
+
+
 def test_changes_of_a_script_come_at_the_next_beat(run, tmp_path):
     """Rate, amplitude and pulse; the current moves no faster than the slew limit, and the force follows."""
     (tmp_path / "changes.csv").write_text("t_s,rate,amplitude,pulse\n3,100,,\n5,,50,bifid\n")

@@ -24,6 +24,14 @@ def _seams(*places: int) -> np.ndarray:
     return np.isin(np.arange(50), places)
 
 
+def test_lost_samples_leave_the_ranges_of_a_run_known():
+    """As text it says from where to where the others go."""
+    run = examples.run(50)
+    lost = np.where(np.arange(50) == 7, np.nan, run.output)
+    assert "nan" not in str(replace(run, output=lost))
+    assert "no samples" in str(replace(run, output=np.full(50, np.nan)))
+
+
 def test_parts_of_a_run_lie_between_its_seams():
     """A seam is the first sample after a pause; the parts together are the run, and have no seam."""
     run = examples.run(50, seam=_seams(10, 30))
