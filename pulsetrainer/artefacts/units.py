@@ -56,7 +56,7 @@ _OF_MICRO = "|".join(sorted(_PREFIXED, key=len, reverse=True))
 _MICRO = re.compile(rf"(?<![A-Za-zΩµ])u(?=(?:{_OF_MICRO})(?![A-Za-zΩµ]))|\N{{GREEK SMALL LETTER MU}}")
 _EXPONENT = re.compile(r"(?:\^|\*\*)?(?P<exponent>[-+]?\d)$|(?P<raised>[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹])$")
 _SEPARATOR = re.compile(r"\s*[*·/×]\s*|\s+|(?<=[A-Za-zΩµ])\.(?=[A-Za-zΩµ])")
-_BRACKETED = re.compile(r"^(?P<name>.*?)\s*/?\s*[(\[](?P<unit>[^()\[\]]*)[)\]]\s*$")
+_BRACKETED = re.compile(r"^(?P<name>.*?)\s*/?\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()\[\]]*)\))\s*$")
 _MARK = re.compile(r"\s*[/,]\s*|\s+in\s+")
 _SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,12})$")
 _POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -128,7 +128,7 @@ def split_unit(heading: str) -> tuple[str, str]:
     is one if it is known: ``B/T`` is, ``A/B`` and ``H/V ratio`` are names.
     """
     if (found := _BRACKETED.match(heading)) and found["name"]:
-        return found["name"].strip(), found["unit"].strip()
+        return found["name"].strip(), (found["square"] or found["round"] or "").strip()
     found = _SUFFIXED.match(heading)
     if found and found["unit"] != "second" and _stands_alone(found["unit"]):
         return found["name"], found["unit"]

@@ -40,7 +40,7 @@ def series_of(artefact: Any) -> Columns:
 
 def _heading(quantity: str, unit: str) -> str:
     """A heading that ``import`` reads: the unit in square brackets, in which others cannot stand."""
-    return f"{quantity} [{unit.replace('(', '').replace(')', '')}]"
+    return f"{quantity} [{unit}]"
 
 
 def _text(artefact: Any, text: str) -> str:
