@@ -110,7 +110,8 @@ def _spreads(one: Evaluation) -> dict[str, float]:
     found = {}
     for w in one.waveforms:
         stem, spread = f"{w.name}.{w.inversion}", w.error_spread_percent
-        found[f"{stem}.mean_error_reduction_percent"] = 100.0 * spread / w.scaled.mean_abs_error_percent
+        if w.scaled.mean_abs_error_percent > 0:
+            found[f"{stem}.mean_error_reduction_percent"] = 100.0 * spread / w.scaled.mean_abs_error_percent
         for drive in ("scaled", "compensated"):
             found |= dict.fromkeys((f"{stem}.{drive}.{m}_error_percent" for m in ("mean_abs", "rms")), spread)
             found[f"{stem}.{drive}.max_abs_error_percent"] = w.noise_percent

@@ -115,8 +115,9 @@ def _of_playback(name: str, playback: Playback) -> WaveformEvaluation:
         target=waveform.target[scored],
         scaled=scaled,
         compensated=compensated,
-        mean_error_reduction_percent=100.0
-        * (1.0 - compensated.mean_abs_error_percent / scaled.mean_abs_error_percent),
+        mean_error_reduction_percent=_gain_percent(
+            compensated.mean_abs_error_percent, scaled.mean_abs_error_percent
+        ),
         full_force=waveform.full_force,
         noise_percent=100.0 * spread / waveform.full_force,
         error_spread_percent=max(

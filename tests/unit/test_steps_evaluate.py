@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,13 +11,15 @@ import report_examples
 import store_examples as examples
 from core_jobs import curves
 
-from pulsetrainer.artefacts import Evaluation, Extension, Parameter, Run
+from pulsetrainer.artefacts import Evaluation, Extension, Parameter, Playback, Run
 from pulsetrainer.core.memory import positive_saturation
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.files.store import read
 from pulsetrainer.steps.compare import compare
 from pulsetrainer.steps.evaluate import breaches, evaluate
 
+FOLDER = Path(__file__).parents[1] / "data/files-0.1"
 MODEL = examples.model(6)
 U = 0.5 + 0.5 * curves(1000, 6, 4)
 WAVE = 0.2 * np.sin(np.arange(1000) / 7.0) + 0.3 * (np.arange(1000) >= 500)
@@ -61,6 +64,15 @@ def test_over_a_model_without_any_error_no_gain_can_be_told():
     first, same, worse = evaluate(exact, [model, model, other]).models
     assert (first.rms, first.gain_percent, same.gain_percent) == (0.0, 0.0, 0.0)
     assert np.isnan(worse.gain_percent)
+
+
+def test_over_a_scaled_drive_without_any_error_no_reduction_can_be_told():
+    """As in a simulation of one's own; it is compared all the same."""
+    played = read(FOLDER / "played.h5", Playback)
+    exact = np.tile(played.waveform.target, (played.scaled.output.shape[0], 1))
+    found = evaluate(replace(played, scaled=replace(played.scaled, output=exact)))
+    assert np.isnan(found.waveforms[0].mean_error_reduction_percent)
+    assert {metric.better for metric in compare([found, found])} == {None}
 
 
 def test_the_state_before_a_record_is_the_one_that_was_predicted_from():
