@@ -70,6 +70,7 @@ def capture(
     job = Job(context, outputs=() if resume else (out,), overwrite=overwrite, as_json=json)
     if resume:
         check_resumable(out)
+    from pulsetrainer.artefacts import Run
     from pulsetrainer.core.course import Course
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.resume import earlier_of
@@ -90,7 +91,7 @@ def capture(
     if resume:
         earlier = earlier_of(out, {name: context.params[name] for name in _SAME}, overwrite=overwrite)
     else:
-        job.left_over(out, "an interrupted capture: continue it with --resume, or delete it")
+        job.left_over(out, Run, "an interrupted capture: continue it with --resume, or delete it")
     with contextlib.nullcontext() if earlier is None else contextlib.closing(earlier):
         if earlier is not None:
             at = samples_played(earlier.run, course)

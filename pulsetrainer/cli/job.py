@@ -223,11 +223,11 @@ class Job:
             if path is not None:
                 self.screen.whole(f"wrote {path}")
 
-    def left_over(self, out: Path, said: str) -> None:
-        """Say what programs that were killed left beside an output: ``said`` names what it is of."""
+    def left_over(self, out: Path, kind: type, said: str) -> None:
+        """Say what programs that were killed left beside an output, of this kind: ``said`` names it."""
         from pulsetrainer.files.recorder import interrupted
 
-        for left, samples in interrupted(out):
+        for left, samples in interrupted(out, kind):
             self.notes([f"{left} holds {samples} samples of {said.format(left=left)}"])
 
     def notes(self, lines: Sequence[str]) -> None:

@@ -154,7 +154,8 @@ def _press(
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, perform
 
     out, html = outputs
-    job.left_over(out, "a session that was cut off: look with `pulsetrainer show {left}`, and delete it")
+    said = "a session that was cut off: look with `pulsetrainer show {left}`, and delete it"
+    job.left_over(out, pt.Session, said)
     shapes = [read_pulse(name) for name in pulses]
     blind = chosen if isinstance(chosen, Blind) else None
     steered = hands.steer(job.screen, chosen, shapes, by_key=by_key)

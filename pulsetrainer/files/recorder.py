@@ -17,7 +17,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pulsetrainer.artefacts import FloatArray, Run
+from pulsetrainer.artefacts import FloatArray, Run, Session
 from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.errors import ArgumentError, DataError, PulsetrainerError
 from pulsetrainer.files import journal, store
@@ -264,11 +264,12 @@ class RunRecorder:
             self._lease.end()
 
 
-def interrupted(final: Path | str) -> list[tuple[Path, int]]:
-    """Return what killed programs left of captures into ``final``, with the number of samples, longest first.
+def interrupted(final: Path | str, kind: type = Run) -> list[tuple[Path, int]]:
+    """Return what killed programs left of runs, or sessions, into ``final``, with the samples, longest first.
 
     Files that hold no sample are removed; one whose writer is alive, or that is damaged, is not listed.
     """
+    tags = (journal.GOAL,) if kind is Session else (journal.DATA, journal.PART)
     final = Path(final)
     pattern = re.compile(rf"{re.escape(final.name)}\.partial(-\d+)?")
     found: list[tuple[Path, int]] = []
@@ -277,11 +278,11 @@ def interrupted(final: Path | str) -> list[tuple[Path, int]]:
             if not is_abandoned(path):
                 continue
             with contextlib.suppress(DataError):
-                samples = sum(block.samples.shape[1] for block in journal.blocks(path))
-                if samples:
-                    found.append((path, samples))
-                else:
+                lengths = [(block.tag, block.samples.shape[1]) for block in journal.blocks(path)]
+                if not any(length for _, length in lengths):
                     sweep(path)
+                elif samples := sum(length for tag, length in lengths if tag in tags):
+                    found.append((path, samples))
     return sorted(found, key=lambda pair: -pair[1])
 
 

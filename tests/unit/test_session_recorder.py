@@ -13,6 +13,7 @@ from pulsetrainer.artefacts import Beats, Quiz, Run, Session
 from pulsetrainer.errors import DamagedFileError, WrongKindError
 from pulsetrainer.files import journal
 from pulsetrainer.files.encode import values_of
+from pulsetrainer.files.recorder import interrupted
 from pulsetrainer.files.session_recorder import SessionRecorder
 from pulsetrainer.files.store import read, read_any
 
@@ -98,6 +99,15 @@ def test_a_session_that_is_cut_off_is_no_run(pressed):
     with pytest.raises(WrongKindError) as refused:
         read(recorder.partial, Run)
     assert refused.value.found == "session"
+
+
+def test_a_killed_session_is_no_capture_to_be_resumed(pressed, tmp_path):
+    """It is told as what it is, and stays where it is."""
+    _, recorder = pressed
+    left = tmp_path / "other.h5.partial"
+    left.write_bytes(recorder.partial.read_bytes())
+    assert interrupted(tmp_path / "other.h5") == []
+    assert interrupted(tmp_path / "other.h5", Session) == [(left, BEATS * SAMPLES)]
 
 
 @pytest.mark.parametrize("content", [b"{}", b"[1]", b'{"beats": [[1]], "windows": [], "quiz": null}', b"no"])
