@@ -65,6 +65,12 @@ class WaveformEvaluation:
         FloatArray | None, Data("K", "copper warmer than at calibration", "repeat", path="temperature")
     ] = None
 
+    def figures(self) -> dict[str, float]:
+        """Figures by dotted name within the waveform: ``scaled.max_abs_error_percent``."""
+        drives = (("scaled", self.scaled), ("compensated", self.compensated))
+        errors = {f"{name}.{metric}": getattr(drive, metric) for name, drive in drives for metric in METRICS}
+        return {"mean_error_reduction_percent": self.mean_error_reduction_percent, **errors}
+
 
 @dataclass(frozen=True, slots=True)
 class ModelEvaluation:
@@ -96,6 +102,10 @@ class ModelEvaluation:
         """Name of the model without the folder and the ending of its file."""
         return self.name.replace("\\", "/").rpartition("/")[2].removesuffix(".h5")
 
+    def figures(self) -> dict[str, float]:
+        """Figures by name."""
+        return {metric: getattr(self, metric) for metric in MODEL_METRICS}
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Evaluation(Shown):
@@ -114,19 +124,24 @@ class Evaluation(Shown):
 
     waveforms: tuple[WaveformEvaluation, ...] = ()
     models: tuple[ModelEvaluation, ...] = ()
-    model: Model | None = None  # the model behind the first waveform, for the figures
+    model: Model | None = None  # the model behind the last waveform, for the figures
     notes: tuple[str, ...] = ()  # what a person should know about the comparison
 
     def figures(self) -> dict[str, float]:
         """All figures by dotted name: ``normal.continuous.scaled.max_abs_error_percent``."""
-        named: dict[str, float] = {}
-        for waveform in self.waveforms:
-            stem = f"{waveform.name}.{waveform.inversion}"
-            named[f"{stem}.mean_error_reduction_percent"] = waveform.mean_error_reduction_percent
-            for drive, errors in (("scaled", waveform.scaled), ("compensated", waveform.compensated)):
-                for metric in METRICS:
-                    named[f"{stem}.{drive}.{metric}"] = getattr(errors, metric)
-        for model in self.models:
-            for metric in MODEL_METRICS:
-                named[f"{model.short_name}.{metric}"] = getattr(model, metric)
-        return named
+        parts = [*(w.figures() for w in self.waveforms), *(m.figures() for m in self.models)]
+        return {
+            f"{stem}.{name}": value
+            for stem, figures in zip(self.stems, parts, strict=True)
+            for name, value in figures.items()
+        }
+
+    @property
+    def stems(self) -> tuple[str, ...]:
+        """What the figures of each waveform, then of each model, begin with; a repeated one has a number.
+
+        ``normal.continuous``, ``normal.continuous#2``, ``bifid.continuous``.
+        """
+        names = [*(f"{w.name}.{w.inversion}" for w in self.waveforms), *(m.short_name for m in self.models)]
+        before = [names[:k].count(name) for k, name in enumerate(names)]
+        return tuple(f"{name}#{n + 1}" if n else name for name, n in zip(names, before, strict=True))

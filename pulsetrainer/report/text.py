@@ -88,13 +88,10 @@ def _predictions(evaluation: Evaluation) -> Table:
 
 def _pulses(evaluation: Evaluation, width: int) -> Iterator[Table]:
     """One table of all pulses where it fits the width, else one for each pulse."""
-    figures = evaluation.figures()
     columns: dict[str, list[tuple[str, dict[str, float]]]] = {}  # by pulse: heading and figures
     for w in evaluation.waveforms:
-        stem = f"{w.name}.{w.inversion}."
         published = [("published", PUBLISHED[w.name])] if w.name in PUBLISHED else []
-        found = {name[len(stem) :]: value for name, value in figures.items() if name.startswith(stem)}
-        columns.setdefault(w.name, published).append((w.inversion, found))
+        columns.setdefault(w.name, published).append((w.inversion, w.figures()))
     needed = _LABEL_WIDTH + _COLUMN_WIDTH * sum(len(group) for group in columns.values())
     for page in [list(columns)] if needed <= width else [[name] for name in columns]:
         named = [

@@ -108,8 +108,8 @@ def compare(
 def _spreads(one: Evaluation) -> dict[str, float]:
     """How far each figure goes from one repeat to the next, by its name; of none that is not known."""
     found = {}
-    for w in one.waveforms:
-        stem, spread = f"{w.name}.{w.inversion}", w.error_spread_percent
+    for stem, w in zip(one.stems, one.waveforms, strict=False):
+        spread = w.error_spread_percent
         if w.scaled.mean_abs_error_percent > 0:
             found[f"{stem}.mean_error_reduction_percent"] = 100.0 * spread / w.scaled.mean_abs_error_percent
         for drive in ("scaled", "compensated"):

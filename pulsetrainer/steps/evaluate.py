@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,7 @@ from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES
 from pulsetrainer.steps.one_thread import one_thread
 
+_REPEATED = re.compile(r"#\d+(?=\.)")  # the number of a name that is there again
 BEYOND = 0.005  # of the model's range: an input further out than this was never identified
 
 
@@ -266,7 +268,8 @@ class Breach:
 def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) -> tuple[Breach, ...]:
     """Return the metrics that are outside their two-sided bounds; names as in ``Evaluation.figures``.
 
-    UsageError where a bound names a metric that the evaluation does not have.
+    A bound holds for all playbacks of a pulse by an inversion, and all models of a name. UsageError where it
+    names a metric that the evaluation does not have.
     """
     figures = evaluation.figures()
     unknown = [name for name in bounds if name not in figures]
@@ -276,7 +279,8 @@ def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) 
             hint=f"it has {', '.join(sorted(figures)[:4])}, ...",
         )
     return tuple(
-        Breach(name, figures[name], low, high)
-        for name, (low, high) in bounds.items()
-        if not low <= figures[name] <= high
+        Breach(name, value, low, high)
+        for bound, (low, high) in bounds.items()
+        for name, value in figures.items()
+        if bound in (name, _REPEATED.sub("", name)) and not low <= value <= high
     )

@@ -16,6 +16,7 @@ from pulsetrainer.core.memory import positive_saturation
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.store import read
+from pulsetrainer.report.text import tables_of
 from pulsetrainer.steps.compare import compare
 from pulsetrainer.steps.evaluate import breaches, evaluate
 
@@ -118,6 +119,25 @@ def test_a_bound_holds_on_both_sides():
     with pytest.raises(UsageError) as caught:
         breaches(evaluation, {"none.such": (0.0, 1.0)})
     assert "none.such" in caught.value.message
+
+
+def test_a_pulse_that_was_played_twice_has_all_its_figures():
+    """By one inversion: each in the table, under a name of its own, and none is kept from a bound."""
+    good = read(FOLDER / "played.h5", Playback)
+    weak = replace(good.compensated, output=0.9 * good.compensated.output)
+    both = evaluate([replace(good, compensated=weak), good])
+    metric = "compensated.mean_abs_error_percent"
+    worse, better = (one.compensated.mean_abs_error_percent for one in both.waveforms)
+    assert worse > 1.5 * better
+    figures = both.figures()
+    assert (figures[f"pulse.continuous.{metric}"], figures[f"pulse.continuous#2.{metric}"]) == (worse, better)
+    (table,) = tables_of(both)
+    shown = [row[1:] for row in table.rows]
+    assert (worse, better) in shown
+    for order in ([replace(good, compensated=weak), good], [good, replace(good, compensated=weak)]):
+        (broken,) = breaches(evaluate(order), {f"pulse.continuous.{metric}": (0.0, 1.2 * better)})
+        assert broken.value == worse
+    assert {m.better for m in compare([both, both], everything=True)} == {None}
 
 
 def test_models_are_compared_by_their_place():
