@@ -161,13 +161,14 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
             f"`resample` must be a rate above 0, got {rate_Hz:g} Hz", hint="for instance `resample` 1000"
         )
     step = steps_of(run.time_s).median if rate_Hz is None else 1.0 / rate_Hz
-    count = int(np.floor((run.time_s[-1] - run.time_s[0]) / step + 1e-9)) + 1
+    with np.errstate(over="ignore"):  # then it is infinite
+        count = np.floor((run.time_s[-1] - run.time_s[0]) / step + 1e-9) + 1
     if not 2 <= count <= MOST_SAMPLES:
         raise UsageError(
-            f"resampling to steps of {step:.3g} s would make {count} samples of {run.input.size}",
+            f"resampling to steps of {step:.3g} s would make {count:.6g} samples of {run.input.size}",
             hint="choose another rate",
         )
-    even = run.time_s[0] + np.arange(count) * step
+    even = run.time_s[0] + np.arange(int(count)) * step
     return replace(
         run,
         time_s=even,

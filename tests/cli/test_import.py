@@ -128,6 +128,7 @@ def test_time_stamps_stay_as_they_are_unless_asked(run, tmp_path, columns):
     assert "filled with straight lines" in done.err
     assert run(*_words("pneu_oring_3bar", "--resample", "50", "-o", "half.h5")).code == 0
     assert run(*_words("pneu_oring_3bar", "--resample", "often", "-o", "x.h5")).code == 2
+    assert run(*_words("pneu_oring_3bar", "--resample", "1e308", "-o", "x.h5")).code == 2
     t, u, _ = columns
     with h5py.File(tmp_path / "run.h5") as file:
         np.testing.assert_array_equal(file["time"], t)
