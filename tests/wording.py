@@ -205,6 +205,7 @@ NOTES = {
     "leaves much": ("% of the span", "the noise from sample to sample", "pulsetrainer diagnose"),
     "zeros differ": ("shifted against each other",),
     "no time": ("no time",),
+    "nothing gained": ("in 1 pass:", "none was better than the first"),
     "follows half the range": ("% of 0.75 A",),
     "stronger": ("the force moved by +5", "(limit 1.5 %)"),
     "changed": ("(limit 0.", "next", "identify again", "temperature"),

@@ -239,8 +239,12 @@ def _repeats(noise: float, error: float) -> int:
 def _note(tried: list[_Pressed], best: int) -> str:
     """Say what was gained, and what is left."""
     first, kept = tried[0].errors, tried[best].errors
-    return (
-        f"refined in {len(tried)} passes: the mean error fell from {first.mean_abs_error_percent:.2f} to "
-        f"{kept.mean_abs_error_percent:.2f} % of full force in pass {best + 1}, which is kept; the noise "
-        f"alone gives {kept.noise_percent:.2f} %"
+    gained = (
+        f"the mean error fell from {first.mean_abs_error_percent:.2f} to {kept.mean_abs_error_percent:.2f} % "
+        f"of full force in pass {best + 1}, which is kept"
+        if best
+        else "none was better than the first, which is kept, with a mean error of "
+        f"{kept.mean_abs_error_percent:.2f} % of full force"
     )
+    passes = "1 pass" if len(tried) == 1 else f"{len(tried)} passes"
+    return f"refined in {passes}: {gained}; the noise alone gives {kept.noise_percent:.2f} %"

@@ -9,6 +9,7 @@ import pytest
 
 import pulsetrainer as pt
 from program import pulsetrainer
+from wording import tells
 
 KEPT = Path(__file__).parents[1] / "data/files-0.1"
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the bench needs a pty")
@@ -34,6 +35,13 @@ def test_a_refined_drive_is_better_where_it_is_played(tmp_path):
     assert pulsetrainer(tmp_path, "plot", "refined.h5", "-o", "refined.png").code == 0
     shown = pulsetrainer(tmp_path, "show", "refined.h5", "--json")
     assert f"pass {kept} of {len(passes)}" in str(shown.json)
+
+
+def test_a_first_pass_alone_gains_nothing_and_says_so(tmp_path):
+    """No error fell: the drive is kept as it was."""
+    done = pulsetrainer(tmp_path, "refine", KEPT / "drive.h5", "--passes", 1, "-o", "refined.h5")
+    assert done.code == 0, done.err
+    tells(done.err, "nothing gained")
 
 
 @pytest.mark.parametrize(
