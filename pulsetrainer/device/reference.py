@@ -19,12 +19,14 @@ def ticks_per_sample(rate_Hz: float, tick_rate_Hz: float) -> int:
     """
     if not (np.isfinite(rate_Hz) and rate_Hz > 0):
         raise ArgumentError(f"a sample rate of {rate_Hz} Hz is not possible", hint="1000 Hz is usual")
-    exact = tick_rate_Hz / rate_Hz
+    most = codes.MAX_TICKS_PER_SAMPLE
+    exact = min(tick_rate_Hz / rate_Hz, most + 1.0)
     ticks = round(exact)
-    if ticks < 1 or ticks > codes.MAX_TICKS_PER_SAMPLE or abs(exact - ticks) > 1e-9 * exact:
-        nearest = tick_rate_Hz / min(max(ticks, 1), codes.MAX_TICKS_PER_SAMPLE)
+    if not 1 <= ticks <= most or abs(exact - ticks) > 1e-9 * exact:
+        nearest = tick_rate_Hz / min(max(ticks, 1), most)
         raise ArgumentError(
-            f"the reference's rate of {rate_Hz:g} Hz does not divide the device's {tick_rate_Hz:g} Hz",
+            f"the reference's rate of {rate_Hz:g} Hz does not divide the device's {tick_rate_Hz:g} Hz "
+            f"by a whole number up to {most}",
             hint=f"resample it to {nearest:g} Hz",
         )
     return ticks

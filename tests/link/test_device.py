@@ -159,6 +159,8 @@ def test_real_speed_is_the_wall_clock(pulse):
         ([], 1000, "shape"),
         ([[0.1]], 1000, "shape"),
         ([0.1], 3000, "3000 Hz does not divide the device's 10000 Hz"),
+        ([0.1], 0.5, "by a whole number up to 10000"),
+        ([0.1], 1e-305, "by a whole number up to 10000"),
         ([0.1], 0, "not possible"),
         ([0.1], np.inf, "not possible"),
         (np.zeros(901), 1, "900"),
