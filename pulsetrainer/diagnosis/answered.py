@@ -20,6 +20,7 @@ from pulsetrainer.artefacts import (
 from pulsetrainer.artefacts.units import unit_of, with_unit
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
@@ -84,7 +85,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         extended=state.extended,
         extended_rms_percent=float("nan")
         if state.extended is None
-        else rms_of(state, state.extended) * of_samples / scale.span,
+        else rms_of(state, state.extended, undone(state)) * of_samples / scale.span,
         input_unit=model.input_unit,
         output_unit=model.output_unit,
         input_quantity=model.input_quantity,
@@ -127,8 +128,11 @@ def _words(given: Given) -> Words:
     }
 
 
-def rms_of(state: State, model: Model) -> float:
-    """Rms error of a model, as given or extended, over the single samples with weight, as measured."""
+def rms_of(state: State, model: Model, undone: Sequence[FloatArray] = ()) -> float:
+    """Rms error of a model, as given or extended, over the single samples with weight, as measured.
+
+    ``undone`` holds what faults of the measurement did to each record (n,), which is no error of a model.
+    """
     question, errors = state.question, []
     for k, own in enumerate(question.records):
         masked = masked_by(own, [firing for record, firing in state.firings if record == k])
@@ -137,8 +141,32 @@ def rms_of(state: State, model: Model) -> float:
         said = predict(model, even.input, even.step) * model.polarity
         if stamps is not None:
             said = np.interp(stamps, np.arange(said.size) * even.step, said)
-        errors.append((said - own.output)[masked.sample_weight > 0])
+        fault = undone[k] if undone else 0.0
+        errors.append((said + fault - own.output)[masked.sample_weight > 0])
     return root_mean_square(np.concatenate(errors))
+
+
+def faults_of(state: State) -> tuple[Term, ...]:
+    """Return the faults of the measurement in the model that goes on, which can be taken out of a record."""
+    terms = () if state.repeated is None else state.repeated.terms
+    return tuple(term for term in terms if term.cause.id in state.correctable)
+
+
+def undone(state: State) -> list[FloatArray]:
+    """Return what these faults did to each record, at its samples (n,), polarity 1; empty without faults."""
+    faults, fitted, question = faults_of(state), state.repeated, state.question
+    if fitted is None or not faults:
+        return []
+    others = [term for term in fitted.terms if term not in faults]
+    with_them, without = (fitted.simulator.full(terms) for terms in (fitted.terms, others))
+    found = []
+    for k, (own, record) in enumerate(zip(question.records, state.problem.records, strict=True)):
+        effect = state.scale.span * (with_them[k] - without[k])
+        seconds = state.scale.second * record.step * np.arange(effect.size)
+        stamps = question.stamps[k] if question.stamps else None
+        at = own.step * np.arange(own.output.size) if stamps is None else stamps - stamps[0]
+        found.append(np.interp(at, seconds, effect))
+    return found
 
 
 def _noise_of(state: State) -> float:
@@ -221,7 +249,8 @@ def extended_model(state: State, model: Model) -> Model:
     assert state.question.given is not None
     assert state.repeated is not None
     scale, words = state.scale, _words(state.question.given)
-    behind = static_behind(state.repeated, lasting, model, scale)
+    known = [t for t in state.repeated.terms if t in lasting or t in faults_of(state)]
+    behind = static_behind(state.repeated, known, model, scale)
     found = behind.identified.operator
     remembered = [one.output if model.form == "dual" else one.input for one in behind.records]
     return Model(

@@ -39,6 +39,7 @@ def question_of(
     *called, model_name = names or (*(f"run {k}" for k in range(1, len(runs) + 1)), "the model")
     records, notes, fingerprints = [], [], []
     stamps: list[FloatArray | None] = []
+    corrected: list[tuple[str, ...]] = []
     for name, run in zip(called, runs, strict=True):
         _check_fits(name, run, model_name, model)
         for part in run.parts(LIMITS.least_samples):
@@ -46,6 +47,7 @@ def question_of(
             records.append(record)
             fingerprints.append(part.fingerprint)
             stamps.append(times)
+            corrected.append(run.corrected)
             words = first_stroke_words(record.input, record.output, low, high)
             notes += [f"{name}: {words}"] if words else []
         if not run.complete:
@@ -55,7 +57,7 @@ def question_of(
         for run in runs
     )
     given = Given(model, runs[0].input_quantity, runs[0].output_quantity, ours, tuple(fingerprints))
-    return Question(records, low, high, rng, quick, progress, given, tuple(notes), stamps)
+    return Question(records, low, high, rng, quick, progress, given, tuple(notes), stamps, corrected)
 
 
 def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:

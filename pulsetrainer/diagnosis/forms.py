@@ -46,12 +46,13 @@ def base_of(model: Model, scale: Scale) -> Static | None:
     return base
 
 
-def static_behind(found: Fitted, lasting: Sequence[Term], model: Model, scale: Scale) -> StaticFit:
+def static_behind(found: Fitted, known: Sequence[Term], model: Model, scale: Scale) -> StaticFit:
     """Return the static part of a model in the form of ``model``, fitted to what causes leave of the records.
 
     It is identified as any model is, with its own levels, smoothing and polarity, in the units of the record.
-    What the causes that are not ``lasting`` did to the records is taken out but for its mean: where the zero
-    will be on another day nobody knows, and its mean is the best guess.
+    What causes that are not ``known`` (properties of the device, and faults of the measurement that can be
+    taken out of a record) did to the records is taken out but for its mean: where the zero will be on another
+    day nobody knows, and its mean is the best guess.
     """
     problem, terms = found.problem, found.terms
     signals, kept = [], []
@@ -60,7 +61,7 @@ def static_behind(found: Fitted, lasting: Sequence[Term], model: Model, scale: S
         problem.frames,
         found.simulator.inner(terms),
         found.simulator.full(terms),
-        found.simulator.full(lasting),
+        found.simulator.full(known),
         strict=True,
     ):
         u = input_noise.clean(scale.inputs(seen_input(terms, record.output, frame))).input

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import library, settled
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
 
@@ -17,14 +18,16 @@ def check(
     second: float = 1.0,
     stamps: FloatArray | None = None,
     polarity: int = 1,
+    corrected: Sequence[str] = (),
 ) -> list[Firing]:
     """Ask every gate about a record as it was measured; ``low`` and ``high`` are the identified range.
 
     Wild samples are found first and taken out for the others; a gate is not asked where one has fired that
-    blinds it.
+    blinds it, nor about what was taken out of the record already (``corrected``) or is left of that.
     """
     raw = Raw(record, low, high, second, stamps, polarity=polarity)
-    causes = [cause for cause in library().values() if cause.stage == "record"]
+    out = settled(corrected)
+    causes = [one for one in library().values() if one.stage == "record" and one.id not in out]
     fired: dict[str, Firing] = {}
     for cause in sorted(causes, key=lambda one: not one.wild):
         if not any(name in fired for name in cause.blinded_by):

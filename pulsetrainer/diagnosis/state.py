@@ -53,6 +53,7 @@ class Question:
     given: Given | None = None
     notes: tuple[str, ...] = ()  # what a person should know about the records
     stamps: Sequence[FloatArray | None] = ()  # s, (n,) times of the samples of each record; None: even steps
+    corrected: Sequence[tuple[str, ...]] = ()  # ids of the causes that were taken out of each record
 
     @property
     def timed(self) -> bool:

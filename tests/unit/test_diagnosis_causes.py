@@ -458,6 +458,19 @@ def test_gates_do_not_see_what_blinds_them():
     assert "stick-slip" not in names
 
 
+@pytest.mark.parametrize(
+    ("corrected", "fired"),
+    [((), True), (("outliers",), True), (("quantisation",), False), (("stick-slip",), False)],
+)
+def test_gates_are_not_asked_about_what_was_taken_out(corrected, fired):
+    """Nor about what is left of coarse steps: flat runs and jumps."""
+    from pulsetrainer.diagnosis import gates
+
+    y, u = _stairs(30, 0.5)
+    found = gates.check(_raw(y, u).record, 0.0, 3.0, corrected=corrected)
+    assert ("stick-slip" in [one.cause for one in found]) is fired
+
+
 def test_every_text_of_a_gate_has_its_figures():
     """The words of each firing, with numbers in them."""
     y, u = _stairs(30, 0.5)

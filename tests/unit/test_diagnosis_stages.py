@@ -639,6 +639,16 @@ def test_of_several_curves_one_gives_its_place_to_a_listed_cause(monkeypatch, fi
     assert after.current.names == (("creep", "unlisted") if named else ("unlisted",))
 
 
+@pytest.mark.parametrize(("corrected", "asked"), [((), True), ((("quantisation",),), False)])
+def test_no_jumps_are_sought_in_coarse_steps_that_were_smoothed(monkeypatch, corrected, asked):
+    """What the model leaves of them has flat runs still."""
+    seen = []
+    monkeypatch.setattr(type(CAUSE["stick-slip"]), "gate_left", lambda self, fitted: seen.append(1))
+    state = _state(_fit(500.0))
+    jumps.stage(replace(state, question=replace(state.question, corrected=corrected)))
+    assert bool(seen) is asked
+
+
 @pytest.mark.parametrize("again", [None, FIRED])
 def test_jumps_that_the_causes_found_make_are_withdrawn(monkeypatch, again):
     """The gate is asked about the output less what the causes add to the hysteresis."""
@@ -1210,7 +1220,7 @@ def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, la
 def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, better):
     """By three fifths of the 6 that its causes gain in the search: else nothing is added, and it is said."""
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
-    monkeypatch.setattr(extension, "rms_of", lambda state, model: after if model == "extended" else 10.0)
+    monkeypatch.setattr(extension, "rms_of", lambda state, model, known: after if model == "extended" else 10)
     state = _state(_fit(500.0, "creep"))
     state = replace(state, repeated=state.current, question=replace(state.question, given=Given("given")))
     found = extension.stage(state)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import inspect
 import pkgutil
+from collections.abc import Iterable
 from functools import cache
 
 from pulsetrainer.artefacts import Cause as Found
@@ -39,6 +40,11 @@ def cause_named(name: str) -> Cause:
             hint="update pulsetrainer, or extend the model again",
         )
     return library()[name]
+
+
+def settled(corrected: Iterable[str]) -> set[str]:
+    """Return the ids of causes that were taken out of a record, and of those that what is left looks like."""
+    return {name for one in corrected for name in (one, *library()[one].leaves)}
 
 
 def upright_values(one: Found | Extension, polarity: int) -> Values:

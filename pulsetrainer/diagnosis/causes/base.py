@@ -125,6 +125,7 @@ class Cause:
     by_contrast: ClassVar[bool] = False  # sought where the weights cannot hold it: see ``congruency``
     wild: ClassVar[bool] = False  # its gate finds samples that the other gates must not see
     blinded_by: ClassVar[tuple[str, ...]] = ()  # causes whose firing makes its gate blind
+    leaves: ClassVar[tuple[str, ...]] = ()  # causes whose gates see what is left of it in a corrected record
     doubted: ClassVar[bool] = False  # others also set off its gate: it is asked again without what they add
     # what it means
     lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model

@@ -37,6 +37,7 @@ class Quantisation(Cause):
     lasting = False
     jagged = True
     corrects = True
+    leaves = ("saturation", "stick-slip")
     size = "of one step of the {output}"
     texts: ClassVar[Mapping[str, str]] = {
         "gate": "the output changes in steps of {step:.4g}{in_y}, {percent:.2g} % of its span"

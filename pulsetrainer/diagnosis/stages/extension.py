@@ -3,15 +3,17 @@
 The search judges a model on averages, with a free offset and begin. What is used is a model on levels of its
 own, from rest. It is made here, and must predict the very records better than the model as given, by at least
 three fifths of what the causes gain in the search; else nothing is added to that. What gains less was already
-under way before the record, and begins otherwise in the next.
+under way before the record, and begins otherwise in the next. What a fault of the measurement did to the
+records, and can be taken out of them, counts on neither side.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.answered import extended_model, rms_of
+from pulsetrainer.diagnosis.answered import extended_model, faults_of, rms_of, undone
 from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -22,9 +24,11 @@ def stage(state: State) -> State:
         return state
     given = state.question.given.model
     extended = extended_model(state, given)
-    before, after = rms_of(state, given), rms_of(state, extended)
     assert state.repeated is not None
-    gained = (state.baseline.squares - state.repeated.squares) / state.floor.count
+    known, faults = undone(state), faults_of(state)
+    before, after = rms_of(state, given, known), rms_of(state, extended, known)
+    plain = refit(state.problem, faults, state.repeated) if faults else state.baseline
+    gained = (plain.squares - state.repeated.squares) / state.floor.count
     if before**2 - after**2 > LIMITS.gain_in_use * max(gained, 0.0) * state.scale.span**2:
         return replace(state, extended=extended)
     figures = {"given": PERCENT * before / state.scale.span, "extended": PERCENT * after / state.scale.span}

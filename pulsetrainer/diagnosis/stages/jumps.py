@@ -3,14 +3,15 @@
 A hum also jumps between flat runs. So a gate that other causes can set off as well is asked once more about
 the output less what the causes found add to it, and its finding is dropped if it no longer fires. The other
 way round, sticking smaller than the noise shows only in what the model leaves: where that is relevant, and
-nothing jagged was found, the residual is searched for it (decision 044).
+nothing jagged was found, the residual is searched for it (decision 044). What was taken out of a record is
+not asked about, nor what is left of that: coarse steps that were smoothed still have flat runs.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import library, settled
 from pulsetrainer.diagnosis.raw import Firing, Raw
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.state import State
@@ -22,7 +23,9 @@ def stage(state: State) -> State:
     state = replace(state, firings=kept)
     if state.current.squares - state.floor.squares <= state.floor.relevant or state.jagged:
         return state
-    left = [cause.gate_left(state.current) for cause in library().values() if cause.stage == "record"]
+    out = settled(name for one in state.question.corrected for name in one)
+    asked = [one for one in library().values() if one.stage == "record" and one.id not in out]
+    left = [cause.gate_left(state.current) for cause in asked]
     seen = [(0, _in_its_unit(firing, state.scale)) for firing in left if firing is not None]
     return replace(state, firings=(*kept, *seen))
 

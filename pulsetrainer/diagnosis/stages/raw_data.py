@@ -47,9 +47,10 @@ def stage(question: Question) -> Masked:
     stamps = question.stamps or [None] * len(question.records)
     second = second_of(question.records, stamps, low, high)
     polarity = 1 if question.given is None else question.given.model.polarity
+    corrected = question.corrected or [()] * len(question.records)
     found = [
-        gates.check(record, low, high, second, times, polarity)
-        for record, times in zip(question.records, stamps, strict=True)
+        gates.check(record, low, high, second, times, polarity, known)
+        for record, times, known in zip(question.records, stamps, corrected, strict=True)
     ]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
     even = [evenly(record, times) for record, times in zip(masked, stamps, strict=True)]
