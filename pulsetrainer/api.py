@@ -16,7 +16,8 @@ from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device import opening as _device
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.gains import Gains
-from pulsetrainer.device.limits import Limits
+from pulsetrainer.device.limits import Limits, Rehearsal
+from pulsetrainer.device.schemes import find_opener
 from pulsetrainer.errors import ArgumentError, UsageError
 from pulsetrainer.files import provenance, pulses, store
 from pulsetrainer.files.run_from_table import run_from_table
@@ -96,8 +97,7 @@ def open_device(
     ...     device.info.current_limit_A
     1.5
     """
-    entries = {} if tuned is None else read_tuned(tuned)
-    known = {serial: _gains(tuned, entry) for serial, entry in entries.items()}
+    known = _known_gains(tuned)
     device = _device.open_device(port, limits=limits)
     try:
         if device.info.serial in known:
@@ -106,6 +106,31 @@ def open_device(
         device.close()
         raise
     return device
+
+
+def check_device(port: str | None, *, limits: Limits | None = None, tuned: Path | str | None = None) -> None:
+    """Refuse what ``open_device`` would for a device as it is delivered, without touching a port.
+
+    Raises
+    ------
+    UsageError
+        The text names no kind of port or no such bench, or the file of settings cannot be used.
+    ArgumentError
+        A limit is not positive, or above the device's own.
+    """
+    _known_gains(tuned)
+    text = port or _device.DEFAULT_PORT
+    find_opener(text)
+    if text.startswith("bench:"):
+        from pulsetrainer.simulation.bench import check_bench  # noqa: PLC0415 - what a bench alone needs
+
+        check_bench(text)
+    Rehearsal(limits or Limits())
+
+
+def _known_gains(tuned: Path | str | None) -> dict[str, Gains]:
+    entries = {} if tuned is None else read_tuned(tuned)
+    return {serial: _gains(tuned, entry) for serial, entry in entries.items()}
 
 
 def _gains(path: Path | str | None, entry: dict[str, Any]) -> Gains:

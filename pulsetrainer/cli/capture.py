@@ -96,6 +96,7 @@ def capture(
         if earlier is not None:
             at = samples_played(earlier.run, course)
         if dry_run:
+            job.check_device(port, limits)
             planned = plan(played, levels=levels, condition=condition, repeats=repeats, limits=limits, at=at)
             length = f"{planned.seconds - planned.conditioning_s:.1f} s"
             if condition:

@@ -107,6 +107,12 @@ class Job:
                 self.notes([f"{said}, which plays with those delivered; `pulsetrainer tune` measures it"])
         return device
 
+    def check_device(self, port: str | None, limits: Limits) -> None:
+        """Refuse what ``open_device`` would by port, limits and file of settings alone: nothing is opened."""
+        from pulsetrainer.api import check_device
+
+        check_device(port, limits=limits, tuned=self._settings)
+
     def view(self, *ends: float, live: bool) -> LoopView | None:
         """Return a live view with these ends of its axes, if asked for and the terminal can show it."""
         if not live or self.screen.as_json or not sys.stderr.isatty():
@@ -205,7 +211,13 @@ class Job:
         self.write(path, render(noun, provenance_json=header.provenance.to_json(), **said))
 
     def would(
-        self, what: str, plan: Any, port: str | None, out: Path, rows: Mapping[str, Any], **besides: Any
+        self,
+        what: str,
+        plan: Any,
+        port: str | None,
+        out: Path | None,
+        rows: Mapping[str, Any],
+        **besides: Any,
     ) -> None:
         """Say what a dry run would have played, and where; ``besides`` is for JSON."""
         from pulsetrainer.device.opening import DEFAULT_PORT
@@ -214,7 +226,7 @@ class Job:
         where = redact(port or DEFAULT_PORT)
         self.screen.result(besides | plain(plan) | {"port": where, "output": out, "dry_run": True})
         current = f"{plan.peak_current_A:.3f} A at most, {plan.rms_current_A:.3f} A rms"
-        title = f"would {what} on {where} and write {out}; nothing was done"
+        title = f"would {what} on {where}{f' and write {out}' if out else ''}; nothing was done"
         self.screen.facts(title, {**rows, "current": current})
 
     def wrote(self, *paths: Path | None) -> None:

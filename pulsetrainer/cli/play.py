@@ -60,7 +60,8 @@ def play(
 
     waveform, limits = job.load(drive, pt.Waveform), Limits(limit_current_A, limit_force_N)
     if dry_run:
-        planned = plan(waveform, repeats=repeats, limits=limits)
+        job.check_device(port, limits)
+        planned = plan(waveform, repeats=repeats, track_heat=track_heat, limits=limits)
         rows = {
             "repeats": f"{repeats} of each drive, {planned.seconds:.1f} s in all",
             "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",

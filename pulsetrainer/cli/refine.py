@@ -42,6 +42,7 @@ def refine(
     check(waveform, passes)
     limits = Limits(limit_current_A, limit_force_N)
     if dry_run:
+        job.check_device(port, limits)
         planned = plan(waveform, passes=passes, limits=limits)
         rows = {
             "passes": f"at most {passes}, {planned.seconds:.1f} s in all",

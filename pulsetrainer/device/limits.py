@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.device import codes
-from pulsetrainer.device.heat import added, cooled, in_words, wait_s
+from pulsetrainer.device.heat import added, in_words, wait_s
+from pulsetrainer.device.plausibility import least_force
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
 from pulsetrainer.device.trace import FloatArray
 from pulsetrainer.errors import ArgumentError, DeviceError
@@ -86,9 +87,12 @@ class Rehearsal:
     def __init__(self, limits: Limits) -> None:
         self.current_A, self.force_N = limits.within(CURRENT_A, FORCE_N)
         self._heat = 0.0
+        self.most_heat = 0.0  # so far, of the heat at which the device stops
 
     def play(self, reference_A: FloatArray, rate_Hz: float, expected_N: FloatArray | None = None) -> None:
         """Take a reference (n,) in A as played, and the force (n,) in N that it is foretold to give.
+
+        None: no more than that a lower force would be implausible.
 
         Raises
         ------
@@ -113,13 +117,36 @@ class Rehearsal:
                 f"the coil would be too hot: at {100 * self._heat:.0f} % of its limit by then",
                 hint="play fewer repeats, or at a lower current",
             )
-        gained = float(added(current, rate_Hz)[-1])
-        self._heat = cooled(self._heat, current.size / rate_Hz) + gained
-        if expected_N is not None and np.nanmax(expected_N) > self.force_N:
+        self._warm(current, rate_Hz)
+        if expected_N is None:
+            expected_N = least_force(current, rate_Hz)  # where nobody foretells it
+        self._press(expected_N, "raise `limit_force_N`, or invert again with a lower `force_max`")
+
+    def stream(self, reference_A: FloatArray, rate_Hz: float, expected_N: FloatArray) -> None:
+        """Take the next piece (n,) of a reference without a known end as played; otherwise as ``play``."""
+        current = codes.CURRENT_UNIT_A * to_wire(reference_A, limit_A=self.current_A).astype(float)
+        self._press(expected_N, "raise `limit_force_N`, or take a model that was captured with less current")
+        if self._warm(current, rate_Hz) > 1.0:
             raise DeviceError(
-                f"the device would stop: {np.nanmax(expected_N):.3g} N are foretold, and its force limit is "
+                "the device would stop: the coil becomes too hot in the middle of a beat",
+                hint="press pulses at a lower amplitude, or shorter beats",
+            )
+
+    def _warm(self, current_A: FloatArray, rate_Hz: float) -> float:
+        """Add the heat of a current (n,), and return the most that there is meanwhile."""
+        left = self._heat * np.exp(-np.arange(1, current_A.size + 1) / (rate_Hz * codes.HEAT_TAU_S))
+        heat = left + added(current_A, rate_Hz)
+        self._heat, most = float(heat[-1]), float(heat.max())
+        self.most_heat = max(self.most_heat, most)
+        return most
+
+    def _press(self, expected_N: FloatArray, hint: str) -> None:
+        most = float(np.nanmax(expected_N))
+        if most > self.force_N:
+            raise DeviceError(
+                f"the device would stop: {most:.3g} N are foretold, and its force limit is "
                 f"{self.force_N:g} N",
-                hint="raise `limit_force_N`, or invert again with a lower `force_max`",
+                hint=hint,
             )
 
 

@@ -143,6 +143,13 @@ def _outside(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> 
     )
 
 
+def least_force(current_A: FloatArray, rate_Hz: float) -> FloatArray:
+    """Return the force (n,) in N below which a reading would be implausible, for a current (n,) in A."""
+    least, _ = _recent(np.arange(current_A.size) / rate_Hz, current_A)
+    force: FloatArray = _LEAST_GAIN * np.interp(least, _CURRENT_A, _RISING_N) - _OFFSET_N
+    return force
+
+
 def judge_against(time_s: FloatArray, expected_N: FloatArray, force_N: FloatArray) -> str:
     """Return what is wrong with a force, shapes (n,), that a model has foretold; empty if it is plausible.
 
@@ -189,7 +196,7 @@ def judge_repeat(time_s: FloatArray, earlier_N: FloatArray, force_N: FloatArray)
 
 def _recent(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the least and the most of what a lagging force may still belong to, at each sample."""
-    width = max(1, round(_SETTLES_S / float(np.median(np.diff(time_s)))))
+    width = max(1, round(_SETTLES_S / float(np.median(np.diff(time_s))))) if time_s.size > 1 else 1
     back = (width - 1) // 2  # the filter's window then ends at the sample itself
     from scipy.ndimage import maximum_filter1d, minimum_filter1d  # noqa: PLC0415 - what plays nothing waits
 

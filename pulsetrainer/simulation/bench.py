@@ -62,6 +62,18 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
     )
 
 
+def check_bench(port: str) -> None:
+    """Raise UsageError where a bench would refuse its parameters; none is started."""
+    options = parse_bench(port)
+    if not (options.settings or options.breaks):
+        return  # nothing that has to be compiled to be asked
+    executable = firmware_executable()
+    words = [str(executable), *options.arguments(), "--list"]  # read before it lists
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode == 2:
+        raise _explain(executable, options, done.stderr.strip())
+
+
 class Bench:
     """A running firmware process; ``path`` is its pty."""
 

@@ -189,6 +189,11 @@ def _setting(name: str, text: str) -> float:
     return value
 
 
+def serial_of(port: str) -> str:
+    """Return the serial number of a simulated device by its port; empty for one that must be asked."""
+    return {"bench": "BENCH-0", "qemu": "QEMU-0"}.get(port.partition(":")[0], "")
+
+
 def check_port(port: str) -> None:
     """Raise UsageError where a simulated device's port makes no sense; others are tried when they open."""
     if port.startswith("bench:"):

@@ -49,20 +49,31 @@ def thermometer_of(model: Model | None, device: Device, *, asked: bool | None) -
     DeviceError
         It is asked for and the device does not tell the duty.
     """
+    coil = coil_of(model, asked=asked)
+    if coil is None or model is None:
+        return None
+    if asked is None and (coil.serial not in ("", device.info.serial) or not device.tells_duty):
+        return None
+    device.needs_duty("tracking heat")
+    check_same_device(model, device)
+    return thermometer(coil, thermal_of(model))
+
+
+def coil_of(model: Model | None, *, asked: bool | None) -> Coil | None:
+    """Return the coil whose heat is tracked on the model's own device; None where none is.
+
+    ``asked`` and DataError are those of ``thermometer_of``.
+    """
     if asked is False or model is None:
         return None
-    coil, thermal = model.coil, thermal_of(model)
-    unknown = coil is None or thermal is None or coil.serial not in ("", device.info.serial)
-    if asked is None and (unknown or not device.tells_duty):
+    if asked is None and thermal_of(model) is None:
         return None
-    if coil is None:
+    if asked and model.coil is None:
         raise DataError(
             "the model does not know the coil's resistance at calibration, so no heat can be tracked",
             hint="capture and identify with firmware that tells the duty (protocol 2.2)",
         )
-    device.needs_duty("tracking heat")
-    check_same_device(model, device)
-    return thermometer(coil, thermal)
+    return model.coil
 
 
 def thermometer(coil: Coil, thermal: Thermal | None) -> Thermometer:

@@ -21,7 +21,7 @@ from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.steps.heat import Correction, take_temperature, thermometer_of
+from pulsetrainer.steps.heat import Correction, coil_of, take_temperature, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -41,11 +41,15 @@ class Plan:
     rms_current_A: float
 
 
-def plan(drive: Waveform, *, repeats: int = 5, limits: Limits | None = None) -> Plan:
+def plan(
+    drive: Waveform, *, repeats: int = 5, track_heat: bool | None = None, limits: Limits | None = None
+) -> Plan:
     """Return what ``play`` would play on a device as it is delivered, with a cold coil; fails as ``play``."""
     _check(drive, repeats)
     rehearsal = Rehearsal(limits or Limits())
     _check_peak(drive, rehearsal.current_A)
+    if _is_remade(drive, track_heat):
+        coil_of(drive.model, asked=track_heat)
     for _ in range(repeats):
         rehearsal.play(drive.compensated, drive.rate_Hz, drive.predicted)
         rehearsal.play(drive.scaled, drive.rate_Hz)
@@ -152,14 +156,9 @@ class _Tracked:
 
     @classmethod
     def of(cls, drive: Waveform, device: Device, asked: bool | None) -> _Tracked | None:
-        model = drive.model
-        if drive.inversion == "closest-match":
-            if asked:
-                raise DataError(
-                    f"the drive {drive.name} is a closest match; for another heat it cannot be made again",
-                    hint="invert with `method` continuous or extended",
-                )
+        if not _is_remade(drive, asked):
             return None
+        model = drive.model
         thermometer = thermometer_of(model, device, asked=asked)
         if thermometer is None or model is None:
             return None
@@ -178,6 +177,18 @@ class _Tracked:
         there = np.isfinite(once.duty)
         reference, current, _ = once.rows
         self._thermometer.add(time_s[there], reference[there], current[there], once.duty[there])
+
+
+def _is_remade(drive: Waveform, asked: bool | None) -> bool:
+    """Whether a drive can be made again for another heat; DataError where that is asked for and it cannot."""
+    if drive.inversion != "closest-match":
+        return True
+    if asked:
+        raise DataError(
+            f"the drive {drive.name} is a closest match; for another heat it cannot be made again",
+            hint="invert with `method` continuous or extended",
+        )
+    return False
 
 
 def _check(drive: Waveform, repeats: int) -> None:

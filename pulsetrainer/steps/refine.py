@@ -108,6 +108,8 @@ def refine(
 
     def respond(current: FloatArray) -> FloatArray:
         whole = whole_current(drive, part, current, limit if tried else None)
+        if tried:  # what is learnt may ask for more than the drive did
+            whole = np.minimum(whole, device.info.current_limit_A)
         pressed = _press(drive, device, whole, tried, smooth)
         tried.append(pressed)
         progress(len(tried) / passes)
@@ -146,7 +148,7 @@ def plan(drive: Waveform, *, passes: int = 5, limits: Limits | None = None) -> P
 
     Its first pass is rehearsed, and its currents are those of the drive: what is learnt nobody knows before.
     """
-    check(drive, passes)
+    invertible(check(drive, passes), drive.rate_Hz)
     rehearsal = Rehearsal(limits or Limits())
     for _ in range(FEWEST):
         rehearsal.play(drive.compensated, drive.rate_Hz, drive.predicted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -78,6 +79,19 @@ def test_a_dry_run_says_what_refining_would_play_and_fails_as_it(tmp_path, words
         assert done.json["dry_run"] is True
         assert done.json["peak_current_A"] == pytest.approx(float(drive.compensated.max()))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_learnt_stays_below_the_limit_in_force(tmp_path):
+    """A drive that the limit just lets through is refined to its end: what it lacks in current stays."""
+    drive = pt.load(KEPT / "drive.h5")
+    low = replace(drive, compensated=0.5 * drive.compensated)
+    limit = float(low.compensated.max()) + 1e-4
+    pt.save(replace(low, predicted=drive.model.predict(low.compensated, 1e-3)), tmp_path / "low.h5")
+    words = ("refine", "low.h5", "-o", "out.h5", "--passes", 2, "--limit-current", limit, "--json")
+    done = pulsetrainer(tmp_path, *words)
+    assert done.code == 0, done.err
+    assert len(done.json["passes"]) == 2
+    assert pt.load(tmp_path / "out.h5").compensated.max() <= limit
 
 
 def test_what_was_learnt_is_asked_for_in_another_pulse(tmp_path):
