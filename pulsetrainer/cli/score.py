@@ -12,9 +12,15 @@ from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from pulsetrainer.artefacts import Quiz
+    from pulsetrainer.cli.hands import Steered
+    from pulsetrainer.core.pulses import Shape
     from pulsetrainer.device.identity import DeviceInfo
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.provenance import Header
+    from pulsetrainer.steps.conductor import Decide
     from pulsetrainer.steps.performance import Performed
 
 
@@ -42,6 +48,40 @@ def say(job: Job, path: Path, html: Path | None, session: pt.Session) -> None:
     job.screen.result(said | {"complete": session.complete, "fault": session.fault, "html": html, **quizzed})
     job.screen.facts(f"{path}: session", {k: v for k, v in facts(session).items() if v is not None} | right)
     job.wrote(html)
+
+
+def would(
+    job: Job,
+    out: Path,
+    model: pt.Model,
+    shapes: Sequence[Shape],
+    chosen: Decide,
+    steered: Steered,
+    asked: Mapping[str, Any],
+    device: tuple[str | None, Limits],
+) -> None:
+    """Say what a session would press, as far as no key changes it."""
+    from pulsetrainer.steps.session import plan
+
+    port, limits = device
+    job.check_device(port, limits)
+    with job.working("rehearsing") as progress:
+        planned = plan(
+            model, shapes, chosen, limits=limits, watch=lambda s: progress(steered.share(s)), **asked
+        )
+    pauses = sum(pause.seconds for pause in planned.pauses)
+    limit = f"the device stays on for {planned.longest_part_s / 60:.0f} minutes in one go"
+    rows = {
+        "beats": ", ".join(f"{count} of {name}" for name, count in planned.pulses.items()),
+        "length": f"{planned.seconds / 60:.1f} minutes, {planned.seconds:.0f} s",
+        "parts": f"{planned.parts}: {limit}",
+        "heat": f"{planned.heat_percent:.0f} % of the limit at most, from cold; "
+        + (f"{len(planned.pauses)} pauses to cool, {pauses:.0f} s in all" if pauses else "no pause to cool"),
+        "force": f"{planned.peak_force_N:.2f} N at most, by the model",
+    }
+    if limits.force_N is not None:
+        rows["force"] += f"; above {limits.force_N:g} N the device stops"
+    job.would("press a session", planned, port, out, rows)
 
 
 def tell(

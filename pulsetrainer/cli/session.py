@@ -11,12 +11,13 @@ import typer
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Out, Overwrite, Port, TrackHeat
+from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port, TrackHeat
 from pulsetrainer.files.settings import variable
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import FloatArray
-    from pulsetrainer.cli.hands import Hands
+    from pulsetrainer.cli.hands import Steered
+    from pulsetrainer.core.pulses import Shape
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.session_recorder import SessionRecorder
     from pulsetrainer.steps.performance import Now, Performed
@@ -77,6 +78,7 @@ def session(
     port: Port = None,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
+    dry_run: DryRun = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
@@ -102,9 +104,11 @@ def session(
         if str(path) == name:
             job.uses(path)
     from pulsetrainer.cli.hands import Hands
+    from pulsetrainer.cli.score import would
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.changes import read_answers, read_changes
+    from pulsetrainer.files.pulses import read_pulse
     from pulsetrainer.steps.programme import Change
     from pulsetrainer.steps.session import check_model, programme
 
@@ -121,7 +125,11 @@ def session(
         beats=beats,
         changes=[Change(*row) for row in read_changes(changes, hands.names)] if changes else (),
         quiz=quiz,
-        answers=read_answers(answers, hands.names, quiz) if answers else hands.answer,
+        answers=read_answers(answers, hands.names, quiz)
+        if answers
+        else (lambda _: (hands.names[0], 0.0))  # at once, since nobody knows when
+        if dry_run
+        else hands.answer,
         seed=seed,
     )
     asked = {
@@ -130,25 +138,27 @@ def session(
         "track_heat": track_heat,
     }
     limits = Limits(limit_current_A, limit_force_N)
-    by_key = answers is None
-    _press(job, (out, html), loaded, names, chosen, asked, hands, (port, limits), seed=seed, by_key=by_key)
+    shapes = [read_pulse(name) for name in names]
+    steered = hands.steer(job.screen, chosen, shapes, by_key=answers is None)
+    if dry_run:
+        would(job, out, loaded, shapes, chosen, steered, asked, (port, limits))
+        return
+    _press(job, (out, html), loaded, shapes, chosen, steered, asked, (port, limits), seed=seed)
 
 
 def _press(
     job: Job,
     outputs: tuple[Path, Path | None],
     model: pt.Model,
-    pulses: list[str],
+    shapes: list[Shape],
     chosen: Programme | Blind,
+    steered: Steered,
     asked: dict[str, Any],
-    hands: Hands,
     device: tuple[str | None, Limits],
     *,
     seed: int,
-    by_key: bool,
 ) -> None:
     from pulsetrainer.cli.score import tell
-    from pulsetrainer.files.pulses import read_pulse
     from pulsetrainer.files.session_recorder import SessionRecorder
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, perform
@@ -156,9 +166,7 @@ def _press(
     out, html = outputs
     said = "a session that was cut off: look with `pulsetrainer show {left}`, and delete it"
     job.left_over(out, pt.Session, said)
-    shapes = [read_pulse(name) for name in pulses]
     blind = chosen if isinstance(chosen, Blind) else None
-    steered = hands.steer(job.screen, chosen, shapes, by_key=by_key)
     with job.open_device(*device) as opened:
         info = opened.info
         header = job.header("Session under way")

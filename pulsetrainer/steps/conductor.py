@@ -85,6 +85,17 @@ class Given:
 
 
 @dataclass(frozen=True, slots=True)
+class Pause:
+    """A rest that nobody asked for: the coil has to cool."""
+
+    at_s: float
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"a pause of {self.seconds:.0f} s after {self.at_s:.0f} s, to let the coil cool"
+
+
+@dataclass(frozen=True, slots=True)
 class _Place:
     """Where the next beat begins."""
 
@@ -133,7 +144,7 @@ class Conductor:
         self.clipped = 0
         self.ended = False
         self.idle = True  # the part holds neither a beat nor a rest
-        self.notes: list[str] = []
+        self.pauses: list[Pause] = []
 
     @property
     def time_s(self) -> float:
@@ -179,7 +190,7 @@ class Conductor:
 
     def _cooling(self, longest_s: float) -> float:
         seconds = min(self._cooling_s * float(np.log(self._heat / COOL)), longest_s)
-        self.notes.append(f"a pause of {seconds:.0f} s after {self.time_s:.0f} s, to let the coil cool")
+        self.pauses.append(Pause(self.time_s, seconds))
         return seconds
 
     # --- pieces ------------------------------------------------------------------------------------

@@ -26,6 +26,8 @@ from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach
 from pulsetrainer.steps.recording import PAUSE_S
 
+# what is wrong where a part ends without a beat, and what to do
+TOO_SHORT = ("the device stays on too short for one beat", "raise its on-time limit, or press shorter beats")
 _FOLLOW = 0.3  # of a new reading of the loss: a window of a second is noisier than the room
 
 
@@ -101,6 +103,32 @@ class Performed:
         }
 
 
+def conductor_of(
+    model: Model,
+    pulses: Sequence[Pulse],
+    reach: Reach,
+    rhythm: Rhythm,
+    decide: Decide,
+    give: Callable[[Given], None],
+    *,
+    heat: float = 0.0,
+    loss: Callable[[], float] = lambda: 0.0,
+) -> Conductor:
+    """Return the conductor for our device, whose coil has this heat."""
+    return Conductor(
+        extended_of(model),
+        pulses,
+        reach,
+        rhythm,
+        decide,
+        give,
+        heat=heat,
+        heated=added,
+        cooling_s=HEAT_TAU_S,
+        loss=loss,
+    )
+
+
 class Performance:
     """A session under way: what is given out, what comes back."""
 
@@ -123,17 +151,8 @@ class Performance:
         self._pulses = tuple(pulse.name for pulse in pulses)
         self._ledger = Ledger(self._pulses)
         self._reach = reach
-        self._conductor = Conductor(
-            extended_of(model),
-            pulses,
-            reach,
-            rhythm,
-            decide,
-            self._ledger.give,
-            heat=device.heat,
-            heated=added,
-            cooling_s=HEAT_TAU_S,
-            loss=lambda: self._loss,
+        self._conductor = conductor_of(
+            model, pulses, reach, rhythm, decide, self._ledger.give, heat=device.heat, loss=lambda: self._loss
         )
         self._begun = 0  # sample at which the part began
         self._begins_s: list[float] = []  # of the parts, without the pauses between them
@@ -167,8 +186,7 @@ class Performance:
             if self._implausible:
                 self._fault, self._remedy = self._implausible, FORCE_REMEDY
             if not self._fault and not conductor.ended and conductor.idle:
-                self._fault = "the device stays on too short for one beat"
-                self._remedy = "raise its on-time limit"
+                self._fault, self._remedy = TOO_SHORT
         return self._so_far()
 
     def _so_far(self) -> Performed:
@@ -185,7 +203,7 @@ class Performance:
             underruns=self._underruns,
             fault=self._fault,
             remedy=self._remedy,
-            notes=tuple(self._conductor.notes),
+            notes=tuple(map(str, self._conductor.pauses)),
             pulses=self._pulses,
             temperature=tuple(self._warmth),
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,16 +14,18 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, check_peak
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
-from pulsetrainer.steps.conductor import RATE_HZ, Decide, Play, Reach
-from pulsetrainer.steps.heat import rest_force, take_temperature, thermometer_of
+from pulsetrainer.steps.conductor import RATE_HZ, Decide, Given, Pause, Play, Reach
+from pulsetrainer.steps.heat import coil_of, rest_force, take_temperature, thermometer_of
 from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.one_thread import one_thread
-from pulsetrainer.steps.performance import Now, Performance, Performed, Sink
+from pulsetrainer.steps.performance import TOO_SHORT, Now, Performance, Performed, Sink, conductor_of
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.quiz import Answer, Blind, from_list, order
+from pulsetrainer.steps.recording import PAUSE_S
 from pulsetrainer.steps.stopped import raise_if_stopped
 
 LEAD_S = 3.0  # of current that is ready before its time: how long this computer may be busy with other things
@@ -93,6 +96,12 @@ def reach_of(model: Model, pulses: Sequence[Pulse], rates: Sequence[float | None
     return Reach(max(lows), min(highs))
 
 
+def _check_top(model: Model, limit_A: float) -> None:
+    """Refuse a model beyond the current limit: every part begins with all of its range."""
+    hint = f"give a model that was captured with `current_max_A` at most {limit_A:g}"
+    check_peak(model.edges, limit_A, hint=hint)
+
+
 @one_thread
 def perform(
     model: Model,
@@ -130,6 +139,7 @@ def perform(
         The device cannot be talked to, or its firmware knows no open-ended waves.
     """
     check_model(model)
+    _check_top(model, device.info.current_limit_A)
     beating = [Pulse(shape) for shape in pulses]
     reach = reach_of(model, beating, rates)
     meter = thermometer_of(model, device, asked=track_heat)
@@ -140,6 +150,77 @@ def perform(
         reach = Reach(reach.low, rest + (reach.high - rest) * left)
     performance = Performance(model, device, beating, rhythm, decide, sink, reach, watch, meter)
     return performance.run(lead_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What would be pressed."""
+
+    beats: int
+    seconds: float  # all pauses included
+    pulses: dict[str, int]  # beats of each
+    parts: int  # in which the device is on: no longer than it stays on in one go
+    longest_part_s: float  # that it may take
+    pauses: tuple[Pause, ...]  # to let the coil cool
+    heat_percent: float  # the most, of that at which the device stops
+    peak_force_N: float  # foretold by the model
+    peak_current_A: float
+    rms_current_A: float
+
+
+@one_thread
+def plan(
+    model: Model,
+    pulses: Sequence[Shape],
+    decide: Decide,
+    *,
+    rhythm: Rhythm,
+    rates: Sequence[float | None] = (None,),
+    track_heat: bool | None = None,
+    limits: Limits | None = None,
+    watch: Callable[[float], None] = lambda _time_s: None,
+) -> Plan:
+    """Return what ``perform`` would press on a device as it is delivered, with a cold coil; fails as it.
+
+    ``watch`` is called with each time, s, up to which it is known.
+    """
+    check_model(model)
+    rehearsal = Rehearsal(limits or Limits())
+    _check_top(model, rehearsal.current_A)
+    beating = [Pulse(shape) for shape in pulses]
+    reach = reach_of(model, beating, rates)
+    coil_of(model, asked=track_heat)
+    count = dict.fromkeys((pulse.name for pulse in beating), 0)
+    square = peak_A = peak_N = 0.0
+
+    def give(piece: Given) -> None:
+        nonlocal square, peak_A, peak_N
+        rehearsal.stream(piece.input, RATE_HZ, piece.predicted)
+        square += float(np.sum(piece.input**2))
+        peak_A, peak_N = max(peak_A, float(piece.input.max())), max(peak_N, float(piece.predicted.max()))
+        if piece.beat is not None:
+            count[beating[piece.beat.play.pulse].name] += 1
+
+    conductor = conductor_of(model, beating, reach, rhythm, decide, give)
+    parts, longest_s = 0, ON_TIME_S - RAMP_S
+    while not conductor.ended:
+        beats, parts = sum(count.values()), parts + 1
+        for _ in conductor.part(longest_s):
+            watch(conductor.time_s)
+        if not conductor.ended and sum(count.values()) == beats:
+            raise_if_stopped(*TOO_SHORT, "the session")
+    return Plan(
+        beats=sum(count.values()),
+        seconds=conductor.time_s + PAUSE_S * (parts - 1),
+        pulses=count,
+        parts=parts,
+        longest_part_s=longest_s,
+        pauses=tuple(conductor.pauses),
+        heat_percent=100.0 * rehearsal.most_heat,
+        peak_force_N=peak_N,
+        peak_current_A=peak_A,
+        rms_current_A=float(np.sqrt(square / (conductor.time_s * RATE_HZ))),
+    )
 
 
 def session(

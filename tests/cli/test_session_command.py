@@ -54,6 +54,44 @@ def test_the_contract(run, tmp_path):
     assert "vary by" not in page
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--beats", 5, "--pulses", "normal,bifid", "--variability", 5, "--seed", 3),
+        ("--minutes", 3, "--pulses", "hot.csv"),
+        ("--pulses", "normal,bifid", "--quiz", 2, "--answers", "a.txt"),
+    ],
+    ids=["beats", "too hot to go on", "a quiz"],
+)
+def test_a_dry_run_tells_beats_length_current_and_pauses_as_they_come(run, tmp_path, words):
+    """No port is opened: that it is absent does not matter; nothing is written."""
+    level = [0.2, *[1.0] * 15]
+    (tmp_path / "hot.csv").write_text("t_s,p\n" + "".join(f"{k / 20},{p}\n" for k, p in enumerate(level)))
+    (tmp_path / "a.txt").write_text("normal\nbifid\n")
+    before = sorted(tmp_path.iterdir())
+    plan = run(*SHORT, *words, "--dry-run", "--json", "--port", "/dev/absent").json
+    assert sorted(tmp_path.iterdir()) == before
+    done = run(*SHORT, *words, "--json")
+    assert done.code == 0, done.err
+    kept = read(tmp_path / "s.h5", Session)
+    count = np.bincount(kept.beats.pulse, minlength=len(kept.pulses)).tolist()
+    assert (plan["dry_run"], plan["beats"], plan["parts"]) == (True, done.json["beats"], done.json["parts"])
+    assert plan["pulses"] == dict(zip(kept.pulses, count, strict=True))
+    assert plan["seconds"] == pytest.approx(kept.time_s[-1], abs=0.01)
+    assert plan["peak_current_A"] == pytest.approx(kept.reference.max(), abs=2e-4)
+    assert plan["rms_current_A"] == pytest.approx(np.sqrt(np.mean(kept.reference**2)), rel=1e-3)
+    assert plan["peak_force_N"] == pytest.approx(kept.output.max(), rel=0.1)
+    said = [f"a pause of {p['seconds']:.0f} s after {p['at_s']:.0f} s" for p in plan["pauses"]]
+    assert [note.partition(",")[0] for note in kept.notes] == said
+    assert bool(said) is ("hot.csv" in words)
+
+
+def test_a_dry_run_of_a_quiz_by_key_needs_the_keys_too(run):
+    """Where there is no terminal, both are refused."""
+    words = (*SHORT, "--pulses", "normal,bifid", "--quiz", 2)
+    refusal(run(*words, "--dry-run", "--json"), 2, "a quiz without a terminal")
+
+
 def test_a_session_in_a_file_has_its_sheet_made_again(run, tmp_path):
     """The same page as when it was pressed; models, bounds and an evaluation do not go with it."""
     assert run(*SHORT, "--beats", 3, "--variability", 4, "--html", "s.html").code == 0

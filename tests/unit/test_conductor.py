@@ -174,7 +174,7 @@ def test_a_long_session_comes_in_parts_that_end_at_rest(model):
 def test_a_hot_coil_gets_a_pause_and_it_is_said(model):
     """Long enough to cool, before the device would stop by itself."""
     conductor, given, _ = _conducted(model, Programme(NAMES[:1], beats=15), heat=0.8, warms=0.1)
-    assert conductor.notes
+    assert conductor.pauses
     rests = [g for g in given if g.beat is None and np.all(g.input == model.edges[0]) and g.input.size > 2000]
     assert rests
     assert rests[0].input.size / RATE_HZ == pytest.approx(TAU_S * np.log(HOT / COOL), rel=0.2)
