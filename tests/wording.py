@@ -183,6 +183,13 @@ MESSAGES = {
     "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),
     "interrupted": Message("stopped by you", None, got=KEPT),
     "no beat was pressed": Message("no beat was pressed", "pulsetrainer tune", "{file}"),
+    "too small a range to tune": Message(
+        "a coil cannot be measured",
+        "--limit-current",
+        expected="below {least} A",
+        got="the limit in force is {limit} A",
+    ),
+    "a quiz without a terminal": Message("a quiz is answered by key", "in a file", got="no live view"),
     "another supply": Message("does not fit the voltage", "the supply", "during {during}"),
     "limit below the model's range": Message(
         "the current goes up", "--limit-current", expected="the limit in force is {limit} A", got="{got} A"

@@ -10,10 +10,14 @@ import typer
 import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Overwrite, Port, positive
+from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Overwrite, Port, positive
 
 if TYPE_CHECKING:
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.steps.tune import Tuned
+
+
+_FOLLOWED = ("normal", "bifid")  # where no drive is given
 
 
 def tune(
@@ -42,6 +46,7 @@ def tune(
     ] = [],  # noqa: B006
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
+    dry_run: DryRun = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
@@ -63,14 +68,54 @@ def tune(
 
     drives = [job.load(path, pt.Waveform) for path in drive]
     limits = Limits(limit_current_A, limit_force_N)
+    if dry_run:
+        _would(job, drives, supply_V, port, limits, out, overwrite=overwrite)
+        return
     with job.working("tuning") as progress, pt.open_device(port, limits=limits) as device:
         if out is not None:
             check_tuned(out, device.info.serial, overwrite=overwrite)
-        found = pt.tune(device, pulses=drives or ("normal", "bifid"), supply_V=supply_V, progress=progress)
+        found = pt.tune(device, pulses=drives or _FOLLOWED, supply_V=supply_V, progress=progress)
     if out is not None:
         measured = {"resistance_ohm": found.resistance_ohm, "inductance_H": found.inductance_H}
         write_tuned(out, found.serial, measured | found.gains.values(), overwrite=overwrite)
     _show(job, out, found)
+
+
+def _would(
+    job: Job,
+    drives: list[pt.Waveform],
+    supply_V: float | None,
+    port: str | None,
+    limits: Limits,
+    out: Path | None,
+    *,
+    overwrite: bool,
+) -> None:
+    from pulsetrainer.api import check_device
+    from pulsetrainer.device.opening import DEFAULT_PORT
+    from pulsetrainer.files.pulses import read_pulse
+    from pulsetrainer.files.tuning import check_tuned, read_tuned
+    from pulsetrainer.simulation.options import serial_of
+    from pulsetrainer.steps.tune import plan
+
+    check_device(port, limits=limits)
+    serial = serial_of(port or DEFAULT_PORT)
+    if out is not None and out.exists():
+        known = ", ".join(read_tuned(out))
+        if serial:
+            check_tuned(out, serial, overwrite=overwrite)
+        elif known and not overwrite:
+            job.notes([f"{out} has gains for {known}: a device of that serial needs --overwrite"])
+    planned = plan(drives or list(map(read_pulse, _FOLLOWED)), supply_V=supply_V, limits=limits)
+    rows = {
+        f"{number}. {step.what}": f"{step.seconds:.2f} s up to {step.peak_A:.3f} A"
+        + ("" if step.gains == "none" else f", gains {step.gains}")
+        for number, step in enumerate(planned.steps, 1)
+    }
+    rows["length"] = f"{planned.seconds:.1f} s at most"
+    rows["limits"] = f"{planned.current_limit_A:g} A; above {planned.force_limit_N:g} N the device stops"
+    rows["heat"] = f"{planned.heat_percent:.0f} % of the limit at most, from cold"
+    job.would("tune the device", planned, port, out, rows)
 
 
 def _show(job: Job, out: Path | None, found: Tuned) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
 from pulsetrainer.core import coil as electrical
@@ -11,7 +14,7 @@ from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, Fault
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.trace import Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
-from pulsetrainer.errors import DeviceError
+from pulsetrainer.errors import ArgumentError, DeviceError
 from pulsetrainer.steps.loop_gains import OPEN_LOOP
 from pulsetrainer.steps.progress import Progress
 from pulsetrainer.steps.stopped import raise_if_stopped
@@ -22,12 +25,15 @@ _HOLD_S = 0.17
 _REST_S = 0.3
 _FIRST_DUTY = 0.03  # 0.14 V at 24 V: a coil of 0.1 ohm takes 1.4 A
 _STEP_UP = 1.6  # from one try to the next
+_TRIES = 1 + math.ceil(math.log(1.0 / _FIRST_DUTY, _STEP_UP))  # at most
 _ENOUGH_A = 0.15
+_FIRST_SHARE = 0.2  # of the range, where that is less
 _TOP_SHARE = 0.7  # of the range, for the holds that are measured
 _HOLDS = (0.15, 0.35, 0.65, 1.0)  # of that
 _NO_CURRENT_A = 0.02
 _SHORTED_OHM = 1.0
 _UNEXPLAINED_A = 0.004  # ten times what noise and converter leave
+_LEAST_A = 0.05  # of a range: below it the coil draws what noise and diode hide
 _FINGER_N = 1.5  # zero of the sensor 0.6 N, what a stroke leaves behind 0.8 N
 _MOVES_N = 0.25  # of means over 50 ms at rest: a finger trembles, a table does not
 _SHIFTED_N = 1.2  # from the first rest to the last
@@ -52,6 +58,42 @@ _REMEDY: dict[int, str] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One of the things that tuning plays."""
+
+    what: str
+    peak_A: float
+    seconds: float
+    gains: str = "none"  # of the current loop; none: the reference is the duty
+
+
+def planned(range_A: float) -> list[tuple[str, FloatArray]]:
+    """Return what a measurement asks for at most, up to the coil that is known: what, and current (n,) in A.
+
+    Its currents are those that a duty is to drive; ArgumentError where the range is too small to measure in.
+    """
+    check_range(range_A)
+    hold = round(_HOLD_S * RATE_HZ)
+    look = np.full(hold * _TRIES, min(_ENOUGH_A, _FIRST_SHARE * range_A))
+    holds = [("coil", np.full(hold, share * _TOP_SHARE * range_A)) for share in _HOLDS]
+    return [rest_of(), ("first look", look), *holds, rest_of()]
+
+
+def rest_of() -> tuple[str, FloatArray]:
+    """Return what is played to look at the force at rest."""
+    return "rest", np.zeros(round(_REST_S * RATE_HZ))
+
+
+def check_range(range_A: float) -> None:
+    """Raise ArgumentError for a current limit in force that leaves no current to measure a coil with."""
+    if range_A < _LEAST_A:
+        raise ArgumentError(
+            f"a coil cannot be measured below {_LEAST_A:g} A; the limit in force is {range_A:g} A",
+            hint=f"raise `limit_current_A` to {_LEAST_A:g} or more",
+        )
+
+
 class Measurement:
     """What is played on one device to know its coil; ``supply_known``: ohms are not by the diode's drop."""
 
@@ -59,11 +101,13 @@ class Measurement:
         self._device, self._supply_known, self._progress = device, supply_known, progress
         self._dt_s = 1.0 / device.info.tick_rate_Hz
         self._range_A = device.info.current_limit_A
+        # the duty goes over the wire as a current, which the limit cuts off
+        self._most = min(1.0, self._range_A / CURRENT_UNIT_A / DUTY_FULL - 0.001)
         self.notes: list[str] = []
 
     def rest(self) -> float:
         """Return the force at rest, N; refuse one where nothing should press, or that moves."""
-        trace = self.play(np.zeros(round(_REST_S * RATE_HZ)), "the look at the force at rest")
+        trace = self.play(rest_of()[1], "the look at the force at rest")
         width = round(MEAN_S * RATE_HZ)
         means = trace.force_N[: trace.force_N.size // width * width].reshape(-1, width).mean(axis=1)
         force = float(means.mean())
@@ -88,7 +132,7 @@ class Measurement:
 
     def _hold(self, duty: float) -> tuple[Hold, Trace]:
         """Return what a constant duty drives, from rest, at every tick."""
-        counts = round(min(duty, 1.0) * DUTY_FULL) + 1  # 65535/65536 of it is rounded down
+        counts = round(min(duty, self._most) * DUTY_FULL) + 1  # 65535/65536 of it is rounded down
         reference = np.full(round(_HOLD_S * RATE_HZ), counts * CURRENT_UNIT_A)
         trace = self._device.play(np.append(0.0, reference), RATE_HZ, decimation=1)
         last = int(trace.tick[-1]) + 1 if trace.tick.size else 1
@@ -98,15 +142,14 @@ class Measurement:
 
     def _first_look(self) -> Hold:
         """Raise the duty until a current flows."""
-        most = min(1.0, self._range_A / CURRENT_UNIT_A / DUTY_FULL - 0.001)
         duty = _FIRST_DUTY
         while True:
             hold, trace = self._hold(duty)
             self._check_first(trace, duty)
             top = float(np.nanmax(hold.current_A))
-            if top >= min(_ENOUGH_A, 0.2 * self._range_A) or duty >= most:
+            if top >= min(_ENOUGH_A, _FIRST_SHARE * self._range_A) or duty >= self._most:
                 break
-            duty = min(duty * _STEP_UP, most)
+            duty = min(duty * _STEP_UP, self._most)
         if top < _NO_CURRENT_A:
             raise _no_coil(duty)
         return hold

@@ -12,13 +12,14 @@ import numpy as np
 from pulsetrainer.artefacts import Waveform
 from pulsetrainer.core import coil as electrical
 from pulsetrainer.core.coil import Coil, Margins
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.device.gains import Gains
-from pulsetrainer.device.limits import check_peak
+from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.loop_gains import MOST_PROPORTIONAL, OPEN_LOOP, from_wire, to_wire
-from pulsetrainer.steps.measure_coil import MEAN_S, RATE_HZ, Measurement
+from pulsetrainer.steps.measure_coil import MEAN_S, RATE_HZ, Measurement, Step, check_range, planned, rest_of
 from pulsetrainer.steps.play import check_current
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -93,13 +94,7 @@ def tune(
     Interrupted
         Ctrl-C: the output was stopped first.
     """
-    if supply_V is not None:
-        positive(supply_V=supply_V)
-    for pulse in pulses:
-        if isinstance(pulse, Waveform):
-            check_current(pulse)
-            hint = "invert again with a lower `force_max`"
-            check_peak(pulse.compensated, device.info.current_limit_A, hint=hint)
+    _check(pulses, supply_V, device.info.current_limit_A)
     device.needs_duty("tuning")
     before = device.gains
     try:
@@ -108,6 +103,85 @@ def tune(
         device.stop()
         device.set_gains(before)
         raise
+
+
+def _check(pulses: Sequence[Shape | Waveform], supply_V: float | None, limit_A: float) -> None:
+    if supply_V is not None:
+        positive(supply_V=supply_V)
+    check_range(limit_A)
+    for pulse in pulses:
+        if isinstance(pulse, Waveform):
+            check_current(pulse)
+            check_peak(pulse.compensated, limit_A, hint="invert again with a lower `force_max`")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What would be played."""
+
+    steps: tuple[Step, ...]
+    seconds: float  # at most: the first look ends as soon as a current flows
+    current_limit_A: float
+    force_limit_N: float  # the force is known once it is measured
+    heat_percent: float  # the most, of that at which the device stops
+    peak_current_A: float
+    rms_current_A: float
+
+
+def plan(
+    pulses: Sequence[Shape | Waveform], *, supply_V: float | None = None, limits: Limits | None = None
+) -> Plan:
+    """Return what ``tune`` would play at most on a device as it is delivered, with a cold coil; fails as it.
+
+    What the coil, its supply and the force sensor are like nobody knows before.
+    """
+    rehearsal = Rehearsal(limits or Limits())
+    range_A = rehearsal.current_A
+    _check(pulses, supply_V, range_A)
+    names = ["sine", *(pulse.name for pulse in pulses)]
+    verified = list(zip(names, references(pulses, range_A), strict=True))
+    played = [(*one, "none") for one in planned(range_A)]
+    played += [(*one, gains) for gains in ("before", "new") for one in verified]
+    played += [("steps", step_reference(range_A), "new"), (*rest_of(), "none")]
+    steps = []
+    for what, current, gains in played:
+        rehearsal.play(current, RATE_HZ)
+        steps.append(Step(what, float(current.max()), current.size / RATE_HZ, gains))
+    currents = np.concatenate([current for _, current, _ in played])
+    return Plan(
+        steps=tuple(steps),
+        seconds=currents.size / RATE_HZ,
+        current_limit_A=range_A,
+        force_limit_N=rehearsal.force_N,
+        heat_percent=100.0 * rehearsal.most_heat,
+        peak_current_A=float(currents.max()),
+        rms_current_A=root_mean_square(currents),
+    )
+
+
+def references(pulses: Sequence[Shape | Waveform], range_A: float) -> list[FloatArray]:
+    """Return what is followed to verify, A: a sine of half the range, then the pulses over all of it."""
+    phase = 2.0 * math.pi * np.arange(round(2 * RATE_HZ / _SINE_HZ) + 1) * _SINE_HZ / RATE_HZ
+    middle, swing = _SINE
+    up = np.linspace(0.0, middle - swing, round(MEAN_S * RATE_HZ))
+    sine = np.concatenate((up, middle - swing * np.cos(phase), up[::-1]))
+    return [range_A * sine, *(_current(pulse, range_A) for pulse in pulses)]
+
+
+def _current(pulse: Shape | Waveform, range_A: float) -> FloatArray:
+    """Return the current (n,) of a pulse, A."""
+    if isinstance(pulse, Shape):
+        return train(pulse, periods=_BEATS, rate_Hz=RATE_HZ, low=0.0, high=range_A)
+    samples = np.arange(round(float(pulse.time_s[-1]) * RATE_HZ) + 1)
+    return np.interp(samples / RATE_HZ, pulse.time_s, pulse.compensated)
+
+
+def step_reference(range_A: float) -> FloatArray:
+    """Return some steps up and down, (n,) in A."""
+    low, high = (share * range_A for share in _STEP)
+    half = round(_STEP_HOLD_S * RATE_HZ)
+    one = np.concatenate((np.full(half, low), np.full(half, high)))
+    return np.concatenate((np.linspace(0.0, low, half), np.tile(one, _STEPS), np.linspace(low, 0.0, half)))
 
 
 class _Tuning:
@@ -134,18 +208,18 @@ class _Tuning:
         self._measurement.same_rest(rest_N)
         self._progress(0.4)
         ohm, henry, volts = self._scaled(coil)
-        references = self._references()
-        self._check_drivable(coil, references[1:], ohm, volts)
+        followed = references(self._pulses, self._range_A)
+        self._check_drivable(coil, followed[1:], ohm, volts)
         rule = electrical.tuned_gains(
             coil, self._dt_s, top_A=self._range_A, most_proportional=MOST_PROPORTIONAL
         )
         gains = to_wire(rule, self._dt_s)
         was = electrical.margins(coil, from_wire(before, self._dt_s), self._dt_s)
         now = electrical.margins(coil, from_wire(gains, self._dt_s), self._dt_s)
-        error_before = self._before(before, was, references)
+        error_before = self._before(before, was, followed)
         self._progress(0.7)
         device.set_gains(gains)
-        error = max(self._error_percent(reference) for reference in references)
+        error = max(self._error_percent(reference) for reference in followed)
         settle_ms, overshoot = self._step()
         self._measurement.same_rest(rest_N)
         self._progress(1.0)
@@ -202,22 +276,6 @@ class _Tuning:
 
     # --- verifying -------------------------------------------------------------------------------
 
-    def _references(self) -> list[FloatArray]:
-        """A sine of half the range, then the pulses over all of it."""
-        phase = 2.0 * math.pi * np.arange(round(2 * RATE_HZ / _SINE_HZ) + 1) * _SINE_HZ / RATE_HZ
-        pulses = [self._current(pulse) for pulse in self._pulses]
-        middle, swing = _SINE
-        up = np.linspace(0.0, middle - swing, round(MEAN_S * RATE_HZ))
-        sine = np.concatenate((up, middle - swing * np.cos(phase), up[::-1]))
-        return [self._range_A * sine, *pulses]
-
-    def _current(self, pulse: Shape | Waveform) -> FloatArray:
-        """Return the current (n,) of a pulse, A."""
-        if isinstance(pulse, Shape):
-            return train(pulse, periods=_BEATS, rate_Hz=RATE_HZ, low=0.0, high=self._range_A)
-        samples = np.arange(round(float(pulse.time_s[-1]) * RATE_HZ) + 1)
-        return np.interp(samples / RATE_HZ, pulse.time_s, pulse.compensated)
-
     def _before(self, gains: Gains, sound: Margins, references: Sequence[FloatArray]) -> float | None:
         """Return the error with the gains from before, where they are fit to be tried on this coil."""
         if not (sound.stable and sound.gain >= _SOUND_GAIN and sound.phase_deg >= _SOUND_PHASE):
@@ -241,9 +299,7 @@ class _Tuning:
         """Settling time, ms, and overshoot, % of the step, in the mean of some steps."""
         low, high = (share * self._range_A for share in _STEP)
         half = round(_STEP_HOLD_S * RATE_HZ)
-        one = np.concatenate((np.full(half, low), np.full(half, high)))
-        run_up = np.linspace(0.0, low, half)
-        reference = np.concatenate((run_up, np.tile(one, _STEPS), np.linspace(low, 0.0, half)))
+        reference = step_reference(self._range_A)
         trace = self._measurement.play(reference, "the verification", decimation=1)
         told = np.full(reference.size * round(self._device.info.tick_rate_Hz / RATE_HZ), np.nan)
         told[trace.tick] = trace.current_A

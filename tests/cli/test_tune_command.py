@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import pulsetrainer as pt
+from pulsetrainer.device.limits import Limits
+from wording import refusal
 
 KEYS = {"resistance_ohm", "inductance_H", "gains", "tracking_percent", "settle_ms", "overshoot_percent"}
 MINE = '# mine\nlevels = 12  # few\n\n[limits]\ncurrent_A = 1.5\n\n[tuned."OTHER"]\npid_kp = 1\n'
@@ -27,6 +29,58 @@ def test_the_contract(run, tmp_path):
     assert entry == done.json["gains"] | {
         name: done.json[name] for name in ("resistance_ohm", "inductance_H")
     }
+
+
+def test_a_dry_run_says_what_is_played_and_touches_nothing(run, tmp_path):
+    """Steps, currents and times as in the tuning itself, at the limit in force; no port, no file."""
+    words = ("tune", "--limit-current", 1.2, "-o", "pulsetrainer.toml")
+    plan = run(*words, "--dry-run", "--json", "--port", "/dev/absent").json
+    assert list(tmp_path.iterdir()) == []
+    assert (plan["dry_run"], plan["current_limit_A"], plan["peak_current_A"]) == (True, 1.2, 1.2)
+    assert plan["seconds"] == pytest.approx(sum(step["seconds"] for step in plan["steps"]))
+    with pt.open_device("bench:", limits=Limits(1.2)) as device:
+        played, play = [], device.play
+
+        def noted(reference, rate_Hz, **more):
+            played.append((np.size(reference) / rate_Hz, float(np.max(reference))))
+            return play(reference, rate_Hz, **more)
+
+        device.play = noted
+        pt.tune(device)
+    looks = len(played) - len(plan["steps"]) + 1  # the first look is a play for each try
+    assert looks > 1
+    planned = [(step["seconds"], step["peak_A"]) for step in plan["steps"]]
+    assert played[0] == pytest.approx(planned[0])
+    assert sum(seconds for seconds, _ in played[1 : 1 + looks]) <= planned[1][0]
+    for (seconds, peak_A), one in zip(played[1 + looks :], plan["steps"][2:], strict=True):
+        assert seconds == pytest.approx(one["seconds"], abs=2e-3)
+        assert one["what"] == "coil" or peak_A == pytest.approx(one["peak_A"])  # a hold's is a duty
+    assert run(*words, "--dry-run").code == 0
+
+
+def test_a_dry_run_refuses_gains_that_are_there(run, tmp_path):
+    """Where the port tells which device it is; of another one it is said which devices the file knows."""
+    (tmp_path / "pulsetrainer.toml").write_text('[tuned."BENCH-0"]\npid_kp = 1\n')
+    words = ("tune", "-o", "pulsetrainer.toml", "--dry-run", "--json")
+    refused = run(*words)
+    assert (refused.code, refused.json["error"]["kind"]) == (2, "usage")
+    assert run(*words, "--overwrite").code == 0
+    elsewhere = run(*words, "--port", "/dev/absent")
+    assert (elsewhere.code, "BENCH-0" in elsewhere.err) == (0, True)
+
+
+def test_a_coil_is_measured_below_a_lowered_limit_that_its_duty_would_pass(run):
+    """A duty goes over the wire as a current: what the limit cuts off of it is done without."""
+    done = run("tune", "--port", "bench:?resistance=24", "--limit-current", 0.5, "--json")
+    assert done.code == 0, done.err
+    assert done.json["resistance_ohm"] == pytest.approx(24.0, rel=0.01)
+
+
+def test_a_limit_that_leaves_no_current_to_measure_is_refused(run):
+    """Before anything is driven, and in a dry run."""
+    for more in ((), ("--dry-run",)):
+        done = run("tune", "--limit-current", 0.04, "--json", *more)
+        refusal(done, 3, "too small a range to tune", limit="0.04", least="0.05")
 
 
 def test_an_earlier_entry_is_replaced_only_if_asked(run, tmp_path):
