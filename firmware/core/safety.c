@@ -88,7 +88,7 @@ uint8_t safety_before_arm(const struct safety *s)
     int32_t force_mN = s->slow_force >> SAFETY_ZERO_SHIFT;
     if (force_mN < SAFETY_ZERO_LOW_MN || force_mN > SAFETY_ZERO_HIGH_MN)
         return PT_FAULT_FORCE_ZERO;
-    return s->slow_current >> SAFETY_PLAUSIBLE_SHIFT > SAFETY_STRAY_100UA ? PT_FAULT_STRAY_CURRENT : PT_FAULT_NONE;
+    return s->not_off >= SAFETY_ARM_TICKS ? PT_FAULT_STRAY_CURRENT : PT_FAULT_NONE;
 }
 
 /* Counts consecutive ticks of a condition; true from the `limit`-th on. */

@@ -83,7 +83,7 @@
 #define SAFETY_CEILING_MARGIN_MN 1500
 #define SAFETY_NO_FORCE_MN 300 /* under the floor and no more than this: none at all */
 
-/* The sensors before a play, filtered over 32 ticks (3 ms). Force: the FSG15N1A's null is off by up to 15 mV, at
+/* The force before a play, filtered over 32 ticks (3 ms). The FSG15N1A's null is off by up to 15 mV, at
  * 0.24 mV a gram 0.61 N; what is left after a full stroke (remanence and friction 0.63 N, creep after 20 s another
  * 0.2 N, measured on 40 drawn devices) can only add: -0.75 to 1.75 N. */
 #define SAFETY_ZERO_SHIFT 5u
@@ -97,6 +97,7 @@
 #define SAFETY_STRAY_100UA 1000
 #define SAFETY_STRAY_TICKS 2000u
 #define SAFETY_OFF_TICKS 1000u
+#define SAFETY_ARM_TICKS 32u /* before a play: what flowed in the play before it is none of it */
 #define SAFETY_RELEASE_TICKS 5000u
 
 struct safety_limits {

@@ -377,6 +377,15 @@ static void the_sensors_are_looked_at_before_a_play(void)
             (void)safety_tick(&s, &in);
         CHECK_EQUAL(safety_before_arm(&s), rows[k].fault);
     }
+    normal(); /* the current of a run that is just over is none that flows now */
+    in.current_100uA = 10000;
+    for (int n = 0; n < 2000; n++)
+        (void)safety_tick(&s, &in);
+    in.armed = in.awaited = in.driving = false;
+    in.force_mN = in.current_100uA = 0;
+    for (int n = 0; n < 400; n++)
+        (void)safety_tick(&s, &in);
+    CHECK_EQUAL(safety_before_arm(&s), PT_FAULT_NONE);
     safety_init(&s, &kept, true, -900); /* the first reading of all counts, too */
     CHECK_EQUAL(safety_before_arm(&s), PT_FAULT_FORCE_ZERO);
 }

@@ -22,6 +22,7 @@ from pulsetrainer.device.codes import (
     ResetCause,
     State,
 )
+from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.session import RefusedError
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES
 
@@ -231,6 +232,14 @@ def test_a_force_sensor_that_does_not_read_zero(wire, offset):
     status = one.status()
     assert status.state == State.FAULT
     assert abs(status.fault_force - 1000 * offset) < 250
+
+
+def test_a_play_may_begin_as_soon_as_another_is_over():
+    """Whatever it ended at: its current counts for what flows before the next one no more."""
+    with open_device("bench:?speed=real") as device:
+        for _ in range(2):
+            trace = device.play(np.append(np.linspace(0.0, 1.0, 100), np.full(60, 1.0)), 1000)
+            assert trace.complete, trace.fault
 
 
 @everywhere
