@@ -181,7 +181,16 @@ MESSAGES = {
     "hang": Message("restarted in mid-play (cause: watchdog)", "power supply", got=KEPT),
     "port is gone": Message("is gone", "cable", "/dev/", got=KEPT),
     "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),
-    "interrupted": Message("stopped by you", None, got=KEPT),
+    "stopped with nothing": Message("stopped by you", "run the command again", got="nothing was written"),
+    "stopped with repeats": Message(
+        "stopped by you", "--overwrite", got="1 of 5 repeats were kept in run.h5"
+    ),
+    "stopped before a repeat": Message(
+        "stopped by you", "run the command again", got="run.h5 was not written"
+    ),
+    "stopped with beats": Message("stopped by you", "evaluate", got="beats were kept in run.h5"),
+    "stopped before a beat": Message("stopped by you", "run the command again", got="run.h5 was not written"),
+    "interrupted": Message("stopped by you", "--resume", got=KEPT),
     "no beat was pressed": Message("no beat was pressed", "pulsetrainer tune", "{file}"),
     "too small a range to tune": Message(
         "a coil cannot be measured",

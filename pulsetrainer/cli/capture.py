@@ -179,10 +179,13 @@ def _record(
             recorder.coil = ending.coil
             recorder.finish(complete=ending.complete)
         raise_if_stopped(ending.fault, ending.remedy, "the capture")
-    except (DeviceError, Interrupted) as error:
+    except (DeviceError, Interrupted, KeyboardInterrupt) as stopped:
+        error = Interrupted("stopped by you") if isinstance(stopped, KeyboardInterrupt) else stopped
         if recorder.samples:
-            error.message += f"; {recorder.samples} samples were kept in {out} (complete=false)"
-        raise
+            where = recorder.partial if recorder.partial.exists() else out
+            error.message += f"; {recorder.samples} samples were kept in {where} (complete=false)"
+            error.hint = error.hint or "go on with the same command and --resume"
+        raise error from stopped.__cause__
     return {
         "output": out,
         "signal": signal.name,

@@ -1,7 +1,8 @@
-"""A command whose errors about a file name the argument that the file was given as."""
+"""A command that adds to errors what only the command line knows: which argument, and what was written."""
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import shlex
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 from typer.core import TyperCommand
 
 from pulsetrainer.cli.next_step import MAKES
-from pulsetrainer.errors import AbsentError, ExistsError
+from pulsetrainer.errors import AbsentError, ExistsError, Interrupted
 from pulsetrainer.files.input_file import is_sound, near_names
 
 # what the file of an argument holds; others take any artefact, or a table
@@ -44,7 +45,7 @@ _NEAR = 0.7  # how alike a name must be to be taken for the one that was meant
 
 
 class Command(TyperCommand):
-    """A command that adds to an error about a file what only the command line knows."""
+    """A command that names the argument of a file, and says what there is after Ctrl-C."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command.
@@ -53,14 +54,33 @@ class Command(TyperCommand):
         ------
         PulsetrainerError
             As the command; a file that is absent, or in the way, is named with its argument.
+        Interrupted
+            Also where Ctrl-C came while nothing was played.
         """
+        before = _files(ctx)
         try:
             return super().invoke(ctx)
+        except (Interrupted, KeyboardInterrupt) as error:
+            stopped = error if isinstance(error, Interrupted) else Interrupted("stopped by you")
+            if not stopped.hint:  # the command has not said it
+                written = [str(path) for path, at in _files(ctx).items() if before.get(path) != at]
+                stopped.message += f"; {' and '.join(written) or 'nothing'} was written"
+                stopped.hint = "run the command again" + (" with --overwrite" if written else "")
+            raise stopped from error
         except (AbsentError, ExistsError) as error:
             given = _given_as(ctx, error.path)
             if given is not None:
                 _name(error, given, ctx)
             raise
+
+
+def _files(context: typer.Context) -> dict[Path, int]:
+    """Return the files that arguments name, each with the time of its last change."""
+    paths = [context.params.get(one.name or "") for one in context.command.params if one.type.name == "path"]
+    named = [Path(value) for value in paths if isinstance(value, str | Path)]
+    with contextlib.suppress(OSError):
+        return {path: path.stat().st_mtime_ns for path in named if path.is_file()}
+    return {}
 
 
 def _given_as(context: typer.Context, path: Path) -> Any:

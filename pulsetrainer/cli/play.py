@@ -82,12 +82,14 @@ def play(
             if not isinstance(error.kept, pt.Playback):
                 if isinstance(error, DeviceError | Interrupted):
                     error.message += f"; no repeat was whole, {out} was not written"
+                    error.hint = error.hint or "run the command again"
                 raise
             stopped, played = error, error.kept
     whole = played.compensated.output.shape[0]
     job.save(out, played, f"{_named(waveform)}, played on {info.serial}", device=job.device(info))
     if stopped is not None:
-        stopped.message += f"; {whole} of {repeats} repeats were kept in {out}"
+        stopped.message += f"; {whole} of {repeats} repeats were kept in {out} (complete=false)"
+        stopped.hint = stopped.hint or "evaluate what there is, or play all of it again with --overwrite"
         raise stopped
     _show(job, out, played, info)
 

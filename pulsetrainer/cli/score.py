@@ -100,6 +100,7 @@ def tell(
         raise_if_stopped(done.fault, done.remedy, "the session")
     except PulsetrainerError as error:
         error.message += f"; {done.beats.start_s.size} beats were kept in {out} (complete=false)"
+        error.hint = error.hint or "evaluate what there is, or press another one into another file"
         raise
     quizzed, right = _quizzed(quiz)
     kelvins = [kelvin for _, kelvin in done.temperature]

@@ -209,6 +209,7 @@ def _raise_without_a_beat(done: Performed, out: Path) -> None:
         raise_if_stopped(done.fault, done.remedy, "the session")
     except PulsetrainerError as error:
         error.message += f"; no beat was pressed, so {out} was not written"
+        error.hint = error.hint or "run the command again"
         raise
 
 

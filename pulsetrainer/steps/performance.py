@@ -25,6 +25,7 @@ from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach
 from pulsetrainer.steps.recording import PAUSE_S
+from pulsetrainer.steps.stopped import INTERRUPTED
 
 # what is wrong where a part ends without a beat, and what to do
 TOO_SHORT = ("the device stays on too short for one beat", "raise its on-time limit, or press shorter beats")
@@ -172,14 +173,18 @@ class Performance:
             self._begins_s.append(conductor.time_s)
             if self._thermometer is not None:
                 self._thermometer.begin_part()
-            trace = device.stream(
-                partial(next, conductor.part(device.longest_play_s), None),
-                RATE_HZ,
-                lead_s=lead_s,
-                decimation=decimation,
-                on_block=lambda block: self._take(block, decimation),
-                should_stop=lambda: bool(self._implausible),
-            )
+            try:
+                trace = device.stream(
+                    partial(next, conductor.part(device.longest_play_s), None),
+                    RATE_HZ,
+                    lead_s=lead_s,
+                    decimation=decimation,
+                    on_block=lambda block: self._take(block, decimation),
+                    should_stop=lambda: bool(self._implausible),
+                )
+            except KeyboardInterrupt:  # while the beginning of a part is made
+                self._fault = INTERRUPTED
+                break
             self._parts += 1
             self._dropped = dropped + trace.dropped_samples
             self._fault, self._remedy, self._underruns = trace.fault, trace.remedy, int(trace.underrun)

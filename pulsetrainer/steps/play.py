@@ -23,7 +23,7 @@ from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.heat import Correction, coil_of, take_temperature, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
-from pulsetrainer.steps.stopped import raise_if_stopped
+from pulsetrainer.steps.stopped import INTERRUPTED, raise_if_stopped
 
 _LOG = logging.getLogger(__name__)
 DRIVES = ("compensated", "scaled")
@@ -111,25 +111,29 @@ def play(
         name = DRIVES[number % len(DRIVES)]
         repeat = number // len(DRIVES) + 1
         _LOG.info("repeat %d of %d, %s drive", repeat, repeats, name)
-        current = currents[name]
-        if tracked is not None and name == "compensated":
-            current = tracked.current()
-        once = play_once(
-            drive,
-            device,
-            current,
-            expected=drive.predicted if name == "compensated" else None,
-            earlier=[rows[2] for rows in kept[name]],
-            watch=None if watch is None else partial(watch, name, repeat),
-        )
-        dropped += once.dropped_samples
-        fault, remedy = once.fault, once.remedy
-        if tracked is not None:
-            tracked.take(drive.time_s, once)
-        if fault:
+        try:
+            current = currents[name]
+            if tracked is not None and name == "compensated":
+                current = tracked.current()
+            once = play_once(
+                drive,
+                device,
+                current,
+                expected=drive.predicted if name == "compensated" else None,
+                earlier=[rows[2] for rows in kept[name]],
+                watch=None if watch is None else partial(watch, name, repeat),
+            )
+            dropped += once.dropped_samples
+            fault, remedy = once.fault, once.remedy
+            if tracked is not None:
+                tracked.take(drive.time_s, once)
+            if fault:
+                break
+            kept[name].append(once.rows)
+            progress((number + 1) / (repeats * len(DRIVES)))
+        except KeyboardInterrupt:  # between two plays: what was played is kept all the same
+            fault = INTERRUPTED
             break
-        kept[name].append(once.rows)
-        progress((number + 1) / (repeats * len(DRIVES)))
     whole = min(len(rows) for rows in kept.values())
     known = operator_of(drive.model) if drive.model else None
     playback = Playback(
