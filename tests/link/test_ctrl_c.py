@@ -191,7 +191,6 @@ def test_repeats_that_are_whole_are_kept_when_it_comes_between_two_plays():
 
 def test_a_session_that_is_stopped_while_a_part_is_made_keeps_its_beats():
     """Its first part is over and the next one has not begun."""
-
     asked: list[int] = []
 
     def decide(number: int, _time_s: float) -> Play:
@@ -200,8 +199,9 @@ def test_a_session_that_is_stopped_while_a_part_is_made_keeps_its_beats():
             raise KeyboardInterrupt
         return Play(0)
 
-    with pt.open_device("bench:") as device, pytest.raises(Interrupted) as caught:
+    with pt.open_device("bench:") as device:
         device.set_parameter("on_time", 6)
-        pt.session(pt.load(KEPT / "model.h5"), device, pulses="normal", decide=decide)
+        with pytest.raises(Interrupted) as caught:
+            pt.session(pt.load(KEPT / "model.h5"), device, pulses="normal", decide=decide)
     assert isinstance(caught.value.kept, pt.Session)
     assert caught.value.kept.beats.start_s.size == asked[-1]
