@@ -204,10 +204,10 @@ def plan(
     conductor = conductor_of(model, beating, reach, rhythm, decide, give)
     parts, longest_s = 0, ON_TIME_S - RAMP_S
     while not conductor.ended:
-        beats, parts = sum(count.values()), parts + 1
+        parts += 1
         for _ in conductor.part(longest_s):
             watch(conductor.time_s)
-        if not conductor.ended and sum(count.values()) == beats:
+        if not conductor.ended and conductor.idle:
             raise_if_stopped(*TOO_SHORT, "the session")
     return Plan(
         beats=sum(count.values()),
