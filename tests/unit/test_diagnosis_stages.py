@@ -482,10 +482,14 @@ def test_a_cause_that_predicts_little_or_worse_is_dropped(monkeypatch, gain, pie
     assert after.current.names == kept
 
 
-@pytest.mark.parametrize(("left", "kept"), [(136.0, ("creep", "step")), (137.0, ())])
-def test_where_only_noise_is_left_little_need_be_predicted(monkeypatch, left, kept):
+@pytest.mark.parametrize(
+    ("left", "without", "kept"),
+    [(100.0, 136.0, ("creep", "step")), (100.0, 137.0, ()), (136.0, 440.0, ()), (137.0, 440.0, ())],
+)
+def test_where_only_noise_is_left_without_it_little_need_be_predicted(monkeypatch, left, without, kept):
     """The floor is 100, and 36 more are not worth a word: what blocks leave is then mostly noise."""
-    _refitting(monkeypatch, fitting, squares={frozenset({"step"}): 440.0, frozenset({"creep"}): 450.0})
+    squares = {frozenset({"step"}): without, frozenset({"creep"}): without}
+    _refitting(monkeypatch, fitting, squares=squares)
     monkeypatch.setattr(screened, "stage", lambda state: state)
     state = _state(_fit(left, "creep", "step"), p_values={"creep": 0.006, "step": 0.007})
     assert elimination.stage(replace(state, held_out=HeldOut(0.32))).current.names == kept

@@ -4,8 +4,8 @@ From the model with all causes each is taken out in turn. While the one that is 
 difference, or less than a five hundredth of that of all together (the formulas of the others are not that
 exact), it is dropped. So is one without which time that was left out is predicted better: it was accepted
 before the others, and does harm beside them. So is one that takes away less than a third of what can be
-lowered on blocks that were left out, where more than noise is left beside it: it fits a device that is no
-Preisach operator, as anything does. A single cause has proved itself against the baseline, and goes only for
+lowered on blocks that were left out, where more than noise is left beside it or without it: it fits a device
+that is no Preisach operator, as anything does. A single cause has proved itself against the baseline, and goes only for
 the last two reasons.
 """
 
@@ -55,9 +55,11 @@ def _spare(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted |
 def _of_little_use(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
     """The one of the models with one cause less of which that cause predicts least, if little.
 
-    Where only noise is left, what was left out is noise for the most part, and nothing predicts that.
+    Where only noise is left without it too, what was left out is noise for the most part, and nothing
+    predicts that.
     """
-    if state.is_whole(current):
+    without = [fewer for fewer in without if not (state.is_whole(current) and state.is_whole(fewer))]
+    if not without:
         return None
     gains = [state.held_out.gain(fewer, current, state.floor) for fewer in without]
     least = int(np.argmin(gains))  # NaN where it cannot be told: that is the least, and no reason
