@@ -126,7 +126,7 @@ MESSAGES = {
     "names it": Message("", "", "{named}"),
     "no beat of a session": Message("has no whole beat", "pulsetrainer session", "{file}"),
     "not such a row": Message("", "", "{file}, {row}", "expected {expected}", "{got}"),
-    "too few answers": Message("answers to", "one pulse name on each line", "{file}", "{expected}", "{got}"),
+    "too few answers": Message("answer", "one pulse name on each line", "{file}", "{expected}", "{got}"),
     "a run that was diagnosed": Message("to verify with is one that", "not diagnosed", "{file}"),
     "nothing to extend by": Message("nothing to extend", "{next}", "{file}", got="{verdict}"),
     # --- words -------------------------------------------------------------------------------------------

@@ -48,10 +48,12 @@ def session(
         int | None, typer.Option(help="Length in beats, instead of minutes.", show_default=False)
     ] = None,
     variability: Annotated[
-        float, typer.Option(help="Standard deviation of the intervals between beats, %.")
+        float, typer.Option(min=0, max=25, help="Standard deviation of the intervals between beats, %.")
     ] = 0.0,
-    respiration: Annotated[float, typer.Option(help="Swing of the intervals with the breath, %.")] = 0.0,
-    ectopic: Annotated[float, typer.Option(help="Share of premature beats, %.")] = 0.0,
+    respiration: Annotated[
+        float, typer.Option(min=0, max=30, help="Swing of the intervals with the breath, %.")
+    ] = 0.0,
+    ectopic: Annotated[float, typer.Option(min=0, max=50, help="Share of premature beats, %.")] = 0.0,
     seed: Annotated[
         int | None,
         typer.Option(

@@ -87,8 +87,10 @@ def _must(parameter: Any, error: Exception) -> str:
         return said
     kind = "a whole number" if "int" in parameter.type.name else "a number"
     low, high = (getattr(parameter.type, end, None) for end in ("min", "max"))
-    within = f" from {low} to {high}" if high is not None else f", {low} or more" if low is not None else ""
-    return f"must be {kind}{within}, got {repr(got[1]) if 'valid' in got[0] else got[1]}"
+    within = (
+        f" from {low:g} to {high:g}" if high is not None else f", {low:g} or more" if low is not None else ""
+    )
+    return f"must be {kind}{within}, got {repr(got[1]) if 'valid' in got[0] else got[1].removesuffix('.0')}"
 
 
 def _without(parameter: Any, help_: str) -> str:

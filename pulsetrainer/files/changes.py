@@ -31,8 +31,7 @@ def read_changes(
             unknown = set(rows.fieldnames or ()) - set(_COLUMNS)
             if unknown or "t_s" not in (rows.fieldnames or ()):
                 raise DataError(
-                    f"{path} has the columns {', '.join(rows.fieldnames or ('none',))}; expected t_s and any "
-                    "of rate, amplitude, pulse",
+                    f"{path} has {_columns(rows.fieldnames)}; expected t_s and any of rate, amplitude, pulse",
                     hint="write a header such as: t_s,rate,amplitude,pulse",
                 )
             found: list[tuple[float, float | None, float | None, str | None]] = []
@@ -48,6 +47,12 @@ def read_changes(
             return found
     except (OSError, UnicodeError, csv.Error) as error:
         raise DataError(f"{path} cannot be read: {error}", hint="give a table of text") from error
+
+
+def _columns(names: Sequence[str] | None) -> str:
+    if not names:
+        return "no columns"
+    return f"the column{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
 def _change(
@@ -109,7 +114,7 @@ def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str
             )
     if len(answers) < questions:
         raise DataError(
-            f"{path} has {len(answers)} answers to {questions} questions",
+            f"{path} has {len(answers)} answer{'s' * (len(answers) != 1)} to {questions} questions",
             hint="write one pulse name on each line, as many as questions",
         )
     return [said for _, said in answers]

@@ -61,7 +61,7 @@ def from_list(answers: Sequence[str], choices: Sequence[str], questions: int) ->
             )
     if len(answers) < questions:
         raise DataError(
-            f"there are {len(answers)} answers to {questions} questions",
+            f"expected {questions} answers, one a question, got {len(answers)}",
             hint="write one pulse name on each line, as many as questions",
         )
     return lambda question: (answers[question], np.nan)

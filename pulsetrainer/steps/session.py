@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -332,6 +333,14 @@ def programme(
             "a session needs pulses, each named once, got " + (", ".join(names) or "none"),
             hint="name some of the library: normal,bifid",
         )
+    _check_length(minutes, beats)
+    if quiz:
+        _check_quiz(minutes=minutes, beats=beats, changes=changes or None)
+    elif answers and not callable(answers):
+        raise UsageError(
+            "`answers` were given, but no quiz asks for them",
+            hint="give `quiz` with the number of questions, or leave `answers` out",
+        )
     if minutes is None and beats is None:
         minutes = 5.0
     seconds = None if minutes is None else 60.0 * minutes
@@ -343,6 +352,28 @@ def programme(
     asked = order(len(names), quiz, seed)
     answer = answers if callable(answers) else from_list(answers, names, quiz)
     return Blind(names, asked, answer, Play(0, amplitude / 100.0, rate)), (rate,)
+
+
+def _check_length(minutes: float | None, beats: int | None) -> None:
+    if minutes is not None and beats is not None:
+        raise UsageError(
+            f"a session ends after minutes or after beats, got both: `minutes` {minutes:g} and `beats` {beats}",
+            hint="give one of the two",
+        )
+    if beats is not None and beats < 1:
+        raise UsageError(f"`beats` must be 1 or more, got {beats}", hint="20 last a quarter of a minute")
+    if minutes is not None and not 0 < minutes < math.inf:
+        raise UsageError(f"`minutes` must be a finite number above 0, got {minutes:g}", hint="5 are usual")
+
+
+def _check_quiz(**given: object) -> None:
+    """Refuse what a quiz decides by itself: its length, and what is pressed when."""
+    for name, value in given.items():
+        if value is not None:
+            raise UsageError(
+                f"a quiz does not go with `{name}`: it ends with its last question, and asks at one rate and height",
+                hint=f"leave `{name}` out, or leave `quiz` out",
+            )
 
 
 def _session(sink: Memory, done: Performed, asked: Quiz | None) -> Session | None:

@@ -132,7 +132,7 @@ def test_a_session_that_fails_before_its_first_beat_leaves_no_file(run, tmp_path
             ("line 2: pulse", "one of normal, bifid", "'bifd'"),
         ),
         ("--answers", "normal\n\nfoo\n", "not such a row", ("line 3", "one of normal, bifid", "'foo'")),
-        ("--answers", "normal\n", "too few answers", ("", "2 questions", "1 answers")),
+        ("--answers", "normal\n", "too few answers", ("", "2 questions", "1 answer to")),
     ],
 )
 def test_a_bad_row_is_named_with_its_file(run, tmp_path, option, text, name, named):
@@ -205,9 +205,13 @@ def test_a_quiz_by_file(run, tmp_path):
         (("--rate", "10"), 2, "20 to 240"),
         (("--rate", "241"), 2, "20 to 240"),
         (("--amplitude", "120"), 2, "100 %"),
-        (("--beats", "0"), 2, "beat"),
+        (("--beats", "0"), 2, "--beats must be 1 or more, got 0"),
+        (("--minutes", "-1"), 2, "--minutes must be"),
         (("--beats", "5", "--minutes", "1"), 2, "one of the two"),
-        (("--variability", "60"), 3, "25 %"),
+        (("--variability", "60"), 2, "--variability must be a number from 0 to 25, got 60"),
+        (("--ectopic", "-1"), 2, "--ectopic"),
+        (("--answers", "right.txt"), 2, "leave --answers out"),
+        (("--quiz", "2", "--pulses", "normal,bifid", "--answers", "right.txt", "--beats", "3"), 2, "--beats"),
         (("--quiz", "4"), 2, "two pulses"),
         (("--quiz", "4", "--pulses", "normal,bifid"), 2, "terminal"),
         (("--quiz", "4", "--pulses", "normal,bifid", "--answers", "short.txt"), 3, "4 questions"),
@@ -221,6 +225,7 @@ def test_a_quiz_by_file(run, tmp_path):
 def test_what_makes_no_sense_is_told_before_anything_moves(run, tmp_path, words, code, said):
     """Exit code, what is wrong, and nothing written."""
     (tmp_path / "short.txt").write_text("normal\n")
+    (tmp_path / "right.txt").write_text("normal\nnormal\n")
     (tmp_path / "wrong.txt").write_text("normal\nstiff\n")
     (tmp_path / "bad.csv").write_text("t_s,rate\nsoon,80\n")
     (tmp_path / "other.csv").write_text("time,bpm\n1,80\n")
