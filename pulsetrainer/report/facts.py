@@ -91,7 +91,8 @@ def loop_words(model: Model) -> str:
 
 def warmth_words(kelvin: Sequence[float] | FloatArray) -> str:
     """How the coil's temperature went against that of calibration, K (n,)."""
-    return f"{kelvin[0]:+.1f} to {kelvin[-1]:+.1f} K against calibration, made up for"
+    first, last = (round(float(k), 1) + 0.0 for k in (kelvin[0], kelvin[-1]))  # no -0.0
+    return f"{first:+.1f} to {last:+.1f} K against calibration, made up for"
 
 
 def minor_words(percent: float) -> str:

@@ -14,7 +14,7 @@ from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.temperature import CoilRecord, Thermal, Thermometer
 from pulsetrainer.diagnosis.prediction import extended_of, operator_of
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
 from pulsetrainer.steps.invertible import invertible
 from pulsetrainer.steps.recording import conditioning_loop
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
 
 _RATE_HZ = 1000.0
+_COLDEST_K, _HOTTEST_K = -80.0, 150.0  # against calibration: beyond, it is another coil or another supply
 _NEW = 3e-4  # of the force: a change of the loss that is worth another inverse
 
 
@@ -105,14 +106,25 @@ def take_temperature(device: Device, thermometer: Thermometer, high_A: float) ->
     Raises
     ------
     DeviceError, Interrupted
-        The loop could not be completed.
+        The loop could not be completed, or no room explains what it tells.
     """
     for _ in range(2):  # a loop lasts about as long as a window
         trace = device.play(conditioning_loop(high_A, _RATE_HZ), _RATE_HZ)
         raise_if_stopped(trace.fault, trace.remedy, "taking the temperature")
         thermometer.add(trace.time_s, trace.reference_A, trace.current_A, trace.duty)
         if thermometer.known:
+            _check_plausible(thermometer.temperature_K)
             return
+
+
+def _check_plausible(kelvin: float) -> None:
+    if not _COLDEST_K <= kelvin <= _HOTTEST_K:
+        raise DeviceError(
+            f"the duty says that the coil is {kelvin:+.0f} K against calibration, expected "
+            f"{_COLDEST_K:+.0f} to {_HOTTEST_K:+.0f} K: the coil or the supply is another",
+            hint="connect those of the calibration, or capture and identify again; `no_track_heat` leaves "
+            "heat out",
+        )
 
 
 class Correction:

@@ -10,7 +10,7 @@ import pytest
 import pulsetrainer as pt
 from pulsetrainer.artefacts.model import Extension, Parameter
 from pulsetrainer.diagnosis.prediction import operator_of, predict
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.check import RATE_HZ, check_updatable, signal, updated
 from pulsetrainer.steps.heat import rest_force
 from wording import raises
@@ -127,6 +127,16 @@ def test_the_model_of_another_device_is_refused(model):
         with raises(DataError, "names it", named="OTHER"):
             pt.play(drive, device, repeats=1, track_heat=True)
         assert pt.play(drive, device, repeats=1).temperature_K is None
+
+
+def test_a_temperature_that_no_room_has_is_told(model):
+    """Another coil behind the same serial number: nothing is made up for, and what to do is said."""
+    drive = pt.invert("normal", replace(model, extensions=(THERMAL,)), periods=2)
+    with (
+        pt.open_device("bench:?seed=1&coil=40") as device,
+        raises(DeviceError, "names it", named="the coil or the supply is another"),
+    ):
+        pt.play(drive, device, repeats=1)
 
 
 def test_a_play_makes_up_for_the_room(model):
