@@ -219,6 +219,7 @@ NOTES = {
     "reversed": ("falls where the model rises", "the other way round", "Identify it again"),
     "follows the velocity": ("velocity of u", "wrong model"),
     "leaves much": ("% of the span", "the noise from sample to sample", "pulsetrainer diagnose"),
+    "seen before": ("was identified from", "a run that neither has seen"),
     "zeros differ": ("shifted against each other",),
     "no time": ("no time",),
     "nothing gained": ("in 1 pass:", "none was better than the first"),

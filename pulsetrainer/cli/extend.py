@@ -41,14 +41,19 @@ def extend(
 
     with job.working("extending"):
         found = job.load(diagnosis, pt.Diagnosis)
-        extended = pt.extend(
-            job.load(model, pt.Model),
-            found,
-            verify=None if verify is None else job.load(verify, pt.Run),
-            names=(str(model), str(diagnosis)),
-        )
+        plain = job.load(model, pt.Model)
+        other = None if verify is None else job.load(verify, pt.Run)
+        extended = pt.extend(plain, found, verify=other, names=(str(model), str(diagnosis)))
         added = [one.cause for one in extended.extensions]
+        proof = () if other is None else pt.evaluate(other, [plain, extended]).models
         job.save(out, extended, f"Model extended by {', '.join(added)}")
+    if verify is None:
+        job.notes(_doubts(found, extended))
+    elif _was_fitted(model, verify):
+        job.notes([f"{model} was identified from {verify}: a run that neither has seen proves more"])
+    verified = (
+        {"without_percent": proof[0].rms_percent, "with_percent": proof[1].rms_percent} if proof else {}
+    )
     job.screen.result(
         {
             "output": out,
@@ -56,12 +61,37 @@ def extend(
             "extensions": extended.extensions,
             "levels": extended.levels,
             **picked(found, *_FIGURES),
+            **({"verified": verified} if verified else {}),
         }
     )
     rows = _left(found, extended) | _apart(found, extended)
+    if verified:
+        rows["verified"] = (
+            f"{verify} is predicted to {verified['with_percent']:.3f} % of its span (rms), by the model as it "
+            f"was to {verified['without_percent']:.3f} %"
+        )
     job.screen.facts(f"{out}: extended model of {extended.levels} levels", rows)
     for one in extended.extensions:
         job.screen.facts(f"with {one.cause}", parameters(one.parameters))
+
+
+def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
+    """Say which causes were added although something speaks against them."""
+    added = {one.cause for one in extended.extensions}
+    return [
+        f"{one.cause} is in doubt ({'; '.join(one.doubts)}): `verify` RUN.h5, a run that was not diagnosed, "
+        "tells whether it repeats"
+        for one in found.found
+        if one.cause in added and one.doubts
+    ]
+
+
+def _was_fitted(model: Path, run: Path) -> bool:
+    """Return whether a model was identified from the run in a file."""
+    from pulsetrainer.files import provenance, store
+
+    digest = set(provenance.digests([run]).values())
+    return bool(digest & set(store.read_header(model).provenance.inputs.values()))
 
 
 def _apart(found: pt.Diagnosis, extended: pt.Model) -> dict[str, str]:

@@ -54,7 +54,8 @@ def read_pulse(name: str) -> Shape:
     columns, time_s, value = first_two(path, "a pulse needs a time and a value", names="t_s,p")
     if columns.rows < FEWEST_SAMPLES:
         raise DataError(
-            f"{path} has {columns.rows} row{'s' * (columns.rows != 1)}, expected {FEWEST_SAMPLES} or more: one period of a pulse",
+            f"{path} has {columns.rows} row{'s' * (columns.rows != 1)}, expected {FEWEST_SAMPLES} or more: "
+            "one period of a pulse",
             hint="give a whole period, with samples close enough to draw it",
         )
     said = {c.partition(":")[0]: c.partition(":")[2].strip() for c in columns.comments}

@@ -357,7 +357,7 @@ def programme(
 def _check_length(minutes: float | None, beats: int | None) -> None:
     if minutes is not None and beats is not None:
         raise UsageError(
-            f"a session ends after minutes or after beats, got both: `minutes` {minutes:g} and `beats` {beats}",
+            f"a session ends after minutes or after beats, got both: `minutes` {minutes:g}, `beats` {beats}",
             hint="give one of the two",
         )
     if beats is not None and beats < 1:
@@ -371,7 +371,8 @@ def _check_quiz(**given: object) -> None:
     for name, value in given.items():
         if value is not None:
             raise UsageError(
-                f"a quiz does not go with `{name}`: it ends with its last question, and asks at one rate and height",
+                f"a quiz does not go with `{name}`: it ends with its last question, and asks at one rate and "
+                "height",
                 hint=f"leave `{name}` out, or leave `quiz` out",
             )
 

@@ -96,6 +96,13 @@ def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     assert plain["gain_percent"] == 0.0
     assert extended["gain_percent"] > 50.0
     assert extended["rms"] < 0.5 * plain["rms"]
+    words = ("extend", "diagnosis.h5", "--model", "model.h5", "--json", "--verify")
+    done = pulsetrainer(bench, *words, "fresh.h5", "-o", "verified.h5")
+    assert done.json["verified"]["with_percent"] == pytest.approx(extended["rms_percent"])
+    assert done.json["verified"]["without_percent"] == pytest.approx(plain["rms_percent"])
+    assert "identified from" not in done.err
+    done = pulsetrainer(bench, *words, "slow.h5", "-o", "seen.h5")
+    tells(done.err, "seen before")
 
 
 def test_quick_says_that_it_is_quick(bench):
