@@ -27,8 +27,9 @@ from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.device.trace import Trace
 from pulsetrainer.diagnosis import gates, wording
-from pulsetrainer.errors import PulsetrainerError
+from pulsetrainer.errors import Interrupted, PulsetrainerError
 from pulsetrainer.simulation import build
+from pulsetrainer.steps.stopped import INTERRUPTED, raise_if_stopped
 from pulsetrainer.version import __version__
 
 State = Literal["ok", "warning", "problem"]
@@ -185,6 +186,8 @@ def _device(port: str | None, tuned: Path | None, *, capture: bool) -> Iterator[
             yield _finding("gains", own)
             if capture:
                 yield from _short_capture(device)
+    except Interrupted:
+        raise
     except PulsetrainerError as error:
         yield _finding("device", error.message, problem=error.hint)
 
@@ -208,6 +211,8 @@ def _short_capture(device: Device) -> Iterator[Finding]:
     reference = np.concatenate((rest, up, rest + top, up[::-1], rest))
     held = slice(rest.size + up.size + rest.size // 5, rest.size + up.size + rest.size)
     recording = device.play(reference, _RATE_HZ, decimation=round(device.info.tick_rate_Hz / _RATE_HZ))
+    if recording.fault == INTERRUPTED:
+        raise_if_stopped(recording.fault, recording.remedy, "the short capture")
     if recording.fault:
         yield _finding("short capture", f"it ended early: {recording.fault}", problem=recording.remedy)
         return

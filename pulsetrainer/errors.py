@@ -70,7 +70,8 @@ class WrongKindError(DataError):
     """A file holds another kind of artefact than is wanted here."""
 
     def __init__(self, path: Path | str, expected: Sequence[str], found: str) -> None:
-        wanted = " or ".join(map(_with_article, expected))
+        *others, last = map(_with_article, expected)
+        wanted = f"{', '.join(others)} or {last}" if others else last
         super().__init__(
             f"{path}: expected {wanted}, got {_with_article(found)}", hint=f"give {wanted} instead"
         )

@@ -76,6 +76,12 @@ def at_once() -> dict[str, Mistake]:
         ),
         "no such smoothing": ("identify", "run.h5", "-o", "out.h5", "--smoothing", "much"),
         "a figure of no format": ("plot", "run.h5", "-o", "out.txt"),
+        "an artefact named like a table": ("identify", "run.h5", "-o", "out.csv"),
+        "a page named like a figure": (
+            *("diagnose", "run.h5", "--model", "model.h5", "-o", "out.h5"),
+            *("--html", "out.pdf"),
+        ),
+        "settings named like an artefact": ("tune", "-o", "out.h5"),
         "a comparison of one": ("compare", "evaluation.h5"),
         "a comparison of no format": ("compare", "evaluation.h5", "evaluation.h5", "-o", "out.txt"),
         "a time column and a rate": (*table, "--time", "t", "--rate", "5"),

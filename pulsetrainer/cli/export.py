@@ -30,7 +30,9 @@ def export(
     """
     if out.suffix.lower() not in _TABLES:
         raise UsageError(
-            f"a table is written as CSV, but {out} ends in {out.suffix!r}", hint=f"name it {out.stem}.csv"
+            f"a table is written as CSV, but {out} "
+            + (f"ends in {out.suffix!r}" if out.suffix else "has no such ending"),
+            hint=f"name it {out.stem}.csv",
         )
     job = Job(context, inputs=(file,), outputs=(out,), overwrite=overwrite, as_json=json)
     artefact = job.load_any(file)

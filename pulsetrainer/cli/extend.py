@@ -67,8 +67,8 @@ def extend(
     rows = _left(found, extended) | _apart(found, extended)
     if verified:
         rows["verified"] = (
-            f"{verify} is predicted to {verified['with_percent']:.3f} % of its span (rms), by the model as it "
-            f"was to {verified['without_percent']:.3f} %"
+            f"{verify} is predicted to {verified['with_percent']:.3f} % of its span (rms), by the model as "
+            f"it was to {verified['without_percent']:.3f} %"
         )
     job.screen.facts(f"{out}: extended model of {extended.levels} levels", rows)
     for one in extended.extensions:

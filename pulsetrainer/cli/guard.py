@@ -22,6 +22,7 @@ from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, Usage
 from pulsetrainer.report.tables import folded
 
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_STOPPED = "stopped by you; what was not finished was not written"
 _DEBUG_HINT = "run it again with --debug for the whole traceback, and report it"
 
 
@@ -34,13 +35,13 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     words = [{"--force": "--overwrite"}.get(w, w) for w in argv if w not in ("--debug", "--verbose")]
     problem: PulsetrainerError
     try:
-        code = program(args=words, standalone_mode=False, prog_name="pulsetrainer")
+        code = _run(program, words)
         sys.stdout.flush()  # here, not at the end of the process, where a full disk has no words
     except PulsetrainerError as error:
         problem = error
         _trace(debug)
     except KeyboardInterrupt as error:
-        problem = Interrupted("stopped by you", hint="nothing was written")
+        problem = Interrupted(_STOPPED)
         for note in getattr(error, "__notes__", ()):
             problem.add_note(note)
     except BrokenPipeError:  # the reader of our output went away: its business
@@ -65,6 +66,13 @@ def _command_in(words: Sequence[str]) -> str:
     """Return the command: the first word that is no option, nor the file of settings that one names."""
     pairs = zip(["", *words], words, strict=False)
     return next((word for before, word in pairs if word[:1] != "-" and before != "--settings"), "")
+
+
+def _run(program: Callable[..., Any], words: Sequence[str]) -> Any:
+    code = program(args=words, standalone_mode=False, prog_name="pulsetrainer")
+    if code == Interrupted.exit_code:  # what the parser makes of Ctrl-C
+        raise KeyboardInterrupt
+    return code
 
 
 def hush_libraries(argv: Sequence[str]) -> None:
@@ -143,5 +151,5 @@ def _outside_of(error: Exception) -> PulsetrainerError | None:
 
 def _bug_of(error: Exception) -> PulsetrainerError:
     if type(error).__name__ == "Abort":  # Ctrl-C, as the parser words it
-        return Interrupted("stopped by you", hint="nothing was written")
+        return Interrupted(_STOPPED)
     return PulsetrainerError(f"a bug: {type(error).__name__}: {error}", hint=_DEBUG_HINT)

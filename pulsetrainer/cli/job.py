@@ -28,6 +28,11 @@ if TYPE_CHECKING:
     from pulsetrainer.files.provenance import Header
 
 K = TypeVar("K")
+_OTHER_FORMATS = {
+    *(".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".npz", ".mat", ".wav"),
+    *(".png", ".svg", ".pdf", ".html", ".htm"),
+}
+_WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
 # what is no parameter of the work: files have digests, a port may hold what no file may know
 _NOT_PARAMETERS = {"json", "overwrite", "port", "dry_run", "resume", "out", "html"}
 
@@ -67,6 +72,7 @@ class Job:
             check_port(context.params["port"])
         written = [path for path in outputs if path is not None]
         for path in written:
+            check_ending(path, context)
             check_output(path, overwrite)
         if len({path.resolve() for path in written}) < len(written):
             raise UsageError(
@@ -246,6 +252,29 @@ class Job:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
             self.screen.note(as_options(line))
+
+
+def check_ending(path: Path, context: typer.Context) -> None:
+    """Refuse an output whose name promises another format than it gets."""
+    ending, command = path.suffix.lower(), context.info_name
+    if str(path) == str(context.params.get("html")):
+        if ending in (_OTHER_FORMATS | {".h5"}) - {".html", ".htm"}:
+            raise UsageError(
+                f"a page is written as HTML, but {path} ends in {ending!r}",
+                hint=f"name it {path.stem}.html; a browser prints it to PDF",
+            )
+    elif command == "tune":
+        if ending in (_OTHER_FORMATS | {".h5"}) - {".toml"}:
+            raise UsageError(
+                f"a file of settings is written as TOML, but {path} ends in {ending!r}",
+                hint=f"name it {path.stem}.toml",
+            )
+    elif command not in _WRITE_NO_ARTEFACT and ending in _OTHER_FORMATS:
+        raise UsageError(
+            f"{command} writes HDF5, but {path} ends in {ending!r}",
+            hint=f"name it {path.stem}.h5; then `pulsetrainer export` makes a table of it, "
+            "`pulsetrainer plot` a figure",
+        )
 
 
 def _is_path(value: Any) -> bool:

@@ -35,7 +35,8 @@ def refine(
     Example: pulsetrainer refine drive.h5 -o refined.h5
     """
     job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.device.limits import Limits
+    from pulsetrainer.device.limits import Limits, check_peak
+    from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
     from pulsetrainer.steps.refine import check, plan
 
     waveform = job.load(drive, pt.Waveform)
@@ -50,11 +51,23 @@ def refine(
         }
         job.would(f"refine {waveform.name}", planned, port, out, rows, name=waveform.name, passes=passes)
         return
+    stopped: PulsetrainerError | None = None
     with job.working(f"refining {drive.name}") as progress, job.open_device(port, limits) as device:
-        refined = pt.refine(waveform, device, passes=passes, progress=progress)
         info = device.info
+        hint = "invert again with a lower `force_max`"
+        check_peak(waveform.compensated, info.current_limit_A, hint=hint)
+        try:
+            refined = pt.refine(waveform, device, passes=passes, progress=progress)
+        except (DeviceError, Interrupted) as error:
+            if not isinstance(error.kept, pt.Waveform):
+                error.message += f"; {out} was not written"
+                raise
+            stopped, refined = error, error.kept
     title = f"{refined.name} refined on {info.serial}"
     job.save(out, refined, title, device=job.device(info))
+    if stopped is not None:
+        stopped.message += f"; the best of {len(refined.passes)} passes was kept in {out}"
+        raise stopped
     job.notes(refined.notes[len(waveform.notes) :])
     job.screen.result({"output": out, **picked(refined, "name", "passes", "kept"), "serial": info.serial})
     rows = {

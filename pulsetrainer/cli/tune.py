@@ -9,7 +9,7 @@ import typer
 
 import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
-from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.job import Job, check_ending
 from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Overwrite, Port, positive
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ def tune(
     from pulsetrainer.files.atomic_write import check_output
 
     if out is not None:
+        check_ending(out, context)
         check_output(out, overwrite=True)
     job = Job(context, inputs=drive, as_json=json)
     from pulsetrainer.device.limits import Limits

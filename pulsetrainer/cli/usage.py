@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
-from pulsetrainer.errors import UsageError
+from pulsetrainer.errors import PulsetrainerError, UsageError
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
@@ -34,7 +38,14 @@ def usage_of(error: Exception) -> UsageError | None:
     if kind == "MissingParameter" and parameter is not None:
         example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
         like = example[1] if example else help_
-        return UsageError(f"{_named(parameter)} is missing: {_meaning(parameter)}", hint=like)
+        said = f"{_named(parameter)} is missing: {_meaning(parameter)}"
+        given: list[Path] = (context.params.get("files") or []) if context is not None else []
+        columns = _columns(given) if parameter.name in ("input_column", "output_column") else ()
+        if len(columns) > 1:
+            first, second = map(shlex.quote, columns[-2:])
+            said += f"; {given[0]} has {', '.join(columns)}"
+            like = f"name two of them, such as --input {first} --output {second}"
+        return UsageError(said, hint=like)
     if kind == "BadParameter" and parameter is not None:
         return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
     named = getattr(error, "param_hint", None)  # of what a command finds out itself
@@ -42,6 +53,17 @@ def usage_of(error: Exception) -> UsageError | None:
         said = f"{named} {str(getattr(error, 'message', error)).rstrip('.')}"
         return UsageError(said, hint=_EXAMPLES.get(named, help_))
     return _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
+
+
+def _columns(files: Sequence[Path]) -> tuple[str, ...]:
+    """Return the columns of the first table that is to be imported; none where it cannot be read."""
+    from pulsetrainer.files.csv_dialect import detect
+
+    if not files or Path(files[0]).suffix.lower() not in (".csv", ".tsv", ".txt", ".dat"):
+        return ()
+    with contextlib.suppress(PulsetrainerError, OSError, ValueError):
+        return detect(Path(files[0])).names
+    return ()
 
 
 def _other(said: str, command: str, parsed: Any) -> UsageError:
@@ -76,7 +98,7 @@ def _named(parameter: Any) -> str:
 
 def _meaning(parameter: Any) -> str:
     text = (getattr(parameter, "help", None) or "what the command works on").rstrip(".")
-    return text[:1].lower() + text[1:]
+    return text if text[1:2].isupper() else text[:1].lower() + text[1:]
 
 
 def _must(parameter: Any, error: Exception) -> str:

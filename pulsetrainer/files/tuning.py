@@ -26,15 +26,22 @@ def read_tuned(path: Path | str) -> dict[str, dict[str, Any]]:
     """
     tree = read_toml(path)
     table = tree.get(TABLE, {})
-    entries = table.values() if isinstance(table, dict) else [None]
-    for entry in entries:
-        numbers = isinstance(entry, dict) and all(type(value) in (int, float) for value in entry.values())
-        if not numbers:
-            raise UsageError(
-                f"{path}: [{TABLE}] holds something that `tune` did not write",
-                hint=f"delete its tables [{TABLE}...] and tune again",
-            )
+    if not isinstance(table, dict):
+        raise _not_by_tune(path, TABLE, table, "tables, one a device")
+    for serial, entry in table.items():
+        if not isinstance(entry, dict):
+            raise _not_by_tune(path, f"{TABLE}.{serial}", entry, "a table")
+        for name, value in entry.items():
+            if type(value) not in (int, float):
+                raise _not_by_tune(path, f"{TABLE}.{serial}.{name}", value, "a number")
     return table
+
+
+def _not_by_tune(path: Path | str, name: str, value: object, expected: str) -> UsageError:
+    return UsageError(
+        f"{path}: {name} is {value!r}, expected {expected}",
+        hint=f"delete the tables [{TABLE}...] in it and measure again: pulsetrainer tune -o {path}",
+    )
 
 
 def check_tuned(path: Path, serial: str, *, overwrite: bool) -> None:

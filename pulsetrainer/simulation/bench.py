@@ -36,7 +36,7 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
     parameters, breaks = _known(executable)
     for name, value in options.settings:
         if name not in parameters:
-            near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.5)
+            near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.6)
             return UsageError(
                 f"`port`: the bench has no parameter {name!r}",
                 hint=f"did you mean {' or '.join(near)}?"
@@ -45,10 +45,9 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
             )
         unit, low, high, meaning = parameters[name]
         if f"{name}={value}" in complaint:
+            within = f"{low} to {high} {unit}".removesuffix(" 1")
             return UsageError(
-                f"`port`: the bench parameter {name}={value} is outside {low} to {high} {unit}".removesuffix(
-                    " 1"
-                ),
+                f"`port`: the bench parameter {name}={value} is not a number from {within}",
                 hint=f"give {name} ({meaning}) a value in that range",
             )
     for what in options.breaks:

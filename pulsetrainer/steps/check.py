@@ -127,9 +127,7 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     check_same_device(model, device)
     operator = operator_of(model)  # the edges of a dual model are forces
     low, high = operator.low, operator.high
-    hint = (
-        "a check plays the whole range of the model: raise `limit_current_A`, or check a model of less range"
-    )
+    hint = "a check plays the whole range of the model: check a model of less range"
     check_peak(np.asarray([low, high]), device.info.current_limit_A, hint=hint)
     condition(device, high, RATE_HZ)
     progress(0.2)

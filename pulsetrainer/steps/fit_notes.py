@@ -21,17 +21,18 @@ _UNCOUNTED = 1000.0  # times the noise: more is not counted
 UNEXPLAINED = 0.5  # of the output's standard deviation: what leaves more explains next to nothing
 
 
-def of_form(fitted: Fitted, run: Run) -> list[str]:
-    """Say what was done where the form is not the direct one."""
+def of_form(fitted: Fitted, run: Run, asked: str) -> list[str]:
+    """Say what was done where the form is not the direct one, and why where nobody asked for it."""
     output, given = run.output_quantity, run.input_quantity
     if fitted.form == "dual":
         how = f"fitted with the roles exchanged, {given} over {output} (dual form)"
-        return [f"the {output} leads the {given}, its loop runs clockwise: {how}"]
-    if fitted.form == "signed":
-        return [
-            "no loop that runs one way fits this record: fitted with weights of either sign (signed form)"
-        ]
-    return []
+        why = f"the {output} leads the {given}, its loop runs clockwise"
+    elif fitted.form == "signed":
+        how = "fitted with weights of either sign (signed form)"
+        why = "no loop that runs one way fits this record"
+    else:
+        return []
+    return [f"{why}: {how}" if asked == "auto" else f"{how}, as was asked"]
 
 
 def of_wild(masks: Sequence[BoolArray]) -> list[str]:
@@ -74,4 +75,5 @@ def warning(fitted: Fitted, runs: Sequence[Run], asked: str) -> str:
         f"{what}{verb}: the best fit leaves {100 * left / span:.1f} % of the span. The "
         f"{first.output_quantity} may depend on the speed, on a second input, or hardly on the "
         f"{first.input_quantity}"
+        + ("" if asked == "auto" else ". With no form named, the one that suits is found")
     )

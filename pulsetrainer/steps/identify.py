@@ -127,7 +127,7 @@ def identify(
     wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
-    notes += fit_notes.of_form(fitted, measured[0])
+    notes += fit_notes.of_form(fitted, measured[0], form)
     notes += _of_offsets(titles, fitted, measured)
     notes += _of_first_strokes(titles, measured, operator.low, operator.high)
     if not fitted.evenly_spaced:

@@ -13,7 +13,7 @@ from pulsetrainer.core import inversion, learning, metrics
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.device.limits import Limits, Rehearsal
-from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.errors import ArgumentError, DataError, Interrupted
 from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
 from pulsetrainer.steps.play import Plan, check_current, play_once
@@ -79,7 +79,7 @@ def refine(
     DeviceError
         The device stopped by itself, or its force reading is not to be trusted. Nothing is kept.
     Interrupted
-        Ctrl-C: the output was stopped first.
+        Ctrl-C: the output was stopped first. From the second pass on ``kept`` is the drive of the best one.
 
     Source: Bristow, Tharayil, Alleyne 2006 (iterative learning control); docs/theory.md.
 
@@ -123,14 +123,33 @@ def refine(
         start=start[middle],
         careful=True,
     )
-    best = 0
-    for one in learnt:
-        mean = [pressed.errors.mean_abs_error_percent for pressed in tried]
-        best = int(np.argmin(mean))
-        last = tried[-1].errors
-        only_noise = last.mean_abs_error_percent <= _ENOUGH * last.noise_percent
-        if len(tried) == passes or only_noise or one.number - best >= _PATIENCE:
-            break
+    try:
+        for one in learnt:
+            last, best = tried[-1].errors, _best(tried)
+            only_noise = last.mean_abs_error_percent <= _ENOUGH * last.noise_percent
+            if len(tried) == passes or only_noise or one.number - best >= _PATIENCE:
+                break
+    except Interrupted as error:
+        error.kept = _so_far(drive, tried)
+        raise
+    except KeyboardInterrupt:  # between two plays
+        said = f"stopped by you after pass {len(tried)}"
+        raise Interrupted(said, kept=_so_far(drive, tried)) from None
+    return _refined(drive, tried)
+
+
+def _best(tried: list[_Pressed]) -> int:
+    return int(np.argmin([pressed.errors.mean_abs_error_percent for pressed in tried]))
+
+
+def _so_far(drive: Waveform, tried: list[_Pressed]) -> Waveform | None:
+    """Return what was learnt until now; None where that is nothing."""
+    return _refined(drive, tried) if len(tried) > 1 else None
+
+
+def _refined(drive: Waveform, tried: list[_Pressed]) -> Waveform:
+    """Return the drive of the best pass."""
+    best = _best(tried)
     kept = tried[best]
     return replace(
         drive,
@@ -210,7 +229,7 @@ def _press(
     for number in range(repeats):
         _LOG.info("pass %d, repeat %d of %d", len(tried) + 1, number + 1, repeats)
         once = play_once(drive, device, current, expected=expected, earlier=forces)
-        raise_if_stopped(once.fault, once.remedy, f"pass {len(tried) + 1} (nothing was kept)")
+        raise_if_stopped(once.fault, once.remedy, f"pass {len(tried) + 1}")
         forces.append(once.rows[2])
     measured, scored = np.stack(forces), drive.scored
     output = metrics.mean_over_repeats(measured)

@@ -109,10 +109,17 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
             f"the drive {refined.name} was not refined, so there is nothing to learn from",
             hint="refine it first: pulsetrainer refine drive.h5 -o refined.h5",
         )
-    if model.fingerprint != of_refined.fingerprint or abs(drive.rate_Hz - refined.rate_Hz) > 1e-6:
+    if model.fingerprint != of_refined.fingerprint:
         raise DataError(
-            f"{refined.name} was refined with another model or rate than {drive.name} is made with",
-            hint="invert with the model of the refined drive",
+            f"what was learnt on {refined.name} belongs to another model than the one that {drive.name} is "
+            "made with",
+            hint="give the model that the refined drive was made with: pulsetrainer show REFINED.h5 tells it",
+        )
+    if abs(drive.rate_Hz - refined.rate_Hz) > 1e-6:
+        raise DataError(
+            f"{refined.name} was refined at {refined.rate_Hz:g} samples a second, but {drive.name} has "
+            f"{drive.rate_Hz:g}",
+            hint="invert both at one rate",
         )
     if drive.inversion != "continuous":
         raise DataError(

@@ -17,7 +17,7 @@ from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.device.gains import Gains
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
-from pulsetrainer.errors import DeviceError
+from pulsetrainer.errors import ArgumentError, DeviceError
 from pulsetrainer.steps.loop_gains import MOST_PROPORTIONAL, OPEN_LOOP, from_wire, to_wire
 from pulsetrainer.steps.measure_coil import MEAN_S, RATE_HZ, Measurement, Step, check_range, planned, rest_of
 from pulsetrainer.steps.play import check_current
@@ -26,6 +26,7 @@ from pulsetrainer.steps.progress import Progress, silent
 if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
 
+_DIODE_V = (0.15, 2.0)  # what any diode drops
 _FOLLOWS = 0.01  # of the range: what nobody can do better than is no fault of the gains
 _SINE_HZ = 4.0
 _SINE = (0.5, 0.25)  # of the range: middle and amplitude
@@ -86,7 +87,7 @@ def tune(
     Raises
     ------
     ArgumentError
-        A drive goes beyond the device's range.
+        A drive goes beyond the device's range, or no diode explains the coil at that supply.
     DeviceError
         No coil, a shorted one, one that the supply cannot drive over the pulses (with the reason), a force at
         rest, a fault, or a firmware that does not tell the duty. The output is off and the gains are those
@@ -241,6 +242,14 @@ class _Tuning:
         """Resistance, ohm, inductance, H, and supply, V."""
         if self._supply_V is None:
             return coil.resistance_ohm, coil.inductance_H, coil.supply_V
+        drop_V = electrical.DIODE_V * self._supply_V / coil.supply_V
+        low, high = _DIODE_V
+        if not low <= drop_V <= high:
+            raise ArgumentError(
+                f"a supply of {self._supply_V:g} V does not fit the coil's current: the free-wheeling diode "
+                f"would drop {drop_V:.2g} V, expected {low:g} to {high:g} V",
+                hint="measure the supply again, or leave `supply_V` out",
+            )
         return (*coil.scaled_to(self._supply_V), self._supply_V)
 
     def _check_drivable(self, coil: Coil, references: Sequence[FloatArray], ohm: float, volts: float) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from mistakes import SIGNATURE
 from program import cold
+from pulsetrainer.cli.guard import funnel
 from wording import refusal
 
 # A script of the user's own that has the name of a library hides the library: the commonest way in which a
@@ -75,3 +76,9 @@ def test_debug_shows_what_caused_an_expected_error(tmp_path, run):
     assert whole.err.count("Traceback (most recent call last)") == 2
     assert "TOMLDecodeError" in whole.err.partition("direct cause of the following exception")[0]
     assert whole.err.endswith(plain.err), "the same words at the end"
+
+
+def test_a_command_that_is_stopped_says_so(capsys):
+    """Whatever the parser makes of Ctrl-C: exit 130, and words."""
+    assert funnel(lambda **_: 130, ["identify"]) == 130
+    assert "stopped by you" in capsys.readouterr().err

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import pulsetrainer as pt
+from wording import refusal
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 
@@ -315,3 +316,9 @@ def test_a_large_file_is_streamed(tmp_path):
         f"peak memory {low / 1e6:.0f} MB at {small / 1e6:.0f} MB, {high / 1e6:.0f} MB at {large / 1e6:.0f} MB"
     )
     assert growth < 1.2 * 24 / 28
+
+
+def test_a_column_that_is_not_named_is_offered(run, tmp_path):
+    """The headings of the table stand in the error, and how two of them are named."""
+    (tmp_path / "piezo.csv").write_text("Time (ms);Drive (V);Stroke (um)\n0;0,1;0,2\n1;0,3;0,4\n")
+    refusal(run("import", "piezo.csv", "-o", "p.h5"), 2, "column not named", has="Drive (V), Stroke (um)")

@@ -10,7 +10,8 @@ import pytest
 
 import pulsetrainer as pt
 from program import pulsetrainer
-from wording import tells
+from pulsetrainer.errors import Interrupted
+from wording import refusal, tells
 
 KEPT = Path(__file__).parents[1] / "data/files-0.1"
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the bench needs a pty")
@@ -121,3 +122,29 @@ def test_a_drive_that_was_not_refined_has_nothing_to_give(tmp_path):
     done = pulsetrainer(tmp_path, *words, "-o", "bifid.h5", "--json")
     assert (done.code, done.json["error"]["kind"]) == (3, "data")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_limit_below_the_drive_is_named_with_what_helps(tmp_path):
+    """Before anything is played: the current, the limit in force, and both ways out."""
+    words = ("refine", KEPT / "drive.h5", "-o", "r.h5", "--limit-current", 0.4)
+    done = pulsetrainer(tmp_path, *words)
+    refusal(done, 3, "limit below the model's range", limit="0.4", got="1.2")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("passes", [1, 2])
+def test_what_was_learnt_is_kept_when_it_is_stopped(passes):
+    """From the second pass on the error carries the best drive; after the first there is nothing."""
+    told = []
+
+    def stop(share):
+        told.append(share)
+        if len(told) == passes:
+            raise KeyboardInterrupt
+
+    with pt.open_device("bench:?seed=3") as device, pytest.raises(Interrupted) as caught:
+        pt.refine(pt.load(KEPT / "drive.h5"), device, progress=stop)
+    kept = caught.value.kept
+    assert (kept is None) == (passes == 1)
+    if kept is not None:
+        assert (len(kept.passes), kept.kept, kept.inversion) == (2, 2, "refined")

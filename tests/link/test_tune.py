@@ -138,3 +138,12 @@ def test_a_measured_supply_makes_the_ohms():
     with pt.open_device("bench:") as device:
         found = pt.tune(device, supply_V=24.0)
     assert (found.resistance_ohm, found.inductance_H) == pytest.approx((10.0, 0.024), rel=0.01)
+
+
+def test_a_supply_that_no_diode_explains_is_refused():
+    """230 V for 12 V would be a diode that drops 11 V: the output is off and nothing is written."""
+    with (
+        pt.open_device("bench:") as device,
+        raises(ArgumentError, "names it", named="the free-wheeling diode would drop 11 V"),
+    ):
+        pt.tune(device, supply_V=230.0)
