@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -28,6 +30,7 @@ _MOST_BARS = 10
 _WHOLE = 100.0 + 1e-9  # %
 _SHADES = {"yes": BLUE, "in doubt": GREEN, "no": MUTED}
 _MANY = 1.5  # decades: over fewer, an even scale shows more
+_LABEL = 44  # letters that fit below such a figure
 _SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side
 
 
@@ -70,7 +73,7 @@ def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
     if one.name == "direction":
         axes.set_xticks([-1, 0, 1], ["falling", "rest", "rising"])
         axes.margins(x=0.08)
-    axes.set_xlabel(axis_of(one, input_quantity))
+    axes.set_xlabel(_folded(axis_of(one, input_quantity)))
     axes.set_ylabel(label("rms error left", one.output_unit))
     axes.set_ylim(bottom=0.0)
     panels.headroom(axes)
@@ -81,6 +84,14 @@ def _decades(at: FloatArray) -> float:
     """Return over how many decades values other than zero are spread."""
     sizes = np.abs(at[at != 0])
     return float(np.log10(sizes.max() / sizes.min())) if sizes.size else 0.0
+
+
+def _folded(text: str) -> str:
+    """Return a label in lines that fit below a small figure, its unit on the last one."""
+    if len(text) <= _LABEL:
+        return text
+    name, bracket, unit = text.partition(" [")
+    return "\n".join([*textwrap.wrap(name, _LABEL), bracket.strip() + unit])
 
 
 def axis_of(one: Profile, input_quantity: str = "") -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import math
 import os
 import select
 import subprocess
@@ -31,6 +32,12 @@ def _known(executable: Path) -> tuple[dict[str, tuple[str, str, str, str]], list
     return {name: (unit, low, high, meaning) for name, unit, low, high, meaning in rows}, breaks.split()
 
 
+def _is_number(text: str) -> bool:
+    with contextlib.suppress(ValueError):
+        return math.isfinite(float(text))
+    return False
+
+
 def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageError:
     """Return the usage error behind the firmware process's complaint."""
     parameters, breaks = _known(executable)
@@ -46,8 +53,9 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
         unit, low, high, meaning = parameters[name]
         if f"{name}={value}" in complaint:
             within = f"{low} to {high} {unit}".removesuffix(" 1")
+            amiss = "is outside" if _is_number(value) else "is not a number from"
             return UsageError(
-                f"`port`: the bench parameter {name}={value} is not a number from {within}",
+                f"`port`: the bench parameter {name}={value} {amiss} {within}",
                 hint=f"give {name} ({meaning}) a value in that range",
             )
     for what in options.breaks:

@@ -208,6 +208,9 @@ def test_paper_has_everything(opened, report):
     for words in (*headings, provenance, page.locator("pre.history").text_content()):
         assert re.sub(r"\s+", "", unicodedata.normalize("NFKC", words)) in squeezed
     assert 2 <= len(document.pages) <= 8
+    for sheet in document.pages:  # the errors of a drive and their figures are not torn apart
+        said = re.sub(r"\s+", "", unicodedata.normalize("NFKC", sheet.extract_text()))
+        assert said.count("Errorswithandwithoutcompensation") == said.count("Hysteresisopensaloop")
 
 
 @pytest.mark.slow

@@ -14,12 +14,13 @@ import store_examples as stored
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib import rcParams
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.figure import Figure
 
-from pulsetrainer.artefacts import Evaluation, Run, units
+from pulsetrainer.artefacts import Evaluation, Profile, Run, units
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import comparison_figure, figures
+from pulsetrainer.report import comparison_figure, diagnosis_figures, figures
 from pulsetrainer.report.directions import directions, turns
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
@@ -393,3 +394,15 @@ def test_a_comparison_shows_what_became_worse_than_nothing():
     low, high = first.get_ylim()
     assert low < -30.0 < 20.0 < high
     assert second.get_ylim() == (0.0, 1.0)
+
+
+def test_a_long_name_of_the_input_fits_below_its_figure():
+    """The label of an axis has more lines, and none goes beyond the figure."""
+    group = np.linspace(0.01, 10.0, 6)
+    one = Profile("rate", "1/s", group, group, group, output_unit="um")
+    for name in ("Drive voltage", "Drive voltage of the amplifier in the other room"):
+        figure = diagnosis_figures.profile(one, name, extended=True)
+        FigureCanvasAgg(figure).draw()
+        box = figure.axes[0].xaxis.label.get_window_extent()
+        assert figure.bbox.x0 <= box.x0
+        assert box.x1 <= figure.bbox.x1
