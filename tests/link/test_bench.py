@@ -65,7 +65,7 @@ def test_ports_that_do_not(port):
         ("bench:?zzzz=1", "no parameter 'zzzz'", "there are: ideal, speed, break, wire, wire-seed, seed"),
         ("bench:?creep=7", "creep=7 is outside 0 to 0.5", "give creep ("),
         ("bench:?creep=lots", "creep=lots is not a number from 0 to 0.5", ""),
-        ("bench:?creep=", "creep= is outside 0 to 0.5", ""),
+        ("bench:?creep=", "creep= is not a number from 0 to 0.5", ""),
         ("bench:?break=leg@1", "cannot break 'leg@1'", "current-rail"),
         ("bench:?break=reset@soon", "cannot break 'reset@soon'", "WHAT@SECONDS"),
     ],
