@@ -76,6 +76,8 @@ def at_once() -> dict[str, Mistake]:
         ),
         "no such smoothing": ("identify", "run.h5", "-o", "out.h5", "--smoothing", "much"),
         "a figure of no format": ("plot", "run.h5", "-o", "out.txt"),
+        "an option without its value": ("tune", "--drive"),
+        "a value where none goes": ("capture", "identification", "-o", "out.h5", "--live=yes"),
         "an artefact named like a table": ("identify", "run.h5", "-o", "out.csv"),
         "a page named like a figure": (
             *("diagnose", "run.h5", "--model", "model.h5", "-o", "out.h5"),

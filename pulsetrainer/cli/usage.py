@@ -36,23 +36,39 @@ def usage_of(error: Exception) -> UsageError | None:
         said = f"{command} has no option {getattr(error, 'option_name', '')}"
         return UsageError(said, hint=f"did you mean {' or '.join(near)}?" if near else help_)
     if kind == "MissingParameter" and parameter is not None:
-        example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
-        like = example[1] if example else help_
-        said = f"{_named(parameter)} is missing: {_meaning(parameter)}"
-        given: list[Path] = (context.params.get("files") or []) if context is not None else []
-        columns = _columns(given) if parameter.name in ("input_column", "output_column") else ()
-        if len(columns) > 1:
-            first, second = map(shlex.quote, columns[-2:])
-            said += f"; {given[0]} has {', '.join(columns)}"
-            like = f"name two of them, such as --input {first} --output {second}"
-        return UsageError(said, hint=like)
+        return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
         return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
     named = getattr(error, "param_hint", None)  # of what a command finds out itself
     if kind == "BadParameter" and isinstance(named, str):
         said = f"{named} {str(getattr(error, 'message', error)).rstrip('.')}"
         return UsageError(said, hint=_EXAMPLES.get(named, help_))
-    return _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
+    return (
+        _with_or_without_value(error)
+        if kind == "BadOptionUsage"
+        else _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
+    )
+
+
+def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
+    example = _EXAMPLE.search(getattr(getattr(context, "command", None), "help", None) or "")
+    like = example[1] if example else help_
+    said = f"{_named(parameter)} is missing: {_meaning(parameter)}"
+    given: list[Path] = (context.params.get("files") or []) if context is not None else []
+    columns = _columns(given) if parameter.name in ("input_column", "output_column") else ()
+    if len(columns) > 1:
+        first, second = map(shlex.quote, columns[-2:])
+        said += f"; {given[0]} has {', '.join(columns)}"
+        like = f"name two of them, such as --input {first} --output {second}"
+    return UsageError(said, hint=like)
+
+
+def _with_or_without_value(error: Exception) -> UsageError:
+    """A value where none goes, or none where one does; the parser does not tell of which command."""
+    takes = "takes no value" if "not take" in str(getattr(error, "message", "")) else "needs a value"
+    return UsageError(
+        f"{getattr(error, 'option_name', 'an option')} {takes}", hint="pulsetrainer COMMAND --help"
+    )
 
 
 def _columns(files: Sequence[Path]) -> tuple[str, ...]:

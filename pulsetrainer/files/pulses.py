@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,11 +34,12 @@ def pulse_file(name: str) -> Path:
     path = known.get(name, Path(name))
     if name not in known and path.suffix.lower() != ".csv" and not path.exists():
         near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
-        raise UsageError(
-            f"there is no pulse {name!r}; the library has {', '.join(known)}",
-            hint=(f"did you mean {' or '.join(near)}? Or " if near else "name one of them, or ")
-            + "give any CSV file with a time and a value column, such as my-pulse.csv",
-        )
+        hint = f"did you mean {' or '.join(near)}? Or " if near else "name one of them, or "
+        hint += "give any CSV file with a time and a value column, such as my-pulse.csv"
+        several = re.split(r"[;|\s]+", name)
+        if len(several) > 1 and set(several) <= set(known):
+            hint = f"put commas between the names: {','.join(several)}"
+        raise UsageError(f"there is no pulse {name!r}; the library has {', '.join(known)}", hint=hint)
     check_file(path)
     return path
 

@@ -50,7 +50,7 @@ def course(session: Session) -> Figure:
     below.set_ylabel("error [% of full force]")
     below.set_xlabel(label("start of the beat", "s"))
     below.set_ylim(bottom=0.0)
-    panels.headroom(below)
+    panels.headroom(below, 0.3)
     return figure
 
 

@@ -39,7 +39,13 @@ def refused(folder: Path, words: list[object], code: int, name: str, env=None, *
         (["identify", "played.h5", "-o", "x.h5"], "played.h5", "a run", "a playback", "capture"),
         (["invert", "normal", "--model", "run.h5", "-o", "x.h5"], "run.h5", "a model", "a run", "identify"),
         (["play", "model.h5", "-o", "x.h5"], "model.h5", "a waveform", "a model", "invert"),
-        (["evaluate", "drive.h5", "-o", "x.h5"], "drive.h5", "a playback or a run", "a waveform", "play"),
+        (
+            ["evaluate", "drive.h5", "-o", "x.h5"],
+            "drive.h5",
+            "a playback, a run or a session",
+            "a waveform",
+            "play",
+        ),
     ],
 )
 def test_the_wrong_kind_of_file_names_both_kinds_and_the_next_step(ready, words, file, expected, got, verb):

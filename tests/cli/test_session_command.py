@@ -202,6 +202,7 @@ def test_a_quiz_by_file(run, tmp_path):
     [
         (("--pulses", "normla"), 2, "normal"),
         (("--pulses", "normal,normal"), 2, "once"),
+        (("--pulses", "normal;bifid"), 2, "commas between the names: normal,bifid"),
         (("--rate", "10"), 2, "20 to 240"),
         (("--rate", "241"), 2, "20 to 240"),
         (("--amplitude", "120"), 2, "100 %"),
