@@ -5,8 +5,8 @@ difference, or less than a five hundredth of that of all together (the formulas 
 exact), it is dropped. So is one without which time that was left out is predicted better: it was accepted
 before the others, and does harm beside them. So is one that takes away less than a third of what can be
 lowered on blocks that were left out, where more than noise is left beside it or without it: it fits a device
-that is no Preisach operator, as anything does. A single cause has proved itself against the baseline, and goes only for
-the last two reasons.
+that is no Preisach operator, as anything does. A single cause has proved itself against the baseline, and
+goes only for the last two reasons.
 """
 
 from __future__ import annotations
