@@ -134,6 +134,11 @@ def session(
         else hands.answer,
         seed=seed,
     )
+    beside = {"--minutes": minutes, "--beats": beats, "--changes": changes}
+    if quiz and (unused := [name for name, value in beside.items() if value is not None]):
+        job.notes(
+            [f"a quiz ends with its last question, at one rate and height: {', '.join(unused)} not used"]
+        )
     asked = {
         "rhythm": Rhythm(variability / 100, respiration / 100, ectopic / 100, seed),
         "rates": rates,

@@ -334,9 +334,7 @@ def programme(
             hint="name some of the library: normal,bifid",
         )
     _check_length(minutes, beats)
-    if quiz:
-        _check_quiz(minutes=minutes, beats=beats, changes=changes or None)
-    elif answers and not callable(answers):
+    if not quiz and answers and not callable(answers):
         raise UsageError(
             "`answers` were given, but no quiz asks for them",
             hint="give `quiz` with the number of questions, or leave `answers` out",
@@ -364,17 +362,6 @@ def _check_length(minutes: float | None, beats: int | None) -> None:
         raise UsageError(f"`beats` must be 1 or more, got {beats}", hint="20 last a quarter of a minute")
     if minutes is not None and not 0 < minutes < math.inf:
         raise UsageError(f"`minutes` must be a finite number above 0, got {minutes:g}", hint="5 are usual")
-
-
-def _check_quiz(**given: object) -> None:
-    """Refuse what a quiz decides by itself: its length, and what is pressed when."""
-    for name, value in given.items():
-        if value is not None:
-            raise UsageError(
-                f"a quiz does not go with `{name}`: it ends with its last question, and asks at one rate and "
-                "height",
-                hint=f"leave `{name}` out, or leave `quiz` out",
-            )
 
 
 def _session(sink: Memory, done: Performed, asked: Quiz | None) -> Session | None:

@@ -182,8 +182,9 @@ def test_a_quiz_by_file(run, tmp_path):
     """Score and confusion fit what the file holds; right are those that are right."""
     (tmp_path / "a.txt").write_text("normal\nbifid\nnormal\nbifid\n")
     words = ("--pulses", "normal,bifid", "--quiz", 4, "--answers", "a.txt", "--seed", 3, "--html", "q.html")
-    done = run(*SHORT, *words, "--json")
+    done = run(*SHORT, *words, "--beats", 2, "--json")
     assert done.code == 0, done.err
+    assert "--beats not used" in done.err
     quiz = done.json["quiz"]
     kept = read(tmp_path / "s.h5", Session).quiz
     assert kept.answered == ("normal", "bifid", "normal", "bifid")
@@ -212,7 +213,6 @@ def test_a_quiz_by_file(run, tmp_path):
         (("--variability", "60"), 2, "--variability must be a number from 0 to 25, got 60"),
         (("--ectopic", "-1"), 2, "--ectopic"),
         (("--answers", "right.txt"), 2, "leave --answers out"),
-        (("--quiz", "2", "--pulses", "normal,bifid", "--answers", "right.txt", "--beats", "3"), 2, "--beats"),
         (("--quiz", "4"), 2, "two pulses"),
         (("--quiz", "4", "--pulses", "normal,bifid"), 2, "terminal"),
         (("--quiz", "4", "--pulses", "normal,bifid", "--answers", "short.txt"), 3, "4 questions"),
