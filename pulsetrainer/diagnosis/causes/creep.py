@@ -22,8 +22,10 @@ _SHORT = (3.0, 1.0 / 6.0)  # s, or of the record: ... but in a short one as slow
 _RATIO = 10**0.5  # from one to the next
 _BOUND = 0.2  # of the record
 _RATIOS = (0.25, 4.0)  # of the outer time constants to the middle one
-_EQUAL, _ALONE = 1.0 / 3.0, 1.0  # share of the middle time constant: of three, or alone
-_OTHER = {_EQUAL: 0.5, _ALONE: 0.75}  # shares that are as plausible
+_EQUAL = 1.0 / 3.0  # share of the middle time constant of three ...
+_OTHER = 0.5  # ... and one that is as plausible
+_ALONE = 1.0  # share of a time constant alone ...
+_NEARLY = 0.75  # ... and one that is as plausible
 
 
 class Creep(Cause):
@@ -81,7 +83,7 @@ class Creep(Cause):
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Another share of the middle time constant: no record tells the shares of all three."""
-        return [_crept(y, values, frame, _OTHER[self.middle])]
+        return [_crept(y, values, frame, _NEARLY if self.middle == _ALONE else _OTHER)]
 
 
 def _crept(y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
