@@ -119,8 +119,9 @@ def test_the_output_is_off_first_and_it_is_said_what_there_is(
     model = pt.load(KEPT / "model.h5")
     pt.save(pt.invert("normal", model, periods=1), tmp_path / "drive.h5")
     HeatMemory(tmp_path / "state/pulsetrainer/coil-heat").remember("BENCH-0", 0.0, time.time())
+    output = "run.toml" if words[0] == "tune" else "run.h5"
     process = subprocess.Popen(
-        [*PROGRAM, *map(str, words), "--port", overheard.port, "-o", "run.h5", "--json"],
+        [*PROGRAM, *map(str, words), "--port", overheard.port, "-o", output, "--json"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
