@@ -1233,6 +1233,32 @@ def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, b
     assert bool(found.extensions) is better
 
 
+@pytest.mark.parametrize(
+    ("shown", "gains", "added"),
+    [(True, True, ("creep",)), (False, True, ()), (True, False, ())],
+)
+def test_what_only_equal_loops_show_costs_no_extension(monkeypatch, shown, gains, added):
+    """Where the model gains nothing with it, and much without, it is not added, and in doubt."""
+
+    def with_names(state, model):
+        return tuple(term.cause.id for term in state.extensions)
+
+    monkeypatch.setattr(extension, "extended_model", with_names)
+    rms = {"given": 10.0, ("creep",): 9.0 if gains else 10.0, ("creep", "load-dependence"): 10.0}
+    monkeypatch.setattr(extension, "rms_of", lambda state, model, known: rms[model])
+    _refitting(monkeypatch, extension, squares={frozenset({"creep"}): 510.0})
+    monkeypatch.setattr(extension.begin, "stage", lambda state: state)
+    fit = _fit(500.0, "creep", "load-dependence")
+    findings = (_finding("creep", 20.0), _finding("load-dependence", 0.0))
+    contrast = {"load-dependence": ()} if shown else {}
+    state = _state(fit, repeated=fit, findings=findings, by_contrast=contrast)
+    found = extension.stage(replace(state, question=replace(state.question, given=Given("given"))))
+    assert (found.extended or ()) == added
+    creep, load = found.findings
+    assert (creep.doubts, bool(load.doubts)) == ((), bool(added))
+    assert [one.kind for one in found.evidence] == ([] if added else ["no gain"])
+
+
 # --- the model as given
 RAMP = np.linspace(0.0, 10.0, 1000)
 

@@ -4,16 +4,20 @@ The search judges a model on averages, with a free offset and begin. What is use
 own, from rest. It is made here, and must predict the very records better than the model as given, by at least
 three fifths of what the causes gain in the search; else nothing is added to that. What gains less was already
 under way before the record, and begins otherwise in the next. What a fault of the measurement did to the
-records, and can be taken out of them, counts on neither side.
+records, and can be taken out of them, counts on neither side. Equal loops tell a cause by differences that
+the weights hold, not by what it predicts: where the model gains nothing with it, it is tried without.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from pulsetrainer.artefacts import Model
 from pulsetrainer.diagnosis.answered import extended_model, faults_of, rms_of, undone
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.stages import begin
+from pulsetrainer.diagnosis.stages.repetition import DOUBT
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -23,6 +27,15 @@ def stage(state: State) -> State:
     if state.question.given is None or not state.extensions:
         return state
     given = state.question.given.model
+    found = _extended(state, given)
+    if found.extended is None and {term.cause.id for term in state.extensions} & set(state.by_contrast):
+        fewer = _without_contrast(state)
+        other = _extended(fewer, given) if fewer.extensions else found
+        return other if other.extended is not None else found
+    return found
+
+
+def _extended(state: State, given: Model) -> State:
     extended = extended_model(state, given)
     assert state.repeated is not None
     known, faults = undone(state), faults_of(state)
@@ -35,3 +48,15 @@ def stage(state: State) -> State:
     names = tuple(term.cause.id for term in state.extensions)
     said = Evidence("no gain", figures=figures, names=names)
     return replace(state, repeated=None, evidence=(*state.evidence, said))
+
+
+def _without_contrast(state: State) -> State:
+    """Return the state without the causes that only equal loops showed in the model that goes on."""
+    assert state.repeated is not None
+    kept = [term for term in state.repeated.terms if term.cause.id not in state.by_contrast]
+    findings = tuple(
+        replace(one, doubts=(*one.doubts, DOUBT)) if one.cause.id in state.by_contrast else one
+        for one in state.findings
+    )
+    fewer = refit(state.problem, kept, state.repeated, rebuild=True)
+    return begin.stage(replace(state, repeated=fewer, findings=findings))
