@@ -128,10 +128,10 @@ def _words(given: Given) -> Words:
     }
 
 
-def rms_of(state: State, model: Model, undone: Sequence[FloatArray] = ()) -> float:
+def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = ()) -> float:
     """Rms error of a model, as given or extended, over the single samples with weight, as measured.
 
-    ``undone`` holds what faults of the measurement did to each record (n,), which is no error of a model.
+    ``faults`` holds what faults of the measurement did to each record (n,), which is no error of a model.
     """
     question, errors = state.question, []
     for k, own in enumerate(question.records):
@@ -141,7 +141,7 @@ def rms_of(state: State, model: Model, undone: Sequence[FloatArray] = ()) -> flo
         said = predict(model, even.input, even.step) * model.polarity
         if stamps is not None:
             said = np.interp(stamps, np.arange(said.size) * even.step, said)
-        fault = undone[k] if undone else 0.0
+        fault = faults[k] if faults else 0.0
         errors.append((said + fault - own.output)[masked.sample_weight > 0])
     return root_mean_square(np.concatenate(errors))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis.causes import library, settled
+from pulsetrainer.diagnosis.causes import library, taken_out
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
 
@@ -26,7 +26,7 @@ def check(
     blinds it, nor about what was taken out of the record already (``corrected``) or is left of that.
     """
     raw = Raw(record, low, high, second, stamps, polarity=polarity)
-    out = settled(corrected)
+    out = taken_out(corrected)
     causes = [one for one in library().values() if one.stage == "record" and one.id not in out]
     fired: dict[str, Firing] = {}
     for cause in sorted(causes, key=lambda one: not one.wild):

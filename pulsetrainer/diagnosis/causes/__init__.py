@@ -42,9 +42,10 @@ def cause_named(name: str) -> Cause:
     return library()[name]
 
 
-def settled(corrected: Iterable[str]) -> set[str]:
+def taken_out(corrected: Iterable[str]) -> set[str]:
     """Return the ids of causes that were taken out of a record, and of those that what is left looks like."""
-    return {name for one in corrected for name in (one, *library()[one].leaves)}
+    known = [library()[one] for one in corrected if one in library()]  # a later version may know more
+    return {name for one in known for name in (one.id, *one.leaves)}
 
 
 def upright_values(one: Found | Extension, polarity: int) -> Values:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pulsetrainer.diagnosis.causes import library, settled
+from pulsetrainer.diagnosis.causes import library, taken_out
 from pulsetrainer.diagnosis.raw import Firing, Raw
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.state import State
@@ -23,7 +23,7 @@ def stage(state: State) -> State:
     state = replace(state, firings=kept)
     if state.current.squares - state.floor.squares <= state.floor.relevant or state.jagged:
         return state
-    out = settled(name for one in state.question.corrected for name in one)
+    out = taken_out(name for one in state.question.corrected for name in one)
     asked = [one for one in library().values() if one.stage == "record" and one.id not in out]
     left = [cause.gate_left(state.current) for cause in asked]
     seen = [(0, _in_its_unit(firing, state.scale)) for firing in left if firing is not None]
