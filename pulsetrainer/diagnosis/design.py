@@ -239,6 +239,22 @@ class Design:
             return np.asarray(self.nodes.T @ columns)
         return self.plane.adjoint((self.nodes.T @ columns).T).T
 
+    def products(
+        self, own: NDArray[np.bool_], cells: IntArray, beside: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Products (k, k) and (k, m) of the cells' columns, offset and start not taken off, over some rows.
+
+        The first with themselves, the second with columns ``beside`` (own rows, m).
+        """
+        nodes = self.nodes[own]
+        if isinstance(nodes, np.ndarray):
+            nodes = nodes[:, cells]
+            return nodes.T @ nodes, nodes.T @ beside
+        plane = self.plane
+        # symmetric: the cells of one side may be chosen before the other side is summed
+        half = plane.adjoint((nodes.T @ nodes).toarray())[:, cells]
+        return plane.adjoint(half.T)[:, cells], plane.adjoint((nodes.T @ beside).T).T[cells]
+
     @cached_property
     def squares(self) -> FloatArray:
         """Products D'D (n_q, n_q); zero for cells that only offset and start see."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg
 
 from pulsetrainer.core.plane import FloatArray, IntArray
@@ -31,7 +32,6 @@ class HeldOut:
         self.block = _blocks_of(problem)
         self._by_rate = _sorted_by_rate(problem, self.block)
         self._errors: list[tuple[Fitted, float]] = []
-        self._rows: list[tuple[Fitted, FloatArray]] = []  # of the last two: they are large
 
     def error(self, fitted: Fitted) -> float:
         """Sum of squares on both halves of the blocks, each predicted from the other; NaN for few blocks."""
@@ -88,8 +88,8 @@ class HeldOut:
         size = free.size + extra + starts
         if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | ~test.any(axis=0)):
             return
-        rows = self._rows_of(fitted)
-        parts = [own.T @ own for own in (rows[one] for one in test.T)]
+        rows = _Rows(fitted)
+        parts = [rows.products(own) for own in test.T]
         masses = (fitted.simulator.operator.weights * design.plane.areas)[free]
         smooth, pull = np.zeros((size, size)), np.zeros(size)  # pull: of the smoothing at the joint fit
         smooth[: free.size, : free.size] = design.smooth[np.ix_(free, free)]
@@ -106,17 +106,38 @@ class HeldOut:
             normal[np.diag_indices(size)] += TINY
             factor = linalg.cho_factor(normal, lower=True, check_finite=False, overwrite_a=True)
             change = linalg.cho_solve(factor, left[:-1, -1] - share * pull, check_finite=False)
-            yield rows[own] @ np.append(-change, 1.0), change[free.size : free.size + extra]
+            yield fitted.residual[own] - rows.output(change)[own], change[free.size : free.size + extra]
 
-    def _rows_of(self, fitted: Fitted) -> FloatArray:
-        """Rows (count, k + 1) of all that is fitted, with the residual beside them."""
-        for known, rows in self._rows:
-            if known is fitted:
-                return rows
-        bins, cells = fitted.design.bins, fitted.projector.columns
-        rows = np.hstack((cells, bins.settled(fitted.slopes), bins.free, fitted.residual[:, None]))
-        self._rows = [*self._rows[-1:], (fitted, rows)]
-        return rows
+
+class _Rows:
+    """Rows [D, G, F, r] of all that is fitted (cells, slopes, offset and start) and of the residual.
+
+    D (count, k) are the columns of the cells without their part along F; where the nodes are
+    sparse they are never made, and their products come of those of the nodes.
+    """
+
+    def __init__(self, fitted: Fitted) -> None:
+        self._design, self._cells = fitted.design, fitted.projector.cells
+        bins = self._design.bins
+        self._beside = np.hstack((bins.settled(fitted.slopes), bins.free, fitted.residual[:, None]))
+        self._starts = slice(fitted.slopes.shape[1], self._beside.shape[1] - 1)
+
+    def products(self, own: NDArray[np.bool_]) -> FloatArray:
+        """R'R (k + m, k + m) over the rows ``own`` (count,)."""
+        beside = self._beside[own]
+        cells, across = self._design.products(own, self._cells, beside)
+        taken = self._design.taken[:, self._cells]
+        along = taken.T @ across[:, self._starts].T
+        cells = cells - along - along.T + taken.T @ (beside.T @ beside)[self._starts, self._starts] @ taken
+        across = across - taken.T @ (beside.T @ beside)[self._starts]
+        return np.block([[cells, across], [across.T, beside.T @ beside]])
+
+    def output(self, change: FloatArray) -> FloatArray:
+        """What a change (k + m - 1,) of all that is fitted adds (count,)."""
+        masses = np.zeros(self._design.plane.n_q)
+        masses[self._cells] = change[: self._cells.size]
+        added = self._design.bins.settled(self._design.output(masses))
+        return np.asarray(added + self._beside[:, :-1] @ change[self._cells.size :])
 
 
 def _fold_of(folds: int, *, whole: bool) -> IntArray:

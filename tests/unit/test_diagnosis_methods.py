@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import sparse, stats
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.record import Record
@@ -228,14 +228,18 @@ def test_what_does_not_count_moves_no_block():
 
 
 @pytest.mark.parametrize(("whole", "by_rate"), [(False, False), (True, False), (True, True)])
-def test_errors_of_folds_are_those_of_as_many_fits(whole, by_rate):
+@pytest.mark.parametrize(
+    ("name", "values"), [("output-lag", (0.02,)), ("resonance", (9.0, 0.4))], ids=["sparse", "filtered"]
+)
+def test_errors_of_folds_are_those_of_as_many_fits(name, values, whole, by_rate):
     """The sums over blocks against each fold fitted on its own rows, weighted one by one."""
     u = np.tile(_loops(), 4)
     u = np.concatenate((np.repeat(u, 2), u)) if by_rate else u
     rng = np.random.default_rng(3)
     y = CAUSE["output-lag"].on_output(3.0 * u, (0.03,), FRAME) + 0.01 * rng.standard_normal(u.size)
     problem = problem_for([Record(u, y, dt_s=0.01)], 0.0, 1.5)
-    fitted = refit(problem, (Term(CAUSE["output-lag"], (0.02,)),), None, rounds=2)
+    fitted = refit(problem, (Term(CAUSE[name], values),), None, rounds=2)
+    assert sparse.issparse(fitted.design.nodes) == (name == "output-lag")
     held_out, folds = HeldOut(problem), 4
     blocks = np.arange(LIMITS.blocks)
     fold_of = (blocks * folds // LIMITS.blocks if whole else blocks % folds)[
