@@ -21,7 +21,7 @@ from pulsetrainer.diagnosis.noise import burstiness
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.raw import Firing
 from pulsetrainer.diagnosis.scale import Scale
-from pulsetrainer.diagnosis.screening import Score, Screen
+from pulsetrainer.diagnosis.screening import Score, Screen, Sight
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 
@@ -82,6 +82,7 @@ class State:
     by_contrast: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)  # what equal loops show
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # of every cause, strongest first
+    sights: Mapping[str, Sight] = field(default_factory=dict)  # of every cause that was screened
     limits: Mapping[str, float] = field(default_factory=dict)  # smallest effects that would show, of the span
     extended: Model | None = None  # with those causes
     verdict: str = "none"

@@ -21,7 +21,7 @@ from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.raw import Firing
 from pulsetrainer.diagnosis.scale import Scale
-from pulsetrainer.diagnosis.screening import Score, Screen
+from pulsetrainer.diagnosis.screening import Score, Screen, Sight
 from pulsetrainer.diagnosis.stages import (
     acceptance,
     account,
@@ -181,6 +181,26 @@ def test_a_fault_that_could_be_the_device_is_left_in(tied, kept):
     """A drift that is tied with another fault of the measurement is one of them in any case."""
     found = Finding(CAUSE["offset-drift"], found=True, confounded_with=tied)
     assert _state(_fit(1.0), findings=(found,)).correctable == (["offset-drift"] if kept else [])
+
+
+def test_what_would_have_shown_of_a_cause_in_the_model_is_asked_against_the_noise_of_today(monkeypatch):
+    """Its own gain is no error of the levels, and the noise of its screen held what others explain."""
+
+    def seen(name: str, gain: float, noise: float) -> Score:
+        return replace(_score(name, gain), sight=Sight(0.5, noise, 3.0))
+
+    screens = iter(
+        [Screen((seen("creep", 64.0, 8.0), seen("delay", 4.0, 8.0))), Screen((seen("delay", 1.0, 2.0),))]
+    )
+    monkeypatch.setattr(screened, "screen", lambda fitted, rng: next(screens))
+    state = screened.stage(_state(_fit(100.0)))
+    norm = state.floor.span * np.sqrt(state.floor.count)
+    before, today = Sight(0.5, 8.0, 3.0), Sight(0.5, 2.0, 3.0)
+    relevant = state.floor.relevant
+    assert state.limits["creep"] == pytest.approx(before.least(relevant, 64.0) / norm)
+    after = screened.stage(state).limits
+    assert after["delay"] == pytest.approx(today.least(relevant, 1.0) / norm)
+    assert after["creep"] == pytest.approx(today.least(relevant) / norm)
 
 
 # --- what the state knows

@@ -8,7 +8,7 @@ on with p of at most 0.01.
 
 From the same null follows how small an effect of each cause would have shown: large enough that the test
 finds it in nine of ten records, that what the weights leave of it matters, and that neither is undone by what
-looks like the cause already.
+looks like the cause already. Of a cause that is in the model by now it is asked against the noise of today.
 """
 
 from __future__ import annotations
@@ -25,9 +25,14 @@ def stage(state: State) -> State:
     """Return the state with the scores of all causes that are not in the model."""
     scores = screen(state.current, state.question.rng)
     norm = state.floor.span * float(np.sqrt(state.floor.count))
+    gains = {one.cause.id: one.gain for one in scores.scores}
+    seen = {one.cause.id: one.sight for one in scores.scores if one.sight is not None}
+    falls = [seen[name].noise / state.sights[name].noise for name in seen if name in state.sights]
+    quieter = float(np.median(falls or 1.0))
+    # of one in the model, what it and later ones explain has left the noise since
+    known = {name: replace(one, noise=one.noise * quieter) for name, one in state.sights.items()}
+    sights = {**known, **seen}
     limits = {
-        one.cause.id: one.sight.least(state.floor.relevant, one.gain) / norm
-        for one in scores.scores
-        if one.sight is not None
+        name: one.least(state.floor.relevant, gains.get(name, 0.0)) / norm for name, one in sights.items()
     }
-    return replace(state, scores=scores, limits={**state.limits, **limits})
+    return replace(state, scores=scores, sights=sights, limits=limits)
