@@ -222,6 +222,34 @@ class Late(Cause):
         return [[(one,)] for one in sorted({max(s, frames[0].dt_s) for s in self._tried_s})]
 
 
+class OfKinds(Cause):
+    """A cause whose formula leaves a number open: each of a few is tried, as a kind of its own."""
+
+    number: ClassVar[str]  # its name in a model
+    tried: ClassVar[tuple[float, ...]]  # the first is meant where a model keeps none
+
+    def __init__(self, kind: float | None = None) -> None:
+        self.kind = self.tried[0] if kind is None else kind
+
+    @cached_property
+    def _kinds(self) -> tuple[Cause, ...]:
+        plain = self.kind == self.tried[0]
+        return (self, *(type(self)(one) for one in self.tried[1:])) if plain else (self,)
+
+    def kinds(self) -> tuple[Cause, ...]:
+        """Return the causes of this id to be tried."""
+        return self._kinds
+
+    def constants(self) -> tuple[tuple[str, float, str], ...]:
+        """Return what a model must keep of it besides its parameters: name, value and unit."""
+        return () if self.kind == self.tried[0] else ((self.number, self.kind, "1"),)
+
+    def restored(self, values: Values) -> tuple[Cause, Values]:
+        """Return the cause and its parameters; the first kind keeps no constant."""
+        kind, own = values[: -len(self.parameters)], values[-len(self.parameters) :]
+        return type(self)(*kind), own
+
+
 def sampled(quantities: Sequence[Quantity], frame: Frame) -> tuple[Quantity, ...]:
     """Return times that may be as long as some time steps, where these are longer than their bounds."""
     return tuple(replace(one, high=max(one.high, _STEPS * frame.dt_s)) for one in quantities)

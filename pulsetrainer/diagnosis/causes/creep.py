@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass, spread
+from pulsetrainer.diagnosis.causes.base import Frame, OfKinds, Quantity, Values, low_pass, spread
 
 _TRIED = 0.03  # amplitude
 _FASTEST_S = 0.1  # the fastest middle time constant
@@ -28,7 +27,7 @@ _ALONE = 1.0  # share of a time constant alone ...
 _NEARLY = 0.75  # ... and one that is as plausible
 
 
-class Creep(Cause):
+class Creep(OfKinds):
     """Slow relaxation, as a low-pass or as three on a logarithmic grid of time constants."""
 
     id = "creep"
@@ -40,31 +39,13 @@ class Creep(Cause):
     stage = "output"
     order = 80
     family = "slow memory"
+    number = "middle"
+    tried = (_EQUAL, _ALONE)  # shares of the middle time constant
     common = True
     parameters = (
         Quantity("amplitude", "1", -0.3, 0.6, 0.002, "what follows slowly, per change at once"),
         Quantity("tau", "s", 0.04, 20.0, 0.02, "time constant; of three, the middle one"),
     )
-
-    def __init__(self, middle: float = _EQUAL) -> None:
-        self.middle = middle  # share of the middle time constant
-
-    @cached_property
-    def _kinds(self) -> tuple[Cause, ...]:
-        return (self, Creep(_ALONE)) if self.middle == _EQUAL else (self,)
-
-    def kinds(self) -> tuple[Cause, ...]:
-        """Return the causes of this id to be tried."""
-        return self._kinds
-
-    def constants(self) -> tuple[tuple[str, float, str], ...]:
-        """Return what a model must keep of it besides its parameters: name, value and unit."""
-        return () if self.middle == _EQUAL else (("middle", self.middle, "1"),)
-
-    def restored(self, values: Values) -> tuple[Cause, Values]:
-        """Return the cause and its parameters; a bank of three keeps no constant."""
-        *middle, strength, tau = values
-        return Creep(*middle), (strength, tau)
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""
@@ -79,11 +60,11 @@ class Creep(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return _crept(y, values, frame, self.middle)
+        return _crept(y, values, frame, self.kind)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Another share of the middle time constant: no record tells the shares of all three."""
-        return [_crept(y, values, frame, _NEARLY if self.middle == _ALONE else _OTHER)]
+        return [_crept(y, values, frame, _NEARLY if self.kind == _ALONE else _OTHER)]
 
 
 def _crept(y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:

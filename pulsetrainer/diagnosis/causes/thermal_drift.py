@@ -9,12 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, low_pass, spread
+from pulsetrainer.diagnosis.causes.base import Frame, OfKinds, Quantity, Values, low_pass, spread
 
 _TRIED = 0.02  # coefficient
 _FASTEST_S = 5.0  # a wire's: what is faster is creep
@@ -25,7 +24,7 @@ _NOT_COLD = 0.05  # of the heat that the largest input would lead to
 _BOTH_WAYS = 0.5  # of the range: the input at which a device that is driven both ways stays cold
 
 
-class ThermalDrift(Cause):
+class ThermalDrift(OfKinds):
     """A gain that falls with heat."""
 
     id = "thermal-drift"
@@ -40,6 +39,8 @@ class ThermalDrift(Cause):
     stage = "output"
     order = 50
     family = "slow gain"
+    number = "cold"
+    tried = (0.0, _BOTH_WAYS)  # share of the input's range at which nothing heats
     drifts = True
     common = True
     parameters = (
@@ -49,30 +50,10 @@ class ThermalDrift(Cause):
         Quantity("tau", "s", 1.0, 300.0, 0.5, "time constant of the heat"),
     )
 
-    def __init__(self, cold: float = 0.0) -> None:
-        self.cold = cold  # share of the input's range at which nothing heats
-
-    @cached_property
-    def _kinds(self) -> tuple[Cause, ...]:
-        return (self,) if self.cold else (self, ThermalDrift(_BOTH_WAYS))
-
-    def kinds(self) -> tuple[Cause, ...]:
-        """Return the causes of this id to be tried."""
-        return self._kinds
-
-    def constants(self) -> tuple[tuple[str, float, str], ...]:
-        """Return what a model must keep of it besides its parameters: name, value and unit."""
-        return (("cold", self.cold, "1"),) if self.cold else ()
-
-    def restored(self, values: Values) -> tuple[Cause, Values]:
-        """Return the cause and its parameters; a device that is driven one way keeps no constant."""
-        *cold, strength, tau = values
-        return ThermalDrift(*cold), (strength, tau)
-
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""
         strength, tau = self.parameters
-        hottest = (1.0 - self.cold) ** 2  # heat of the largest input, squared ranges
+        hottest = (1.0 - self.kind) ** 2  # heat of the largest input, squared ranges
         low, high = (share * frame.length_s for share in _BOUNDS)
         return (
             replace(strength, low=strength.low / hottest, high=strength.high / hottest),
@@ -100,9 +81,9 @@ class ThermalDrift(Cause):
         if frame.past is None or not frame.past.before:  # the first sample already heats
             squared = np.append(begin, squared)
         heat = low_pass(squared, values[1], frame.dt_s, frame.past, "heat")[-y.size :]
-        about = frame.zero + self.cold * (frame.ends[1] - frame.ends[0])
+        about = frame.zero + self.kind * (frame.ends[1] - frame.ends[0])
         return np.asarray(y - values[0] * heat * (y - about))
 
     def _power(self, frame: Frame) -> FloatArray:
         """What heats: (n,) squared input, from where it is cold, input unit squared."""
-        return np.asarray((frame.input - frame.low - self.cold * frame.reach) ** 2)
+        return np.asarray((frame.input - frame.low - self.kind * frame.reach) ** 2)
