@@ -113,12 +113,12 @@ def test_wild_samples_stand_apart_from_the_tail():
     """Heavy tails go on and have no limit; a dozen far samples beyond a tail have one."""
     rng = np.random.default_rng(8)
     tail = np.abs(rng.standard_t(3.0, 60_000))
-    far = np.sort(tail[tail > 4.0])
-    assert _beyond_the_tail(far, 8.0) is None
-    limit = _beyond_the_tail(np.sort(np.append(far, 300.0 + np.arange(12.0))), 8.0)
+    far = np.sort(tail[tail > 4.0]) / 8.0
+    assert _beyond_the_tail(far) is None
+    limit = _beyond_the_tail(np.sort(np.append(far, 40.0 + np.arange(12.0))))
     assert limit is not None
-    assert np.count_nonzero(np.append(far, 300.0 + np.arange(12.0)) > limit) <= 20
-    assert _beyond_the_tail(np.asarray([9.0, 9.5]), 8.0) is None
+    assert np.count_nonzero(np.append(far, 40.0 + np.arange(12.0)) > limit) <= 20
+    assert _beyond_the_tail(np.asarray([1.1, 1.2])) is None
 
 
 def test_a_frequency_chosen_by_the_data_is_no_surprise():

@@ -12,11 +12,13 @@ from scipy import ndimage
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
+from pulsetrainer.diagnosis.thresholds import TINY
 
 _SIGMAS = 8.0  # of Gaussian noise one sample in 10^15 is farther out
 _DIFFERENCE = 2.0**0.5  # a sample less a neighbour has that much more noise
 _AROUND = 7  # samples of the median
-_FAST = 0.95  # quantile of the steps from sample to sample: the fast branches
+_FAST = 80.0  # percentile of the steps near by, which three wild samples do not reach
+_NEAR = 31  # samples that are near by
 _TIP = 4.0  # of those steps: a tip at full speed stands out from its median by up to three
 _STEPS = 2.0  # converter steps: nearer is its rounding
 _LINE = 5  # samples on one side of a suspect that may explain it
@@ -51,29 +53,33 @@ class Outliers(Cause):
         """Samples far from the median around them, farther than fast turns go."""
         y = raw.record.output
         apart = np.abs(y - ndimage.median_filter(y, _AROUND, mode="nearest"))
-        usual = _TIP * float(np.quantile(np.abs(np.diff(y)), _FAST))
-        limit = max(_SIGMAS * _DIFFERENCE * noise_of(y), usual, _STEPS * spacing_of(y))
+        steps = np.abs(np.diff(y, prepend=y[0]))
+        usual = _TIP * ndimage.percentile_filter(steps, _FAST, _NEAR, mode="nearest")
+        noise = max(_SIGMAS * _DIFFERENCE * noise_of(y), _STEPS * spacing_of(y), TINY)
+        limit = np.maximum(usual, noise)
         told = ~raw.beside_breaks(_AROUND) & ~_turns_fast(raw.record.input, raw.high - raw.low)
         off = np.where((apart > 0.5 * limit) & told, apart, 0.0)
         for at in np.flatnonzero(off):  # where a stroke ends with a jump, its last sample still lies on it
             off[at] = min(off[at], _off_line(y, int(at), -1), _off_line(y, int(at), 1))
-        found = _beyond_the_tail(np.sort(off[off > 0.5 * limit]), limit)
-        if found is None:
+        beyond = off / limit
+        least = _beyond_the_tail(np.sort(beyond[beyond > 0.5]))
+        if least is None:
             return None
-        limit, wild = found, off > found
-        count = np.count_nonzero(wild)
-        figures = {"count": float(count), "limit": float(limit)}
+        wild = beyond > least
+        figures = {"count": float(np.count_nonzero(wild)), "limit": least * float(limit[wild].min())}
         return Firing(self.id, "gate", float(apart[wild].max()), "{y}", figures, wild)
 
 
-def _beyond_the_tail(off: FloatArray, limit: float) -> float | None:
-    """Return the smallest limit beyond which samples stand apart; None where there is none.
+def _beyond_the_tail(beyond: FloatArray) -> float | None:
+    """Return the smallest limit from 1 on beyond which samples stand apart; None where there is none.
 
-    ``off`` (k,) rises from half of ``limit``. Heavy tails go on: at half a limit they hold many times more.
+    ``beyond`` (k,) rises from a half. Heavy tails go on: at half a limit they hold many times more.
     """
-    while np.count_nonzero(off > limit) >= _LEAST:
-        beyond, below = np.count_nonzero(off > limit), np.count_nonzero((off > 0.5 * limit) & (off <= limit))
-        if below <= _TAIL * beyond:
+    limit = 1.0
+    while np.count_nonzero(beyond > limit) >= _LEAST:
+        above = np.count_nonzero(beyond > limit)
+        below = np.count_nonzero((beyond > 0.5 * limit) & (beyond <= limit))
+        if below <= _TAIL * above:
             return limit
         limit *= _HIGHER
     return None
