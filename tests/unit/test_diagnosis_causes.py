@@ -60,10 +60,10 @@ def test_creep_is_the_mean_of_three_lags():
     np.testing.assert_allclose(other, (T + a * slow) / (1 + a), atol=1e-12)
 
 
-def test_creep_of_one_time_constant_is_that_lag_alone():
+def test_creep_of_one_time_constant_or_of_five():
     """Tried beside the bank of three; the constant goes into the model and comes back."""
     a, tau = 0.3, 0.4
-    bank, alone = CAUSE["creep"].kinds()
+    bank, alone, wide = CAUSE["creep"].kinds()
     found = alone.on_output(T, (a, tau), _frame())
     np.testing.assert_allclose(found, (T + a * _lagged(tau)) / (1 + a), atol=1e-12)
     kept = tuple(value for _, value, _ in alone.constants())
@@ -75,6 +75,10 @@ def test_creep_of_one_time_constant_is_that_lag_alone():
     (other,) = alone.variants(T, (a, tau), _frame())
     slow = 0.75 * _lagged(tau) + 0.125 * (_lagged(0.25 * tau) + _lagged(4 * tau))
     np.testing.assert_allclose(other, (T + a * slow) / (1 + a), atol=1e-12)
+    five = [0.1 * tau, tau / 10**0.5, tau, tau * 10**0.5, 10.0 * tau]
+    slow = sum(_lagged(one) for one in five) / 5
+    np.testing.assert_allclose(wide.on_output(T, (a, tau), _frame()), (T + a * slow) / (1 + a), atol=1e-12)
+    assert CAUSE["creep"].restored((wide.constants()[0][1], a, tau))[0].kind == wide.kind
 
 
 @pytest.mark.parametrize("cold", [True, False])
@@ -442,6 +446,16 @@ def test_jumps_in_slow_motion(number, rate, fires):
         firing = CAUSE["stick-slip"].gate(_raw(y, u))
         assert firing.figures["count"] == number
         assert firing.value == pytest.approx(0.2, rel=0.02)
+
+
+@pytest.mark.parametrize("rest", [40, 200])
+def test_short_ramps_between_rests_are_no_jumps(rest):
+    """All of a ramp of twelve samples is a jump beside the rests, which are as even before it as after it."""
+    levels = np.tile(np.concatenate((np.arange(20), np.arange(20)[::-1])) / 20.0, 2)
+    at = np.arange(levels.size) * (rest + 12)
+    u = np.interp(np.arange(at[-1] + rest), np.ravel((at, at + rest), "F"), np.repeat(levels, 2))
+    y = u**2 + 1e-3 * np.random.default_rng(5).standard_normal(u.size)
+    assert not _fires("stick-slip", y, u, dt=0.02)
 
 
 def test_jumps_below_the_noise_and_short_records_show_nothing():

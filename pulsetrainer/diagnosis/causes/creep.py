@@ -1,7 +1,7 @@
-"""the output creeps on under a constant input: a low-pass, or a bank of three.
+"""the output creeps on under a constant input: a low-pass, or a bank of three or five.
 
-One time constant is that of a single process, such as air that passes a gap; three, a factor of four apart,
-stand for the many of a solid. Both kinds are tried.
+One time constant is that of a single process, such as air that passes a gap; three or five stand for the many
+of a solid, over one decade of time or over two. All kinds are tried.
 """
 
 from __future__ import annotations
@@ -20,19 +20,23 @@ _SLOWEST = 1.0 / 30.0  # of the record: the slowest one ...
 _SHORT = (3.0, 1.0 / 6.0)  # s, or of the record: ... but in a short one as slow as these
 _RATIO = 10**0.5  # from one to the next
 _BOUND = 0.2  # of the record
-_RATIOS = (0.25, 4.0)  # of the outer time constants to the middle one
+_RATIOS = (0.25, 4.0)  # of the outer time constants of three to the middle one
+_DECADES = (0.1, 10**-0.5, 10**0.5, 10.0)  # of the outer ones of five
 _EQUAL = 1.0 / 3.0  # share of the middle time constant of three ...
 _OTHER = 0.5  # ... and one that is as plausible
+_FIVE = 0.2  # share of the middle one of five ...
+_UNEVEN = 0.3  # ... and one that is as plausible
 _ALONE = 1.0  # share of a time constant alone ...
 _NEARLY = 0.75  # ... and one that is as plausible
+_PLAUSIBLE = {_EQUAL: _OTHER, _FIVE: _UNEVEN, _ALONE: _NEARLY}
 
 
 class Creep(OfKinds):
-    """Slow relaxation, as a low-pass or as three on a logarithmic grid of time constants."""
+    """Slow relaxation, as a low-pass or as some on a logarithmic grid of time constants."""
 
     id = "creep"
     title = "the {output} creeps on under a constant {input}"
-    formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau, or tau alone"
+    formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau, or tau/10 to 10 tau, or tau"
     signature = "relaxation towards a new value during holds, over several decades of time"
     excitation = "holds of three time constants after reversals, on several levels"
     source = "Kuhnen and Krejci, IEEE Trans. Automatic Control 54, 2009: creep as a bank of low-passes"
@@ -40,11 +44,11 @@ class Creep(OfKinds):
     order = 80
     family = "slow memory"
     number = "middle"
-    tried = (_EQUAL, _ALONE)  # shares of the middle time constant
+    tried = (_EQUAL, _ALONE, _FIVE)  # shares of the middle time constant
     common = True
     parameters = (
         Quantity("amplitude", "1", -0.3, 0.6, 0.002, "what follows slowly, per change at once"),
-        Quantity("tau", "s", 0.04, 20.0, 0.02, "time constant; of three, the middle one"),
+        Quantity("tau", "s", 0.04, 20.0, 0.02, "time constant; of several, the middle one"),
     )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
@@ -60,17 +64,17 @@ class Creep(OfKinds):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return _crept(y, values, frame, self.kind)
+        return self._crept(y, values, frame, self.kind)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
-        """Another share of the middle time constant: no record tells the shares of all three."""
-        return [_crept(y, values, frame, _NEARLY if self.kind == _ALONE else _OTHER)]
+        """Another share of the middle time constant: no record tells the shares of all of them."""
+        return [self._crept(y, values, frame, _PLAUSIBLE[self.kind])]
 
-
-def _crept(y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
-    """Creep with a share ``middle`` of its amplitude in the middle time constant."""
-    slow = middle * low_pass(y, values[1], frame.dt_s, frame.past, "creep")
-    for ratio in _RATIOS if middle < _ALONE else ():
-        part = low_pass(y, values[1] * ratio, frame.dt_s, frame.past, f"creep {ratio:g}")
-        slow = slow + 0.5 * (1.0 - middle) * part
-    return np.asarray((y + values[0] * slow) / (1.0 + values[0]))
+    def _crept(self, y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
+        """Creep with a share ``middle`` of its amplitude in the middle time constant."""
+        slow = middle * low_pass(y, values[1], frame.dt_s, frame.past, "creep")
+        outer = _DECADES if self.kind == _FIVE else _RATIOS
+        for ratio in outer if middle < _ALONE else ():
+            part = low_pass(y, values[1] * ratio, frame.dt_s, frame.past, f"creep {ratio:g}")
+            slow = slow + (1.0 - middle) / len(outer) * part
+        return np.asarray((y + values[0] * slow) / (1.0 + values[0]))

@@ -174,7 +174,8 @@ def _slow(u: FloatArray, dt_s: float, wide: int, reach: float) -> FloatArray:
     """Whether the input moves slowly and evenly at each sample (n,)."""
     rate = ndimage.uniform_filter1d(np.gradient(u, dt_s), _RATE * wide) / reach
     moved = np.abs(rate)
-    change = np.abs(np.roll(rate, -_APART * wide) - np.roll(rate, _APART * wide))
+    # both sides: between two rests a short ramp is no even motion, and all of it looks like a jump
+    change = np.max([np.abs(np.roll(rate, side * _APART * wide) - rate) for side in (-1, 1)], axis=0)
     return np.asarray((moved > _RATES[0]) & (moved < _RATES[1]) & (change < _EVEN * moved))
 
 

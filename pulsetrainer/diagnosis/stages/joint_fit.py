@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
@@ -29,13 +31,25 @@ def stage(state: State) -> State:
         if len(lower) == LIMITS.tried or not promising(state, score):
             break
         if score.cause.family not in state.families:
-            terms = (*state.current.terms, Term(score.cause, score.start))
-            trials.append((refit(state.problem, terms, state.current, rounds=LIMITS.trial_rounds), score))
+            trials.append((_of_best_kind(state, score), score))
     trials.sort(key=lambda pair: pair[0].squares)
     if trials:
         best = trials[0][0]
         trials.sort(key=lambda pair: not _simpler(state, best, pair[0]))  # stable: else by their squares
     return replace(state, trials=tuple(trials))
+
+
+def _of_best_kind(state: State, score: Score) -> Fitted:
+    """Refit with the kind of a cause that fits best: linearised they can hardly be told apart."""
+    best = _with(state, score.cause, score.start)
+    values = best.terms[best.names.index(score.cause.id)].values
+    others = [one for one in library()[score.cause.id].kinds() if one is not score.cause]
+    return min([best, *(_with(state, kind, values) for kind in others)], key=lambda fitted: fitted.squares)
+
+
+def _with(state: State, cause: Cause, values: Values) -> Fitted:
+    terms = (*state.current.terms, Term(cause, values))
+    return refit(state.problem, terms, state.current, rounds=LIMITS.trial_rounds)
 
 
 def _simpler(state: State, best: Fitted, trial: Fitted) -> bool:
