@@ -11,7 +11,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
 from pulsetrainer.artefacts.units import same_units, with_unit
-from pulsetrainer.core import input_noise, metrics, uncertainty, wild
+from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
 from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
@@ -114,7 +114,10 @@ def identify(
     reach = _reach(titles, measured)
     cleaned = [input_noise.clean(part.input) for part in measured]
     notes += _of_noise(cleaned, measured[0].input_unit)
-    measured = [replace(part, input=clean.input) for part, clean in zip(measured, cleaned, strict=True)]
+    measured = [
+        replace(part, input=clean.input if part.time_s is None else turns.reached(clean.input, part.time_s))
+        for part, clean in zip(measured, cleaned, strict=True)
+    ]
     progress(0.1)
     if smoothing is None:
         smoothing = 0.0 if reading == "relay" else "auto"
