@@ -33,6 +33,11 @@ class Table:
     rows: tuple[tuple[Any, ...], ...]
 
 
+def picked(noun: Any, *names: str) -> dict[str, Any]:
+    """Return some attributes by name."""
+    return {name: getattr(noun, name) for name in names}
+
+
 def folded(lead: str, text: str, width: int | None, indent: int | None = None) -> str:
     """Return a line, folded between words to a width; None: not folded."""
     if width is None or len(lead) + len(text) <= width:
