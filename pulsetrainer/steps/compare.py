@@ -80,19 +80,12 @@ def compare(
     check_several(evaluations)
     sessions = [one for one in evaluations if isinstance(one, Session)]
     if sessions and len(sessions) < len(evaluations):
-        given = [
+        given = ", ".join(
             f"{name} is {'a session' if isinstance(one, Session) else 'an evaluation'}"
             for name, one in zip(names, evaluations, strict=False)
-        ]
-        raise DataError(
-            ": ".join(
-                (
-                    "evaluations and sessions cannot be compared with each other",
-                    *filter(None, [", ".join(given)]),
-                )
-            ),
-            hint="give one kind or the other",
         )
+        said = "evaluations and sessions cannot be compared with each other"
+        raise DataError(f"{said}: {given}" if given else said, hint="give one kind or the other")
     tested = [one for one in evaluations if isinstance(one, Evaluation)]
     every = [_of_session(one) for one in sessions] or _named(tested, [one.figures() for one in tested])
     spreads = _named(tested, [_spreads(one) for one in tested])

@@ -15,9 +15,7 @@ from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.core.temperature import Thermometer
-from pulsetrainer.device.codes import HEAT_TAU_S
 from pulsetrainer.device.device import Device
-from pulsetrainer.device.heat import added
 from pulsetrainer.device.plausibility import judge_against
 from pulsetrainer.device.trace import Block
 from pulsetrainer.device.wording import FORCE_REMEDY
@@ -104,32 +102,6 @@ class Performed:
         }
 
 
-def conductor_of(
-    model: Model,
-    pulses: Sequence[Pulse],
-    reach: Reach,
-    rhythm: Rhythm,
-    decide: Decide,
-    give: Callable[[Given], None],
-    *,
-    heat: float = 0.0,
-    loss: Callable[[], float] = lambda: 0.0,
-) -> Conductor:
-    """Return the conductor for our device, whose coil has this heat."""
-    return Conductor(
-        extended_of(model),
-        pulses,
-        reach,
-        rhythm,
-        decide,
-        give,
-        heat=heat,
-        heated=added,
-        cooling_s=HEAT_TAU_S,
-        loss=loss,
-    )
-
-
 class Performance:
     """A session under way: what is given out, what comes back."""
 
@@ -152,9 +124,10 @@ class Performance:
         self._pulses = tuple(pulse.name for pulse in pulses)
         self._ledger = Ledger(self._pulses)
         self._reach = reach
-        self._conductor = conductor_of(
-            model, pulses, reach, rhythm, decide, self._ledger.give, heat=device.heat, loss=lambda: self._loss
-        )
+        self._conductor = Conductor(
+            extended_of(model), pulses, reach, rhythm, decide, self._ledger.give,
+            heat=device.heat, loss=lambda: self._loss,
+        )  # fmt: skip
         self._begun = 0  # sample at which the part began
         self._begins_s: list[float] = []  # of the parts, without the pauses between them
         self._next = 0  # sample that comes, where none is lost
