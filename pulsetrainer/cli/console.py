@@ -102,26 +102,21 @@ class Screen:
             typer.echo(f"error: {failed.message}\n  try: {failed.hint}", err=True)
             raise typer.Exit(failed.exit_code)
 
-    def facts(self, title: str, rows: Mapping[str, Any]) -> None:
-        """Print names and values, one a line, unless JSON was asked for."""
-        names = [tables.label(name) for name in rows]
-        width = max((len(name) for name in names), default=0)
-        self.line("", title, indent=2)
-        if self.is_terminal and 2 * width + 8 > self.width:  # no room beside the names: below them
-            for name, value in zip(names, rows.values(), strict=True):
-                self.line("  ", name)
-                self.line("    ", tables.text(value))
-            return
-        for name, value in zip(names, rows.values(), strict=True):
-            self.line(f"  {name:<{width}}  " if width else "  ", tables.text(value))
-
     def parts(self, parts: Iterable[tables.Facts | tables.Table]) -> None:
         """Print facts and tables, unless JSON was asked for."""
-        for part in parts:
-            if isinstance(part, tables.Facts):
-                self.facts(part.title, part.rows)
-            else:
-                self.table(part.title, part.columns, part.rows)
+        for part in () if self.as_json else parts:
+            sys.stdout.write(tables.rendered(part, self.width if self.is_terminal else None))
+
+    def facts(self, title: str, rows: Mapping[str, Any]) -> None:
+        """Print names and values, one a line, unless JSON was asked for."""
+        self.parts([tables.Facts(title, rows)])
+
+    def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+        """Print a table, unless JSON was asked for; the first column is text, the others are numbers.
+
+        Where the terminal is too narrow for it: the same, one figure a line.
+        """
+        self.parts([tables.Table(title, columns, rows)])
 
     def line(self, lead: str, text: str, *, indent: int | None = None) -> None:
         """Print a line; on a terminal that is too narrow, on several, broken between words below ``lead``."""
@@ -131,15 +126,3 @@ class Screen:
         """Print a line that is never folded, since a path or a command in it is copied in one piece."""
         if not self.as_json:
             sys.stdout.write(text + "\n")
-
-    def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-        """Print a table, unless JSON was asked for; the first column is text, the others are numbers.
-
-        Where the terminal is too narrow for it: the same, one figure a line.
-        """
-        if self.as_json:
-            return
-        drawn = tables.drawn(title, columns, rows)
-        if self.is_terminal and max(map(len, tables.ESCAPE.sub("", drawn).splitlines())) > self.width:
-            drawn = "\n".join(tables.listed(title, columns, rows)) + "\n"
-        sys.stdout.write(drawn)
