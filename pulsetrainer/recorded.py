@@ -141,7 +141,7 @@ def session_into(
                 raise
         quiz = blind.quiz(out.stem) if blind else None
         recorder.keep(done.fields | {"quiz": quiz}, header())
-        recorder.finish(complete=not done.fault, dropped_samples=done.dropped)
+        recorder.finish(complete=not done.fault, dropped_samples=done.dropped_samples)
     return done, quiz
 
 

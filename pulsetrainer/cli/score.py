@@ -81,7 +81,7 @@ def tell(
         error.hint = error.hint or "evaluate what there is, or press another one into another file"
         raise
     quizzed, right = _quizzed(quiz)
-    kelvins = [kelvin for _, kelvin in done.temperature]
+    kelvins = [] if done.temperature_K is None else done.temperature_K.tolist()
     payload: dict[str, Any] = {
         "output": out,
         "beats": int(done.beats.start_s.size),
@@ -89,8 +89,7 @@ def tell(
         "underruns": done.underruns,
         "parts": done.parts,
         "force_range_N": (done.reach.low, done.reach.high),
-        "clipped_samples": done.clipped,
-        "dropped_samples": done.dropped,
+        **picked(done, "clipped_samples", "dropped_samples"),
         "temperature_K": kelvins or None,
         **picked(info, "serial", "firmware"),
         **quizzed,
