@@ -15,11 +15,11 @@ from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import FigureBase
 from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import (
     DrivePlayback,
     Fit,
+    FloatArray,
     Model,
     ModelEvaluation,
     Waveform,
@@ -43,9 +43,6 @@ from pulsetrainer.report.style import (
     label,
 )
 from pulsetrainer.report.thin import extremes, path
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 # A density is mostly small, with a ridge: the square root shows both. Lone spikes far beyond the
 # rest (the least squares make some) do not set the scale.

@@ -8,23 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pulsetrainer.artefacts import Evaluation, Session
+from pulsetrainer.artefacts.evaluation import HEADLINES
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.asked import check_several
 from pulsetrainer.steps.quiz import score
 
-# What a person wants to see first; the others on request.
-HEADLINES = (
-    "mean_error_reduction_percent",
-    "compensated.mean_abs_error_percent",
-    "compensated.max_abs_error_percent",
-    "rms_percent",
-    "max_percent",
-    "right_percent",
-    "right_from_percent",
-    "right_to_percent",
-    "response_s",
-    "pressed.mean_abs_error_percent",
-)
 _RISING = (
     "mean_error_reduction_percent",
     "gain_percent",
