@@ -33,8 +33,8 @@ def seconds(cell: str, *, day_first: bool | None = None) -> float | None:
     if found := _POINTS.fullmatch(cell):
         return _stamp(found[3], found[2], found[1], found.groups()[3:])
     if found := _SLASHES.fullmatch(cell):
-        orders = (False, True) if day_first is None else (day_first,)
-        readings = [_stamp(found[3], *_month_and_day(found, order), found.groups()[3:]) for order in orders]
+        orders = ((1, 2), (2, 1)) if day_first is None else ((2, 1) if day_first else (1, 2),)
+        readings = [_stamp(found[3], found[month], found[day], found.groups()[3:]) for month, day in orders]
         return next((reading for reading in readings if reading is not None), None)
     return None
 
@@ -56,10 +56,6 @@ def day_first(columns: Iterable[tuple[str, ...]]) -> bool | None:
         if len(spans) == len(set(spans.values())) > 0:
             return min(spans, key=spans.__getitem__)
     return None
-
-
-def _month_and_day(found: re.Match[str], day_comes_first: bool) -> tuple[str, str]:
-    return (found[2], found[1]) if day_comes_first else (found[1], found[2])
 
 
 def _of_day(time: tuple[str | Any, ...]) -> float:
