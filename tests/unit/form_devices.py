@@ -140,6 +140,14 @@ def rectified(rng: Generator) -> Device:
     return strain
 
 
+def squared(rng: Generator) -> Device:
+    """Return the square of a polarisation that lags: electrostriction. Its minor loops are not congruent."""
+    plant = bump_plane(rng, 120)
+    low, high = plant.saturation
+    middle = low + (high - low) * rng.uniform(0.4, 0.6)
+    return lambda u: ((plant(u) - middle) / (high - low)) ** 2
+
+
 def mixed_plays(rng: Generator) -> Device:
     """Return narrow plays that lead beside wide plays that lag, over a steep reversible part."""
     radius, _ = _radii(rng)
@@ -168,6 +176,7 @@ def mixed_planes(rng: Generator) -> Device:
 DIRECT = (lagging_plane, play_sum, falling)
 CLOCKWISE = (exchanged_plane, stop_sum, bouc_wen)
 BUTTERFLY = (butterfly_density, rectified)
+NOT_CONGRUENT = (squared, rectified)
 MIXED = (mixed_plays, mixed_planes)
 
 
