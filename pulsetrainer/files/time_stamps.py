@@ -13,6 +13,7 @@ from typing import Any
 
 _TIME = r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:[.,]\d+)?))?(?: ?([AaPp])[Mm])?"
 _CLOCK = re.compile(_TIME)
+_MINUTES = re.compile(r"(\b)(\d+):([0-5]\d[.,]\d+)(\b)")
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 _YEAR_FIRST = re.compile(rf"(\d{{4}})[/-](\d{{1,2}})[/-](\d{{1,2}}),?[T ]{_TIME}")
 _POINTS = re.compile(rf"(\d{{1,2}})\.(\d{{1,2}})\.(\d{{4}}),? {_TIME}")
@@ -24,8 +25,9 @@ def seconds(cell: str, *, day_first: bool | None = None) -> float | None:
 
     ``day_first`` is the order of a date with slashes; None is any that exists.
     """
-    if found := _CLOCK.fullmatch(cell):
-        return _of_day(found.groups()) if found[3] else None  # 12:34 may be minutes and seconds too
+    if found := _CLOCK.fullmatch(cell) or _MINUTES.fullmatch(cell):
+        # 12:34 may be minutes and seconds too; a share of a second tells
+        return _of_day(found.groups()) if found[3] else None
     if _ISO.fullmatch(cell):
         return _since_1970(cell)
     if found := _YEAR_FIRST.fullmatch(cell):
@@ -61,8 +63,8 @@ def day_first(columns: Iterable[tuple[str, ...]]) -> bool | None:
 def _of_day(time: tuple[str | Any, ...]) -> float:
     """Return the seconds since midnight of hour, minute, second and the letter of a half of the day."""
     hour, minute, second, half = time
-    count = int(hour)
-    if half is not None:
+    count = int(hour or 0)
+    if half:
         count = count % 12 + 12 * (half in "Pp")
     return 3600.0 * count + 60.0 * int(minute) + float((second or "0").replace(",", "."))
 

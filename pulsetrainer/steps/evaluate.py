@@ -171,6 +171,8 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
                 hint="use a model of the same device, in the same units",
             )
         one = _of_model(title, model, run, found[0].rms if found else None)
+        if model.fit and model.fit.warning:
+            notes.append(f"warning: {title}: {model.fit.warning}")
         if one.outside_percent > 0:
             notes.append(
                 f"{one.outside_percent:.1f} % of the input of {name} is outside the range of {title}, "

@@ -31,6 +31,7 @@ SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
 _ROUNDS = 3  # of fits, each without the wild samples of the one before
 LEVELS = 48  # where nothing else is asked for
 FEWEST_LEVELS = 4
+_CROWDED = "the loop is steep: the levels lie closer where the output changes"
 WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
 
@@ -130,11 +131,9 @@ def identify(
     wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
-    notes += fit_notes.of_form(fitted, measured[0], form)
-    notes += _of_offsets(titles, fitted, measured)
+    notes += [*fit_notes.of_form(fitted, measured[0], form), *_of_offsets(titles, fitted, measured)]
     notes += _of_first_strokes(titles, measured, operator.low, operator.high)
-    if not fitted.evenly_spaced:
-        notes.append("the loop is steep: the levels lie closer where the output changes")
+    notes += [] if fitted.evenly_spaced else [_CROWDED]
     progress(0.4 if bootstrap else 0.8)
     ensemble = None
     if bootstrap and fitted.form != "direct":
@@ -149,8 +148,10 @@ def identify(
     remembered = [x for x, _ in (exchanged(_signals(measured)) if dual else _signals(measured))]
     covered = coverage(plane, remembered)
     notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
-    warning = fit_notes.warning(fitted, measured, form)
-    notes += [] if warning else fit_notes.of_rest(fitted)
+    minor_percent = 100.0 * minor_coverage(plane, remembered)
+    warning = fit_notes.warning(fitted, measured, form, minor_percent)
+    little = fit_notes.of_no_minor_loops(fitted, measured[0], minor_percent)
+    notes += little if warning else [*fit_notes.of_rest(fitted), *little]
     if way := _only_way(measured):
         notes.append(f"the {measured[0].input_quantity} only {way}: a loop, if there is one, is not seen")
     progress(1.0)
@@ -158,7 +159,7 @@ def identify(
     said = {
         "notes": tuple(notes),
         "warning": warning,
-        "minor_percent": 100.0 * minor_coverage(plane, remembered),
+        "minor_percent": minor_percent,
         "masked_samples": sum(int(mask.sum()) for mask in masks),
         "wild_input": raw[0].input[first] if first.any() else None,
         "wild_output": raw[0].output[first] if first.any() else None,
