@@ -262,6 +262,17 @@ def _refitting(monkeypatch, *modules, squares):
     return asked
 
 
+@pytest.mark.parametrize("bursts", [True, False])
+def test_what_comes_in_bursts_is_not_called_noise_alone(monkeypatch, bursts):
+    """Neither in the table nor in the evidence beside it; never more than is left."""
+    monkeypatch.setattr(State, "in_bursts", property(lambda state: bursts))
+    state = _state(_fit(500.0))
+    slow = replace(state, floor=Floor(10, 1.0, 4.0, 1.0))
+    floor = slow.floor.quick if bursts else slow.floor
+    assert slow.floor_rms == pytest.approx(min(floor.rms, state.current.rms))
+    assert slow.floor.quick.rms < slow.floor.rms
+
+
 def test_of_a_cause_the_kind_that_fits_best_is_tried(monkeypatch):
     """The screen can hardly tell them apart; each of the others begins where the first one ended."""
     kinds, begun = CAUSE["creep"].kinds(), []
