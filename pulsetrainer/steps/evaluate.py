@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,10 +23,9 @@ from pulsetrainer.core import metrics
 from pulsetrainer.core.initial_state import estimated_start, first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
-from pulsetrainer.core.turns import reached
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES
+from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES, to_their_tips
 from pulsetrainer.steps.one_thread import one_thread
 
 _REPEATED = re.compile(r"#\d+(?=\.)")  # the number of a name that is there again
@@ -193,10 +192,7 @@ def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> Mod
     """Return the prediction error of one model; its gain is over ``first_rms``."""
     operator = operator_of(model)
     low, high = operator.low, operator.high
-    parts = [
-        p if p.time_s is None else replace(p, input=reached(p.input, p.time_s))
-        for p in run.parts(SHORTEST_PART)
-    ]
+    parts = to_their_tips(list(run.parts(SHORTEST_PART)))
     counted = [(part, _known(part, low, high)) for part in parts]
     records = [Record(part.input, part.output, known.astype(np.float64)) for part, known in counted]
     start, state = estimated_start(operator, records)

@@ -115,10 +115,9 @@ def identify(
     reach = _reach(titles, measured)
     cleaned = [input_noise.clean(part.input) for part in measured]
     notes += _of_noise(cleaned, measured[0].input_unit)
-    measured = [
-        replace(part, input=clean.input if part.time_s is None else turns.reached(clean.input, part.time_s))
-        for part, clean in zip(measured, cleaned, strict=True)
-    ]
+    measured = to_their_tips(
+        [replace(part, input=clean.input) for part, clean in zip(measured, cleaned, strict=True)]
+    )
     progress(0.1)
     if smoothing is None:
         smoothing = 0.0 if reading == "relay" else "auto"
@@ -207,6 +206,22 @@ def _without_wild(
         reach = max(reach[0], float(ranges[:, 0].min())), min(reach[1], float(ranges[:, 1].max()))
         fitted = on(_signals(runs), *reach, kept=[~mask for mask in masks])
     return fitted, runs, masks
+
+
+def to_their_tips(runs: list[Run]) -> list[Run]:
+    """Return runs with turns of the input at their tips between samples, where that fits better.
+
+    A device that is driven sample by sample never sees those tips.
+    """
+    tips = [run.input if run.time_s is None else turns.reached(run.input, run.time_s) for run in runs]
+    if all(map(np.array_equal, tips, [run.input for run in runs])):
+        return runs
+    nowhere = [np.zeros(run.input.size, dtype=bool) for run in runs]
+    masked = [none if run.masked is None else run.masked for run, none in zip(runs, nowhere, strict=True)]
+    told = not all(mask.all() for mask in masked)
+    if told and not wild.fits_better(_signals(runs), tips, list(zip(nowhere, masked, strict=True))):
+        return runs
+    return [replace(run, input=tip) for run, tip in zip(runs, tips, strict=True)]
 
 
 def _signals(runs: Sequence[Run]) -> list[tuple[FloatArray, FloatArray]]:

@@ -153,6 +153,11 @@ def test_a_signed_model_predicts_within_twice_the_noise(draw):
     assert error <= 2.0
 
 
+def test_a_device_that_is_driven_sample_by_sample_keeps_its_turns():
+    """Tips between its samples, where the lines on both sides meet, are none that it saw: 1.74 with them."""
+    assert held_out(devices.butterfly_density, 7001)[1] <= 1.2
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("draws", "most"),
