@@ -127,8 +127,7 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     check_same_device(model, device)
     operator = operator_of(model)  # the edges of a dual model are forces
     low, high = operator.low, operator.high
-    hint = "a check plays the whole range of the model: check a model of less range"
-    check_peak(np.asarray([low, high]), device.info.current_limit_A, hint=hint)
+    check_peak(np.asarray([low, high]), device.info.current_limit_A)
     condition(device, high, RATE_HZ)
     progress(0.2)
     reference = signal(max(low, 0.0), high)

@@ -97,12 +97,6 @@ def reach_of(model: Model, pulses: Sequence[Pulse], rates: Sequence[float | None
     return Reach(max(lows), min(highs))
 
 
-def _check_top(model: Model, limit_A: float) -> None:
-    """Refuse a model beyond the current limit: every part begins with all of its range."""
-    hint = f"give a model that was captured with `current_max_A` at most {limit_A:g}"
-    check_peak(model.edges, limit_A, hint=hint)
-
-
 @one_thread
 def perform(
     model: Model,
@@ -140,7 +134,7 @@ def perform(
         The device cannot be talked to, or its firmware knows no open-ended waves.
     """
     check_model(model)
-    _check_top(model, device.info.current_limit_A)
+    check_peak(model.edges, device.info.current_limit_A)
     beating = [Pulse(shape) for shape in pulses]
     reach = reach_of(model, beating, rates)
     meter = thermometer_of(model, device, asked=track_heat)
@@ -187,7 +181,7 @@ def plan(
     """
     check_model(model)
     rehearsal = Rehearsal(limits or Limits())
-    _check_top(model, rehearsal.current_A)
+    check_peak(model.edges, rehearsal.current_A)
     beating = [Pulse(shape) for shape in pulses]
     reach = reach_of(model, beating, rates)
     coil_of(model, asked=track_heat)

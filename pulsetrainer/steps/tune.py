@@ -113,7 +113,7 @@ def _check(pulses: Sequence[Shape | Waveform], supply_V: float | None, limit_A: 
     for pulse in pulses:
         if isinstance(pulse, Waveform):
             check_current(pulse)
-            check_peak(pulse.compensated, limit_A, hint="invert again with a lower `force_max`")
+            check_peak(pulse.compensated, limit_A)
 
 
 @dataclass(frozen=True, slots=True)
