@@ -155,7 +155,7 @@ def identify(
     said = {
         "notes": tuple(notes),
         "warning": warning,
-        "minor_percent": 100.0 * minor_coverage(plane, remembered),
+        "minor_percent": 100.0 * minor_coverage(plane, remembered, _unsure(measured, cleaned, dual=dual)),
         "masked_samples": sum(int(mask.sum()) for mask in masks),
         "wild_input": raw[0].input[first] if first.any() else None,
         "wild_output": raw[0].output[first] if first.any() else None,
@@ -276,6 +276,12 @@ def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
             hint="record a run that sweeps the range: pulsetrainer capture identification -o run.h5",
         )
     return low, high
+
+
+def _unsure(runs: Sequence[Run], cleaned: Sequence[input_noise.Cleaned], *, dual: bool) -> float:
+    """How far noise moves the turns of what the operator remembers: the inputs, or of a dual the outputs."""
+    turned = [input_noise.clean(run.output) for run in runs] if dual else cleaned
+    return max(one.dead_band for one in turned)
 
 
 def _of_noise(cleaned: Sequence[input_noise.Cleaned], unit: str) -> list[str]:

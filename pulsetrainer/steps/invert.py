@@ -26,6 +26,7 @@ from pulsetrainer.steps.progress import Progress, silent
 Inversion = Literal["continuous", "closest-match", "extended"]
 
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
+_SLIGHT = 1.0  # % of full force: below what presses and sensors of such devices repeat
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
 _NORMALISED = 0.02  # how far the ends of a mere shape may lie from 0 and 1
 DEVICE_RATE_HZ = 1000.0  # as our own device plays; the parts around the beats have samples for it
@@ -120,8 +121,6 @@ def invert(
         exact, clipped = _tracked(model, part, layout, notes, BAND_HZ * (rate_Hz / own_Hz))
     else:
         exact, clipped = _compensated(part, chosen, layout)
-    if clipped:
-        notes.append(f"{clipped} samples of the target were out of reach and were clipped")
     limit = slew_limit(slew, model)
     current = exact if limit is None else inversion.slew_limited(exact, rate_Hz, limit)
     compensated = np.concatenate((part.lead, current, part.tail))
@@ -195,11 +194,11 @@ def slew_limit(asked: float | None, model: Model) -> float | None:
 
 
 def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
-    """Warn where the model itself expects a large error of the drive, with the reason."""
+    """Say what error the model itself expects of a drive: with a reason where it is large."""
     error = drive.predicted_max_error_percent
-    if not error > EXPECTED:
-        return []
     full = f"full {drive.model.output_quantity if drive.model else 'force'}"
+    if not error > EXPECTED:
+        return _of_clipped(drive.clipped_samples, f"{error:.2g} % of {full}", slight=error <= _SLIGHT)
     if limit is not None and slowed > 0:
         unit = with_unit(f"{limit:g}", f"{drive.input_unit}/s")
         why = f"the drive may move at most {unit}, which this pulse exceeds"
@@ -213,6 +212,19 @@ def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
     else:
         why = "the model's output does not follow the pulse even without a limit"
     return [f"warning: the model itself expects errors of up to {error:.1f} % of {full}: {why}"]
+
+
+def _of_clipped(samples: int, error: str, *, slight: bool) -> list[str]:
+    """Say what it costs that the drive stays at an end of its range; nothing where it never has to."""
+    if not samples:
+        return []
+    found = f"for {samples} samples the drive would have to leave the model's range, and stays at its end"
+    matters = (
+        f"this does not matter, the model expects errors of at most {error}"
+        if slight
+        else f"the model expects errors of up to {error}; a smaller pulse (`force_min`, `force_max`) has less"
+    )
+    return [f"{found}: {matters}"]
 
 
 def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
