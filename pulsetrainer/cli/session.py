@@ -91,7 +91,9 @@ def session(
     Example: pulsetrainer session --model extended.h5 -o session.h5 --pulses normal,bifid --minutes 2
     """
     from pulsetrainer.files.pulses import pulse_file
+    from pulsetrainer.steps.asked import check_asked_for
 
+    check_asked_for(answers, quiz)
     names = [name for name in (part.strip() for part in pulses.split(",")) if name]
     tables = [pulse_file(name) for name in names]
     job = Job(

@@ -18,6 +18,7 @@ from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, check_peak
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
+from pulsetrainer.steps.asked import check_asked_for
 from pulsetrainer.steps.conductor import RATE_HZ, Decide, Given, Pause, Play, Reach
 from pulsetrainer.steps.heat import coil_of, rest_force, take_temperature, thermometer_of
 from pulsetrainer.steps.invertible import major_loop
@@ -328,11 +329,7 @@ def programme(
             hint="name some of the library: normal,bifid",
         )
     _check_length(minutes, beats)
-    if not quiz and answers and not callable(answers):
-        raise UsageError(
-            "`answers` were given, but no quiz asks for them",
-            hint="give `quiz` with the number of questions, or leave `answers` out",
-        )
+    check_asked_for(None if callable(answers) else answers, quiz)
     if minutes is None and beats is None:
         minutes = 5.0
     seconds = None if minutes is None else 60.0 * minutes
