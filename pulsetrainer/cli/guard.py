@@ -53,7 +53,7 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
         ):  # nothing is wrong with a bare command: this is its help
             sys.stdout.write(f"{error}\n")
             return UsageError.exit_code
-        problem = usage_of(error) or _outside_of(error) or _bug_of(error)
+        problem = usage_of(error, _command_in(words)) or _outside_of(error) or _bug_of(error)
         _trace(debug)
     else:
         return int(code or 0)

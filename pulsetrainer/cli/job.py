@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import typer
 
 from pulsetrainer.cli.console import Screen, plain
-from pulsetrainer.cli.next_step import as_options
+from pulsetrainer.cli.next_step import as_options, with_files
 from pulsetrainer.errors import UsageError
 from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
@@ -251,7 +251,7 @@ class Job:
     def notes(self, lines: Sequence[str]) -> None:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
-            self.screen.note(as_options(line))
+            self.screen.note(as_options(with_files(line, self._parameters)))
 
 
 def check_ending(path: Path, context: typer.Context) -> None:

@@ -22,8 +22,11 @@ _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 
 
-def usage_of(error: Exception) -> UsageError | None:
-    """Return what the parser objects to, or None when the error is not the parser's."""
+def usage_of(error: Exception, named: str = "") -> UsageError | None:
+    """Return what the parser objects to, or None when the error is not the parser's.
+
+    ``named`` is the command, which the parser does not always tell.
+    """
     explain = getattr(error, "format_message", None)
     if explain is None:
         return None
@@ -39,12 +42,12 @@ def usage_of(error: Exception) -> UsageError | None:
         return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
         return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
-    named = getattr(error, "param_hint", None)  # of what a command finds out itself
-    if kind == "BadParameter" and isinstance(named, str):
-        said = f"{named} {str(getattr(error, 'message', error)).rstrip('.')}"
-        return UsageError(said, hint=_EXAMPLES.get(named, help_))
+    option = getattr(error, "param_hint", None)  # of what a command finds out itself
+    if kind == "BadParameter" and isinstance(option, str):
+        said = f"{option} {str(getattr(error, 'message', error)).rstrip('.')}"
+        return UsageError(said, hint=_EXAMPLES.get(option, help_))
     return (
-        _with_or_without_value(error)
+        _with_or_without_value(error, named)
         if kind == "BadOptionUsage"
         else _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
     )
@@ -63,11 +66,12 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     return UsageError(said, hint=like)
 
 
-def _with_or_without_value(error: Exception) -> UsageError:
+def _with_or_without_value(error: Exception, command: str) -> UsageError:
     """A value where none goes, or none where one does; the parser does not tell of which command."""
     takes = "takes no value" if "not take" in str(getattr(error, "message", "")) else "needs a value"
     return UsageError(
-        f"{getattr(error, 'option_name', 'an option')} {takes}", hint="pulsetrainer COMMAND --help"
+        f"{getattr(error, 'option_name', 'an option')} {takes}",
+        hint=" ".join(("pulsetrainer", *filter(None, [command]), "--help")),
     )
 
 

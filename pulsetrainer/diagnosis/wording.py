@@ -149,7 +149,7 @@ ADVICE: Mapping[str, str] = {
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
     ),
     "identify anew": (
-        "Identify the device again in this condition (pulsetrainer identify RUN.h5 -o model.h5), and "
+        "Identify the device again in this condition (a new capture, then pulsetrainer identify), and "
         "diagnose with the new model."
     ),
 }

@@ -17,6 +17,7 @@ from program import PROGRAM, Ran, pulsetrainer
 from wording import refusal
 
 MODEL = ("--model", "model.h5", "-o", "x.h5")
+KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 
 
 @pytest.fixture
@@ -304,3 +305,19 @@ def test_control_c_stops_the_output_and_keeps_what_was_recorded(tmp_path):
     shown = pulsetrainer(tmp_path, "show", "run.h5", "--json")
     assert shown.json["facts"]["samples"] == kept
     assert shown.json["facts"]["complete"] is False
+
+
+def test_a_hint_names_the_files_that_were_given(ready):
+    """None that stands for one, where the command line names it or there is but one of its kind."""
+    for path in ready.iterdir():
+        if path.name != "run.h5":
+            path.unlink()
+    shutil.copy(KEPT / "diagnosis.h5", ready / "why not.h5")
+    for words, hint in (
+        (("invert", "normal", "--model", "mine.h5", "-o", "x.h5"), "identify run.h5 -o mine.h5"),
+        (("capture", "identification", "-o", "x.h5", "--live=yes"), "pulsetrainer capture --help"),
+        (("correct", "absent.h5", "--diagnosis", "why not.h5", "-o", "x.h5"), "run.h5"),
+    ):
+        assert hint in pulsetrainer(ready, *words, "--json").json["error"]["hint"]
+    (ready / "run.h5").unlink()
+    assert "show 'why not.h5'" in pulsetrainer(ready, *words, "--json").json["error"]["hint"]
