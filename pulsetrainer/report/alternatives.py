@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Fit, Model, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.artefacts.units import shown
+from pulsetrainer.report.names import digits
 
 
 def _range(values: NDArray[np.float64], unit: str) -> str:
@@ -66,8 +67,8 @@ def tracking(played: WaveformEvaluation) -> str:
     return (
         f"Above: target force, {_range(played.target, played.output_unit)}, over time, "
         f"{_range(played.time_s, 's')}, with the measured force of the scaled and of the compensated drive. "
-        f"Below: their errors, at most {played.scaled.max_abs_error_percent:.2f} % of full force for "
-        f"the scaled and {played.compensated.max_abs_error_percent:.2f} % for the compensated drive."
+        f"Below: their errors, at most {digits(played.scaled.max_abs_error_percent)} % of full force for "
+        f"the scaled and {digits(played.compensated.max_abs_error_percent)} % for the compensated drive."
     )
 
 
@@ -75,8 +76,8 @@ def loops(played: WaveformEvaluation) -> str:
     """Say how wide each loop is."""
     return (
         "Measured force over target force, beside the diagonal where both are equal. "
-        f"The scaled drive makes a loop area of {played.scaled.hysteresis_percent:.2f} % of full force², "
-        f"the compensated drive one of {played.compensated.hysteresis_percent:.2f} %."
+        f"The scaled drive makes a loop area of {digits(played.scaled.hysteresis_percent)} % of full force², "
+        f"the compensated drive one of {digits(played.compensated.hysteresis_percent)} %."
     )
 
 
@@ -85,5 +86,5 @@ def prediction(model: ModelEvaluation) -> str:
     return (
         f"Above: measured output, {_range(model.output, model.output_unit)}, with the prediction of "
         f"{model.name} laid on it. Below: the residual, rms {model.rms:.3g} "
-        f"{shown(model.output_unit)}, at most {model.max_percent:.2f} % of the span."
+        f"{shown(model.output_unit)}, at most {digits(model.max_percent)} % of the span."
     )

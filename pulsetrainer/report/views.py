@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Model, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.report import alternatives, figures, heat_figures
-from pulsetrainer.report.names import NAMES
+from pulsetrainer.report.names import NAMES, digits
 from pulsetrainer.report.panels import largest_residual, scale, titled
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
@@ -52,17 +52,21 @@ class Part:
     pictures: tuple[Picture, ...]
 
 
-def number(value: float | None, metric: str = "", digits: str = ".2f", *, published: bool = False) -> Number:
-    """Return a number for the page; NaN, the mean of nothing, is said in words; None is an empty place."""
+def number(value: float | None, metric: str = "", form: str = "", *, published: bool = False) -> Number:
+    """Return a number for the page, in a form or with its usual digits.
+
+    NaN, the mean of nothing, is said in words; None is an empty place.
+    """
     if value is None:
         return Number("")
-    text = format(value, digits).replace("-", "−") if math.isfinite(value) else "no value"
+    shown = format(value, form) if form else digits(value)
+    text = shown.replace("-", "−") if math.isfinite(value) else "no value"
     return Number(text, repr(float(value)), metric, published)
 
 
-def known(value: float | None, metric: str, digits: str) -> Number:
+def known(value: float | None, metric: str, form: str) -> Number:
     """Return a number for the page; an empty place where it was not measured."""
-    return number(value if value is not None and math.isfinite(value) else None, metric, digits)
+    return number(value if value is not None and math.isfinite(value) else None, metric, form)
 
 
 def _count(value: int, metric: str) -> Number:
@@ -75,9 +79,9 @@ def picture(figure: Figure, identifier: str, title: str, description: str, capti
     return Picture(Markup(svg), caption or description)  # noqa: S704 - our own XML, its texts are escaped
 
 
-def metric(played: WaveformEvaluation, dotted: str, digits: str = ".2f") -> Number:
+def metric(played: WaveformEvaluation, dotted: str, form: str = "") -> Number:
     """Return a figure of a played waveform by its name within it: ``scaled.max_abs_error_percent``."""
-    return number(attrgetter(dotted)(played), f"{played.name}.{played.inversion}.{dotted}", digits)
+    return number(attrgetter(dotted)(played), f"{played.name}.{played.inversion}.{dotted}", form)
 
 
 def beats(played: Sequence[WaveformEvaluation]) -> list[Picture]:
@@ -162,8 +166,8 @@ def model_part(model: Model, which: str = "") -> Part:
     ]
     if fit is not None:
         facts += [
-            (name, number(getattr(fit, field), f"model.fit.{field}", digits))
-            for name, field, digits in (
+            (name, number(getattr(fit, field), f"model.fit.{field}", form))
+            for name, field, form in (
                 (str(NAMES["coverage_percent"]), "coverage_percent", ".1f"),
                 (label("rms error of the fit", model.output_unit), "rms", ".3g"),
                 (str(NAMES["fit_rms_percent"]), "rms_percent", ".3g"),
