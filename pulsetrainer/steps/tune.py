@@ -254,8 +254,8 @@ class _Tuning:
         if abs(self._supply_V / coil.supply_V - 1.0) > _SUPPLY_OFF:
             self._notes.append(
                 f"a supply of {self._supply_V:g} V was taken as given, as the device does not measure it; a "
-                f"diode of the usual {electrical.DIODE_V:g} V makes it {coil.supply_V:.1f} V. Ohms and henries "
-                "are as good as the volts, the loop gains are the same with either"
+                f"diode of the usual {electrical.DIODE_V:g} V makes it {coil.supply_V:.1f} V. Ohms and "
+                "henries are as good as the volts, the loop gains are the same with either"
             )
         return (*coil.scaled_to(self._supply_V), self._supply_V)
 
