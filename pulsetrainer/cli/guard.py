@@ -17,6 +17,7 @@ from types import FrameType
 from typing import Any
 
 from pulsetrainer.cli.next_step import as_options, next_step
+from pulsetrainer.cli.starting import loaded
 from pulsetrainer.cli.usage import usage_of
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
 from pulsetrainer.report.tables import folded
@@ -35,6 +36,7 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     words = [{"--force": "--overwrite"}.get(w, w) for w in argv if w not in ("--debug", "--verbose")]
     problem: PulsetrainerError
     try:
+        loaded()
         code = _run(program, words)
         sys.stdout.flush()  # here, not at the end of the process, where a full disk has no words
     except PulsetrainerError as error:
