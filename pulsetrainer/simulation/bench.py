@@ -19,7 +19,7 @@ from pulsetrainer.simulation.build import firmware_executable
 from pulsetrainer.simulation.options import BenchOptions, parse_bench
 
 BENCH_PORT = "bench:"
-_OWN = ("ideal", "speed", "break", "wire", "wire-seed")
+_OWN = ("ideal", "speed", "break", "wire", "wire-seed", "serial")
 _START_S = 10.0
 _LEAVE_S = 2.0
 

@@ -64,7 +64,7 @@ def test_a_stronger_force_is_told_by_how_much(run, calibrated):
 
 def test_another_device_is_not_updated(run, calibrated, tmp_path):
     """A changed density: exit 3, nothing written; the verdict alone is no error. The limit is told."""
-    words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9")
+    words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9&serial=0")
     shown = run(*words)
     assert shown.code == 0
     tells(shown.out, "changed")

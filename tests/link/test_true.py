@@ -38,7 +38,7 @@ def test_the_model_knows_its_coil(model):
     assert model.coil.duty_per_A == pytest.approx(5 / 12.6, rel=2e-3)
     assert model.coil.duty_offset == pytest.approx(0.6 / 12.6, rel=0.02)
     assert model.coil.rise_per_A2 == pytest.approx(0.012, rel=0.15)
-    assert model.coil.serial == "BENCH-0"
+    assert model.coil.serial == "BENCH-1"
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_what_moved_is_told(model, moved, verdict, offset, gain, kelvin):
 @pytest.mark.parametrize("seed", [101, 123])
 def test_another_density_is_changed_and_not_updated(model, seed):
     """No offset and no gain makes one device another; the second is the next but one of sixty."""
-    with pt.open_device(f"bench:?seed={seed}") as device:
+    with pt.open_device(f"bench:?seed={seed}&serial=1") as device:
         found = pt.check(model, device)
     assert found.verdict == "changed"
     with raises(DataError, "another shape"):
@@ -83,7 +83,7 @@ def test_a_coarse_and_fast_calibration_stays_true():
         run = pt.capture("identification", device, levels=12, speed_A_per_s=4.0)
     coarse = pt.identify(run, levels=12)
     verdicts = []
-    for port in ("bench:?seed=4&noise-seed=3", "bench:?seed=104"):
+    for port in ("bench:?seed=4&noise-seed=3", "bench:?seed=104&serial=4"):
         with pt.open_device(port) as device:
             verdicts.append(pt.check(coarse, device).verdict)
     assert verdicts == ["true", "changed"]
