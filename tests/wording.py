@@ -204,6 +204,7 @@ MESSAGES = {
     "limit below the model's range": Message(
         "the current goes up", "--limit-current", expected="the limit in force is {limit} A", got="{got} A"
     ),
+    "lost on the wire": Message("samples of the", "check the cable", got="were lost on the wire"),
     "tuning is no play": Message("force", "off the device while it is tuned", "during"),
     "a supply that sags": Message("cannot follow the pulses (voltage)", "a supply", got="sags"),
     # --- gates and bugs ----------------------------------------------------------------------------------

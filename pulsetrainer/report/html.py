@@ -61,11 +61,15 @@ def render_evaluation(
     return page(
         "evaluation.html.j2",
         **header,
-        waveforms=[views.waveform_part(one, f"waveform-{k}") for k, one in enumerate(played, start=1)],
+        waveforms=[
+            views.waveform_part(one, stem, f"waveform-{k}")
+            for k, (one, stem) in enumerate(zip(played, evaluation.stems, strict=False), start=1)
+        ],
         published=published,
         beats=views.beats(played),
         model=None if evaluation.model is None else views.model_part(evaluation.model, last),
         predicted=evaluation.models,
+        model_stems=evaluation.stems[len(played) :],
         predictions=views.predictions(evaluation.models),
     )
 
@@ -81,7 +85,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters |= {"unbroken": unbroken, "unit": shown, "stem": lambda name: PurePath(name).stem}
+    made.filters |= {"unbroken": unbroken, "unit": shown}
     made.tests["of_a_curve"] = of_a_curve
     made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS}
     made.globals |= {"number": views.number, "known": views.known, "metric": views.metric}

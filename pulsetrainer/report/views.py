@@ -47,6 +47,7 @@ class Part:
 
     identifier: str
     title: str
+    stem: str  # what the names of its figures begin with
     of: Any
     facts: tuple[tuple[str, Number], ...]
     pictures: tuple[Picture, ...]
@@ -79,9 +80,9 @@ def picture(figure: Figure, identifier: str, title: str, description: str, capti
     return Picture(Markup(svg), caption or description)  # noqa: S704 - our own XML, its texts are escaped
 
 
-def metric(played: WaveformEvaluation, dotted: str, form: str = "") -> Number:
+def metric(played: WaveformEvaluation, dotted: str, stem: str, form: str = "") -> Number:
     """Return a figure of a played waveform by its name within it: ``scaled.max_abs_error_percent``."""
-    return number(attrgetter(dotted)(played), f"{played.name}.{played.inversion}.{dotted}", form)
+    return number(attrgetter(dotted)(played), f"{stem}.{dotted}", form)
 
 
 def beats(played: Sequence[WaveformEvaluation]) -> list[Picture]:
@@ -102,9 +103,9 @@ def beats(played: Sequence[WaveformEvaluation]) -> list[Picture]:
     return found
 
 
-def waveform_part(played: WaveformEvaluation, identifier: str) -> Part:
+def waveform_part(played: WaveformEvaluation, stem: str, identifier: str) -> Part:
     """Return the part of the page about one played waveform."""
-    stem, title = f"{played.name}.{played.inversion}", titled(played)
+    title = titled(played)
     said = ("mean_error_reduction_percent", "noise_percent")
     full_force = number(played.full_force, f"{stem}.full_force", ".4g")
     pictures = [
@@ -136,11 +137,11 @@ def waveform_part(played: WaveformEvaluation, identifier: str) -> Part:
             )
         )
     facts = (
-        *((str(NAMES[name]), metric(played, name)) for name in said),
+        *((str(NAMES[name]), metric(played, name, stem)) for name in said),
         (label("full force", played.output_unit), full_force),
         ("repeats", _count(played.repeats, f"{stem}.repeats")),
     )
-    return Part(identifier, title, played, facts, tuple(pictures))
+    return Part(identifier, title, stem, played, facts, tuple(pictures))
 
 
 def model_part(model: Model, which: str = "") -> Part:
@@ -183,7 +184,7 @@ def model_part(model: Model, which: str = "") -> Part:
                 "the dotted lines are at plus and minus the rms.",
             )
         )
-    return Part("model", f"Model{which}", model, tuple(facts), tuple(pictures))
+    return Part("model", f"Model{which}", "model", model, tuple(facts), tuple(pictures))
 
 
 def predictions(models: Sequence[ModelEvaluation]) -> list[Picture]:

@@ -100,7 +100,7 @@ def test_a_small_figure_reads_the_same_wherever_it_is_shown():
     legend = figures.loops([one]).legends[0]
     shown = [
         text(row[-1]),
-        views.metric(one, "compensated.hysteresis_percent").text,
+        views.metric(one, "compensated.hysteresis_percent", "").text,
         *re.findall(r"compensated, loop area (\S+) %", " ".join(t.get_text() for t in legend.get_texts())),
         *re.findall(r"compensated drive one of (\S+) %", alternatives.loops(one)),
     ]
