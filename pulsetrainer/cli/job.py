@@ -32,6 +32,7 @@ _OTHER_FORMATS = {
     *(".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".npz", ".mat", ".wav"),
     *(".png", ".svg", ".pdf", ".html", ".htm"),
 }
+_IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
 # what is no parameter of the work: files have digests, a port may hold what no file may know
 _NOT_PARAMETERS = {"json", "overwrite", "port", "dry_run", "resume", "out", "html"}
@@ -73,11 +74,13 @@ class Job:
         written = [path for path in outputs if path is not None]
         for path in written:
             check_ending(path, context)
-            check_output(path, overwrite)
         if len({path.resolve() for path in written}) < len(written):
             raise UsageError(
                 f"{written[0]} was named for two outputs", hint="name another file for one of them"
             )
+        check_keeps_inputs(written, [*inputs, *filter(None, tables)], context)
+        for path in written:
+            check_output(path, overwrite)
         for path in inputs:
             check_artefact(path)
         for table in tables:
@@ -252,6 +255,18 @@ class Job:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
             self.screen.note(as_options(with_files(line, self._parameters)))
+
+
+def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context: typer.Context) -> None:
+    """Refuse to write what a command makes over what it makes that from, which nobody could get back."""
+    if context.info_name in _IN_PLACE:
+        return
+    for path in outputs:
+        if any(path.resolve() == given.resolve() for given in inputs):
+            raise UsageError(
+                f"{path} is what {context.info_name} works on and would be lost: it cannot be the output",
+                hint="name another file",
+            )
 
 
 def check_ending(path: Path, context: typer.Context) -> None:

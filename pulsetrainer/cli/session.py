@@ -58,7 +58,7 @@ def session(
         int | None,
         typer.Option(
             min=0,
-            help="Of the rhythm and of the quiz's order; default: 0, for a quiz drawn.",
+            help="Seed of the rhythm and of a quiz's order; default: 0, for a quiz a new one each time.",
             show_default=False,
         ),
     ] = None,

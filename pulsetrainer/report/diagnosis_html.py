@@ -26,7 +26,9 @@ def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header
         shown=shown,
         course=_course(found),
         profiles=[*_dependences(found), *_profiles(found)],
-        ranking=_ranking(found) if any(one.found or explains(one, found) > 0 for one in shown) else None,
+        ranking=_ranking(found)
+        if any(one.found or explains(one, found) > figures.SEEN for one in shown)
+        else None,
     )
 
 

@@ -6,6 +6,7 @@ import contextlib
 import difflib
 import math
 import os
+import re
 import select
 import subprocess
 from collections.abc import Callable
@@ -54,6 +55,12 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
         if f"{name}={value}" in complaint:
             within = f"{low} to {high} {unit}".removesuffix(" 1")
             amiss = "is outside" if _is_number(value) else "is not a number from"
+            if re.search(r"[,;]\w+=", value):
+                return UsageError(
+                    f"`port`: the bench parameter {name}={value} {amiss} {within}",
+                    hint="put & between parameters, and quotes around them: "
+                    f"`port` 'bench:?{name}={re.sub('[,;]', '&', value)}'",
+                )
             return UsageError(
                 f"`port`: the bench parameter {name}={value} {amiss} {within}",
                 hint=f"give {name} ({meaning}) a value in that range",

@@ -292,8 +292,8 @@ def _of_noise(cleaned: Sequence[input_noise.Cleaned], unit: str) -> list[str]:
     worst = max(cleaned, key=lambda clean: clean.removed)
     sigma, band = with_unit(f"{worst.sigma:.2g}", unit), with_unit(f"{worst.dead_band:.2g}", unit)
     kept = sum(clean.kept for clean in cleaned)
-    found = f"the measured input has noise of {sigma}"
-    return [f"{found}: {removed} false reversals below {band} taken out, {kept} left"]
+    found = f"noise of {sigma} in the measured input"
+    return [f"{found} made {removed} false reversals, all below {band}: taken out; {kept} real ones are left"]
 
 
 def _of_offsets(names: Sequence[str], fitted: Fitted, runs: Sequence[Run]) -> list[str]:

@@ -14,6 +14,7 @@ from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
+from pulsetrainer.device.limits import ON_TIME_S
 from pulsetrainer.diagnosis.prediction import extended_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 from pulsetrainer.steps.asked import check_force_range
@@ -27,6 +28,7 @@ Inversion = Literal["continuous", "closest-match", "extended"]
 
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
 _SLIGHT = 1.0  # % of full force: below what presses and sensors of such devices repeat
+_AROUND_S = 3.0  # of a drive beside its beats: the stroke before them, ramps, rest
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
 _NORMALISED = 0.02  # how far the ends of a mere shape may lie from 0 and 1
 DEVICE_RATE_HZ = 1000.0  # as our own device plays; the parts around the beats have samples for it
@@ -106,6 +108,7 @@ def invert(
     own_Hz = DEVICE_RATE_HZ if rate_Hz is None else rate_Hz  # of what comes before and after the beats
     rate_Hz = _rate_for(shape, model, notes) if rate_Hz is None else rate_Hz
     _check_sampled(shape, rate_Hz)
+    _check_length(shape, model, periods)
     _check_describes(model, name, despite_warning=despite_warning)
     chosen = _method(method, model, name)
     part = invertible(model, own_Hz)
@@ -178,6 +181,20 @@ def _check_sampled(shape: Shape, rate_Hz: float) -> None:
             f"samples a second has {samples:.2g} samples of it: it takes at least {FEWEST}",
             hint=f"stretch the pulse to {with_seconds(FEWEST / rate_Hz)} or more; or in Python, for a faster "
             f"driver of your own: pt.invert(..., rate_Hz={FEWEST / shape.period_s:.2g})",
+        )
+
+
+def _check_length(shape: Shape, model: Model, periods: int) -> None:
+    """Refuse for our own device what it could not play in one go."""
+    longest_s = ON_TIME_S - _AROUND_S
+    if model.input_unit == "A" and model.captured and periods * shape.period_s > longest_s:
+        most = int(longest_s / shape.period_s)
+        raise ArgumentError(
+            f"{periods} periods of {shape.name} last {periods * shape.period_s:.5g} s; the device stays on "
+            f"for at most {ON_TIME_S:g} s at a time",
+            hint=f"give `periods` at most {most}; pulsetrainer session presses for as long as you like"
+            if most
+            else "a pulse this long is mostly one whose time is not in seconds",
         )
 
 
@@ -356,8 +373,7 @@ def _tracked(
     )
     left, static = (with_unit(f"{rms:.3g}", model.output_unit) for rms in (found.rms, found.rms_static))
     notes.append(
-        f"the extended model expects an rms error of {left} after {found.steps} steps, and of {static} with "
-        "the static inverse"
+        f"by the extended model the drive misses the pulse by {left} (rms), the static inverse by {static}"
     )
     if found.steps == 0:
         notes.append("no step improved on the static inverse, which is kept")

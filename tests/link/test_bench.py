@@ -72,6 +72,7 @@ def test_ports_that_do_not(port):
         ("bench:?creep=7", "creep=7 is outside 0 to 0.5", "give creep ("),
         ("bench:?creep=lots", "creep=lots is not a number from 0 to 0.5", ""),
         ("bench:?creep=", "creep= is not a number from 0 to 0.5", ""),
+        ("bench:?seed=3,creep=0.1", "seed=3,creep=0.1 is not", "put & between"),
         ("bench:?break=leg@1", "cannot break 'leg@1'", "current-rail"),
         ("bench:?break=reset@soon", "cannot break 'reset@soon'", "WHAT@SECONDS"),
     ],
