@@ -3,13 +3,15 @@
     python benchmarks/learnt_elsewhere.py [--first 200] [--plants 18] [--pulses normal,bifid,...]
 
 Jiles-Atherton, Duhem, friction and plays in turn, with a lag, creep, a dip and a viscous force as drawn.
-Every pulse is refined, then what was learnt is asked for in each other one; errors are of the plant itself.
+Every pulse is refined: what five passes leave, over the sensor's noise. Then what was learnt is asked for in
+each other pulse; errors there are of the plant itself.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +70,16 @@ def drives(seed: int, press, pulses):
     return {pulse: (drive, pt.refine(drive, device, slew=SLEW)) for pulse, drive in made.items()}
 
 
+def left(refined) -> tuple[float, bool]:
+    """Mean error of the kept pass over noise; whether a pass was worse than the last by more than noise."""
+    means = [one.mean_abs_error_percent for one in refined.passes]
+    noise = [one.noise_percent for one in refined.passes]
+    worse = any(
+        after > before + much for (before, after), much in zip(pairwise(means), noise[1:], strict=True)
+    )
+    return means[refined.kept - 1] / noise[refined.kept - 1], worse
+
+
 def main() -> None:
     """Print a line for each plant, and the counts."""
     parser = argparse.ArgumentParser()
@@ -75,7 +87,7 @@ def main() -> None:
     parser.add_argument("--plants", type=int, default=18)
     parser.add_argument("--pulses", default=PULSES)
     asked = parser.parse_args()
-    pairs, gains = 0, []
+    pairs, gains, ratios = 0, [], {}
     for seed in range(asked.first, asked.first + asked.plants):
         name, press = plant(seed)
 
@@ -88,9 +100,12 @@ def main() -> None:
         except PulsetrainerError as refused:
             print(seed, name, refused, flush=True)
             continue
+        own = [left(refined) for _, refined in made.values()]
+        ratios.setdefault(name, []).extend(own)
+        print(f"{seed} {name}: refined to " + ", ".join(f"{ratio:.2f}" for ratio, _ in own), flush=True)
         here = []
         for learnt, (_, refined) in made.items():
-            for new, (drive, own) in made.items():
+            for new, (drive, best_drive) in made.items():
                 if new == learnt:
                     continue
                 pairs += 1
@@ -98,12 +113,19 @@ def main() -> None:
                     after = error_percent(pt.transfer(drive, refined, slew=SLEW))
                 except DataError:
                     continue
-                before, best = error_percent(drive), error_percent(own)
+                before, best = error_percent(drive), error_percent(best_drive)
                 here.append((before - after, before - best))
                 if after > before:
                     print(f"{seed} {name}: {learnt} to {new}: {before:.2f} % to {after:.2f} %, worse")
         gains += here
         print(f"{seed} {name}: {len(here)} let through, {sum(g <= 0 for g, _ in here)} worse", flush=True)
+    for name, own in ratios.items():
+        over = np.array([ratio for ratio, _ in own])
+        print(
+            f"{name}: {over.size} pulses refined to {over.mean():.2f} of the noise in the mean, "
+            f"{over.max():.2f} at most; {np.sum(over <= 1.2)} at most 1.2; "
+            f"{sum(w for _, w in own)} with a pass worse than the last"
+        )
     half = sum(gain >= 0.5 * most for gain, most in gains)
     worse = sum(gain <= 0 for gain, _ in gains)
     print(f"{len(gains)} of {pairs} let through: {half} keep half of the gain or more, {worse} are worse")

@@ -60,24 +60,14 @@ __all__ = [
     "tune",
 ]
 
-_NOUNS = ("Diagnosis", "Evaluation", "Model", "Playback", "Run", "Session", "Waveform")
-_HOME = {
-    **dict.fromkeys(_NOUNS, "artefacts"),
-    **dict.fromkeys(("invert", "load", "open_device", "read_table", "save", "session", "tune"), "api"),
-    **{
-        verb: f"steps.{verb}"
-        for verb in (
-            *("capture", "check", "compare", "correct", "diagnose", "evaluate"),
-            *("extend", "identify", "play", "refine", "transfer"),
-        )
-    },
-}
+_OF_THE_API = ("invert", "load", "open_device", "read_table", "save", "session", "tune")
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOME:
+    if name not in __all__:
         raise AttributeError(f"module 'pulsetrainer' has no attribute {name!r}")
-    found = getattr(import_module(f"pulsetrainer.{_HOME[name]}"), name)
+    home = "artefacts" if name[0].isupper() else "api" if name in _OF_THE_API else f"steps.{name}"
+    found = getattr(import_module(f"pulsetrainer.{home}"), name)
     globals()[name] = found
     return found
 

@@ -224,6 +224,8 @@ NOTES = {
     "reversed": ("falls where the model rises", "the other way round", "Identify it again"),
     "follows the velocity": ("velocity of u", "wrong model"),
     "leaves much": ("% of the span", "the noise from sample to sample", "pulsetrainer diagnose"),
+    "not congruent": ("not congruent", "% of the span", "other reversals"),
+    "no minor loops": ("minor loops", "a guess", "within the major one"),
     "seen before": ("was identified from", "a run that neither has seen"),
     "zeros differ": ("shifted against each other",),
     "no time": ("no time",),

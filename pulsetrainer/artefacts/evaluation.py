@@ -14,6 +14,12 @@ METRICS = ("mean_abs_error_percent", "max_abs_error_percent", "rms_error_percent
 MODEL_METRICS = (
     "rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent", "second_half_percent",
 )  # fmt: skip
+# What a person wants to see first of evaluations and sessions side by side; the others on request.
+HEADLINES = (
+    "mean_error_reduction_percent", "compensated.mean_abs_error_percent", "compensated.max_abs_error_percent",
+    "rms_percent", "max_percent", "right_percent", "right_from_percent", "right_to_percent", "response_s",
+    "pressed.mean_abs_error_percent",
+)  # fmt: skip
 # Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631: the published device. The maxima are given for the
 # device as a whole, so they stand beside both pulses.
 _PUBLISHED_MAXIMA = {"scaled.max_abs_error_percent": 28.7, "compensated.max_abs_error_percent": 7.8}

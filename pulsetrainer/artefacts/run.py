@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, ClassVar
@@ -103,6 +104,13 @@ class Run(Shown):
             return (self,)
         parts = map(self.cut, self.slices)
         return tuple(one for one in parts if one.input.size >= at_least) or (self,)
+
+
+def seam_of(starts: Sequence[int], samples: int) -> BoolArray | None:
+    """Return which samples (n,) come first after a pause, by their numbers; None where there was no pause."""
+    seam = np.zeros(samples, dtype=np.bool_)
+    seam[[start for start in starts if start < samples]] = True
+    return seam if seam.any() else None
 
 
 _RUN_ARRAYS = ("time_s", "input", "output", "reference", "masked")

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import (
     AsJson,
@@ -22,12 +19,10 @@ from pulsetrainer.cli.options import (
     ShowLive,
     setting,
 )
+from pulsetrainer.report.tables import picked
 
-if TYPE_CHECKING:
-    from pulsetrainer.core.course import Course
-    from pulsetrainer.device.device import Device
-    from pulsetrainer.files.resume import Earlier
-    from pulsetrainer.steps.recording import Watch
+# what must be the same when a capture is resumed
+_SAME = ("signal", "levels", "current_max_A", "speed_A_per_s", "rate_Hz", "condition", "repeats")
 
 
 def capture(
@@ -67,13 +62,13 @@ def capture(
     from pulsetrainer.steps.asked import EXCITATIONS
 
     table = signal_file(signal, EXCITATIONS)
-    job = Job(context, outputs=() if resume else (out,), overwrite=overwrite, as_json=json)
+    job = Job(context, outputs=() if resume else (out,))
     if resume:
         check_resumable(out)
     from pulsetrainer.artefacts import Run
     from pulsetrainer.core.course import Course
-    from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.resume import earlier_of
+    from pulsetrainer.recorded import capture_into
     from pulsetrainer.steps.capture import excitation, plan
     from pulsetrainer.steps.recording import samples_played
 
@@ -86,7 +81,6 @@ def capture(
     )
     if table is not None:
         job.uses(table)
-    limits = Limits(limit_current_A, limit_force_N)
     course, earlier, at = Course(played, repeats), None, 0
     if resume:
         earlier = earlier_of(out, {name: context.params[name] for name in _SAME}, overwrite=overwrite)
@@ -96,8 +90,10 @@ def capture(
         if earlier is not None:
             at = samples_played(earlier.run, course)
         if dry_run:
-            job.check_device(port, limits)
-            planned = plan(played, levels=levels, condition=condition, repeats=repeats, limits=limits, at=at)
+            job.check_device()
+            planned = plan(
+                played, levels=levels, condition=condition, repeats=repeats, limits=job.limits, at=at
+            )
             length = f"{planned.seconds - planned.conditioning_s:.1f} s"
             if condition:
                 length += f", after {planned.conditioning_s:.1f} s around the major loop"
@@ -109,113 +105,35 @@ def capture(
             }
             if limit_force_N is not None:
                 rows["force"] = f"known once it is measured; above {limit_force_N:g} N the device stops"
-            does = (
-                f"continue {played.name} at {100 * at / course.size:.0f} %" if at else f"play {played.name}"
-            )
-            job.would(does, planned, port, out, rows)
+            share = 100 * at / course.size
+            does = f"continue {played.name} at {share:.0f} %" if at else f"play {played.name}"
+            job.would(does, planned, rows)
             return
         view = job.view(float(played.value.max()), live=live)
-        with job.working(f"capturing {signal}", view) as progress, job.open_device(port, limits) as device:
-            payload = _record(
-                job, out, course, device, earlier, at,
-                condition=condition, levels=levels, progress=progress, watch=view.take if view else None,
+        with job.working(f"capturing {signal}", view) as progress, job.open_device() as device:
+            info, ancestors = device.info, []
+            if earlier is not None:
+                earlier.check_device(info.serial)
+                job.uses(earlier.path)
+                ancestors, share = [earlier.header], 100.0 * at / course.size
+                done = f"{earlier.run.input.size} samples, {share:.0f} % of the signal"
+                job.notes([f"continuing {earlier.path} after {done}"])
+            got = capture_into(
+                out, job.header(f"{played.name} on {info.serial}", info, ancestors=ancestors), course, device,
+                earlier=earlier, at=at, overwrite=overwrite, condition=condition, levels=levels,
+                progress=progress, watch=view.take if view else None,
             )  # fmt: skip
-    _show(job, payload)
-
-
-# what must be the same when a capture is resumed
-_SAME = ("signal", "levels", "current_max_A", "speed_A_per_s", "rate_Hz", "condition", "repeats")
-
-
-def _record(
-    job: Job,
-    out: Path,
-    course: Course,
-    device: Device,
-    earlier: Earlier | None,
-    at: int,
-    *,
-    condition: bool,
-    levels: int,
-    progress: Callable[[float], None],
-    watch: Watch | None,
-) -> dict[str, Any]:
-    """Record into the file, or go on with one that was cut off, and return the figures."""
-    from pulsetrainer.errors import DeviceError, Interrupted
-    from pulsetrainer.files.recorder import RunRecorder
-    from pulsetrainer.steps.capture import tally_of
-    from pulsetrainer.steps.recording import decimation_for, record
-    from pulsetrainer.steps.stopped import raise_if_stopped
-
-    info, signal = device.info, course.signal
-    decimation_for(info.tick_rate_Hz, signal.rate_Hz)  # before anything is written
-    tally = tally_of(signal, levels)
-    if earlier is not None:
-        earlier.check_device(info.serial)
-        job.uses(earlier.path)
-        share = 100.0 * at / course.size
-        job.notes(
-            [f"continuing {earlier.path} after {earlier.run.input.size} samples, {share:.0f} % of the signal"]
-        )
-        tally.take_over(earlier.run)
-    header = job.header(
-        f"{signal.name} on {info.serial}",
-        device=job.device(info),
-        ancestors=[] if earlier is None else [earlier.header],
-    )
-    recorder = RunRecorder(
-        out,
-        header,
-        signal=signal.name,
-        overwrite=job.overwrite or (earlier is not None and earlier.contains_final),
-        earlier=None if earlier is None else (earlier.path, earlier.run),
-    )
-    try:
-        with recorder:
-            ending = record(
-                course, device, recorder, tally,
-                at=at, condition_first=condition, progress=progress, watch=watch,
-            )  # fmt: skip
-            recorder.coil = ending.coil
-            recorder.finish(complete=ending.complete)
-        raise_if_stopped(ending.fault, ending.remedy, "the capture")
-    except (DeviceError, Interrupted, KeyboardInterrupt) as stopped:
-        error = Interrupted("stopped by you") if isinstance(stopped, KeyboardInterrupt) else stopped
-        if recorder.samples:
-            where = recorder.partial if recorder.partial.exists() else out
-            error.message += f"; {recorder.samples} samples were kept in {where} (complete=false)"
-            error.hint = error.hint or "go on with the same command and --resume"
-        raise error from stopped.__cause__
-    return {
-        "output": out,
-        "signal": signal.name,
-        "samples": recorder.samples,
-        "seconds": recorder.end_s,
-        "rate_Hz": signal.rate_Hz,
-        "reversals": course.reversals,
-        "parts": ending.parts + (0 if earlier is None else len(earlier.run.parts())),
-        "coverage_percent": tally.coverage_percent,
-        "current_range_A": tally.current_A,
-        "force_range_N": tally.force_N,
-        "dropped_samples": recorder.dropped_samples,
-        "complete": ending.complete,
-        **picked(info, "serial", "firmware"),
-    }
-
-
-def _show(job: Job, got: dict[str, Any]) -> None:
-    if got["dropped_samples"]:
-        job.notes([f"{got['dropped_samples']} samples were lost on the wire; the rest is right"])
-    job.screen.result(got)
-    current, force = got["current_range_A"], got["force_range_N"]
-    job.screen.facts(
-        f"{got['output']}: {got['signal']} on {got['serial']}, firmware {got['firmware']}",
+    if got.dropped_samples:
+        job.notes([f"{got.dropped_samples} samples were lost on the wire; the rest is right"])
+    job.show(
+        {"output": out, "signal": played.name, **got._asdict(), **picked(info, "serial", "firmware")},
+        f"{out}: {played.name} on {info.serial}, firmware {info.firmware}",
         {
-            "samples": f"{got['samples']} in {got['seconds']:.1f} s, {got['rate_Hz']:g} a second",
-            "current": f"{current[0]:.3f} .. {current[1]:.3f} A",
-            "force": f"{force[0]:.3f} .. {force[1]:.3f} N",
-            "reversals": got["reversals"],
-            **({"parts": got["parts"]} if got["parts"] > 1 else {}),
-            "cells switched": f"{got['coverage_percent']:.1f} %",
+            "samples": f"{got.samples} in {got.seconds:.1f} s, {got.rate_Hz:g} a second",
+            "current": "{:.3f} .. {:.3f} A".format(*got.current_range_A),
+            "force": "{:.3f} .. {:.3f} N".format(*got.force_range_N),
+            "reversals": got.reversals,
+            **({"parts": got.parts} if got.parts > 1 else {}),
+            "cells switched": f"{got.coverage_percent:.1f} %",
         },
     )

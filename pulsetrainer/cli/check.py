@@ -51,26 +51,21 @@ def check(
             "--update writes a model and -o names its file: the one needs the other",
             hint="give both, or neither",
         )
-    job = Job(context, inputs=(model,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.device.limits import Limits
+    job = Job(context, inputs=(model,), outputs=(out,))
     from pulsetrainer.steps.check import check_updatable, hindrance, updated
 
     loaded = job.load(model, pt.Model)
     if update:
         check_updatable(loaded)
-    limits = Limits(limit_current_A, limit_force_N)
-    with job.working(f"checking {model.name}") as progress, job.open_device(port, limits) as device:
+    with job.working(f"checking {model.name}") as progress, job.open_device() as device:
         found = pt.check(loaded, device, progress=progress)
         info = device.info
     if out is not None:
-        job.save(
-            out, updated(loaded, found), f"{model.name} as {info.serial} is now", device=job.device(info)
-        )
+        job.save(out, updated(loaded, found), f"{model.name} as {info.serial} is now", info)
     _show(job, model, out, found, info.serial, updatable=not hindrance(loaded))
 
 
 def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, *, updatable: bool) -> None:
-    job.screen.result(plain(found) | {"output": out})
     kelvin, error = found.temperature_K, found.error_percent
     unknown = f"not known: {found.temperature_unknown}"
     rows = {
@@ -91,7 +86,7 @@ def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, 
         rows["next"] = f"pulsetrainer check {shlex.quote(str(model))} --update -o updated.h5"
     elif found.verdict == "changed" or (found.verdict == "shifted" and not updatable):
         rows["next"] = "identify again: pulsetrainer capture identification, then pulsetrainer identify"
-    job.screen.facts(f"{model} on {serial}: {_VERDICTS[found.verdict]}", rows)
+    job.show(plain(found) | {"output": out}, f"{model} on {serial}: {_VERDICTS[found.verdict]}", rows)
     job.wrote(out)
 
 

@@ -9,10 +9,11 @@ from typing import Annotated
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked, plain
+from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
 from pulsetrainer.report.forms import figure_form
+from pulsetrainer.report.tables import picked
 from pulsetrainer.steps.asked import check_several
 
 
@@ -37,7 +38,7 @@ def compare(
     """
     check_several(evaluations)
     form = figure_form(out, "a comparison", "csv") if out is not None else ""
-    job = Job(context, inputs=evaluations, outputs=(out,), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=evaluations, outputs=(out,))
     from pulsetrainer.files import store
     from pulsetrainer.report import names
     from pulsetrainer.report.comparison_text import as_csv, labels_of

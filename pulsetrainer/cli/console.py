@@ -6,17 +6,20 @@ import json
 import math
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from pulsetrainer.errors import QualityError
 from pulsetrainer.report import tables
 from pulsetrainer.steps.progress import Progress
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 _PIPE_WIDTH = 110
 
@@ -36,9 +39,20 @@ def plain(value: Any) -> Any:
     return plain(value.tolist()) if hasattr(value, "tolist") else value  # an array: no numpy to ask here
 
 
-def picked(noun: Any, *names: str) -> dict[str, Any]:
-    """Return some attributes by name."""
-    return {name: getattr(noun, name) for name in names}
+def say(lead: str, text: str) -> None:
+    """Write a line to stderr, on a terminal folded between words."""
+    width = shutil.get_terminal_size().columns if sys.stderr.isatty() else None
+    sys.stderr.write(tables.folded(lead, text, width, indent=2) + "\n")
+
+
+@contextmanager
+def drawing() -> Iterator[Callable[[RenderableType], None]]:
+    """Give what draws on the terminal, each time in the place of what it drew before; gone at the end."""
+    from rich.console import Console
+    from rich.live import Live
+
+    with Live(console=Console(stderr=True), transient=True, auto_refresh=False) as screen:
+        yield lambda drawn: screen.update(drawn, refresh=True)
 
 
 class Screen:
@@ -52,9 +66,7 @@ class Screen:
 
     def note(self, text: str) -> None:
         """Say one line to the person, beside the results; on a terminal folded between words."""
-        width = shutil.get_terminal_size().columns if sys.stderr.isatty() else None
-        lead = "" if text.startswith("warning: ") else "note: "
-        sys.stderr.write(tables.folded(lead, text, width, indent=2) + "\n")
+        say("" if text.startswith("warning: ") else "note: ", text)
 
     @contextmanager
     def bar(self, label: str) -> Iterator[Progress]:
@@ -90,51 +102,27 @@ class Screen:
             typer.echo(f"error: {failed.message}\n  try: {failed.hint}", err=True)
             raise typer.Exit(failed.exit_code)
 
-    def facts(self, title: str, rows: Mapping[str, Any]) -> None:
-        """Print names and values, one a line, unless JSON was asked for."""
-        if self.as_json:
-            return
-        names = [tables.label(name) for name in rows]
-        width = max((len(name) for name in names), default=0)
-        self.line("", title, indent=2)
-        if self.is_terminal and 2 * width + 8 > self.width:  # no room beside the names: below them
-            for name, value in zip(names, rows.values(), strict=True):
-                self.line("  ", name)
-                self.line("    ", tables.text(value))
-            return
-        for name, value in zip(names, rows.values(), strict=True):
-            self.line(f"  {name:<{width}}  " if width else "  ", tables.text(value))
-
     def parts(self, parts: Iterable[tables.Facts | tables.Table]) -> None:
         """Print facts and tables, unless JSON was asked for."""
-        for part in parts:
-            if isinstance(part, tables.Facts):
-                self.facts(part.title, part.rows)
-            else:
-                self.table(part.title, part.columns, part.rows)
+        for part in () if self.as_json else parts:
+            sys.stdout.write(tables.rendered(part, self.width if self.is_terminal else None))
 
-    def line(self, lead: str, text: str, *, indent: int | None = None) -> None:
-        """Print a line; on a terminal that is too narrow, on several, broken between words below ``lead``."""
-        if self.as_json:
-            return
-        sys.stdout.write(tables.folded(lead, text, self.width if self.is_terminal else None, indent) + "\n")
-
-    def whole(self, text: str) -> None:
-        """Print a line that is never folded, since a path or a command in it is copied in one piece."""
-        if not self.as_json:
-            sys.stdout.write(text + "\n")
+    def facts(self, title: str, rows: Mapping[str, Any]) -> None:
+        """Print names and values, one a line, unless JSON was asked for."""
+        self.parts([tables.Facts(title, rows)])
 
     def table(self, title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
         """Print a table, unless JSON was asked for; the first column is text, the others are numbers.
 
         Where the terminal is too narrow for it: the same, one figure a line.
         """
-        if self.as_json:
-            return
-        drawn = tables.drawn(title, columns, rows)
-        if (
-            self.is_terminal
-            and max(len(line) for line in tables.ESCAPE.sub("", drawn).splitlines()) > self.width
-        ):
-            drawn = "\n".join(tables.listed(title, columns, rows)) + "\n"
-        sys.stdout.write(drawn)
+        self.parts([tables.Table(title, columns, rows)])
+
+    def line(self, lead: str, text: str, *, indent: int | None = None) -> None:
+        """Print a line; on a terminal that is too narrow, on several, broken between words below ``lead``."""
+        self.whole(tables.folded(lead, text, self.width if self.is_terminal else None, indent))
+
+    def whole(self, text: str) -> None:
+        """Print a line that is never folded, since a path or a command in it is copied in one piece."""
+        if not self.as_json:
+            sys.stdout.write(text + "\n")

@@ -29,7 +29,7 @@ def correct(
 
     Example: pulsetrainer correct drifting.h5 --diagnosis drift.h5 -o corrected.h5
     """
-    job = Job(context, inputs=(run, diagnosis), outputs=(out,), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=(run, diagnosis), outputs=(out,))
     with job.working("correcting"):
         found = job.load(diagnosis, pt.Diagnosis)
         measured = job.load(run, pt.Run)
@@ -38,12 +38,12 @@ def correct(
     from pulsetrainer.artefacts.units import with_unit
 
     masked = 0 if corrected.masked is None else int(corrected.masked.sum())
-    job.screen.result({"output": out, "corrected": corrected.corrected, "masked_samples": masked})
     changed = abs(corrected.output - measured.output)
     most = float(changed[changed >= 0].max())  # lost samples are not numbers
-    facts = {
+    payload = {"output": out, "corrected": corrected.corrected, "masked_samples": masked}
+    rows = {
         "taken out": ", ".join(corrected.corrected),
         "largest change": with_unit(f"{most:.3g}", corrected.output_unit),
         "samples left out": f"{masked} of {corrected.output.size}",
     }
-    job.screen.facts(f"{out}: corrected run", facts)
+    job.show(payload, f"{out}: corrected run", rows)

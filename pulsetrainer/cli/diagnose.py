@@ -5,12 +5,11 @@ from __future__ import annotations
 import shlex
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
@@ -32,8 +31,9 @@ def diagnose(
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
-    job = Job(context, inputs=(*runs, model), outputs=(out, html), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=(*runs, model), outputs=(out, html))
     from pulsetrainer.report.diagnosis_text import sections
+    from pulsetrainer.report.results import diagnosed
 
     with job.working("diagnosing") as progress:
         found = pt.diagnose(
@@ -52,7 +52,7 @@ def diagnose(
             job.page(html, partial(render_diagnosis, commands=commands), found, header)
     job.notes(found.notes)
     job.screen.result(
-        _payload(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
+        diagnosed(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
     )
     job.screen.parts(sections(found))
     job.wrote(out, html)
@@ -73,31 +73,3 @@ def _commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path) -> 
             words.append(["identify", *corrected, "-o", "model-corrected.h5"])
             words.append(["diagnose", *corrected, *again])
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
-
-
-def _payload(found: pt.Diagnosis) -> dict[str, Any]:
-    errors = (
-        "rms", "rms_percent", "noise_percent", "extended_rms_percent",
-        "static_percent", "extended_percent", "floor_percent",
-    )  # fmt: skip
-    figures = (
-        "found", "p_value", "explains_percent", "confounded_with", "held_out_gain_percent",
-        "detectable_from_percent", "text", "doubts",
-    )  # fmt: skip
-    return {
-        **picked(found, "verdict", "quick"),
-        "baseline": picked(found, *errors),
-        "left": found.left._asdict(),
-        "causes": [
-            {
-                "id": one.cause,
-                **picked(one, *figures),
-                "parameters": {
-                    p.name: picked(p, "value", "unit", "meaning") | {"interval": (p.lower, p.upper)}
-                    for p in one.parameters
-                },
-            }
-            for one in found.causes
-        ],
-        **picked(found, "lacks", "evidence", "next_experiment"),
-    }

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import Screen, picked, plain
+from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
 
@@ -33,11 +33,12 @@ def evaluate(
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
-    job = Job(context, inputs=(*inputs, *model), outputs=(out, html), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=(*inputs, *model), outputs=(out, html))
     from pulsetrainer.files.bounds import read_bounds
 
     limits = read_bounds(bounds) if bounds else {}
     from pulsetrainer.errors import QualityError
+    from pulsetrainer.report.results import evaluated
     from pulsetrainer.steps.evaluate import breaches
 
     with job.working("evaluating") as progress:
@@ -66,7 +67,7 @@ def evaluate(
         failed = QualityError(problem, hint=hint)
     job.notes(evaluation.notes)
     job.screen.result(
-        _payload(evaluation)
+        evaluated(evaluation)
         | {"output": out, "html": html, "bounds_checked": len(limits), "breaches": plain(broken)},
         failed,
     )
@@ -104,20 +105,3 @@ def show_tables(screen: Screen, evaluation: pt.Evaluation) -> None:
         screen.line("improvement: ", "how much less rms error than by the first model")
     if any(w.name in PUBLISHED for w in evaluation.waveforms):
         screen.line("published: ", "the device of Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631")
-
-
-def _payload(evaluation: pt.Evaluation) -> dict[str, Any]:
-    from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
-
-    waveforms = [
-        {
-            **picked(w, "name", "inversion", "repeats", "full_force"),
-            "unit": w.output_unit,
-            "scaled": picked(w.scaled, *METRICS),
-            "compensated": picked(w.compensated, *METRICS),
-            **picked(w, "mean_error_reduction_percent", "noise_percent"),
-        }
-        for w in evaluation.waveforms
-    ]
-    models = [picked(m, "name", *MODEL_METRICS, "start", "outside_percent") for m in evaluation.models]
-    return ({"waveforms": waveforms} if waveforms else {}) | ({"models": models} if models else {})

@@ -34,10 +34,10 @@ def export(
             + (f"ends in {out.suffix!r}" if out.suffix else "has no such ending"),
             hint=f"name it {out.stem}.csv",
         )
-    job = Job(context, inputs=(file,), outputs=(out,), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=(file,), outputs=(out,))
     artefact = job.load_any(file)
     with job.working(f"exporting {file.name}"):
         columns = job.table(out, artefact, file)
     rows = next(iter(columns.values())).size
-    job.screen.result({"output": out, "kind": artefact.kind, "columns": list(columns), "rows": rows})
-    job.screen.facts(f"wrote {out}: {artefact.kind}, {rows} rows", {"columns": list(columns)})
+    payload = {"output": out, "kind": artefact.kind, "columns": list(columns), "rows": rows}
+    job.show(payload, f"wrote {out}: {artefact.kind}, {rows} rows", {"columns": list(columns)})

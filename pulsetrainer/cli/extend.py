@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
-
-_FIGURES = (
-    "rms_percent", "extended_rms_percent", "static_percent", "extended_percent", "held_out_gain_percent",
-)  # fmt: skip
 
 
 def extend(
@@ -36,8 +30,9 @@ def extend(
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """
     inputs = (diagnosis, model, *([] if verify is None else [verify]))
-    job = Job(context, inputs=inputs, outputs=(out,), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=inputs, outputs=(out,))
     from pulsetrainer.report.diagnosis_text import parameters
+    from pulsetrainer.report.results import extended as extended_by
 
     with job.working("extending"):
         found = job.load(diagnosis, pt.Diagnosis)
@@ -51,26 +46,7 @@ def extend(
         job.notes(_doubts(found, extended))
     elif _was_fitted(model, verify):
         job.notes([f"{model} was identified from {verify}: a run that neither has seen proves more"])
-    verified = (
-        {"without_percent": proof[0].rms_percent, "with_percent": proof[1].rms_percent} if proof else {}
-    )
-    job.screen.result(
-        {
-            "output": out,
-            "added": added,
-            "extensions": extended.extensions,
-            "levels": extended.levels,
-            **picked(found, *_FIGURES),
-            **({"verified": verified} if verified else {}),
-        }
-    )
-    rows = _left(found, extended) | _apart(found, extended)
-    if verified:
-        rows["verified"] = (
-            f"{verify} is predicted to {verified['with_percent']:.3f} % of its span (rms), by the model as "
-            f"it was to {verified['without_percent']:.3f} %"
-        )
-    job.screen.facts(f"{out}: extended model of {extended.levels} levels", rows)
+    job.show(*extended_by(out, extended, found, verify, proof))
     for one in extended.extensions:
         job.screen.facts(f"with {one.cause}", parameters(one.parameters))
 
@@ -92,31 +68,3 @@ def _was_fitted(model: Path, run: Path) -> bool:
 
     digest = set(provenance.digests([run]).values())
     return bool(digest & set(store.read_header(model).provenance.inputs.values()))
-
-
-def _apart(found: pt.Diagnosis, extended: pt.Model) -> dict[str, str]:
-    """Say how the extended model differs from what the diagnosis told."""
-    added = {one.cause: [p.value for p in one.parameters] for one in extended.extensions}
-    rows = {
-        f"left out {one.cause}": "comes from the measurement: pulsetrainer correct"
-        if one.cause in found.correctable
-        else "; ".join(one.doubts) or "does not last"
-        for one in found.found
-        if one.cause not in added
-    }
-    told = {one.cause: [p.value for p in one.parameters] for one in found.found}
-    if any(len(told[name]) == len(now) and told[name] != now for name, now in added.items() if name in told):
-        rows["parameters"] = "fitted again as the model is used: from rest"
-    return rows
-
-
-def _left(found: pt.Diagnosis, extended: pt.Model) -> dict[str, str]:
-    """Say what both models leave of the recordings, rms of single samples."""
-    assert found.extended is not None
-    if not math.isfinite(found.extended_rms_percent) or found.extended.extensions != extended.extensions:
-        return {}  # a file of 0.1; or --verify took a cause out
-    before, after = found.rms_percent, found.extended_rms_percent
-    return {
-        "error before": f"{before:.3f} % of the span, rms of single samples",
-        "error now": f"{after:.3f} %; noise alone is {found.noise_percent:.3f} %",
-    }

@@ -7,7 +7,6 @@ import errno
 import io
 import json
 import os
-import shutil
 import signal
 import sys
 import traceback
@@ -16,11 +15,11 @@ from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
+from pulsetrainer.cli.console import say
 from pulsetrainer.cli.next_step import as_options, next_step
 from pulsetrainer.cli.starting import loaded
 from pulsetrainer.cli.usage import usage_of
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
-from pulsetrainer.report.tables import folded
 
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _STOPPED = "stopped by you; what was not finished was not written"
@@ -50,12 +49,10 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except Exception as error:  # noqa: BLE001 - the last resort, which is the point of this function
-        if (
-            type(error).__name__ == "NoArgsIsHelpError"
-        ):  # nothing is wrong with a bare command: this is its help
+        if type(error).__name__ == "NoArgsIsHelpError":  # a bare command is not wrong: this is its help
             sys.stdout.write(f"{error}\n")
             return UsageError.exit_code
-        problem = usage_of(error, _command_in(words)) or _outside_of(error) or _bug_of(error)
+        problem = usage_of(error, _command_in(words)) or _problem_of(error)
         _trace(debug)
     else:
         return int(code or 0)
@@ -125,16 +122,17 @@ def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
     if as_json:
         error = {"kind": problem.kind, "message": message, "hint": hint}
         sys.stdout.write(json.dumps({"schema": 1, "command": command, "error": error}) + "\n")
-    width = shutil.get_terminal_size().columns if sys.stderr.isatty() else None
-    sys.stderr.write(folded("error: ", message, width, indent=2) + "\n")
+    say("error: ", message)
     for note in getattr(problem, "__notes__", ()):
-        sys.stderr.write(folded("note: ", str(note), width, indent=2) + "\n")
+        say("note: ", str(note))
     if hint:  # not folded: a command in it is copied in one piece
         sys.stderr.write(f"  try: {hint}\n")
 
 
-def _outside_of(error: Exception) -> PulsetrainerError | None:
-    """Return what lies outside the program: no memory, nowhere to write the results to."""
+def _problem_of(error: Exception) -> PulsetrainerError:
+    """Return what lies outside the program: no memory, nowhere to write the results to; else it is a bug."""
+    if type(error).__name__ == "Abort":  # Ctrl-C, as the parser words it
+        return Interrupted(_STOPPED)
     if isinstance(error, MemoryError):
         return DataError("there is not enough memory for this", hint="use fewer levels, or a shorter record")
     if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
@@ -148,10 +146,4 @@ def _outside_of(error: Exception) -> PulsetrainerError | None:
         return DataError(
             f"the results could not be printed: {error.strerror}", hint="free some space, or print elsewhere"
         )
-    return None
-
-
-def _bug_of(error: Exception) -> PulsetrainerError:
-    if type(error).__name__ == "Abort":  # Ctrl-C, as the parser words it
-        return Interrupted(_STOPPED)
     return PulsetrainerError(f"a bug: {type(error).__name__}: {error}", hint=_DEBUG_HINT)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from pulsetrainer.cli.live import LETTERS, Live, why_not
@@ -26,10 +26,10 @@ class Steered:
     """A session with its screen and keys, or without."""
 
     decide: Decide
-    view: Callable[[Now], None]
-    screen: contextlib.AbstractContextManager[None]
-    share: Callable[[float], float]  # of the work that is done, at a time in s
-    by_key: bool  # what comes next may change at any moment
+    share: Callable[[float], float] = lambda _s: 0.0  # of the work that is done, at a time in s
+    view: Callable[[Now], None] = lambda _now: None
+    screen: contextlib.AbstractContextManager[None] = field(default_factory=contextlib.nullcontext)
+    by_key: bool = False  # what comes next may change at any moment
 
 
 class Hands:
@@ -54,17 +54,15 @@ class Hands:
         if isinstance(chosen, Blind):
             if by_key and dark:
                 raise UsageError(f"a quiz is answered by key, and {dark}", hint="give the answers in a file")
-            if dark:
-                return Steered(chosen, lambda _now: None, contextlib.nullcontext(), lambda _s: 0.0, False)
-            return self._asked(chosen)
+            return Steered(chosen) if dark else self._asked(chosen)
         if dark:
             if "small" in dark:
                 screen.note(f"{dark}; there are no keys")
-            return Steered(chosen, lambda _now: None, contextlib.nullcontext(), chosen.share_at, False)
+            return Steered(chosen, chosen.share_at)
         steering = Steering(chosen, [Pulse(shape).own_bpm for shape in shapes])
         live = Live(lambda key, _s: steering.press(key), self.names, blind=False)
         live.status = lambda: "paused" if steering.paused else ""
-        return Steered(steering, live, live.on_screen(), chosen.share_at, True)
+        return Steered(steering, chosen.share_at, live, live.on_screen(), by_key=True)
 
     def _asked(self, quiz: Blind) -> Steered:
         """Return a quiz on the screen: a letter answers, Q stops."""
@@ -87,4 +85,4 @@ class Hands:
             + (", answered" if self._answers else "")
             + (f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops" if wrong else "")
         )
-        return Steered(steering, live, live.on_screen(), lambda _s: 0.0, False)
+        return Steered(steering, view=live, screen=live.on_screen())

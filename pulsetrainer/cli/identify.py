@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting, word_or_number
 
@@ -67,8 +66,10 @@ def identify(
 
     Example: pulsetrainer identify run.h5 -o model.h5
     """
-    job = Job(context, inputs=runs, outputs=(out,), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=runs, outputs=(out,))
     length = word_or_number(smoothing, "auto", "--smoothing", "auto or a number from 0 to 1", least=0, most=1)
+
+    from pulsetrainer.report.results import identified
 
     with job.working("fitting") as progress:
         model = pt.identify(
@@ -84,54 +85,8 @@ def identify(
             progress=progress,
         )
         job.save(out, model, f"Preisach model of {', '.join(path.stem for path in runs)}")
-    _show(job, out, model)
-
-
-def _show(job: Job, out: Path, model: pt.Model) -> None:
-    from pulsetrainer.artefacts.units import with_unit
-    from pulsetrainer.report.facts import loop_words, minor_words
-
-    fit, unit = model.fit, model.output_unit
-    assert fit is not None
-    job.notes(fit.notes)
-    job.screen.result(_payload(out, model, job.seconds))
-    if fit.warning:
-        job.screen.line("warning: ", fit.warning)
-    band = fit.output_uncertainty
-    job.screen.facts(
-        f"{out}: Preisach model of {model.levels} levels, {model.weights.size} cells",
-        {
-            "fit": f"{fit.rms_percent:.3f} % rms, {fit.max_percent:.2f} % max, of the span",
-            "fit rms": with_unit(f"{fit.rms:.4g}", unit),
-            "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
-            "cells switched": f"{fit.coverage_percent:.1f} %",
-            "told apart by minor loops": minor_words(fit.minor_percent),
-            "smoothing": f"{fit.smoothing:.3g} of the range of the {model.input_quantity}"
-            if fit.smoothing
-            else "none",
-            "loop": loop_words(model),
-            "form": model.form,
-            **({"output known within": with_unit(f"{band:.2g}", unit) + " (90 % band)"} if band else {}),
-            "took": f"{job.seconds:.2f} s, {fit.iterations} iterations",
-        },
-    )
-
-
-def _payload(out: Path, model: pt.Model, seconds: float) -> dict[str, Any]:
-    fit = model.fit
-    assert fit is not None
-    same = (
-        "coverage_percent", "minor_percent", "smoothing", "input_noise", "false_reversals",
-        "output_uncertainty", "offsets", "spacing", "stiffness", "loop", "masked_samples", "warning",
-        "iterations",
-    )  # fmt: skip
-    return {
-        "output": out,
-        "cells": model.weights.size,
-        **picked(model, "levels", "offset", "output_unit", "polarity", "form"),
-        "fit_rms": fit.rms,
-        "fit_rms_percent": fit.rms_percent,
-        "fit_max_percent": fit.max_percent,
-        **picked(fit, *same),
-        "seconds": seconds,
-    }
+    assert model.fit is not None
+    job.notes(model.fit.notes)
+    if model.fit.warning:
+        job.screen.line("warning: ", model.fit.warning)
+    job.show(*identified(out, model, job.seconds))

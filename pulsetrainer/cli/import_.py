@@ -79,10 +79,7 @@ def import_(
     groups = outputs_of(files, out)
     must = "the word even or a rate above 0 in Hz"
     even = word_or_number(resample, "even", "--resample", must, **_RATES_HZ)
-    jobs = [
-        Job(context, tables=group, outputs=(target,), overwrite=overwrite, as_json=json)
-        for target, group in groups.items()
-    ]
+    jobs = [Job(context, tables=group, outputs=(target,)) for target, group in groups.items()]
     check_timing(time_column, rate, no_time=no_time, resampled=even is not None)
     from pulsetrainer.files.run_from_table import run_from_table
     from pulsetrainer.steps.import_ import import_parts

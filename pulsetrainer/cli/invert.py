@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting
 
@@ -74,9 +73,10 @@ def invert(
 
     pulse = pulse_file(waveform)
     inputs = (model,) if learnt is None else (model, learnt)
-    job = Job(context, inputs=inputs, outputs=(out,), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=inputs, outputs=(out,))
     check_beat(beat)
     check_force_range(force_min, force_max)
+    from pulsetrainer.report.results import drive_title, inverted
     from pulsetrainer.steps.invert import invert as inverse_of
 
     with job.working(f"inverting {waveform}") as progress:
@@ -98,39 +98,6 @@ def invert(
             drive = pt.transfer(drive, job.load(learnt, pt.Waveform), slew=slew_A_per_s)
         if pulse == Path(waveform):  # a file of the user's, wherever it lies
             job.uses(pulse)
-        job.save(out, drive, f"{drive.name} by {drive.inversion} inversion")
-    _show(job, out, drive)
-
-
-def _show(job: Job, out: Path, drive: pt.Waveform) -> None:
-    from pulsetrainer.artefacts.units import with_seconds, with_unit
-
+        job.save(out, drive, drive_title(drive))
     job.notes(drive.notes)
-    force = float(drive.target[drive.scored].min()), float(drive.target[drive.scored].max())
-    current = float(drive.compensated.min()), float(drive.compensated.max())
-    given, made = (
-        (drive.model.input_quantity, drive.model.output_quantity) if drive.model else ("current", "force")
-    )
-    seconds = drive.time_s.size / drive.rate_Hz
-    length = f"{seconds:.2f} s" if seconds >= 1 else with_seconds(seconds)
-    job.screen.result(
-        {
-            "output": out,
-            **picked(drive, "name", "inversion"),
-            "samples": drive.time_s.size,
-            "seconds": seconds,
-            "force_range": force,
-            "current_range": current,
-            **picked(drive, "clipped_samples", "predicted_max_error_percent", "input_unit", "output_unit"),
-        }
-    )
-    job.screen.facts(
-        f"{out}: {drive.name} by {drive.inversion} inversion",
-        {
-            "length": f"{length}, {drive.time_s.size} samples",
-            made: with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
-            given: with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
-            "out of reach": f"{drive.clipped_samples} samples",
-            "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model",
-        },
-    )
+    job.show(*inverted(out, drive))

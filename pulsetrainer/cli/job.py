@@ -24,12 +24,11 @@ if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
     from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.device.limits import Limits
-    from pulsetrainer.files.provenance import Device as Measurer
     from pulsetrainer.files.provenance import Header
 
 K = TypeVar("K")
-_OTHER_FORMATS = {
-    *(".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".npz", ".mat", ".wav"),
+_FORMATS = {
+    *(".h5", ".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".npz", ".mat", ".wav"),
     *(".png", ".svg", ".pdf", ".html", ".htm"),
 }
 _IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
@@ -58,19 +57,18 @@ class Job:
         inputs: Sequence[Path] = (),
         tables: Sequence[Path | None] = (),
         outputs: Sequence[Path | None] = (),
-        overwrite: bool = False,
-        as_json: bool = False,
     ) -> None:
-        self.screen = Screen(str(context.info_name), as_json=as_json)
-        self._parameters = context.params
+        given = self._parameters = context.params
+        self.screen = Screen(str(context.info_name), as_json=given["json"])
+        self.overwrite = bool(given.get("overwrite"))
+        self.port: str | None = given.get("port")
         self._settings: Path | None = context.find_root().obj
-        self.overwrite = overwrite
         self._artefacts: list[Path] = []  # loaded, in their order
         self._tables: list[Path] = []
-        if context.params.get("port"):
+        if self.port:
             from pulsetrainer.simulation.options import check_port
 
-            check_port(context.params["port"])
+            check_port(self.port)
         written = [path for path in outputs if path is not None]
         for path in written:
             check_ending(path, context)
@@ -80,13 +78,19 @@ class Job:
             )
         check_keeps_inputs(written, [*inputs, *filter(None, tables)], context)
         for path in written:
-            check_output(path, overwrite)
+            check_output(path, self.overwrite)
         for path in inputs:
             check_artefact(path)
-        for table in tables:
-            if table is not None:
-                check_file(table)
+        for table in filter(None, tables):
+            check_file(table)
         self.seconds = 0.0
+
+    @property
+    def limits(self) -> Limits:
+        """The limits that were asked for."""
+        from pulsetrainer.device.limits import Limits
+
+        return Limits(self._parameters["limit_current_A"], self._parameters["limit_force_N"])
 
     @contextmanager
     def working(self, label: str, view: LoopView | None = None) -> Iterator[Any]:
@@ -99,12 +103,12 @@ class Job:
             yield progress
         self.seconds = time.perf_counter() - begun
 
-    def open_device(self, port: str | None, limits: Limits | None = None) -> Device:
+    def open_device(self) -> Device:
         """Open a device, as ``api.open_device``, with the gains that the file of settings has for it."""
         from pulsetrainer.api import open_device
         from pulsetrainer.device.gains import DELIVERED
 
-        device = open_device(port, limits=limits, tuned=self._settings)
+        device = open_device(self.port, limits=self.limits, tuned=self._settings)
         if self._settings is not None and device.gains != DELIVERED:
             self.notes([f"{device.info.serial} plays with the gains that {self._settings} has for it"])
         elif self._settings is not None:
@@ -116,11 +120,11 @@ class Job:
                 self.notes([f"{said}, which plays with those delivered; `pulsetrainer tune` measures it"])
         return device
 
-    def check_device(self, port: str | None, limits: Limits) -> None:
+    def check_device(self) -> None:
         """Refuse what ``open_device`` would by port, limits and file of settings alone: nothing is opened."""
         from pulsetrainer.api import check_device
 
-        check_device(port, limits=limits, tuned=self._settings)
+        check_device(self.port, limits=self.limits, tuned=self._settings)
 
     def view(self, *ends: float, live: bool) -> LoopView | None:
         """Return a live view with these ends of its axes, if asked for and the terminal can show it."""
@@ -156,9 +160,10 @@ class Job:
         self._parameters = {**self._parameters, name: value}
 
     def header(
-        self, title: str, *, device: Measurer | None = None, ancestors: Sequence[Header] = ()
+        self, title: str, device: DeviceInfo | None = None, *, ancestors: Sequence[Header] = ()
     ) -> Header:
-        """Return what the result says about itself: command, parameters, inputs and their history."""
+        """Return what the result says of itself: command, parameters, inputs with their history, device."""
+        from pulsetrainer.device.schemes import redact
         from pulsetrainer.files import provenance, store
 
         parameters = {
@@ -167,6 +172,9 @@ class Job:
             if name not in _NOT_PARAMETERS and not _is_path(value)
         }
         made_from = [store.read_header(path) for path in self._artefacts]
+        measurer = None
+        if device is not None:
+            measurer = provenance.Device(device.serial, device.firmware, redact(self.port or ""))
         return provenance.make_header(
             title,
             argv=sys.argv[1:],
@@ -175,22 +183,15 @@ class Job:
             seed=parameters.get("seed"),
             inputs=provenance.digests([*self._artefacts, *self._tables]),
             ancestors=[*made_from, *ancestors],
-            device=device,
+            device=measurer,
             libraries=provenance.library_versions(),
         )
 
-    def device(self, info: DeviceInfo) -> Measurer:
-        """Return who measured, and on which port, as a header names it."""
-        from pulsetrainer.device.schemes import redact
-        from pulsetrainer.files.provenance import Device
-
-        return Device(info.serial, info.firmware, redact(self._parameters.get("port") or ""))
-
-    def save(self, path: Path | None, noun: Any, title: str, *, device: Measurer | None = None) -> Header:
+    def save(self, path: Path | None, noun: Any, title: str, device: DeviceInfo | None = None) -> Header:
         """Write an artefact, if there is a file to write it to, and return its header."""
         from pulsetrainer.files import store
 
-        header = self.header(title, device=device)
+        header = self.header(title, device)
         if path is not None:
             store.write(path, noun, header, overwrite=self.overwrite)
         return header
@@ -219,24 +220,23 @@ class Job:
         said = {name: getattr(header, name) for name in ("title", "created", "history")}
         self.write(path, render(noun, provenance_json=header.provenance.to_json(), **said))
 
-    def would(
-        self,
-        what: str,
-        plan: Any,
-        port: str | None,
-        out: Path | None,
-        rows: Mapping[str, Any],
-        **besides: Any,
-    ) -> None:
+    def would(self, what: str, plan: Any, rows: Mapping[str, Any], **besides: Any) -> None:
         """Say what a dry run would have played, and where; ``besides`` is for JSON."""
         from pulsetrainer.device.opening import DEFAULT_PORT
         from pulsetrainer.device.schemes import redact
 
-        where = redact(port or DEFAULT_PORT)
-        self.screen.result(besides | plain(plan) | {"port": where, "output": out, "dry_run": True})
+        where, out = redact(self.port or DEFAULT_PORT), self._parameters["out"]
         current = f"{plan.peak_current_A:.3f} A at most, {plan.rms_current_A:.3f} A rms"
-        title = f"would {what} on {where}{f' and write {out}' if out else ''}; nothing was done"
-        self.screen.facts(title, {**rows, "current": current})
+        self.show(
+            besides | plain(plan) | {"port": where, "output": out, "dry_run": True},
+            f"would {what} on {where}{f' and write {out}' if out else ''}; nothing was done",
+            {**rows, "current": current},
+        )
+
+    def show(self, payload: Mapping[str, Any], title: str, rows: Mapping[str, Any]) -> None:
+        """Say the result: ``payload`` to a script, ``title`` and ``rows`` to a person."""
+        self.screen.result(payload)
+        self.screen.facts(title, rows)
 
     def wrote(self, *paths: Path | None) -> None:
         """Say which files there are now."""
@@ -271,25 +271,18 @@ def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context:
 
 def check_ending(path: Path, context: typer.Context) -> None:
     """Refuse an output whose name promises another format than it gets."""
-    ending, command = path.suffix.lower(), context.info_name
+    command, ending = context.info_name, path.suffix.lower()
     if str(path) == str(context.params.get("html")):
-        if ending in (_OTHER_FORMATS | {".h5"}) - {".html", ".htm"}:
-            raise UsageError(
-                f"a page is written as HTML, but {path} ends in {ending!r}",
-                hint=f"name it {path.stem}.html; a browser prints it to PDF",
-            )
+        what, right, then = "a page is written as HTML", ".html", "; a browser prints it to PDF"
     elif command == "tune":
-        if ending in (_OTHER_FORMATS | {".h5"}) - {".toml"}:
-            raise UsageError(
-                f"a file of settings is written as TOML, but {path} ends in {ending!r}",
-                hint=f"name it {path.stem}.toml",
-            )
-    elif command not in _WRITE_NO_ARTEFACT and ending in _OTHER_FORMATS:
-        raise UsageError(
-            f"{command} writes HDF5, but {path} ends in {ending!r}",
-            hint=f"name it {path.stem}.h5; then `pulsetrainer export` makes a table of it, "
-            "`pulsetrainer plot` a figure",
-        )
+        what, right, then = "a file of settings is written as TOML", ".toml", ""
+    elif command in _WRITE_NO_ARTEFACT:
+        return
+    else:
+        what, right = f"{command} writes HDF5", ".h5"
+        then = "; then `pulsetrainer export` makes a table of it, `pulsetrainer plot` a figure"
+    if ending in _FORMATS and not right.startswith(ending):  # .htm is a page too
+        raise UsageError(f"{what}, but {path} ends in {ending!r}", hint=f"name it {path.stem}{right}{then}")
 
 
 def _is_path(value: Any) -> bool:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pulsetrainer.cli.console import drawing
 from pulsetrainer.report.characters import plotted
 from pulsetrainer.steps.steering import KEYS
 
@@ -81,14 +82,10 @@ class Live:
         import termios
         import tty
 
-        from rich.console import Console
-        from rich.live import Live as Screen
-
         before = termios.tcgetattr(sys.stdin)
         try:
             tty.setcbreak(sys.stdin)
-            with Screen(console=Console(stderr=True), transient=True, auto_refresh=False) as screen:
-                self._show = lambda text: screen.update(text, refresh=True)
+            with drawing() as self._show:
                 yield
         finally:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pulsetrainer.cli.console import drawing
 from pulsetrainer.report.characters import Dots
 from pulsetrainer.steps.progress import Progress
 
@@ -50,12 +51,8 @@ class LoopView:
     @contextmanager
     def on_screen(self, label: str) -> Iterator[Progress]:
         """Draw on the terminal, and give a callable that takes the share of the work done."""
-        from rich.console import Console
-        from rich.live import Live as Screen
-
         self._label = label
-        with Screen(console=Console(stderr=True), transient=True, auto_refresh=False) as screen:
-            self._show = lambda drawn: screen.update(drawn, refresh=True)
+        with drawing() as self._show:
             yield self._progress
 
     def _progress(self, share: float) -> None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import (
     AsJson,
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from pulsetrainer.artefacts import FloatArray
     from pulsetrainer.cli.loop_view import LoopView
     from pulsetrainer.core.plane import IntArray
-    from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.steps.play import Watch
 
 
@@ -53,26 +51,29 @@ def play(
 
     Example: pulsetrainer play drive.h5 -o played.h5
     """
-    job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.device.limits import Limits
+    job = Job(context, inputs=(drive,), outputs=(out,))
     from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
+    from pulsetrainer.report.results import drive_title
+    from pulsetrainer.report.results import played as said_of
     from pulsetrainer.steps.play import plan
 
-    waveform, limits = job.load(drive, pt.Waveform), Limits(limit_current_A, limit_force_N)
+    waveform = job.load(drive, pt.Waveform)
+    title = drive_title(waveform)
     if dry_run:
-        job.check_device(port, limits)
-        planned = plan(waveform, repeats=repeats, track_heat=track_heat, limits=limits)
+        job.check_device()
+        planned = plan(waveform, repeats=repeats, track_heat=track_heat, limits=job.limits)
         rows = {
             "repeats": f"{repeats} of each drive, {planned.seconds:.1f} s in all",
             "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
         }
         what = {"name": waveform.name, "inversion": waveform.inversion, "repeats": repeats}
-        job.would(f"play {_named(waveform)}", planned, port, out, rows, **what)
+        job.would(f"play {title}", planned, rows, **what)
         return
     stopped: PulsetrainerError | None = None
-    view = job.view(*_ends(waveform), live=live)
+    top = max(waveform.compensated.max(), waveform.scaled.max())
+    view = job.view(1.05 * float(top), 1.1 * float(waveform.target.max()), live=live)  # a little room
     watch = _shown_by(view, waveform) if view else None
-    with job.working(f"playing {drive.name}", view) as progress, job.open_device(port, limits) as device:
+    with job.working(f"playing {drive.name}", view) as progress, job.open_device() as device:
         info = device.info
         try:
             played = pt.play(
@@ -86,21 +87,15 @@ def play(
                 raise
             stopped, played = error, error.kept
     whole = played.compensated.output.shape[0]
-    job.save(out, played, f"{_named(waveform)}, played on {info.serial}", device=job.device(info))
+    job.save(out, played, f"{title}, played on {info.serial}", info)
     if stopped is not None:
         stopped.message += f"; {whole} of {repeats} repeats were kept in {out} (complete=false)"
         stopped.hint = stopped.hint or "evaluate what there is, or play all of it again with --overwrite"
         raise stopped
-    _show(job, out, played, info)
-
-
-def _named(drive: pt.Waveform) -> str:
-    return f"{drive.name} by {drive.inversion} inversion"
-
-
-def _ends(drive: pt.Waveform) -> tuple[float, float]:
-    """Ends of the axes of the live view: a little beyond what is asked for."""
-    return 1.05 * float(max(drive.compensated.max(), drive.scaled.max())), 1.1 * float(drive.target.max())
+    if played.dropped_samples:
+        lost = f"{played.dropped_samples} samples were lost on the wire"
+        job.notes([f"{lost}; they are left out of all errors"])
+    job.show(*said_of(out, played, info.serial, info.firmware))
 
 
 def _shown_by(view: LoopView, drive: pt.Waveform) -> Watch:
@@ -115,34 +110,3 @@ def _shown_by(view: LoopView, drive: pt.Waveform) -> Watch:
         view.take(current, force)
 
     return watch
-
-
-def _show(job: Job, out: Path, played: pt.Playback, info: DeviceInfo) -> None:
-    from pulsetrainer.report.facts import warmth_words
-
-    drive, repeats, kelvin = played.waveform, played.compensated.output.shape[0], played.temperature_K
-    seconds = float(drive.time_s[-1]) * repeats * 2
-    if played.dropped_samples:
-        job.notes(
-            [f"{played.dropped_samples} samples were lost on the wire; they are left out of all errors"]
-        )
-    job.screen.result(
-        {
-            "output": out,
-            **picked(drive, "name", "inversion"),
-            "repeats": repeats,
-            "samples": drive.time_s.size,
-            "seconds": seconds,
-            **picked(played, "dropped_samples", "complete", "temperature_K"),
-            **picked(info, "serial", "firmware"),
-        }
-    )
-    job.screen.facts(
-        f"{out}: {_named(drive)} on {info.serial}",
-        {
-            "repeats": f"{repeats} of each drive, {seconds:.1f} s in all",
-            "samples": f"{drive.time_s.size} a repeat",
-            "lost": f"{played.dropped_samples} samples",
-            **({"coil": warmth_words(kelvin)} if kelvin is not None and kelvin.size else {}),
-        },
-    )

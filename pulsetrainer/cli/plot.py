@@ -31,7 +31,7 @@ def plot(
     out = out or file.with_suffix(".png")
     form = figure_form(out, "a figure")
     table = out.with_suffix(".csv") if data else None
-    job = Job(context, inputs=(file,), outputs=(out, table), overwrite=overwrite, as_json=json)
+    job = Job(context, inputs=(file,), outputs=(out, table))
     artefact = job.load_any(file)
     from pulsetrainer.errors import DataError
     from pulsetrainer.report import figures, render

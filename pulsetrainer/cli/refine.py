@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port
+from pulsetrainer.report.tables import picked
 
 
 def refine(
@@ -34,26 +34,24 @@ def refine(
 
     Example: pulsetrainer refine drive.h5 -o refined.h5
     """
-    job = Job(context, inputs=(drive,), outputs=(out,), overwrite=overwrite, as_json=json)
-    from pulsetrainer.device.limits import Limits
+    job = Job(context, inputs=(drive,), outputs=(out,))
     from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
     from pulsetrainer.steps.refine import check, plan
 
     waveform = job.load(drive, pt.Waveform)
     check(waveform, passes)
-    limits = Limits(limit_current_A, limit_force_N)
     if dry_run:
-        job.check_device(port, limits)
-        planned = plan(waveform, passes=passes, limits=limits)
+        job.check_device()
+        planned = plan(waveform, passes=passes, limits=job.limits)
         rows = {
             "passes": f"at most {passes}, {planned.seconds:.1f} s in all",
             "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
             "rehearsed": "the first pass, which plays the drive as it is; what it shows decides the others",
         }
-        job.would(f"refine {waveform.name}", planned, port, out, rows, name=waveform.name, passes=passes)
+        job.would(f"refine {waveform.name}", planned, rows, name=waveform.name, passes=passes)
         return
     stopped: PulsetrainerError | None = None
-    with job.working(f"refining {drive.name}") as progress, job.open_device(port, limits) as device:
+    with job.working(f"refining {drive.name}") as progress, job.open_device() as device:
         info = device.info
         try:
             refined = pt.refine(waveform, device, passes=passes, progress=progress)
@@ -63,12 +61,11 @@ def refine(
                 raise
             stopped, refined = error, error.kept
     title = f"{refined.name} refined on {info.serial}"
-    job.save(out, refined, title, device=job.device(info))
+    job.save(out, refined, title, info)
     if stopped is not None:
         stopped.message += f"; the best of {len(refined.passes)} passes was kept in {out}"
         raise stopped
     job.notes(refined.notes[len(waveform.notes) :])
-    job.screen.result({"output": out, **picked(refined, "name", "passes", "kept"), "serial": info.serial})
     rows = {
         f"pass {number}{', kept' if number == refined.kept else ''}": (
             f"mean {one.mean_abs_error_percent:.3f} %, max {one.max_abs_error_percent:.2f} % of full force, "
@@ -76,4 +73,5 @@ def refine(
         )
         for number, one in enumerate(refined.passes, 1)
     }
-    job.screen.facts(f"{out}: {title}", rows)
+    payload = {"output": out, **picked(refined, "name", "passes", "kept"), "serial": info.serial}
+    job.show(payload, f"{out}: {title}", rows)

@@ -8,20 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.job import Job
+from pulsetrainer.report.tables import picked
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from pulsetrainer.artefacts import Quiz
-    from pulsetrainer.cli.hands import Steered
-    from pulsetrainer.core.pulses import Shape
     from pulsetrainer.device.identity import DeviceInfo
-    from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.provenance import Header
-    from pulsetrainer.steps.conductor import Decide
     from pulsetrainer.steps.performance import Performed
+    from pulsetrainer.steps.session import Plan
 
 
 def sheet(job: Job, html: Path, session: pt.Session, header: Header) -> None:
@@ -50,25 +45,8 @@ def say(job: Job, path: Path, html: Path | None, session: pt.Session) -> None:
     job.wrote(html)
 
 
-def would(
-    job: Job,
-    out: Path,
-    model: pt.Model,
-    shapes: Sequence[Shape],
-    chosen: Decide,
-    steered: Steered,
-    asked: Mapping[str, Any],
-    device: tuple[str | None, Limits],
-) -> None:
+def would(job: Job, planned: Plan) -> None:
     """Say what a session would press, as far as no key changes it."""
-    from pulsetrainer.steps.session import plan
-
-    port, limits = device
-    job.check_device(port, limits)
-    with job.working("rehearsing") as progress:
-        planned = plan(
-            model, shapes, chosen, limits=limits, watch=lambda s: progress(steered.share(s)), **asked
-        )
     pauses = sum(pause.seconds for pause in planned.pauses)
     limit = f"the device stays on for {planned.longest_part_s / 60:.0f} minutes in one go"
     rows = {
@@ -79,9 +57,9 @@ def would(
         + (f"{len(planned.pauses)} pauses to cool, {pauses:.0f} s in all" if pauses else "no pause to cool"),
         "force": f"{planned.peak_force_N:.2f} N at most, by the model",
     }
-    if limits.force_N is not None:
-        rows["force"] += f"; above {limits.force_N:g} N the device stops"
-    job.would("press a session", planned, port, out, rows)
+    if job.limits.force_N is not None:
+        rows["force"] += f"; above {job.limits.force_N:g} N the device stops"
+    job.would("press a session", planned, rows)
 
 
 def tell(
@@ -103,7 +81,7 @@ def tell(
         error.hint = error.hint or "evaluate what there is, or press another one into another file"
         raise
     quizzed, right = _quizzed(quiz)
-    kelvins = [kelvin for _, kelvin in done.temperature]
+    kelvins = [] if done.temperature_K is None else done.temperature_K.tolist()
     payload: dict[str, Any] = {
         "output": out,
         "beats": int(done.beats.start_s.size),
@@ -111,8 +89,7 @@ def tell(
         "underruns": done.underruns,
         "parts": done.parts,
         "force_range_N": (done.reach.low, done.reach.high),
-        "clipped_samples": done.clipped,
-        "dropped_samples": done.dropped,
+        **picked(done, "clipped_samples", "dropped_samples"),
         "temperature_K": kelvins or None,
         **picked(info, "serial", "firmware"),
         **quizzed,
@@ -128,8 +105,7 @@ def tell(
     }
     if kelvins:
         rows["coil"] = warmth_words(kelvins)
-    job.screen.result(payload)
-    job.screen.facts(f"{out}: a session on {info.serial}", rows | right)
+    job.show(payload, f"{out}: a session on {info.serial}", rows | right)
 
 
 def _spread(figures: Mapping[str, float]) -> str | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,14 +14,8 @@ from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, O
 from pulsetrainer.files.settings import variable
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import FloatArray
-    from pulsetrainer.cli.hands import Steered
-    from pulsetrainer.core.pulses import Shape
-    from pulsetrainer.device.limits import Limits
-    from pulsetrainer.files.session_recorder import SessionRecorder
-    from pulsetrainer.steps.performance import Now, Performed
-    from pulsetrainer.steps.programme import Programme
-    from pulsetrainer.steps.quiz import Blind
+    from pulsetrainer.files.provenance import Header
+    from pulsetrainer.steps.performance import Now
 
 _MOST_SEED = 2**31
 
@@ -96,25 +89,19 @@ def session(
     check_asked_for(answers, quiz)
     names = [name for name in (part.strip() for part in pulses.split(",")) if name]
     tables = [pulse_file(name) for name in names]
-    job = Job(
-        context,
-        inputs=(model,),
-        tables=(changes, answers),
-        outputs=(out, html),
-        overwrite=overwrite,
-        as_json=json,
-    )
+    job = Job(context, inputs=(model,), tables=(changes, answers), outputs=(out, html))
     for path, name in zip(tables, names, strict=True):
         if str(path) == name:
             job.uses(path)
     from pulsetrainer.cli.hands import Hands
-    from pulsetrainer.cli.score import would
+    from pulsetrainer.cli.score import tell, would
     from pulsetrainer.core.rhythm import Rhythm
-    from pulsetrainer.device.limits import Limits
     from pulsetrainer.files.changes import read_answers, read_changes
     from pulsetrainer.files.pulses import read_pulse
+    from pulsetrainer.recorded import session_into
     from pulsetrainer.steps.programme import Change
-    from pulsetrainer.steps.session import check_model, programme
+    from pulsetrainer.steps.quiz import Blind
+    from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, programme
 
     loaded = job.load(model, pt.Model)
     check_model(loaded)
@@ -141,98 +128,37 @@ def session(
         job.notes(
             [f"a quiz ends with its last question, at one rate and height: {', '.join(unused)} not used"]
         )
-    asked = {
+    asked: dict[str, Any] = {
         "rhythm": Rhythm(variability / 100, respiration / 100, ectopic / 100, seed),
         "rates": rates,
         "track_heat": track_heat,
     }
-    limits = Limits(limit_current_A, limit_force_N)
     shapes = [read_pulse(name) for name in names]
     steered = hands.steer(job.screen, chosen, shapes, by_key=answers is None)
     if dry_run:
-        would(job, out, loaded, shapes, chosen, steered, asked, (port, limits))
+        job.check_device()
+        with job.working("rehearsing") as progress:
+            share = steered.share
+            planned = plan(
+                loaded, shapes, chosen, limits=job.limits, watch=lambda s: progress(share(s)), **asked
+            )
+        would(job, planned)
         return
-    _press(job, (out, html), loaded, shapes, chosen, steered, asked, (port, limits), seed=seed)
-
-
-def _press(
-    job: Job,
-    outputs: tuple[Path, Path | None],
-    model: pt.Model,
-    shapes: list[Shape],
-    chosen: Programme | Blind,
-    steered: Steered,
-    asked: dict[str, Any],
-    device: tuple[str | None, Limits],
-    *,
-    seed: int,
-) -> None:
-    from pulsetrainer.cli.score import tell
-    from pulsetrainer.files.session_recorder import SessionRecorder
-    from pulsetrainer.steps.quiz import Blind
-    from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, perform
-
-    out, html = outputs
     said = "a session that was cut off: look with `pulsetrainer show {left}`, and delete it"
     job.left_over(out, pt.Session, said)
-    blind = chosen if isinstance(chosen, Blind) else None
-    with job.open_device(*device) as opened:
-        info = opened.info
-        header = job.header("Session under way")
-        with (
-            SessionRecorder(out, header, overwrite=job.overwrite, signal="session") as recorder,
-            job.working("session") as progress,
-            steered.screen,
-        ):
+    with job.open_device() as device, job.working("session") as progress, steered.screen:
 
-            def watch(now: Now) -> None:
-                steered.view(now)
-                progress(steered.share(now.time_s))
+        def watch(now: Now) -> None:
+            steered.view(now)
+            progress(steered.share(now.time_s))
 
-            done = perform(
-                model,
-                opened,
-                shapes,
-                steered.decide,
-                _Sink(recorder, blind, out.stem),
-                lead_s=LIVE_LEAD_S if steered.by_key else LEAD_S,
-                watch=watch,
-                **asked,
-            )
-            if done.fault and not done.beats.start_s.size:
-                recorder.forget()
-                _raise_without_a_beat(done, out)
-            quiz = blind.quiz(out.stem) if blind else None
+        def header() -> Header:
             job.know("seed", seed)
-            header = job.header(f"Session on {info.serial}", device=job.device(info))
-            recorder.keep(done.fields | {"quiz": quiz}, header)
-            recorder.finish(complete=not done.fault, dropped_samples=done.dropped)
-    tell(job, out, html, done, quiz, info)
+            return job.header(f"Session on {device.info.serial}", device.info)
 
-
-def _raise_without_a_beat(done: Performed, out: Path) -> None:
-    from pulsetrainer.errors import PulsetrainerError
-    from pulsetrainer.steps.stopped import raise_if_stopped
-
-    try:
-        raise_if_stopped(done.fault, done.remedy, "the session")
-    except PulsetrainerError as error:
-        error.message += f"; no beat was pressed, so {out} was not written"
-        error.hint = error.hint or "run the command again"
-        raise
-
-
-class _Sink:
-    """The file of a session; of a quiz it tells what was asked when that is answered."""
-
-    def __init__(self, recorder: SessionRecorder, blind: Blind | None, learner: str) -> None:
-        self._recorder, self._blind, self._learner = recorder, blind, learner
-
-    def append(self, *columns: FloatArray) -> None:
-        self._recorder.append(*columns)
-
-    def judge(self, fields: Mapping[str, Any]) -> None:
-        told: dict[str, Any] = {"quiz": None}
-        if self._blind is not None:
-            told = {"quiz": self._blind.quiz(self._learner), "beats": self._blind.told(fields["beats"])}
-        self._recorder.judge({**fields, **told})
+        done, questions = session_into(
+            out, job.header("Session under way"), header, loaded, device, shapes, steered.decide,
+            blind=chosen if isinstance(chosen, Blind) else None, overwrite=overwrite,
+            lead_s=LIVE_LEAD_S if steered.by_key else LEAD_S, watch=watch, **asked,
+        )  # fmt: skip
+    tell(job, out, html, done, questions, device.info)

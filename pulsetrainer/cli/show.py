@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 
 import pulsetrainer as pt
-from pulsetrainer.cli.console import picked
 from pulsetrainer.cli.evaluate import show_tables
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson
+from pulsetrainer.report.tables import picked
 
 
 def show(
@@ -25,7 +25,7 @@ def show(
 
     Example: pulsetrainer show model.h5
     """
-    job = Job(context, inputs=(file,), as_json=json)
+    job = Job(context, inputs=(file,))
     from pulsetrainer.files import store
     from pulsetrainer.report.diagnosis_text import sections
     from pulsetrainer.report.facts import facts

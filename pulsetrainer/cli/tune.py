@@ -13,7 +13,6 @@ from pulsetrainer.cli.job import Job, check_ending
 from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Overwrite, Port, positive
 
 if TYPE_CHECKING:
-    from pulsetrainer.device.limits import Limits
     from pulsetrainer.steps.tune import Tuned
 
 
@@ -63,16 +62,14 @@ def tune(
     if out is not None:
         check_ending(out, context)
         check_output(out, overwrite=True)
-    job = Job(context, inputs=drive, as_json=json)
-    from pulsetrainer.device.limits import Limits
+    job = Job(context, inputs=drive)
     from pulsetrainer.files.tuning import check_tuned, write_tuned
 
     drives = [job.load(path, pt.Waveform) for path in drive]
-    limits = Limits(limit_current_A, limit_force_N)
     if dry_run:
-        _would(job, drives, supply_V, port, limits, out, overwrite=overwrite)
+        _would(job, drives, supply_V, out, overwrite=overwrite)
         return
-    with job.working("tuning") as progress, pt.open_device(port, limits=limits) as device:
+    with job.working("tuning") as progress, pt.open_device(port, limits=job.limits) as device:
         if out is not None:
             check_tuned(out, device.info.serial, overwrite=overwrite)
         found = pt.tune(device, pulses=drives or _FOLLOWED, supply_V=supply_V, progress=progress)
@@ -83,14 +80,7 @@ def tune(
 
 
 def _would(
-    job: Job,
-    drives: list[pt.Waveform],
-    supply_V: float | None,
-    port: str | None,
-    limits: Limits,
-    out: Path | None,
-    *,
-    overwrite: bool,
+    job: Job, drives: list[pt.Waveform], supply_V: float | None, out: Path | None, *, overwrite: bool
 ) -> None:
     from pulsetrainer.api import check_device
     from pulsetrainer.device.opening import DEFAULT_PORT
@@ -99,15 +89,15 @@ def _would(
     from pulsetrainer.simulation.options import serial_of
     from pulsetrainer.steps.tune import plan
 
-    check_device(port, limits=limits)
-    serial = serial_of(port or DEFAULT_PORT)
+    check_device(job.port, limits=job.limits)
+    serial = serial_of(job.port or DEFAULT_PORT)
     if out is not None and out.exists():
         known = ", ".join(read_tuned(out))
         if serial:
             check_tuned(out, serial, overwrite=overwrite)
         elif known and not overwrite:
             job.notes([f"{out} has gains for {known}: a device of that serial needs --overwrite"])
-    planned = plan(drives or list(map(read_pulse, _FOLLOWED)), supply_V=supply_V, limits=limits)
+    planned = plan(drives or list(map(read_pulse, _FOLLOWED)), supply_V=supply_V, limits=job.limits)
     rows = {
         f"{number}. {step.what}": f"{step.seconds:.2f} s up to {step.peak_A:.3f} A"
         + ("" if step.gains == "none" else f", gains {step.gains}")
@@ -116,7 +106,7 @@ def _would(
     rows["length"] = f"{planned.seconds:.1f} s at most"
     rows["limits"] = f"{planned.current_limit_A:g} A; above {planned.force_limit_N:g} N the device stops"
     rows["heat"] = f"{planned.heat_percent:.0f} % of the limit at most, from cold"
-    job.would("tune the device", planned, port, out, rows)
+    job.would("tune the device", planned, rows)
 
 
 def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> None:
@@ -126,9 +116,9 @@ def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> N
     job.notes(found.notes)
     if out is None:
         job.notes(["the loop gains are not kept: give `out` pulsetrainer.toml to write them down"])
-    job.screen.result(plain(found) | {"output": out})
     before, after = found.tracking_percent.before, found.tracking_percent.after
-    job.screen.facts(
+    job.show(
+        plain(found) | {"output": out},
         f"{out}: {found.serial}" if out else f"{found.serial} (gains not kept)",
         {
             "coil": f"{found.resistance_ohm:.2f} ohm, {1e3 * found.inductance_H:.1f} mH, supply "

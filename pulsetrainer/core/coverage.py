@@ -152,7 +152,7 @@ def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:
             # blank cells above the diagonal count as free, so a beta range may run past them
             inside = bad[high] - bad[low]
             sizes = area[high] - area[low]
-            left = _longest_free(inside)
+            left = np.searchsorted(inside, inside, side="left")  # where the free bands begin, for each end
             size = sizes - sizes[left]
             right = int(np.argmax(size))
             if size[right] > best * (1 + 1e-12):
@@ -167,8 +167,3 @@ def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:
         share=best / whole,
         uncovered=float(plane.areas[~covered].sum()) / whole,
     )
-
-
-def _longest_free(total: NDArray[np.float64]) -> NDArray[np.int64]:
-    """For each end, the first start from which the running ``total`` (n + 1,) has not grown."""
-    return np.searchsorted(total, total, side="left").astype(np.int64)

@@ -50,7 +50,7 @@ class Dual:
         return ends if self.polarity > 0 else (ends[1], ends[0])
 
     @property
-    def _rest(self) -> State | None:
+    def rest(self) -> State | None:
         """Memory of ``inner`` when the input is at its lower end."""
         plane = self.inner.plane
         return None if self.polarity > 0 else positive_saturation(plane.low, plane.high)
@@ -65,7 +65,7 @@ class Dual:
         """
         u = finite_vector("input", values)
         past = np.zeros(0) if start is None else np.asarray(start.extremes)
-        return invert(self.inner, np.concatenate((past, u)), self._rest).input[past.size :]
+        return invert(self.inner, np.concatenate((past, u)), self.rest).input[past.size :]
 
     def inverse(self, target: ArrayLike, lead: FloatArray | None = None) -> Inverse:
         """Input (n,) whose output is ``target`` (n,), after the input ``lead`` has been played.
@@ -79,7 +79,7 @@ class Dual:
         """
         wanted = finite_vector("target", target)
         plane = self.inner.plane
-        state = self._rest
+        state = self.rest
         if lead is not None and lead.size:
             state = invert(self.inner, lead, state).final
         beyond = np.maximum(plane.low - wanted, wanted - plane.high)

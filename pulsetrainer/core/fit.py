@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from pulsetrainer.core.dual import Dual, exchanged
+from pulsetrainer.core.dual_fit import in_output
 from pulsetrainer.core.edges import plane_for
 from pulsetrainer.core.forms import Form, Signals, Static, asked_form
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify, offsets_between
@@ -139,9 +140,11 @@ def _dual(
     smoothing: Smoothing,
     kept: Sequence[BoolArray] | None,
 ) -> Fitted:
-    """Fit the operator from output to input."""
+    """Fit the operator from output to input: first to the input, then where the noise is."""
     swapped = exchanged(signals)
     bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
-    within = fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept)
+    found = fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept).identified
     records = tuple(_records(signals, low, high, kept))
-    return Fitted(within.identified, records, np.zeros(len(records)), "dual")
+    if not found.stiffness:  # else it describes the record poorly, in whatever variable
+        found = replace(found, operator=in_output(found.operator, records, found.smoothing))
+    return Fitted(found, records, np.zeros(len(records)), "dual")

@@ -234,19 +234,15 @@ class _EdgeMemory:
 
     __slots__ = ("extremes", "grid", "output")
 
-    def __init__(self, grid: FloatArray, extremes: list[int], output: float | None = None) -> None:
+    def __init__(self, grid: FloatArray, extremes: list[int]) -> None:
         self.grid, self.extremes = grid, extremes
-        self.output = self._sum() if output is None else output
+        self.output = -float(grid[-1, 0])
+        for a, b in pairwise(extremes):
+            self.output += 2.0 * float(grid[b, a] - grid[a, b])  # one of the two is zero
 
     @property
     def edge(self) -> int:
         return self.extremes[-1]
-
-    def _sum(self) -> float:
-        y = -float(self.grid[-1, 0])
-        for a, b in zip(self.extremes, self.extremes[1:], strict=False):
-            y += 2.0 * float(self.grid[b, a] - self.grid[a, b])  # one of the two is zero
-        return y
 
     def moved(self, direction: int) -> _EdgeMemory:
         """Return the memory after one edge up or down."""

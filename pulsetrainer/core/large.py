@@ -184,9 +184,6 @@ class _System:
         x[self.order] = self.factor.solve(residual[self.order])
         return x
 
-    def _product(self, x: FloatArray) -> FloatArray:
-        return self.matrix @ x - self.mean * float(self.mean @ x)
-
     def solve(self, rhs: FloatArray, tolerance: float, limit: int = 500) -> FloatArray:
         """Solve for a right side in the cells (n_q,): conjugate gradients in the nodes, step in the masses.
 
@@ -201,7 +198,7 @@ class _System:
         for _ in range(limit):
             if energy <= tolerance**2 * first:
                 break
-            product = self._product(direction)
+            product = self.matrix @ direction - self.mean * float(self.mean @ direction)
             curvature = float(direction @ product)
             if curvature <= 0:  # rounding has the last word
                 break

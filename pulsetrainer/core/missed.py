@@ -62,7 +62,8 @@ class Path:
 def elsewhere(known: Path, missed: FloatArray, new: Path) -> tuple[FloatArray, FloatArray]:
     """Expect what is missed (k,) on a new path from what was (m,) on a known one, and its variance (k,)."""
     between = new.along(known)
-    solved = np.linalg.solve(_noisy(known), np.column_stack((missed, between.T)))
+    noisy = known.along(known) + _NOISE**2 * np.eye(known.rate.size)
+    solved = np.linalg.solve(noisy, np.column_stack((missed, between.T)))
     return between @ solved[:, 0], new.variance - np.sum(between * solved[:, 1:].T, axis=1)
 
 
@@ -73,7 +74,3 @@ def told_by_the_rest(known: Path, missed: FloatArray, part: IntArray) -> float:
         held = part == number
         expected[held], _ = elsewhere(known[~held], missed[~held], known[held])
     return 1.0 - float(np.sum((missed - expected) ** 2) / np.sum(missed**2))
-
-
-def _noisy(known: Path) -> FloatArray:
-    return known.along(known) + _NOISE**2 * np.eye(known.rate.size)

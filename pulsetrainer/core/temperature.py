@@ -48,8 +48,7 @@ class CoilRecord:
 class Windows:
     """Cuts telemetry into windows, however it comes: sums of what the regressions need."""
 
-    def __init__(self, window_s: float = WINDOW_S) -> None:
-        self._window_s = window_s
+    def __init__(self) -> None:
         self._held = np.empty((4, 0))
         self.rows: list[FloatArray] = []  # seconds, n, mean d, i, di/dt, d i, i^2, i di/dt; mean i^2 of all
 
@@ -69,16 +68,16 @@ class Windows:
         self._held = np.concatenate((self._held, fresh[:, np.isfinite(duty)]), axis=1)
         before = len(self.rows)
         while self._held.shape[1] > 1:
-            end_s = self._held[0, 0] + self._window_s
+            end_s = self._held[0, 0] + WINDOW_S
             count = int(np.searchsorted(self._held[0], end_s - 1e-9))
             if count >= self._held.shape[1]:
                 break
-            self.rows.append(_row(self._held[:, : count + 1], self._window_s))
+            self.rows.append(_row(self._held[:, : count + 1]))
             self._held = self._held[:, count:]
         return len(self.rows) - before
 
 
-def _row(block: FloatArray, seconds: float) -> FloatArray:
+def _row(block: FloatArray) -> FloatArray:
     time_s, reference, current, duty = block
     slope = np.gradient(reference, time_s)
     used = (current > _LEAST_A) & (reference > _LEAST_A)
@@ -86,9 +85,9 @@ def _row(block: FloatArray, seconds: float) -> FloatArray:
     used[-1] = False  # it is the first of the next window
     d, i, s = duty[used], current[used], slope[used]
     if count == 0:
-        return np.array([seconds, 0.0, *np.zeros(6), np.mean(current[:-1] ** 2)])
+        return np.array([WINDOW_S, 0.0, *np.zeros(6), np.mean(current[:-1] ** 2)])
     means = [np.mean(x) for x in (d, i, s, d * i, i * i, i * s)]
-    return np.array([seconds, count, *means, np.mean(current[:-1] ** 2)])
+    return np.array([WINDOW_S, count, *means, np.mean(current[:-1] ** 2)])
 
 
 def heated(rows: FloatArray, tau_s: float, begin: float = 0.0) -> FloatArray:

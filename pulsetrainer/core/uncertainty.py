@@ -135,7 +135,8 @@ def bootstrap(
             f"the bootstrap needs dense matrices, too large for {plane.n_h} levels", hint="use 48 levels"
         )
     turned, zero = levelled(records, sign)
-    length = block or block_length([_residual(operator, record) for record in records])
+    left = [(r.fitted_output - operator(r.input, r.start))[r.sample_weight > 0] for r in records]
+    length = block or block_length(left)
     parts, count = _blocks(records, length)
     if count < 2:
         raise ArgumentError(
@@ -152,12 +153,6 @@ def bootstrap(
         found = nnls.solve(gram, rhs, passive=passive)
         weights[k], offsets[k] = found.x / plane.areas, sign * (equations.offset(found.x) + zero)
     return Ensemble(operator, weights, offsets, length)
-
-
-def _residual(operator: Preisach, record: Record) -> FloatArray:
-    """Residual (n,) of the samples with weight."""
-    fitted = record.sample_weight > 0
-    return (record.fitted_output - operator(record.input, record.start))[fitted]
 
 
 def _blocks(records: Sequence[Record], length: int) -> tuple[list[IntArray], int]:

@@ -242,7 +242,7 @@ def tame(signals: Sequence[tuple[FloatArray, FloatArray]]) -> list[Tamed]:
     """
     found = [(isolated(u), isolated(y)) for u, y in signals]
     inputs = [through_turns(u, wild) for (u, _), (wild, _) in zip(signals, found, strict=True)]
-    if any(wild.any() for wild, _ in found) and not _fits_better(signals, inputs, found):
+    if any(wild.any() for wild, _ in found) and not fits_better(signals, inputs, found):
         inputs = [u for u, _ in signals]
         found = [(np.zeros_like(in_input), in_output & ~in_input) for in_input, in_output in found]
     return [
@@ -251,12 +251,18 @@ def tame(signals: Sequence[tuple[FloatArray, FloatArray]]) -> list[Tamed]:
     ]
 
 
-def _fits_better(
+def fits_better(
     signals: Sequence[tuple[FloatArray, FloatArray]],
     inputs: Sequence[FloatArray],
     found: Sequence[tuple[BoolArray, BoolArray]],
 ) -> bool:
-    """Tell whether the repaired ``inputs`` leave less than the measured ones, of weights of either sign."""
+    """Tell whether other ``inputs`` (n,) leave less than those of the ``signals``, of weights of either sign.
+
+    Parameters
+    ----------
+    found
+        For each record which samples (n,) are wild in the input, and in the output: the latter do not count.
+    """
 
     def left(given: Sequence[FloatArray]) -> float:
         # one input that is far off would leave all others in one cell of a common plane

@@ -13,9 +13,8 @@ of about two, or an offset below a newton, is the business of `diagnose` and `ch
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from pulsetrainer.device.trace import FloatArray
 
 WINDOW_S = 5.0  # looked at together: some beats of a slow pulse
 STEP_S = 0.5  # looked at again after so long

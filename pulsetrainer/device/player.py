@@ -276,13 +276,9 @@ class Player:
             if self._play_session is None:
                 raise
             return Outcome(-1, played_to_end=False, fault=error.message, remedy=error.hint)
-        finally:
-            self._leave()
-
-    def _leave(self) -> None:
-        """Disarm, whatever happened; a device that cannot be reached does it by itself."""
-        with contextlib.suppress(PulsetrainerError):
-            self._session.request(m.Stop())
+        finally:  # disarm, whatever happened; a device that cannot be reached does it by itself
+            with contextlib.suppress(PulsetrainerError):
+                self._session.request(m.Stop())
 
     def _judge(self, status: m.StatusReply, refused: str) -> Outcome:
         if status.boot_nonce != self._hello.boot_nonce:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import (
     FIRMWARE_MAJOR,
     FIRMWARE_MINOR,
@@ -14,18 +15,6 @@ from pulsetrainer.device.codes import (
     PROTOCOL_MINOR,
 )
 from pulsetrainer.device.frames import Frame, FrameReader, encode
-from pulsetrainer.device.messages import (
-    BY_TYPE,
-    COMMANDS,
-    Heartbeat,
-    Hello,
-    HelloReply,
-    Message,
-    Nak,
-    Telemetry,
-    TelemetryDuty,
-    answers,
-)
 from pulsetrainer.device.schemes import TIMEOUTS_S
 from pulsetrainer.device.transport import Transport
 from pulsetrainer.device.wording import fault_text, refusal_text
@@ -34,9 +23,9 @@ from pulsetrainer.errors import DeviceError
 _HELLO_S = 3.0
 _HELLO_TRY_S = 0.2
 _GREETING_AT_LEAST = 9  # bytes: magic, protocol and firmware version, which no version moves
-_TELEMETRY = {kind.TYPE: kind for kind in (Telemetry, TelemetryDuty)}
+_TELEMETRY = {kind.TYPE: kind for kind in (m.Telemetry, m.TelemetryDuty)}
 _ABOVE_0 = ("tick_rate_Hz", "wave_buffer", "heartbeat_ms", "current_limit", "force_trip", "on_time_s")
-_NAMES = {c.TYPE: c.__name__ for c in COMMANDS}
+_NAMES = {c.TYPE: c.__name__ for c in m.COMMANDS}
 
 
 class NoAnswerError(DeviceError):
@@ -50,7 +39,7 @@ class AbandonedError(DeviceError):
 class RefusedError(DeviceError):
     """The device answered no."""
 
-    def __init__(self, port: str, nak: Nak) -> None:
+    def __init__(self, port: str, nak: m.Nak) -> None:
         self.nak = nak
         fault = fault_text(nak.fault)
         super().__init__(
@@ -80,7 +69,7 @@ class Session:
         self._seq = int(monotonic() * 1000) & 0xFF
         self._replies: list[Frame] = []
         self._heard = 0
-        self.on_telemetry: Callable[[Telemetry], None] = lambda _: None
+        self.on_telemetry: Callable[[m.Telemetry], None] = lambda _: None
         self.sent_at_s = 0.0
         self.rejected = 0
         self._beats = 0
@@ -106,19 +95,19 @@ class Session:
             else:
                 self._replies.append(frame)
 
-    def _send(self, command: Message, seq: int) -> None:
+    def _send(self, command: m.Message, seq: int) -> None:
         self._transport.write(encode(Frame(command.TYPE, seq, command.pack())))
         self.sent_at_s = self._monotonic()
 
     def _reply(
-        self, command: Message, timeout_s: float, abandon: Callable[[], bool] | None = None
-    ) -> Message | None:
+        self, command: m.Message, timeout_s: float, abandon: Callable[[], bool] | None = None
+    ) -> m.Message | None:
         """Return the reply to ``command``, just sent; replies to anything earlier are stale and dropped."""
         deadline = self._monotonic() + timeout_s
         while True:
             while self._replies:
                 frame = self._replies.pop(0)
-                kind = BY_TYPE.get(frame.type)
+                kind = m.BY_TYPE.get(frame.type)
                 if frame.seq != self._seq or kind is None:
                     continue
                 try:
@@ -126,7 +115,7 @@ class Session:
                 except ValueError:
                     self.rejected += 1
                     continue
-                if answers(reply, command):  # else it is 256 commands old, or damage that fits the checksum
+                if m.answers(reply, command):  # else it is 256 commands old, or damage that fits the checksum
                     return reply
                 self.rejected += 1
             if abandon is not None and abandon():
@@ -135,7 +124,7 @@ class Session:
                 return None
             self.receive()
 
-    def request(self, command: Message, abandon: Callable[[], bool] | None = None) -> Any:
+    def request(self, command: m.Message, abandon: Callable[[], bool] | None = None) -> Any:
         """Return the reply to ``command``, of the kind that answers it: see ``messages.answers``.
 
         Commands are idempotent, so a lost one is simply sent again.
@@ -153,7 +142,7 @@ class Session:
         for timeout_s in self._timeouts_s:
             self._send(command, self._seq)
             reply = self._reply(command, timeout_s, abandon)
-            if isinstance(reply, Nak):
+            if isinstance(reply, m.Nak):
                 raise RefusedError(self._port, reply)
             if reply is not None:
                 return reply
@@ -163,12 +152,12 @@ class Session:
             hint="its output goes off by itself; check cable and power, then open it again",
         )
 
-    def next_beat(self) -> Heartbeat:
+    def next_beat(self) -> m.Heartbeat:
         """Return a heartbeat that the device has not heard yet."""
         self._beats += 1
-        return Heartbeat(self._beats)
+        return m.Heartbeat(self._beats)
 
-    def hello(self) -> HelloReply:
+    def hello(self) -> m.HelloReply:
         """Find out who is there, from whatever state and noise the line is in.
 
         Raises
@@ -179,12 +168,12 @@ class Session:
         self._transport.discard()
         self._reader.clear()
         deadline = self._monotonic() + _HELLO_S
-        command = Hello(MAGIC, PROTOCOL_MAJOR, PROTOCOL_MINOR)
+        command = m.Hello(MAGIC, PROTOCOL_MAJOR, PROTOCOL_MINOR)
         while self._monotonic() < deadline:
             self._seq = (self._seq + 1) & 0xFF
             self._send(command, self._seq)
             reply = self._reply(command, _HELLO_TRY_S)
-            if isinstance(reply, HelloReply) and reply.magic == MAGIC:
+            if isinstance(reply, m.HelloReply) and reply.magic == MAGIC:
                 self._check_version(reply)
                 self._check_sense(reply)
                 return reply
@@ -199,7 +188,7 @@ class Session:
             hint="check that the device has power and that this is its port: `pulsetrainer ports`",
         )
 
-    def _check_sense(self, reply: HelloReply) -> None:
+    def _check_sense(self, reply: m.HelloReply) -> None:
         for name in _ABOVE_0:
             if getattr(reply, name) <= 0:
                 raise DeviceError(
@@ -208,7 +197,7 @@ class Session:
                     hint="flash the firmware that came with this program (make -C firmware)",
                 )
 
-    def _check_version(self, reply: HelloReply) -> None:
+    def _check_version(self, reply: m.HelloReply) -> None:
         firmware = (reply.firmware_major, reply.firmware_minor, reply.firmware_patch)
         name = f"the device on {self._port} (firmware {_dotted(firmware)})"
         theirs: tuple[int, ...] = (reply.major, reply.minor)
@@ -227,14 +216,14 @@ class Session:
         raise DeviceError(f"{name} {said}: the {older} is older", hint=remedy)
 
 
-def _parsed(kind: type[Message], payload: bytes) -> Message:
+def _parsed(kind: type[m.Message], payload: bytes) -> m.Message:
     """Return the message; a greeting of another major version by its first fields, whatever follows them.
 
     ValueError where the payload has not the length of its kind.
     """
     size = kind.layout().size
-    if kind is HelloReply and len(payload) >= _GREETING_AT_LEAST and len(payload) != size:
-        greeting = HelloReply.parse(payload[:size].ljust(size, b"\0"))
+    if kind is m.HelloReply and len(payload) >= _GREETING_AT_LEAST and len(payload) != size:
+        greeting = m.HelloReply.parse(payload[:size].ljust(size, b"\0"))
         if greeting.magic == MAGIC and greeting.major != PROTOCOL_MAJOR:
             return greeting
     return kind.parse(payload)

@@ -74,7 +74,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         causes=tuple(
             one for finding in state.findings for one in _causes(state, finding, words, dependences)
         ),
-        evidence=tuple(wording.sentence(one, words) for one in state.evidence),
+        evidence=(*_warned(model), *(wording.sentence(one, words) for one in state.evidence)),
         next_experiment=wording.advice(state.advice, bench),
         profiles=_profiles(state, words),
         time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
@@ -107,6 +107,11 @@ def diagnosis_of(state: State) -> Diagnosis:
         as_measured=True,
         empty=float(scale.outputs(np.asarray(extended.simulator.frames[0].zero))),
     )
+
+
+def _warned(model: Model) -> list[str]:
+    """Return what the model says of the record that it was identified on; nothing where all is well."""
+    return [f"Of the model as given: {model.fit.warning}."] if model.fit and model.fit.warning else []
 
 
 def _held_out_gain(state: State) -> float:

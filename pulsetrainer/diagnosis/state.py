@@ -122,7 +122,7 @@ class State:
     @property
     def floor_rms(self) -> float:
         """What noise and levels leave, rms: no more than is left with the causes found."""
-        return min(self.floor.rms, self.current.rms)
+        return min(self.floor_left.rms, self.current.rms)
 
     @property
     def unexplained(self) -> bool:

@@ -27,7 +27,8 @@ from typing import Any, BinaryIO, Self
 
 import numpy as np
 
-from pulsetrainer.artefacts import BoolArray, FloatArray, Run, Session
+from pulsetrainer.artefacts import FloatArray, Run, Session
+from pulsetrainer.artefacts.run import seam_of
 from pulsetrainer.errors import DamagedFileError, DataError
 from pulsetrainer.files.input_file import JOURNAL
 from pulsetrainer.files.provenance import Header, Provenance
@@ -167,23 +168,13 @@ class Recording:
         arrays: dict[str, Any] = dict(zip(names, columns, strict=True))
         if said:
             return cls(header, session_of(path, arrays, said), found[-1].end)
-        seam, dropped = _seam(found, columns.shape[1]), found[-1].dropped
+        ends = np.cumsum([block.samples.shape[1] for block in found]).tolist()
+        starts = [
+            begin for begin, block in zip([0, *ends], found, strict=False) if begin and block.tag == PART
+        ]
+        seam, dropped = seam_of(starts, columns.shape[1]), found[-1].dropped
         run = Run(**arrays, **texts, seam=seam, complete=False, dropped_samples=dropped)
         return cls(header, run, found[-1].end)
-
-
-def _seam(found: list[Block], samples: int) -> BoolArray | None:
-    """Return which samples (n,) come first after a pause; None where there was no pause."""
-    starts, count = [], 0
-    for block in found:
-        if block.tag == PART and count:
-            starts.append(count)
-        count += block.samples.shape[1]
-    if not starts:
-        return None
-    seam = np.zeros(samples, dtype=np.bool_)
-    seam[starts] = True
-    return seam
 
 
 def _described(path: Path, block: Block) -> tuple[Header, dict[str, Any]]:

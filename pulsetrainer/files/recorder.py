@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pulsetrainer.artefacts import FloatArray, Run, Session
-from pulsetrainer.artefacts.run import Coil
+from pulsetrainer.artefacts.run import Coil, seam_of
 from pulsetrainer.errors import ArgumentError, DataError, PulsetrainerError
 from pulsetrainer.files import journal, store
 from pulsetrainer.files.atomic_write import cannot_write, check_output
@@ -228,10 +228,7 @@ class RunRecorder:
 
     def _known_fields(self) -> dict[str, Any]:
         """Return the fields of the artefact that are no columns."""
-        seam = np.zeros(self._samples, dtype=np.bool_)
-        starts = [start for start in self._seams if start < self._samples]
-        seam[starts] = True
-        return {**self._texts, "seam": seam if starts else None, "coil": self.coil}
+        return {**self._texts, "seam": seam_of(self._seams, self._samples), "coil": self.coil}
 
     def _fill(self, file: h5py.File) -> None:
         paths = {plan.name: plan.path for plan in plan_of(self._kind)}

@@ -24,6 +24,9 @@ _TIME_NAMES = frozenset(
     ["t", "time", "zeit", "temps", "tiempo", "tempo", "t_s", "time_s", "times", "timestamp"]
 )
 _LEAVE_OUT = "leave bad rows out with `skip_bad_rows`"
+_ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the first: it has no name
+_DAY_S = 86_400.0
+_USUAL_STEP = 1.0  # times the usual step: so far another step may be off
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
 _BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
@@ -135,7 +138,26 @@ def _time(table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float 
         said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
         notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
     words = f"time from {split_unit(heading)[0]} [{unit or 's'}]"
+    stamps, days = _past_midnight(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
+    if days:
+        table = replace(table, columns={**table.columns, time: stamps})
+        notes = (*notes, f"the time of {table.path} goes past midnight: a day is added from there on")
     return _Time(seconds(table, time, of_record=True), words, notes)
+
+
+def _past_midnight(stamps: FloatArray, unit: str) -> tuple[FloatArray, bool]:
+    """Return times of day (n,) that go on after midnight, and whether they do.
+
+    A step back is midnight where with a day more it is a usual step of the record.
+    """
+    step = np.diff(stamps)
+    back = np.flatnonzero(step < 0)
+    if unit != "s" or not back.size or stamps.min() < 0 or stamps.max() >= _DAY_S:
+        return stamps, False
+    usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
+    if np.any(np.abs(step[back] + _DAY_S - usual) > _USUAL_STEP * usual):
+        return stamps, False
+    return stamps + _DAY_S * np.cumsum(np.concatenate(([0.0], step < 0))), True
 
 
 def _read_as(table: Table, time: str, meanings: Mapping[str, tuple[str, str]]) -> dict[str, str]:
@@ -224,11 +246,12 @@ def _own_column(table: Table, used: Collection[int]) -> int | None:
     """Return the place of the column that may be the file's own time; None where there is none."""
     if table.rate_Hz is not None:
         return None
-    if table.shifts:
-        candidates = [0]  # of a text, where columns have an order
-    else:
-        words = [split_unit(name)[0].rpartition(".")[2].lower() for name in table.names]
-        candidates = [k for k, word in enumerate(words) if word in _TIME_NAMES]
+    words = [split_unit(name)[0].rpartition(".")[2].lower() for name in table.names]
+    candidates = [k for k, word in enumerate(words) if word in _TIME_NAMES]
+    if (
+        table.shifts
+    ):  # of a text, where columns have an order: the first, or the one behind a number of the row
+        candidates = [*candidates, 0] if words[0] in _ROW_NAMES else [0]
     free = (k for k in candidates if k not in used and table.names[k] not in table.text_names)
     return next(free, None)
 

@@ -32,16 +32,13 @@ class SessionWriter:
         """Return the next block, from the fields of a session that are no samples."""
         beats, quiz = fields["beats"], fields["quiz"]
         rows = np.stack([getattr(beats, name) for name in _BEAT], axis=1)[self._beats :]
-        windows = np.stack([_array(fields[name]) for name in _WINDOW], axis=1)[self._windows :]
+        told = [np.zeros(0) if fields[name] is None else fields[name] for name in _WINDOW]
+        windows = np.stack(told, axis=1)[self._windows :]
         self._beats, self._windows = self._beats + len(rows), self._windows + len(windows)
         plain = {name: value for name, value in fields.items() if name not in ("beats", "quiz", *_WINDOW)}
         asked = None if quiz is None else asdict(quiz) | {"response_s": quiz.response_s.tolist()}
         said = {"beats": rows.tolist(), "windows": windows.tolist(), "fields": plain, "quiz": asked}
         return json.dumps(said).encode()
-
-
-def _array(values: FloatArray | None) -> FloatArray:
-    return np.zeros(0) if values is None else values
 
 
 def session_of(path: Path, samples: Mapping[str, FloatArray], blocks: Sequence[bytes]) -> Session:

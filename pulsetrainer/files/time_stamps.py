@@ -13,6 +13,7 @@ from typing import Any
 
 _TIME = r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:[.,]\d+)?))?(?: ?([AaPp])[Mm])?"
 _CLOCK = re.compile(_TIME)
+_MINUTES = re.compile(r"(\b)(\d+):([0-5]\d[.,]\d+)(\b)")
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 _YEAR_FIRST = re.compile(rf"(\d{{4}})[/-](\d{{1,2}})[/-](\d{{1,2}}),?[T ]{_TIME}")
 _POINTS = re.compile(rf"(\d{{1,2}})\.(\d{{1,2}})\.(\d{{4}}),? {_TIME}")
@@ -24,8 +25,9 @@ def seconds(cell: str, *, day_first: bool | None = None) -> float | None:
 
     ``day_first`` is the order of a date with slashes; None is any that exists.
     """
-    if found := _CLOCK.fullmatch(cell):
-        return _of_day(found.groups()) if found[3] else None  # 12:34 may be minutes and seconds too
+    if found := _CLOCK.fullmatch(cell) or _MINUTES.fullmatch(cell):
+        # 12:34 may be minutes and seconds too; a share of a second tells
+        return _of_day(found.groups()) if found[3] else None
     if _ISO.fullmatch(cell):
         return _since_1970(cell)
     if found := _YEAR_FIRST.fullmatch(cell):
@@ -33,8 +35,8 @@ def seconds(cell: str, *, day_first: bool | None = None) -> float | None:
     if found := _POINTS.fullmatch(cell):
         return _stamp(found[3], found[2], found[1], found.groups()[3:])
     if found := _SLASHES.fullmatch(cell):
-        orders = (False, True) if day_first is None else (day_first,)
-        readings = [_stamp(found[3], *_month_and_day(found, order), found.groups()[3:]) for order in orders]
+        orders = ((1, 2), (2, 1)) if day_first is None else ((2, 1) if day_first else (1, 2),)
+        readings = [_stamp(found[3], found[month], found[day], found.groups()[3:]) for month, day in orders]
         return next((reading for reading in readings if reading is not None), None)
     return None
 
@@ -58,15 +60,11 @@ def day_first(columns: Iterable[tuple[str, ...]]) -> bool | None:
     return None
 
 
-def _month_and_day(found: re.Match[str], day_comes_first: bool) -> tuple[str, str]:
-    return (found[2], found[1]) if day_comes_first else (found[1], found[2])
-
-
 def _of_day(time: tuple[str | Any, ...]) -> float:
     """Return the seconds since midnight of hour, minute, second and the letter of a half of the day."""
     hour, minute, second, half = time
-    count = int(hour)
-    if half is not None:
+    count = int(hour or 0)
+    if half:
         count = count % 12 + 12 * (half in "Pp")
     return 3600.0 * count + 60.0 * int(minute) + float((second or "0").replace(",", "."))
 

@@ -9,20 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from pulsetrainer.artefacts.evaluation import HEADLINES
 from pulsetrainer.report.names import split
 from pulsetrainer.report.style import BLUE, COLUMN_IN, GREEN, INK, VERMILION, styled
 
 _PANEL_IN = 2.3
-_SHOWN = (
-    "mean_error_reduction_percent",
-    "compensated.mean_abs_error_percent",
-    "compensated.max_abs_error_percent",
-    "rms_percent",
-    "max_percent",
-    "right_percent",
-    "response_s",
-    "pressed.mean_abs_error_percent",
-)
+_SHOWN = tuple(one for one in HEADLINES if one not in ("right_from_percent", "right_to_percent"))
 _LINES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
 
 

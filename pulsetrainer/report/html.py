@@ -1,25 +1,100 @@
-"""The report: one HTML page that needs nothing but itself, for a screen, a phone and paper."""
+"""The report: one HTML page that needs nothing but itself, for a screen, a phone and paper.
+
+What the pages say, and which figures they show, is in the templates. A number keeps its full precision in
+``value`` and its dotted name in ``metric``, for instance ``normal.continuous.scaled.max_abs_error_percent``,
+so that page and HDF5 can be held against each other.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
+from operator import attrgetter
 from pathlib import PurePath
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from matplotlib.figure import Figure
 
-from pulsetrainer.artefacts import Evaluation
+from pulsetrainer.artefacts import Evaluation, FloatArray, Model, WaveformEvaluation
 from pulsetrainer.artefacts.evaluation import METRICS, PUBLISHED
 from pulsetrainer.artefacts.units import shown
-from pulsetrainer.report import views
+from pulsetrainer.report import diagnosis_figures, figures, heat_figures, panels, session_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
-from pulsetrainer.report.names import NAMES, OVERVIEW
-from pulsetrainer.report.panels import titled
+from pulsetrainer.report.names import NAMES, OVERVIEW, digits
+from pulsetrainer.report.render import inline_svg
+from pulsetrainer.report.style import label
 
 _UNIT = re.compile(r"(?<=\d) (?=%|[A-Za-z]{1,2}\b)")
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number as it is printed, its value to the last digit, its name; or an empty place."""
+
+    text: str
+    value: str = ""
+    metric: str = ""
+    published: bool = False  # somebody else's: not of this evaluation
+
+
+def number(value: float | None, metric: str = "", form: str = "", *, published: bool = False) -> Number:
+    """Return a number for the page, in a form or with its usual digits.
+
+    NaN, the mean of nothing, is said in words; None is an empty place.
+    """
+    if value is None:
+        return Number("")
+    printed = format(value, form) if form else digits(value)
+    text = printed.replace("-", "−") if math.isfinite(value) else "no value"
+    return Number(text, repr(float(value)), metric, published)
+
+
+def known(value: float | None, metric: str, form: str) -> Number:
+    """Return a number for the page; an empty place where it was not measured."""
+    return number(value if value is not None and math.isfinite(value) else None, metric, form)
+
+
+def count(value: int, metric: str) -> Number:
+    """Return a whole number for the page."""
+    return Number(str(value), str(value), metric)
+
+
+def metric(played: WaveformEvaluation, dotted: str, stem: str, form: str = "") -> Number:
+    """Return a figure of a played waveform by its name within it: ``scaled.max_abs_error_percent``."""
+    return number(attrgetter(dotted)(played), f"{stem}.{dotted}", form)
+
+
+def picture(figure: Figure, identifier: str, title: str, words: Markup) -> Markup:
+    """Return a figure for the page, ``words`` its text alternative."""
+    description = words.unescape()
+    svg = inline_svg(figure, identifier=identifier, title=title, description=description)
+    return Markup(svg)  # noqa: S704 - our own XML, its texts are escaped
+
+
+def reach(values: FloatArray, unit: str) -> str:
+    """Return from where to where values (n,) go, in words."""
+    there = values[np.isfinite(values)]
+    if there.size == 0:
+        return "without a single value"
+    return f"from {there.min():.3g} to {there.max():.3g} {shown(unit)}".rstrip()
+
+
+def densest(model: Model) -> tuple[float, float, float] | None:
+    """Return the largest density off the diagonal, and where relays switch up and down; None: nothing."""
+    i, j = np.tril_indices(model.levels)
+    off_diagonal = np.where((i != j) & model.covered, model.weights, 0.0)
+    k = int(np.argmax(off_diagonal))
+    if off_diagonal[k] <= 0:
+        return None
+    up, down = (float(model.edges[at : at + 2].mean()) for at in (i[k], j[k]))
+    return float(off_diagonal[k]), up, down
 
 
 def page(
@@ -55,22 +130,21 @@ def render_evaluation(
     """
     played = evaluation.waveforms
     # whose model the evaluation holds: that of the last
-    last = f" of {titled(played[-1])}" if len(set(map(titled, played))) > 1 else ""
+    last = f" of {panels.titled(played[-1])}" if len(set(map(panels.titled, played))) > 1 else ""
     if len(evaluation.models) > 1:
         last = f" {PurePath(evaluation.models[-1].name).stem}"
     return page(
         "evaluation.html.j2",
         **header,
         waveforms=[
-            views.waveform_part(one, stem, f"waveform-{k}")
+            (f"waveform-{k}", one, stem)
             for k, (one, stem) in enumerate(zip(played, evaluation.stems, strict=False), start=1)
         ],
         published=published,
-        beats=views.beats(played),
-        model=None if evaluation.model is None else views.model_part(evaluation.model, last),
+        model=evaluation.model,
+        model_title=f"Model{last}",
         predicted=evaluation.models,
         model_stems=evaluation.stems[len(played) :],
-        predictions=views.predictions(evaluation.models),
     )
 
 
@@ -85,16 +159,19 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters |= {"unbroken": unbroken, "unit": shown}
+    made.filters |= {"unbroken": unbroken, "unit": shown, "digits": format, "rounded": digits}
     made.tests["of_a_curve"] = of_a_curve
-    made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS}
-    made.globals |= {"number": views.number, "known": views.known, "metric": views.metric}
+    made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS, "Number": Number}
+    for tool in (number, known, count, metric, picture, reach, densest, label, panels.titled, panels.scale):
+        made.globals[tool.__name__] = tool
+    for drawing in (figures, heat_figures, diagnosis_figures, session_figures, panels):
+        made.globals[drawing.__name__.rpartition(".")[2]] = drawing
     return made
 
 
 def unbroken(text: str) -> str:
-    """Return a text in which no line breaks between a number and its unit."""
-    return _UNIT.sub("\N{NO-BREAK SPACE}", text)
+    """Return a text in which no line breaks between a number and its unit; markup stays markup."""
+    return type(text)(_UNIT.sub("\N{NO-BREAK SPACE}", text))
 
 
 def indented(text: str) -> str:

@@ -15,11 +15,11 @@ from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import FigureBase
 from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import (
     DrivePlayback,
     Fit,
+    FloatArray,
     Model,
     ModelEvaluation,
     Waveform,
@@ -44,9 +44,6 @@ from pulsetrainer.report.style import (
     label,
 )
 from pulsetrainer.report.thin import extremes, path
-
-BoolArray = NDArray[np.bool_]
-FloatArray = NDArray[np.float64]
 
 # A density is mostly small, with a ridge: the square root shows both. Lone spikes far beyond the
 # rest (the least squares make some) do not set the scale.
@@ -364,16 +361,15 @@ def unscored(axes: Axes, waveform: Waveform, name: str = "not scored") -> None:
 
 
 def repeats(axes: Axes, time_s: FloatArray, rows: FloatArray, name: str, style: dict[str, Any]) -> None:
-    """Draw every repeat of one measurement, thin, in one colour; only the first is named."""
+    """Draw every repeat of one measurement, thin, in one colour; only the first is named, if there is one."""
     thin = style | {"linewidth": 0.8, "alpha": 0.6, "linestyle": "-"}
     for k, row in enumerate(rows):
-        trace(axes, time_s, row, **thin, label=f"{name}, {len(rows)} repeats" if k == 0 else None)
+        named = f"{name}, {len(rows)} repeats" if name and k == 0 else None
+        trace(axes, time_s, row, **thin, label=named)
 
 
 def current_error(
     axes: Axes, time_s: FloatArray, drive: DrivePlayback, input_range: float, style: dict[str, Any]
 ) -> None:
     """Draw how far the measured current is from the one asked for, in percent of the range."""
-    thin = style | {"linewidth": 0.8, "alpha": 0.6, "linestyle": "-"}
-    for row in 100.0 * (drive.input - drive.reference) / input_range:
-        trace(axes, time_s, row, **thin)
+    repeats(axes, time_s, 100.0 * (drive.input - drive.reference) / input_range, "", style)

@@ -29,8 +29,13 @@ class Table:
     """A table: the first column is text, the others are numbers or words."""
 
     title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[Any, ...], ...]
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+
+
+def picked(noun: Any, *names: str) -> dict[str, Any]:
+    """Return some attributes by name."""
+    return {name: getattr(noun, name) for name in names}
 
 
 def folded(lead: str, text: str, width: int | None, indent: int | None = None) -> str:
@@ -83,6 +88,22 @@ def listed(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) ->
         for head, cell in zip(heads[1:], row[1:], strict=True):
             if cell not in (None, ""):
                 yield f"    {cell}" if head == "unit" else f"    {head:<{width}}  {text(cell)}"
+
+
+def rendered(part: Facts | Table, width: int | None = None) -> str:
+    """Return facts or a table as lines that fit a ``width``: facts are folded, a table becomes a list."""
+    if isinstance(part, Table):
+        lines = drawn(part.title, part.columns, part.rows)
+        if width is not None and max(map(len, ESCAPE.sub("", lines).splitlines())) > width:
+            lines = "\n".join(listed(part.title, part.columns, part.rows)) + "\n"
+        return lines
+    named = [(label(name), text(value)) for name, value in part.rows.items()]
+    longest = max((len(name) for name, _ in named), default=0)
+    if width is not None and 2 * longest + 8 > width:  # no room beside the names: below them
+        rows = [folded(*one, width) for name, value in named for one in (("  ", name), ("    ", value))]
+    else:
+        rows = [folded(f"  {name:<{longest}}  " if longest else "  ", value, width) for name, value in named]
+    return "\n".join([folded("", part.title, width, indent=2), *rows, ""])
 
 
 def label(name: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -39,22 +39,17 @@ def title(artefact: Any) -> str:
 
 def of(artefact: Any) -> str:
     """Return an artefact as text: its main figures, a line each, or its tables."""
+    parts: Iterable[Facts | Table]
     if isinstance(artefact, Evaluation):
-        return "\n".join(tables.drawn(t.title, t.columns, t.rows) for t in tables_of(artefact)).rstrip("\n")
-    if isinstance(artefact, Diagnosis):
-        return "\n".join(
-            _lines(part.title, part.rows)
-            if isinstance(part, Facts)
-            else tables.drawn(part.title, part.columns, part.rows)
-            for part in sections(artefact)
-        )
-    known = {tables.label(name): value for name, value in facts(artefact).items() if value is not None}
-    return _lines(artefact.kind, known)
-
-
-def _lines(title: str, rows: Mapping[str, Any]) -> str:
-    width = max(map(len, rows), default=0)
-    return "\n".join([title, *(f"  {name:<{width}}  {tables.text(value)}" for name, value in rows.items())])
+        parts = tables_of(artefact)
+    elif isinstance(artefact, Diagnosis):
+        parts = sections(artefact)
+    else:
+        known = {name: value for name, value in facts(artefact).items() if value is not None}
+        parts = [Facts(artefact.kind, known)]
+    # below a table a line is left free
+    lines = (tables.rendered(part) + "\n" * isinstance(part, Table) for part in parts)
+    return "".join(lines).rstrip("\n")
 
 
 def tables_of(evaluation: Evaluation, width: int = _WIDTH) -> Iterator[Table]:

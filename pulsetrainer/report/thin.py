@@ -5,10 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from pulsetrainer.core.plane import FloatArray, IntArray
 
 MOST_POINTS: Final = 4000
 _FAR = 4.0  # times as far off its bin as the farthest usually is: no noise, and no fast stretch either

@@ -9,6 +9,7 @@ import os
 import re
 import select
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation.bad_wire import through
 from pulsetrainer.simulation.build import firmware_executable
-from pulsetrainer.simulation.options import BenchOptions, parse_bench
+from pulsetrainer.simulation.options import BenchOptions, number_in, parse_bench
 
 BENCH_PORT = "bench:"
 _OWN = ("ideal", "speed", "break", "wire", "wire-seed", "serial")
@@ -31,12 +32,6 @@ def _known(executable: Path) -> tuple[dict[str, tuple[str, str, str, str]], list
     table, _, breaks = text.partition("\n\n")
     rows = [line.split("\t") for line in table.splitlines()]
     return {name: (unit, low, high, meaning) for name, unit, low, high, meaning in rows}, breaks.split()
-
-
-def _is_number(text: str) -> bool:
-    with contextlib.suppress(ValueError):
-        return math.isfinite(float(text))
-    return False
 
 
 def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageError:
@@ -54,7 +49,8 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
         unit, low, high, meaning = parameters[name]
         if f"{name}={value}" in complaint:
             within = f"{low} to {high} {unit}".removesuffix(" 1")
-            amiss = "is outside" if _is_number(value) else "is not a number from"
+            most = sys.float_info.max
+            amiss = "is not a number from" if math.isnan(number_in(value, -most, most)) else "is outside"
             if re.search(r"[,;]\w+=", value):
                 return UsageError(
                     f"`port`: the bench parameter {name}={value} {amiss} {within}",

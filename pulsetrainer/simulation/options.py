@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from urllib.parse import parse_qsl
 
 from pulsetrainer.errors import UsageError
@@ -35,32 +35,34 @@ class Wire:
     rate: float = 0.0
     seed: int = 1
 
+    def told(self, kind: str, name: str, text: str) -> Wire:
+        """Return the wire with the parameter ``name=text`` of a ``kind:`` port; UsageError if it is none."""
+        like = f'`port` "{kind}:?wire=0.0001&wire-seed=3"'
+        if name == "wire-seed":
+            if re.fullmatch(r"\d{1,9}", text):
+                return replace(self, seed=int(text))
+            raise UsageError(
+                f"`port`: the {kind} parameter wire-seed={text} is not a whole number from 0 on", hint=like
+            )
+        rate = number_in(text, 0.0, MAX_RATE)
+        if math.isnan(rate):
+            raise UsageError(
+                f"`port`: the {kind} parameter wire={text} is not a share of damaged bytes, 0 to {MAX_RATE}",
+                hint=f"one byte in ten thousand: {like}",
+            )
+        return replace(self, rate=rate)
+
 
 GOOD_WIRE = Wire()
 
 
-def wire_rate(kind: str, text: str) -> float:
-    """Return the rate in ``wire=text`` of a ``kind:`` port; raises UsageError if it is none."""
+def number_in(text: str, low: float, high: float) -> float:
+    """Return the number in a text; NaN where there is none, or it is not from ``low`` to ``high``."""
     try:
-        rate = float(text)
+        value = float(text)
     except ValueError:
-        rate = -1.0
-    if not 0 <= rate <= MAX_RATE:
-        raise UsageError(
-            f"`port`: the {kind} parameter wire={text} is not a share of damaged bytes, 0 to {MAX_RATE}",
-            hint=f'one byte in ten thousand: `port` "{kind}:?wire=0.0001&wire-seed=3"',
-        )
-    return rate
-
-
-def wire_seed(kind: str, text: str) -> int:
-    """Return the seed in ``wire-seed=text`` of a ``kind:`` port; raises UsageError if it is none."""
-    if not re.fullmatch(r"\d{1,9}", text):
-        raise UsageError(
-            f"`port`: the {kind} parameter wire-seed={text} is not a whole number from 0 on",
-            hint=f'`port` "{kind}:?wire=0.0001&wire-seed=3"',
-        )
-    return int(text)
+        return math.nan
+    return value if low <= value <= high else math.nan
 
 
 def parse_break(text: str) -> tuple[int, float]:
@@ -127,7 +129,7 @@ def parse_bench(port: str) -> BenchOptions:
             hint='like this: `port` "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
     ideal, speed, serial = False, "max", ""
-    rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
+    wire = GOOD_WIRE
     settings: list[tuple[str, str]] = []
     breaks: list[str] = []
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
@@ -142,15 +144,13 @@ def parse_bench(port: str) -> BenchOptions:
             speed = value
         elif name == "break":
             breaks.append(value)
-        elif name == "wire":
-            rate = wire_rate("bench", value)
-        elif name == "wire-seed":
-            seed = wire_seed("bench", value)
+        elif name in ("wire", "wire-seed"):
+            wire = wire.told("bench", name, value)
         elif name == "serial":
             serial = _number_of_device(value)
         else:
             settings.append((name, value))
-    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), Wire(rate, seed), serial)
+    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), wire, serial)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,33 +170,28 @@ def parse_qemu(port: str) -> QemuOptions:
             f"`port`: {port!r} is not a port", hint='`port` "qemu:" alone, or "qemu:?break=reset@1"'
         )
     breaks: list[tuple[int, float]] = []
-    rate, seed = GOOD_WIRE.rate, GOOD_WIRE.seed
+    wire = GOOD_WIRE
     settings: list[tuple[str, float]] = []
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
         if name in QEMU_SETTINGS:
             settings.append((name, _setting(name, value)))
         elif name == "break":
             breaks.append(parse_break(value))
-        elif name == "wire":
-            rate = wire_rate("qemu", value)
-        elif name == "wire-seed":
-            seed = wire_seed("qemu", value)
+        elif name in ("wire", "wire-seed"):
+            wire = wire.told("qemu", name, value)
         else:
             raise UsageError(
                 f"`port`: the emulated device (qemu:) has no parameter {name!r}",
                 hint=f"it takes break, wire, wire-seed, {', '.join(QEMU_SETTINGS)}; the bench takes more: "
                 '`port` "bench:?seed=3&creep=0.05"',
             )
-    return QemuOptions(tuple(breaks), Wire(rate, seed), tuple(settings))
+    return QemuOptions(tuple(breaks), wire, tuple(settings))
 
 
 def _setting(name: str, text: str) -> float:
     low, high = QEMU_SETTINGS[name]
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not low <= value <= high:
+    value = number_in(text, low, high)
+    if math.isnan(value):
         raise UsageError(
             f"`port`: the qemu parameter {name}={text} is not a number from {low:g} to {high:g}",
             hint='like this: `port` "qemu:?ambient=20"',

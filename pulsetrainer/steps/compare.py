@@ -8,23 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pulsetrainer.artefacts import Evaluation, Session
+from pulsetrainer.artefacts.evaluation import HEADLINES
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.asked import check_several
 from pulsetrainer.steps.quiz import score
 
-# What a person wants to see first; the others on request.
-HEADLINES = (
-    "mean_error_reduction_percent",
-    "compensated.mean_abs_error_percent",
-    "compensated.max_abs_error_percent",
-    "rms_percent",
-    "max_percent",
-    "right_percent",
-    "right_from_percent",
-    "right_to_percent",
-    "response_s",
-    "pressed.mean_abs_error_percent",
-)
 _RISING = (
     "mean_error_reduction_percent",
     "gain_percent",
@@ -80,19 +68,12 @@ def compare(
     check_several(evaluations)
     sessions = [one for one in evaluations if isinstance(one, Session)]
     if sessions and len(sessions) < len(evaluations):
-        given = [
+        given = ", ".join(
             f"{name} is {'a session' if isinstance(one, Session) else 'an evaluation'}"
             for name, one in zip(names, evaluations, strict=False)
-        ]
-        raise DataError(
-            ": ".join(
-                (
-                    "evaluations and sessions cannot be compared with each other",
-                    *filter(None, [", ".join(given)]),
-                )
-            ),
-            hint="give one kind or the other",
         )
+        said = "evaluations and sessions cannot be compared with each other"
+        raise DataError(f"{said}: {given}" if given else said, hint="give one kind or the other")
     tested = [one for one in evaluations if isinstance(one, Evaluation)]
     every = [_of_session(one) for one in sessions] or _named(tested, [one.figures() for one in tested])
     spreads = _named(tested, [_spreads(one) for one in tested])

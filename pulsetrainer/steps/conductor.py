@@ -17,6 +17,8 @@ from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.device.codes import HEAT_TAU_S
+from pulsetrainer.device.heat import added
 from pulsetrainer.steps.drive_layout import RAMP_S
 from pulsetrainer.steps.invertible import major_loop
 
@@ -125,9 +127,9 @@ class Conductor:
         decide: Decide,
         give: Callable[[Given], None],
         *,
-        heat: float,
-        heated: Callable[[FloatArray, float], FloatArray],
-        cooling_s: float,
+        heat: float = 0.0,
+        heated: Callable[[FloatArray, float], FloatArray] = added,
+        cooling_s: float = HEAT_TAU_S,
         loss: Callable[[], float] = lambda: 0.0,
     ) -> None:
         from pulsetrainer.diagnosis.piecewise import Piecewise

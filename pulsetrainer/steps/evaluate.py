@@ -25,7 +25,7 @@ from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES
+from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES, to_their_tips
 from pulsetrainer.steps.one_thread import one_thread
 
 _REPEATED = re.compile(r"#\d+(?=\.)")  # the number of a name that is there again
@@ -170,6 +170,8 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
                 hint="use a model of the same device, in the same units",
             )
         one = _of_model(title, model, run, found[0].rms if found else None)
+        if model.fit and model.fit.warning:
+            notes.append(f"warning: {title}: {model.fit.warning}")
         if one.outside_percent > 0:
             notes.append(
                 f"{one.outside_percent:.1f} % of the input of {name} is outside the range of {title}, "
@@ -190,18 +192,17 @@ def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> Mod
     """Return the prediction error of one model; its gain is over ``first_rms``."""
     operator = operator_of(model)
     low, high = operator.low, operator.high
-    parts = run.parts(SHORTEST_PART)
-    known = [_known(part, low, high) for part in parts]
-    records = [
-        Record(part.input, part.output, k.astype(np.float64)) for part, k in zip(parts, known, strict=True)
-    ]
+    parts = to_their_tips(list(run.parts(SHORTEST_PART)))
+    counted = [(part, _known(part, low, high)) for part in parts]
+    records = [Record(part.input, part.output, known.astype(np.float64)) for part, known in counted]
     start, state = estimated_start(operator, records)
     if model.extensions and start is not None:  # these are predicted from rest
         state = "negative saturation, as for every extended model"
     predicted = np.concatenate(
-        [predict(model, part.input, run.dt_s, start)[k] for part, k in zip(parts, known, strict=True)]
+        [predict(model, part.input, run.dt_s, start)[known] for part, known in counted]
     )
-    measured = np.concatenate([part.output[k] for part, k in zip(parts, known, strict=True)])
+    measured = np.concatenate([part.output[known] for part, known in counted])
+    times = [part.time_s[known] for part, known in counted if part.time_s is not None]
     errors = metrics.prediction(measured, predicted)
     offset = float(np.mean(measured - predicted))
     outside = (run.input < low - BEYOND * (high - low)) | (run.input > high + BEYOND * (high - low))
@@ -217,7 +218,7 @@ def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> Mod
         start=state,
         outside_percent=100.0 * float(np.mean(outside)),
         gain_percent=_gain_percent(errors.rms, errors.rms if first_rms is None else first_rms),
-        time_s=_times(parts, known, thinned),
+        time_s=np.concatenate(times)[thinned] if times else None,
         output=measured[thinned],
         predicted=predicted[thinned],
         output_unit=run.output_unit,
@@ -244,12 +245,6 @@ def _known(run: Run, low: float, high: float) -> BoolArray:
     kept = np.ones(run.input.size, dtype=bool) if run.masked is None else ~run.masked
     kept[: known_from(run.input, low, high, run.output)] = False
     return kept
-
-
-def _times(parts: Sequence[Run], known: Sequence[BoolArray], thinned: slice) -> FloatArray | None:
-    """Times of the samples of each part that are ``known``, thinned; None where the run has no time."""
-    times = [part.time_s[k] for part, k in zip(parts, known, strict=True) if part.time_s is not None]
-    return np.concatenate(times)[thinned] if times else None
 
 
 # --- bounds -----------------------------------------------------------------------------------------------

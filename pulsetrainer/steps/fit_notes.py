@@ -8,9 +8,10 @@ import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Run
 from pulsetrainer.core.fit import Fitted
-from pulsetrainer.core.forms import leaves_more_than_noise
+from pulsetrainer.core.forms import SMALLEST, leaves_more_than_noise
 from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core.output_curve import rivals
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -18,6 +19,9 @@ POOR = 0.05  # of the output's span, rms: a model that leaves more of what is no
 MUCH = LIMITS.matters  # of the output's span, rms: who leaves more should ask why ...
 MANY = 3.0  # ... where that is so many times the noise of single samples
 _UNCOUNTED = 1000.0  # times the noise: more is not counted
+TOLD_APART = (
+    20.0  # % of the cells, by minor loops: where fewer are, nothing tells whether loops are congruent
+)
 UNEXPLAINED = 0.5  # of the output's standard deviation: what leaves more explains next to nothing
 
 
@@ -56,14 +60,27 @@ def of_rest(fitted: Fitted) -> list[str]:
     return [f"{found}: pulsetrainer diagnose tells what it misses"]
 
 
-def warning(fitted: Fitted, runs: Sequence[Run], asked: str) -> str:
+def of_no_minor_loops(fitted: Fitted, run: Run, minor_percent: float) -> list[str]:
+    """Say that the signed form is a guess between the recorded reversals where hardly a minor loop was."""
+    if fitted.form != "signed" or minor_percent >= TOLD_APART:
+        return []
+    said = (
+        f"minor loops tell only {minor_percent:.0f} % of the cells apart: with weights of either sign the "
+        f"{run.output_quantity} is a guess after any reversal of the {run.input_quantity} that this record "
+        "does not hold. Record loops within the major one too"
+    )
+    return [said]
+
+
+def warning(fitted: Fitted, runs: Sequence[Run], asked: str, minor_percent: float) -> str:
     """Say that no form describes the record, and why where that is plain; nothing where one does."""
     residuals, output = fitted.counted(fitted.residuals), fitted.counted_output
     left = root_mean_square(np.concatenate(residuals))
     span = float(np.ptp(output))
-    if left <= POOR * span:
-        return ""
     first = runs[0]
+    if left <= POOR * span:
+        told = fitted.form == "signed" and minor_percent >= TOLD_APART
+        return _of_loops_that_differ(fitted, first, span) if told else ""
     compared = velocity.compare(fitted.records, [run.dt_s for run in runs], fitted.residuals)
     if compared.wrong:
         return velocity.warning(compared, first.input_quantity, first.output_quantity)
@@ -76,4 +93,19 @@ def warning(fitted: Fitted, runs: Sequence[Run], asked: str) -> str:
         f"{first.output_quantity} may depend on the speed, on a second input, or hardly on the "
         f"{first.input_quantity}"
         + ("" if asked == "auto" else ". With no form named, the one that suits is found")
+    )
+
+
+def _of_loops_that_differ(fitted: Fitted, run: Run, span: float) -> str:
+    """Say that minor loops of one range differ from place to place, as those of no Preisach operator do."""
+    found = rivals(fitted.records, fitted.operator.low, fitted.operator.high)
+    if found is None or found.congruent(SMALLEST * span):
+        return ""
+    output, given = run.output_quantity, run.input_quantity
+    return (
+        f"No static form (direct, dual, signed) describes this record: the same swing of the {given} changes "
+        f"the {output} differently from place to place (its minor loops are not congruent). A curve over a "
+        f"quantity that lags, such as its square, misses {100 * found.curve / span:.2g} % of the span where "
+        f"it was not fitted, weights of either sign {100 * found.signed / span:.2g} %. These follow the "
+        "recorded branches and are off after other reversals"
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
 from pulsetrainer.artefacts.units import same_units, with_unit
-from pulsetrainer.core import input_noise, metrics, uncertainty, wild
+from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
 from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
@@ -31,6 +31,7 @@ SHORTEST_PART = 100  # samples; shorter parts of a run say nothing
 _ROUNDS = 3  # of fits, each without the wild samples of the one before
 LEVELS = 48  # where nothing else is asked for
 FEWEST_LEVELS = 4
+_CROWDED = "the loop is steep: the levels lie closer where the output changes"
 WELL_COVERED = 0.99  # of the cells; below, a note names what is missing
 
 
@@ -114,7 +115,9 @@ def identify(
     reach = _reach(titles, measured)
     cleaned = [input_noise.clean(part.input) for part in measured]
     notes += _of_noise(cleaned, measured[0].input_unit)
-    measured = [replace(part, input=clean.input) for part, clean in zip(measured, cleaned, strict=True)]
+    measured = to_their_tips(
+        [replace(part, input=clean.input) for part, clean in zip(measured, cleaned, strict=True)]
+    )
     progress(0.1)
     if smoothing is None:
         smoothing = 0.0 if reading == "relay" else "auto"
@@ -127,11 +130,9 @@ def identify(
     wild_ones = [mask & ~known for mask, known in zip(masks, masked, strict=True)]
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
-    notes += fit_notes.of_form(fitted, measured[0], form)
-    notes += _of_offsets(titles, fitted, measured)
+    notes += [*fit_notes.of_form(fitted, measured[0], form), *_of_offsets(titles, fitted, measured)]
     notes += _of_first_strokes(titles, measured, operator.low, operator.high)
-    if not fitted.evenly_spaced:
-        notes.append("the loop is steep: the levels lie closer where the output changes")
+    notes += [] if fitted.evenly_spaced else [_CROWDED]
     progress(0.4 if bootstrap else 0.8)
     ensemble = None
     if bootstrap and fitted.form != "direct":
@@ -146,8 +147,10 @@ def identify(
     remembered = [x for x, _ in (exchanged(_signals(measured)) if dual else _signals(measured))]
     covered = coverage(plane, remembered)
     notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
-    warning = fit_notes.warning(fitted, measured, form)
-    notes += [] if warning else fit_notes.of_rest(fitted)
+    minor_percent = 100.0 * minor_coverage(plane, remembered, _unsure(measured, cleaned, dual=dual))
+    warning = fit_notes.warning(fitted, measured, form, minor_percent)
+    little = fit_notes.of_no_minor_loops(fitted, measured[0], minor_percent)
+    notes += little if warning else [*fit_notes.of_rest(fitted), *little]
     if way := _only_way(measured):
         notes.append(f"the {measured[0].input_quantity} only {way}: a loop, if there is one, is not seen")
     progress(1.0)
@@ -155,7 +158,7 @@ def identify(
     said = {
         "notes": tuple(notes),
         "warning": warning,
-        "minor_percent": 100.0 * minor_coverage(plane, remembered, _unsure(measured, cleaned, dual=dual)),
+        "minor_percent": minor_percent,
         "masked_samples": sum(int(mask.sum()) for mask in masks),
         "wild_input": raw[0].input[first] if first.any() else None,
         "wild_output": raw[0].output[first] if first.any() else None,
@@ -203,6 +206,22 @@ def _without_wild(
         reach = max(reach[0], float(ranges[:, 0].min())), min(reach[1], float(ranges[:, 1].max()))
         fitted = on(_signals(runs), *reach, kept=[~mask for mask in masks])
     return fitted, runs, masks
+
+
+def to_their_tips(runs: list[Run]) -> list[Run]:
+    """Return runs with turns of the input at their tips between samples, where that fits better.
+
+    A device that is driven sample by sample never sees those tips.
+    """
+    tips = [run.input if run.time_s is None else turns.reached(run.input, run.time_s) for run in runs]
+    if all(map(np.array_equal, tips, [run.input for run in runs])):
+        return runs
+    nowhere = [np.zeros(run.input.size, dtype=bool) for run in runs]
+    masked = [none if run.masked is None else run.masked for run, none in zip(runs, nowhere, strict=True)]
+    told = not all(mask.all() for mask in masked)
+    if told and not wild.fits_better(_signals(runs), tips, list(zip(nowhere, masked, strict=True))):
+        return runs
+    return [replace(run, input=tip) for run, tip in zip(runs, tips, strict=True)]
 
 
 def _signals(runs: Sequence[Run]) -> list[tuple[FloatArray, FloatArray]]:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray, Run
+from pulsetrainer.artefacts.run import seam_of
 from pulsetrainer.artefacts.time_steps import GAP, gaps_of, steps_of
 from pulsetrainer.artefacts.units import same_units, with_seconds
 from pulsetrainer.core import input_noise
@@ -205,12 +206,10 @@ def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
                     hint="give `rate_Hz` or `no_time` for all, or import them one by one",
                 )
     times, seams, notes = _joined_time(parts)
-    starts = np.cumsum([part.input.size for part in parts])[:-1]
-    seam = np.zeros(sum(part.input.size for part in parts), dtype=bool)
-    seam[starts] = seams
+    ends = np.cumsum([part.input.size for part in parts])
     whole = replace(
         first,
-        seam=seam if seam.any() else None,
+        seam=seam_of(ends[:-1][seams].tolist(), int(ends[-1])),
         time_s=times,
         input=np.concatenate([part.input for part in parts]),
         output=np.concatenate([part.output for part in parts]),

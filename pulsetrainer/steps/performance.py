@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any, Protocol
 
@@ -15,9 +15,7 @@ from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.core.temperature import Thermometer
-from pulsetrainer.device.codes import HEAT_TAU_S
 from pulsetrainer.device.device import Device
-from pulsetrainer.device.heat import added
 from pulsetrainer.device.plausibility import judge_against
 from pulsetrainer.device.trace import Block
 from pulsetrainer.device.wording import FORCE_REMEDY
@@ -29,6 +27,7 @@ from pulsetrainer.steps.stopped import INTERRUPTED, in_part
 
 # what is wrong where a part ends without a beat, and what to do
 TOO_SHORT = ("the device stays on too short for one beat", "raise its on-time limit, or press shorter beats")
+_NO_FIELDS = ("figures", "reach", "parts", "remedy")  # of the artefact, which has each figure by its name
 _FOLLOW = 0.3  # of a new reading of the loss: a window of a second is noisier than the room
 
 
@@ -67,67 +66,29 @@ class Now:
 
 @dataclass(frozen=True, slots=True)
 class Performed:
-    """How a session went, without its samples."""
+    """How a session went, without its samples; all but ``_NO_FIELDS`` are fields of the artefact."""
 
     figures: dict[str, float]
+    reach: Reach
+    parts: int
+    remedy: str
     beats: Beats
     full_force: float
     mean_force: float
-    reach: Reach
-    clipped: int
-    dropped: int
-    parts: int
+    clipped_samples: int
+    dropped_samples: int
     underruns: int
     fault: str
-    remedy: str
     notes: tuple[str, ...]
     pulses: tuple[str, ...]
-    temperature: tuple[tuple[float, float], ...] = ()  # s, K against calibration, where heat was tracked
+    temperature_s: FloatArray | None = None  # where heat was tracked
+    temperature_K: FloatArray | None = None  # against calibration
 
     @property
     def fields(self) -> dict[str, Any]:
         """Fields of the artefact that are neither samples nor a quiz."""
-        warm = np.asarray(self.temperature, dtype=np.float64).reshape(-1, 2).T if self.temperature else None
-        return self.figures | {
-            "beats": self.beats,
-            "pulses": self.pulses,
-            "full_force": self.full_force,
-            "mean_force": self.mean_force,
-            "complete": not self.fault,
-            "dropped_samples": self.dropped,
-            "underruns": self.underruns,
-            "clipped_samples": self.clipped,
-            "fault": self.fault,
-            "notes": self.notes,
-            "temperature_s": None if warm is None else warm[0],
-            "temperature_K": None if warm is None else warm[1],
-        }
-
-
-def conductor_of(
-    model: Model,
-    pulses: Sequence[Pulse],
-    reach: Reach,
-    rhythm: Rhythm,
-    decide: Decide,
-    give: Callable[[Given], None],
-    *,
-    heat: float = 0.0,
-    loss: Callable[[], float] = lambda: 0.0,
-) -> Conductor:
-    """Return the conductor for our device, whose coil has this heat."""
-    return Conductor(
-        extended_of(model),
-        pulses,
-        reach,
-        rhythm,
-        decide,
-        give,
-        heat=heat,
-        heated=added,
-        cooling_s=HEAT_TAU_S,
-        loss=loss,
-    )
+        own = {one.name: getattr(self, one.name) for one in fields(self) if one.name not in _NO_FIELDS}
+        return self.figures | own | {"complete": not self.fault}
 
 
 class Performance:
@@ -152,9 +113,10 @@ class Performance:
         self._pulses = tuple(pulse.name for pulse in pulses)
         self._ledger = Ledger(self._pulses)
         self._reach = reach
-        self._conductor = conductor_of(
-            model, pulses, reach, rhythm, decide, self._ledger.give, heat=device.heat, loss=lambda: self._loss
-        )
+        self._conductor = Conductor(
+            extended_of(model), pulses, reach, rhythm, decide, self._ledger.give,
+            heat=device.heat, loss=lambda: self._loss,
+        )  # fmt: skip
         self._begun = 0  # sample at which the part began
         self._begins_s: list[float] = []  # of the parts, without the pauses between them
         self._next = 0  # sample that comes, where none is lost
@@ -198,21 +160,23 @@ class Performance:
 
     def _so_far(self) -> Performed:
         ledger = self._ledger
+        warm = np.asarray(self._warmth).reshape(-1, 2).T if self._warmth else (None, None)
         return Performed(
             figures=ledger.figures(),
+            reach=self._reach,
+            parts=self._parts,
+            remedy=self._remedy,
             beats=self._beats(),
             full_force=ledger.full_force,
             mean_force=ledger.mean_force,
-            reach=self._reach,
-            clipped=self._conductor.clipped,
-            dropped=self._dropped,
-            parts=self._parts,
+            clipped_samples=self._conductor.clipped,
+            dropped_samples=self._dropped,
             underruns=self._underruns,
             fault=self._fault,
-            remedy=self._remedy,
             notes=tuple(map(str, self._conductor.pauses)),
             pulses=self._pulses,
-            temperature=tuple(self._warmth),
+            temperature_s=warm[0],
+            temperature_K=warm[1],
         )
 
     def _beats(self) -> Beats:

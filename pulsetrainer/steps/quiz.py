@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -110,7 +110,7 @@ class Blind:
         told = slice(self._first if is_open else None)
         names = [field.name for field in fields(beats) if field.name != "output_unit"]
         columns: dict[str, Any] = {name: getattr(beats, name)[told] for name in names}
-        return Beats(**columns, output_unit=beats.output_unit)
+        return replace(beats, **columns)
 
     def quiz(self, learner: str = "") -> Quiz | None:
         """Return what was asked and answered so far; None where that is nothing."""

@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from pulsetrainer.artefacts import Run
-from pulsetrainer.artefacts.run import Coil
+from pulsetrainer.artefacts.run import Coil, seam_of
 from pulsetrainer.core import excitations
 from pulsetrainer.core.course import Course
 from pulsetrainer.core.coverage import coverage
@@ -103,14 +103,12 @@ class Memory:
         if not self._blocks:
             return None
         time_s, reference, current, force = np.concatenate(self._blocks, axis=1)
-        seam = np.zeros(time_s.size, dtype=np.bool_)
-        seam[[start for start in self._seams if start < time_s.size]] = True
         return Run(
             time_s=time_s,
             input=current,
             output=force,
             reference=reference,
-            seam=seam if seam.any() else None,
+            seam=seam_of(self._seams, time_s.size),
             signal=signal,
             complete=complete,
             dropped_samples=self.dropped_samples,

@@ -19,11 +19,11 @@ from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, che
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
 from pulsetrainer.steps.asked import check_asked_for
-from pulsetrainer.steps.conductor import RATE_HZ, Decide, Given, Pause, Play, Reach
+from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Pause, Play, Reach
 from pulsetrainer.steps.heat import coil_of, rest_force, take_temperature, thermometer_of
 from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.one_thread import one_thread
-from pulsetrainer.steps.performance import TOO_SHORT, Now, Performance, Performed, Sink, conductor_of
+from pulsetrainer.steps.performance import TOO_SHORT, Now, Performance, Performed, Sink
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.quiz import Answer, Blind, from_list, order
@@ -197,7 +197,7 @@ def plan(
         if piece.beat is not None:
             count[beating[piece.beat.play.pulse].name] += 1
 
-    conductor = conductor_of(model, beating, reach, rhythm, decide, give)
+    conductor = Conductor(extended_of(model), beating, reach, rhythm, decide, give)
     parts, longest_s = 0, ON_TIME_S - RAMP_S
     while not conductor.ended:
         parts += 1

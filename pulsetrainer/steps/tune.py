@@ -186,7 +186,7 @@ def step_reference(range_A: float) -> FloatArray:
     return np.concatenate((np.linspace(0.0, low, half), np.tile(one, _STEPS), np.linspace(low, 0.0, half)))
 
 
-class _Tuning:
+class _Tuning(Measurement):
     """One device being tuned."""
 
     def __init__(
@@ -196,18 +196,15 @@ class _Tuning:
         supply_V: float | None,
         progress: Progress,
     ) -> None:
-        self._device, self._pulses, self._supply_V, self._progress = device, pulses, supply_V, progress
-        self._dt_s = 1.0 / device.info.tick_rate_Hz
-        self._range_A = device.info.current_limit_A
-        self._measurement = Measurement(device, supply_known=supply_V is not None, progress=progress)
-        self._notes = self._measurement.notes
+        super().__init__(device, supply_known=supply_V is not None, progress=progress)
+        self._pulses, self._supply_V = pulses, supply_V
 
     def run(self, before: Gains) -> Tuned:
         device = self._device
         device.set_gains(OPEN_LOOP)
-        rest_N = self._measurement.rest()
-        coil = self._measurement.coil()
-        self._measurement.same_rest(rest_N)
+        rest_N = self.rest()
+        coil = self.coil()
+        self.same_rest(rest_N)
         self._progress(0.4)
         ohm, henry, volts = self._scaled(coil)
         followed = references(self._pulses, self._range_A)
@@ -223,7 +220,7 @@ class _Tuning:
         device.set_gains(gains)
         error = max(self._error_percent(reference) for reference in followed)
         settle_ms, overshoot = self._step()
-        self._measurement.same_rest(rest_N)
+        self.same_rest(rest_N)
         self._progress(1.0)
         return Tuned(
             serial=device.info.serial,
@@ -236,7 +233,7 @@ class _Tuning:
             overshoot_percent=overshoot,
             margins=now,
             margins_before=was,
-            notes=tuple(self._notes),
+            notes=tuple(self.notes),
         )
 
     def _scaled(self, coil: Coil) -> tuple[float, float, float]:
@@ -252,7 +249,7 @@ class _Tuning:
                 hint="measure the supply again, or leave `supply_V` out",
             )
         if abs(self._supply_V / coil.supply_V - 1.0) > _SUPPLY_OFF:
-            self._notes.append(
+            self.notes.append(
                 f"a supply of {self._supply_V:g} V was taken as given, as the device does not measure it; a "
                 f"diode of the usual {electrical.DIODE_V:g} V makes it {coil.supply_V:.1f} V. Ohms and "
                 "henries are as good as the volts, the loop gains are the same with either"
@@ -295,7 +292,7 @@ class _Tuning:
     def _before(self, gains: Gains, sound: Margins, references: Sequence[FloatArray]) -> float | None:
         """Return the error with the gains from before, where they are fit to be tried on this coil."""
         if not (sound.stable and sound.gain >= _SOUND_GAIN and sound.phase_deg >= _SOUND_PHASE):
-            self._notes.append(
+            self.notes.append(
                 f"the gains from before were not tried: on this coil they would ring (gain margin "
                 f"{sound.gain:.2f}, phase margin {sound.phase_deg:.0f} degrees)"
             )
@@ -304,11 +301,11 @@ class _Tuning:
         try:
             return max(self._error_percent(reference) for reference in references)
         except DeviceError as error:
-            self._notes.append(f"with the gains from before: {error.message}")
+            self.notes.append(f"with the gains from before: {error.message}")
             return None
 
     def _error_percent(self, reference_A: FloatArray) -> float:
-        trace = self._measurement.play(reference_A, "the verification")
+        trace = self.play(reference_A, "the verification")
         return 100.0 * float(np.abs(trace.current_A - trace.reference_A).max()) / self._range_A
 
     def _step(self) -> tuple[float, float]:
@@ -316,7 +313,7 @@ class _Tuning:
         low, high = (share * self._range_A for share in _STEP)
         half = round(_STEP_HOLD_S * RATE_HZ)
         reference = step_reference(self._range_A)
-        trace = self._measurement.play(reference, "the verification", decimation=1)
+        trace = self.play(reference, "the verification", decimation=1)
         told = np.full(reference.size * round(self._device.info.tick_rate_Hz / RATE_HZ), np.nan)
         told[trace.tick] = trace.current_A
         ticks = round(_STEP_HOLD_S / self._dt_s)

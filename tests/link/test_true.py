@@ -78,6 +78,17 @@ def test_another_density_is_changed_and_not_updated(model, seed):
         updated(model, found)
 
 
+def test_a_density_a_quarter_of_a_percent_away_is_changed():
+    """The nearest of forty pairs: offset and gain leave 0.27 % of the span, 0.14 % on what nobody touched."""
+    with pt.open_device("bench:?seed=736") as device:
+        own = pt.identify(pt.capture("identification", device))
+    verdicts = []
+    for port in ("bench:?seed=736&noise-seed=7", "bench:?seed=1736"):
+        with pt.open_device(port) as device:
+            verdicts.append(pt.check(own, device).verdict)
+    assert verdicts == ["true", "changed"]
+
+
 def test_a_coarse_and_fast_calibration_stays_true():
     """12 levels at 4 A/s, five times as fast as delivered; another device is still told."""
     with pt.open_device("bench:?seed=4") as device:

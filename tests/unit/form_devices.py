@@ -40,7 +40,7 @@ def _bend(x: FloatArray, much: float) -> FloatArray:
     return x + much * x * (1.0 - x)
 
 
-def bump_plane(rng: Generator, n_h: int = 240) -> Preisach:
+def bump_plane(rng: Generator, n_h: int = 240, reversible: tuple[float, float] = (0.2, 0.8)) -> Preisach:
     """Return a fine plane with a ridge and a reversible part, of random shape."""
     plane = Plane.uniform(0.0, 1.0, n_h)
     i, j = plane.cell_indices
@@ -51,7 +51,7 @@ def bump_plane(rng: Generator, n_h: int = 240) -> Preisach:
     density = np.exp(-(((width - at) / broad) ** 2) - ((middle - centre) / long) ** 2)
     masses = density * plane.areas / (density @ plane.areas)
     diagonal = i == j
-    masses[diagonal] += rng.uniform(0.2, 0.8) * (1 + 0.5 * np.sin(4 * middle[diagonal])) / diagonal.sum()
+    masses[diagonal] += rng.uniform(*reversible) * (1 + 0.5 * np.sin(4 * middle[diagonal])) / diagonal.sum()
     return Preisach(plane, masses / plane.areas / masses.sum(), rng.uniform(-1.0, 1.0))
 
 
@@ -79,11 +79,16 @@ def falling(rng: Generator) -> Device:
 # --- the output leads: clockwise ----------------------------------------------------------------------
 
 
-def exchanged_plane(rng: Generator) -> Device:
+def exchanged_plane(rng: Generator, reversible: tuple[float, float] = (0.2, 0.8)) -> Device:
     """Return a fine Preisach plane with its roles exchanged: the input is its output."""
-    plant = bump_plane(rng)
+    plant = bump_plane(rng, reversible=reversible)
     low, high = plant.saturation
     return lambda u: invert(plant, low + (high - low) * u).input
+
+
+def steep_exchanged_plane(rng: Generator) -> Device:
+    """Return one with hardly a reversible part: its branches are nearly vertical after a turn."""
+    return exchanged_plane(rng, (0.02, 0.1))
 
 
 def stop_sum(rng: Generator) -> Device:
@@ -140,6 +145,14 @@ def rectified(rng: Generator) -> Device:
     return strain
 
 
+def squared(rng: Generator) -> Device:
+    """Return the square of a polarisation that lags: electrostriction. Its minor loops are not congruent."""
+    plant = bump_plane(rng, 120)
+    low, high = plant.saturation
+    middle = low + (high - low) * rng.uniform(0.4, 0.6)
+    return lambda u: ((plant(u) - middle) / (high - low)) ** 2
+
+
 def mixed_plays(rng: Generator) -> Device:
     """Return narrow plays that lead beside wide plays that lag, over a steep reversible part."""
     radius, _ = _radii(rng)
@@ -168,6 +181,7 @@ def mixed_planes(rng: Generator) -> Device:
 DIRECT = (lagging_plane, play_sum, falling)
 CLOCKWISE = (exchanged_plane, stop_sum, bouc_wen)
 BUTTERFLY = (butterfly_density, rectified)
+NOT_CONGRUENT = (squared, rectified)
 MIXED = (mixed_plays, mixed_planes)
 
 

@@ -157,11 +157,11 @@ def test_steps_and_jumps_do_not_average_out(jump):
 # --- the joint refit
 def test_parameters_move_within_a_factor_of_three_and_their_bounds():
     """A signed one is bounded only by its bounds; the derivative takes two hundredths of the value."""
-    lag, drift = Term(CAUSE["output-lag"], (0.01,)), Term(CAUSE["offset-drift"], (0.01,))
-    for step, lags, drifts in ((1.0, 0.03, 1.01), (-1.0, 0.01 / 3, -0.99), (0.005, 0.015, 0.015)):
-        (one,), (other,) = (_moved([term], np.asarray([step]), FRAME) for term in (lag, drift))
+    lag, skew = Term(CAUSE["output-lag"], (0.01,)), Term(CAUSE["clock-skew"], (0.001,))
+    for step, lags, skews in ((1.0, 0.03, 0.01), (-1.0, 0.01 / 3, -0.01), (0.005, 0.015, 0.006)):
+        (one,), (other,) = (_moved([term], np.asarray([step]), FRAME) for term in (lag, skew))
         assert one.values == pytest.approx((lags,))
-        assert other.values == pytest.approx((drifts,))
+        assert other.values == pytest.approx((skews,))
     assert _moved([Term(CAUSE["output-lag"], (0.4,))], np.asarray([9.0]), FRAME)[0].values == (0.5,)
     (tau,) = CAUSE["output-lag"].parameters
     assert _difference(tau, 0.1) == pytest.approx(0.002)
@@ -179,8 +179,8 @@ def test_one_step_finds_a_parameter_that_enters_linearly():
     record = Record(u, 3.0 * u + 0.05 * np.arange(u.size) / 100, dt_s=0.01)
     problem = problem_for([record], 0.0, 1.5)
     near = weights_for(problem, (), None)
-    fitted = refit(problem, (Term(CAUSE["offset-drift"], (0.01,)),), near, rounds=1)
-    assert fitted.terms[0].values == pytest.approx((0.05,), rel=0.02)
+    fitted = refit(problem, (Term(CAUSE["offset-drift"], (0.01, 0.0)),), near, rounds=1)
+    assert fitted.terms[0].values == pytest.approx((0.05, 0.0), rel=0.02, abs=1e-5)
     assert fitted.squares < 1e-2 * near.squares
     time = problem.bins.time_s
     np.testing.assert_allclose(np.diff(fitted.slopes[:, 0]), np.diff(time), rtol=1e-6)
@@ -213,7 +213,7 @@ def test_a_refit_far_from_its_goal_is_given_up():
     lagged = CAUSE["output-lag"].on_output(3.0 * u, (0.08,), FRAME)
     problem = problem_for([Record(u, lagged, dt_s=0.01)], 0.0, 1.5)
     near = weights_for(problem, (), None)
-    begun = (Term(CAUSE["offset-drift"], (0.01,)),)  # not what it is
+    begun = (Term(CAUSE["offset-drift"], (0.01, 0.0)),)  # not what it is
     free, one = refit(problem, begun, near), refit(problem, begun, near, rounds=1)
     assert refit(problem, begun, near, goal=free.squares * 1.01).squares == pytest.approx(free.squares)
     assert refit(problem, begun, near, goal=1e-9 * near.squares).squares <= one.squares
@@ -548,7 +548,7 @@ def test_a_line_needs_strokes_periods_and_samples(strokes, periods, samples, kno
         ("thermal-drift", [(0.02 / 16.0, 4.3)]),
         ("accommodation", [(0.05, 28.0), (0.05, 80.0), (0.05, 240.0)]),
         ("load-dependence", [(0.01 * 4.0 / 8.0,)]),
-        ("offset-drift", [(0.01 * 8.0 / 10.0,)]),
+        ("offset-drift", [(0.01 * 8.0 / 10.0, 0.0), (0.0, 4.0 * 0.01 * 8.0 / 10.0**2)]),
         ("clock-skew", [(1e-5,), (1e-4,)]),
     ],
 )
@@ -556,7 +556,8 @@ def test_start_values_scale_with_span_range_and_length(name, starts):
     """A span of 8, a range of 4, ten seconds in steps of 10 ms, and half a unit a second to and fro."""
     u = 0.5 * np.abs((np.arange(1000) * 0.01) % 5.0 - 2.5)
     frame = Frame(0.01, u, span=8.0, reach=4.0)
-    found = [block[0] for block in CAUSE[name].starts([frame, Frame(0.01, 0.0 * u, 1.0, 1.0)], [])]
+    blocks = CAUSE[name].starts([frame, Frame(0.01, 0.0 * u, 1.0, 1.0)], [])
+    found = [one for block in blocks for one in block[: CAUSE[name].strengths]]
     assert np.asarray(found) == pytest.approx(np.asarray(starts), rel=0.01)
     assert np.asarray(found).shape == np.asarray(starts).shape
 

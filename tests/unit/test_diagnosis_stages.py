@@ -262,6 +262,17 @@ def _refitting(monkeypatch, *modules, squares):
     return asked
 
 
+@pytest.mark.parametrize("bursts", [True, False])
+def test_what_comes_in_bursts_is_not_called_noise_alone(monkeypatch, bursts):
+    """Neither in the table nor in the evidence beside it; never more than is left."""
+    monkeypatch.setattr(State, "in_bursts", property(lambda state: bursts))
+    state = _state(_fit(500.0))
+    slow = replace(state, floor=Floor(10, 1.0, 4.0, 1.0))
+    floor = slow.floor.quick if bursts else slow.floor
+    assert slow.floor_rms == pytest.approx(min(floor.rms, state.current.rms))
+    assert slow.floor.quick.rms < slow.floor.rms
+
+
 def test_of_a_cause_the_kind_that_fits_best_is_tried(monkeypatch):
     """The screen can hardly tell them apart; each of the others begins where the first one ended."""
     kinds, begun = CAUSE["creep"].kinds(), []
@@ -450,6 +461,7 @@ def _exchanged(monkeypatch, squares: dict[str, float]):
     fits |= {frozenset({"delay", name}): 999.0 for name in ("accommodation",)}
     fits |= {
         frozenset({"field-lag", "accommodation"}): 999.0,
+        frozenset({"field-lag", "creep"}): 400.0,  # another kind of creep
         frozenset({"field-lag"}): 460.0,
         frozenset({"delay"}): 460.0,
     }
@@ -471,6 +483,22 @@ def test_a_cause_is_exchanged_for_a_better_one_of_its_family(monkeypatch):
     assert dict(after.p_values) == {"creep": 0.006, "delay": 0.007}
     assert not [names for names, _, _ in asked if "step" in names]
     assert asked[-1] == (("creep", "delay"), None, False)
+
+
+def test_a_cause_is_exchanged_for_a_better_kind_of_its_own(monkeypatch):
+    """When the kind was chosen, other causes were missing; its name and p-value stay."""
+    kinds = CAUSE["creep"].kinds()
+
+    def refit(problem, terms, near, rounds=None, *, rebuild=False, goal=None):
+        return Fit({kinds[0]: 400.0, kinds[1]: 380.0, kinds[2]: 390.0}[terms[-1].cause], tuple(terms))
+
+    for module in (exchange, acceptance):
+        monkeypatch.setattr(module, "refit", refit)
+    monkeypatch.setattr(exchange, "ranked", lambda fitted, whole: ())
+    _refitting(monkeypatch, fitting, squares={frozenset(): 500.0})
+    after = exchange.stage(_state(_fit(400.0, "creep"), p_values={"creep": 0.006}))
+    assert [term.cause for term in after.current.terms] == [kinds[1]]
+    assert dict(after.p_values) == {"creep": 0.006}
 
 
 def test_a_cause_stays_where_no_other_of_its_family_is_better(monkeypatch):

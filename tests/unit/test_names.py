@@ -12,7 +12,7 @@ import report_examples as examples
 from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.session import FIGURES
-from pulsetrainer.report import alternatives, figures, views
+from pulsetrainer.report import figures, html
 from pulsetrainer.report.names import FORCE, NAMES, headed, split
 from pulsetrainer.report.tables import label, text
 from pulsetrainer.report.text import tables_of
@@ -97,11 +97,13 @@ def test_a_small_figure_reads_the_same_wherever_it_is_shown():
     one = replace(whole, compensated=replace(whole.compensated, hysteresis_percent=0.00553))
     (table,) = tables_of(Evaluation(waveforms=(one,)))
     (row,) = (row for row in table.rows if row[0] == "loop area, compensated")
-    legend = figures.loops([one]).legends[0]
+    legend = " ".join(shown.get_text() for shown in figures.loops([one]).legends[0].get_texts())
+    page = html.render_evaluation(Evaluation(waveforms=(one,)), title="", created="", provenance_json="{}")
     shown = [
         text(row[-1]),
-        views.metric(one, "compensated.hysteresis_percent", "").text,
-        *re.findall(r"compensated, loop area (\S+) %", " ".join(t.get_text() for t in legend.get_texts())),
-        *re.findall(r"compensated drive one of (\S+) %", alternatives.loops(one)),
+        html.metric(one, "compensated.hysteresis_percent", "").text,
+        *re.findall(r"compensated, loop area (\S+) %", legend),
+        *re.findall(r"compensated drive one of (\S+) %", page),
     ]
-    assert shown == ["0.00553"] * 4
+    assert set(shown) == {"0.00553"}
+    assert len(shown) >= 4

@@ -57,7 +57,7 @@ def _diagnosis(
 def _added(name, y, t):
     """Output with a fault, and the parameters that say it."""
     if name == "offset-drift":
-        return y + 0.02 * t, {"rate": 0.02}
+        return y + 0.02 * t + 0.003 * t * (t - t[-1]), {"rate": 0.02, "bend": 0.003}
     if name == "step":
         return np.where(t > 12, 0.4 + 1.03 * y, y), {"offset": 0.4, "gain": 0.03, "time": 12.0}
     if name == "periodic":

@@ -294,6 +294,7 @@ def test_a_header_of_another_count_is_still_an_error(table):
         (("11/02/2024 23:59", "12/02/2024 00:01"), (1707695940, 1707696060)),
         (("02/11/2024 23:59", "02/12/2024 00:01"), (1707695940, 1707696060)),
         (("01.05.2024 12:00:00", "1.5.2024 12:00:00,5"), (1714564800, 1714564800.5)),
+        (("00:59.75", "01:00.25"), (59.75, 60.25)),
         (("2024-05-01T14:00:00+02:00", "2024-05-01T12:00:00,5Z"), (1714564800, 1714564800.5)),
     ],
 )
@@ -316,6 +317,26 @@ def test_the_last_rows_tell_the_order_of_a_date(table, days, encoding):
     text = "when;u;y\n" + "".join(f"{row};{k % 7};1\n" for k, row in enumerate(rows))
     run = read_run(table(text.encode(encoding)).path, **COLUMNS)
     np.testing.assert_array_equal(np.diff(run.time_s), np.ones(3659))
+
+
+def test_times_of_day_go_on_after_midnight(table):
+    """A day is added, and said; a step back that is no midnight is refused."""
+    rows = [(86_390 + k) % 86_400 for k in range(30)]
+    lines = [f"{s // 3600:02}:{s // 60 % 60:02}:{s % 60:02};{s % 7};1\n" for s in rows]
+    read = run_from_table(table("when;u;y\n" + "".join(lines)).path, **COLUMNS)
+    np.testing.assert_array_equal(np.diff(read.run.time_s), np.ones(29))
+    assert any("midnight" in note for note in read.notes)
+    later = "".join([*lines[:5], *lines[2:]])
+    with pytest.raises(DataError):
+        read_run(table("when;u;y\n" + later).path, **COLUMNS)
+
+
+def test_numbers_of_the_rows_before_the_time_are_no_time(table):
+    """What `to_csv` of pandas writes: a column without a name that counts, then the time."""
+    rows = "".join(f"{k},{k / 50},{k % 7},{k % 5}\n" for k in range(40))
+    for heading in (",time,u,y\n", "index,t,u,y\n", "Sample,t (s),u,y\n"):
+        run = read_run(table(heading + rows).path, input="u", output="y")
+        np.testing.assert_allclose(np.diff(run.time_s), 0.02)
 
 
 @pytest.mark.parametrize("cell", ["1e101", "-1e308"])

@@ -28,7 +28,6 @@ _FIVE = 0.2  # share of the middle one of five ...
 _UNEVEN = 0.3  # ... and one that is as plausible
 _ALONE = 1.0  # share of a time constant alone ...
 _NEARLY = 0.75  # ... and one that is as plausible
-_PLAUSIBLE = {_EQUAL: _OTHER, _FIVE: _UNEVEN, _ALONE: _NEARLY}
 
 
 class Creep(OfKinds):
@@ -68,7 +67,8 @@ class Creep(OfKinds):
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         """Another share of the middle time constant: no record tells the shares of all of them."""
-        return [self._crept(y, values, frame, _PLAUSIBLE[self.kind])]
+        other = {_EQUAL: _OTHER, _FIVE: _UNEVEN, _ALONE: _NEARLY}[self.kind]
+        return [self._crept(y, values, frame, other)]
 
     def _crept(self, y: FloatArray, values: Values, frame: Frame, middle: float) -> FloatArray:
         """Creep with a share ``middle`` of its amplitude in the middle time constant."""

@@ -1,4 +1,8 @@
-"""the zero drifts slowly with time: y + b t."""
+"""the zero drifts slowly with time: y + b t, and a bend of it.
+
+Drifts slow down as a device warms up, or grow. What the bend adds is zero at both ends of a record (0 to T),
+so that the rate is that from end to end.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +12,15 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
 _TRIED = 0.01  # of the span over the record
+_MIDDLE = 4.0  # the bend is largest in the middle: a quarter of c T^2
 
 
 class OffsetDrift(Cause):
-    """A zero that moves in proportion to time."""
+    """A zero that moves with time, faster or slower as time goes on."""
 
     id = "offset-drift"
     title = "the zero of the {output} drifts slowly with time"
-    formula = "y + b t"
+    formula = "y + b t + c t (t - T)"
     signature = "equal states give different outputs, and the difference grows with time"
     excitation = "the same loop at the beginning, in the middle and at the end"
     source = "Ljung, System Identification, 1999, section 14.1"
@@ -23,18 +28,29 @@ class OffsetDrift(Cause):
     order = 140
     family = "drift"
     drifts = True
-    parameters = (Quantity("rate", "{y}/s", -1e6, 1e6, 1e-5, "drift of the zero of the {output}"),)
+    strengths = 2
+    parameters = (
+        Quantity("rate", "{y}/s", -1e6, 1e6, 1e-5, "drift of the zero of the {output}, from end to end"),
+        Quantity("bend", "{y}/s^2", -1e6, 1e6, 1e-7, "half of the change of that rate, a second"),
+    )
     lasting = False
     corrects = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try."""
-        return [[(_TRIED * frames[0].span / (frames[0].time_s[-1] + frames[0].dt_s),)]]
+        length = frames[0].time_s[-1] + frames[0].dt_s
+        size = _TRIED * frames[0].span
+        return [[(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
-        return y + values[0] * frame.time_s
+        return y + _drift(values, frame.time_s)
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
         """Output (n,) without the drift since the first sample."""
-        return y - values[0] * taken.time_s
+        return y - _drift(values, taken.time_s)
+
+
+def _drift(values: Values, time_s: FloatArray) -> FloatArray:
+    rate, bend = (*values, 0.0)[:2]  # a diagnosis was once kept without the bend
+    return time_s * (rate + bend * (time_s - time_s[-1]))

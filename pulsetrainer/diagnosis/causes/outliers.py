@@ -25,6 +25,7 @@ _LINE = 5  # samples on one side of a suspect that may explain it
 _TAIL = 0.5  # of them between half the limit and the limit: more are the tail of the noise
 _HIGHER = 1.25  # factor from one limit to the next that is tried
 _BACK = 0.1  # of the range: an input that comes back so far within these samples has turned fast
+_STEEP = 4.0  # spans a range: the output of a steep branch, when the input comes back less far
 _ALONE = 3  # samples of a median that takes away a single wild one
 _LEAST = 3  # wild samples: fewer are no fault of a device
 
@@ -57,7 +58,10 @@ class Outliers(Cause):
         usual = _TIP * ndimage.percentile_filter(steps, _FAST, _NEAR, mode="nearest")
         noise = max(_SIGMAS * _DIFFERENCE * noise_of(y), _STEPS * spacing_of(y), TINY)
         limit = np.maximum(usual, noise)
-        told = ~raw.beside_breaks(_AROUND) & ~_turns_fast(raw.record.input, raw.high - raw.low)
+        own = ndimage.median_filter(raw.record.input, _ALONE, mode="nearest")  # a wild input is no turn
+        back = _comes_back(own) / (raw.high - raw.low)
+        told = (back <= _BACK) & (apart > _STEEP * back * float(np.ptp(y)))
+        told &= ~_hurries(own) & ~raw.beside_breaks(_AROUND)
         off = np.where((apart > 0.5 * limit) & told, apart, 0.0)
         for at in np.flatnonzero(off):  # where a stroke ends with a jump, its last sample still lies on it
             off[at] = min(off[at], _off_line(y, int(at), -1), _off_line(y, int(at), 1))
@@ -85,18 +89,27 @@ def _beyond_the_tail(beyond: FloatArray) -> float | None:
     return None
 
 
-def _turns_fast(u: FloatArray, reach: float) -> NDArray[np.bool_]:
-    """Whether an input (n,) turns and comes far back within the samples that may explain a suspect.
+def _comes_back(u: FloatArray) -> FloatArray:
+    """How far an input (n,) turns and comes back within the samples that may explain a suspect, (n,).
 
     There the output turns as fast, and no sample can be told from those beside it.
     """
-    own = ndimage.median_filter(u, _ALONE, mode="nearest")  # a wild sample of the input is no turn
     width = 2 * _LINE + 1
-    way = width * ndimage.uniform_filter1d(np.abs(np.diff(own, prepend=own[0])), width, mode="nearest")
-    swing = ndimage.maximum_filter1d(own, width, mode="nearest") - ndimage.minimum_filter1d(
-        own, width, mode="nearest"
+    way = width * ndimage.uniform_filter1d(np.abs(np.diff(u, prepend=u[0])), width, mode="nearest")
+    swing = ndimage.maximum_filter1d(u, width, mode="nearest") - ndimage.minimum_filter1d(
+        u, width, mode="nearest"
     )
-    return np.asarray(way - swing > _BACK * reach)
+    return np.asarray(way - swing)
+
+
+def _hurries(u: FloatArray) -> NDArray[np.bool_]:
+    """Whether an input (n,) moves far faster beside a sample than near it: a short ramp between rests.
+
+    A force that follows the speed comes and goes with it.
+    """
+    steps = np.abs(np.diff(u, prepend=u[0]))
+    usual = ndimage.percentile_filter(steps, _FAST, _NEAR, mode="nearest")
+    return np.asarray(ndimage.maximum_filter1d(steps, 2 * _LINE + 1, mode="nearest") > _TIP * usual)
 
 
 def _off_line(y: FloatArray, at: int, side: int) -> float:

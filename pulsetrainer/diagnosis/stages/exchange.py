@@ -1,8 +1,8 @@
-"""Exchange: each cause against the others of its family.
+"""Exchange: each cause against the others of its family, and its own other kinds.
 
-When a cause was chosen, others were still missing. So each is taken out, every other one of its family is
-fitted in its place, and the best is kept. The new one inherits the p-value of the old: that something of
-this family is there was tested, which one of it was not (decision 044).
+When a cause was chosen, others were still missing. So each is taken out, every other one of its family and
+every other kind of its own is fitted in its place, and the best is kept. The new one inherits the p-value of
+the old: that something of this family is there was tested, which one of it was not (decision 044).
 """
 
 from __future__ import annotations
@@ -28,18 +28,19 @@ def stage(state: State) -> State:
 def _exchanged(state: State, cause: Cause) -> State:
     current, problem = state.current, state.problem
     kin = {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
-    if not kin:
+    kinds = [one for one in library()[cause.id].kinds() if one is not cause] if cause.id in library() else []
+    if not kin and not kinds:
         return state
     # by its cause: an exchange before this one has moved all terms
-    without = current.without(next(term for term in current.terms if term.cause is cause))
-    trials = [
-        refit(problem, (*without.terms, Term(score.cause, score.start)), without, goal=current.squares)
-        for score in ranked(without, current)
-        if score.cause.id in kin
-    ]
+    term = next(term for term in current.terms if term.cause is cause)
+    without = current.without(term)
+    others = [Term(kind, term.values) for kind in kinds]
+    if kin:
+        others += [Term(s.cause, s.start) for s in ranked(without, current) if s.cause.id in kin]
+    trials = [refit(problem, (*without.terms, one), without, goal=current.squares) for one in others]
     best = min((current, *trials), key=lambda fitted: fitted.squares)
     if best is current:
         return state
-    (new,) = set(best.names) - set(current.names)
+    (new,) = set(best.names) - set(without.names)
     p_values = {new if name == cause.id else name: p for name, p in state.p_values.items()}
     return replace(state, current=settled(problem, best), p_values=p_values)

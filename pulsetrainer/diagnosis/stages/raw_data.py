@@ -6,9 +6,9 @@ follow its reference, an input outside the range that was identified. Each gate 
 cause. A gate that fires is a finding, and the samples it names are left out of everything that follows:
 filled in, since causes filter the output and wild samples must not reach the filters.
 
-Only then are the records brought to even time steps, and to units of their own: the range of the input, the
-span of the output, and a second that follows from how fast the input moves. Nothing that is decided from
-here on knows a second, an ampere or a newton.
+Only then are the records brought to even time steps, sharp turns of the input to where the lines beside them
+meet, and all to units of their own: the range of the input, the span of the output, and a second that follows
+from how fast the input moves. Nothing that is decided from here on knows a second, an ampere or a newton.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pulsetrainer.core.record import Record
+from pulsetrainer.core.turns import reached
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
@@ -54,6 +55,7 @@ def stage(question: Question) -> Masked:
     ]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
     even = [evenly(record, times) for record, times in zip(masked, stamps, strict=True)]
+    even = [replace(one, input=reached(one.input)) if one.timed else one for one in even]
     scale = scale_of(even, low, high, second)
     firings = tuple((k, one) for k, fired in enumerate(found) for one in fired)
     return Masked(question, tuple(scale.shrunk(record) for record in even), firings, scale)

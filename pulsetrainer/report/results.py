@@ -1,0 +1,203 @@
+"""What a command says of its result: what a script gets under its keys, a title, and lines for a person."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Waveform
+from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
+from pulsetrainer.artefacts.units import with_seconds, with_unit
+from pulsetrainer.report.facts import loop_words, minor_words, warmth_words
+from pulsetrainer.report.tables import picked
+
+Said = tuple[dict[str, Any], str, dict[str, Any]]
+
+_OF_A_FIT: Final = (
+    "coverage_percent", "minor_percent", "smoothing", "input_noise", "false_reversals",
+    "output_uncertainty", "offsets", "spacing", "stiffness", "loop", "masked_samples", "warning",
+    "iterations",
+)  # fmt: skip
+_OF_A_CAUSE: Final = (
+    "found", "p_value", "explains_percent", "confounded_with", "held_out_gain_percent",
+    "detectable_from_percent", "text", "doubts",
+)  # fmt: skip
+_BASELINE: Final = (
+    "rms", "rms_percent", "noise_percent", "extended_rms_percent", "static_percent", "extended_percent",
+    "floor_percent",
+)  # fmt: skip
+_EXTENDED: Final = (
+    "rms_percent", "extended_rms_percent", "static_percent", "extended_percent", "held_out_gain_percent",
+)  # fmt: skip
+
+
+def identified(out: Path, model: Model, seconds: float) -> Said:
+    """Say what came out of a fit that took so many seconds."""
+    fit, unit = model.fit, model.output_unit
+    assert fit is not None
+    payload = {
+        "output": out,
+        "cells": model.weights.size,
+        **picked(model, "levels", "offset", "output_unit", "polarity", "form"),
+        "fit_rms": fit.rms,
+        "fit_rms_percent": fit.rms_percent,
+        "fit_max_percent": fit.max_percent,
+        **picked(fit, *_OF_A_FIT),
+        "seconds": seconds,
+    }
+    share, band = fit.smoothing, fit.output_uncertainty
+    rows = {
+        "fit": f"{fit.rms_percent:.3f} % rms, {fit.max_percent:.2f} % max, of the span",
+        "fit rms": with_unit(f"{fit.rms:.4g}", unit),
+        "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
+        "cells switched": f"{fit.coverage_percent:.1f} %",
+        "told apart by minor loops": minor_words(fit.minor_percent),
+        "smoothing": f"{share:.3g} of the range of the {model.input_quantity}" if share else "none",
+        "loop": loop_words(model),
+        "form": model.form,
+        **({"output known within": with_unit(f"{band:.2g}", unit) + " (90 % band)"} if band else {}),
+        "took": f"{seconds:.2f} s, {fit.iterations} iterations",
+    }
+    return payload, f"{out}: Preisach model of {model.levels} levels, {model.weights.size} cells", rows
+
+
+def drive_title(drive: Waveform) -> str:
+    """Name a drive by its pulse and its inversion."""
+    return f"{drive.name} by {drive.inversion} inversion"
+
+
+def inverted(out: Path, drive: Waveform) -> Said:
+    """Say what drive was found for a pulse."""
+    force = float(drive.target[drive.scored].min()), float(drive.target[drive.scored].max())
+    current = float(drive.compensated.min()), float(drive.compensated.max())
+    model = drive.model
+    given, made = (model.input_quantity, model.output_quantity) if model else ("current", "force")
+    seconds = drive.time_s.size / drive.rate_Hz
+    length = f"{seconds:.2f} s" if seconds >= 1 else with_seconds(seconds)
+    payload = {
+        "output": out,
+        **picked(drive, "name", "inversion"),
+        "samples": drive.time_s.size,
+        "seconds": seconds,
+        "force_range": force,
+        "current_range": current,
+        **picked(drive, "clipped_samples", "predicted_max_error_percent", "input_unit", "output_unit"),
+    }
+    rows = {
+        "length": f"{length}, {drive.time_s.size} samples",
+        made: with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
+        given: with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
+        "out of reach": f"{drive.clipped_samples} samples",
+        "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model",
+    }
+    return payload, f"{out}: {drive_title(drive)}", rows
+
+
+def played(out: Path, made: Playback, serial: str, firmware: str) -> Said:
+    """Say what was played on a device."""
+    drive, repeats, kelvin = made.waveform, made.compensated.output.shape[0], made.temperature_K
+    seconds = float(drive.time_s[-1]) * repeats * 2
+    payload = {
+        "output": out,
+        **picked(drive, "name", "inversion"),
+        "repeats": repeats,
+        "samples": drive.time_s.size,
+        "seconds": seconds,
+        **picked(made, "dropped_samples", "complete", "temperature_K"),
+        "serial": serial,
+        "firmware": firmware,
+    }
+    rows = {
+        "repeats": f"{repeats} of each drive, {seconds:.1f} s in all",
+        "samples": f"{drive.time_s.size} a repeat",
+        "lost": f"{made.dropped_samples} samples",
+        **({"coil": warmth_words(kelvin)} if kelvin is not None and kelvin.size else {}),
+    }
+    return payload, f"{out}: {drive_title(drive)} on {serial}", rows
+
+
+def evaluated(evaluation: Evaluation) -> dict[str, Any]:
+    """Return the errors of played waveforms or of models for a script."""
+    waveforms = [
+        {
+            **picked(w, "name", "inversion", "repeats", "full_force"),
+            "unit": w.output_unit,
+            "scaled": picked(w.scaled, *METRICS),
+            "compensated": picked(w.compensated, *METRICS),
+            **picked(w, "mean_error_reduction_percent", "noise_percent"),
+        }
+        for w in evaluation.waveforms
+    ]
+    models = [picked(m, "name", *MODEL_METRICS, "start", "outside_percent") for m in evaluation.models]
+    return ({"waveforms": waveforms} if waveforms else {}) | ({"models": models} if models else {})
+
+
+def diagnosed(found: Diagnosis) -> dict[str, Any]:
+    """Return a diagnosis for a script."""
+    return {
+        **picked(found, "verdict", "quick"),
+        "baseline": picked(found, *_BASELINE),
+        "left": found.left._asdict(),
+        "causes": [
+            {
+                "id": one.cause,
+                **picked(one, *_OF_A_CAUSE),
+                "parameters": {
+                    p.name: picked(p, "value", "unit", "meaning") | {"interval": (p.lower, p.upper)}
+                    for p in one.parameters
+                },
+            }
+            for one in found.causes
+        ],
+        **picked(found, "lacks", "evidence", "next_experiment"),
+    }
+
+
+def extended(
+    out: Path, model: Model, found: Diagnosis, run: Path | None, proof: Sequence[ModelEvaluation]
+) -> Said:
+    """Say what a diagnosed model was extended by; ``proof`` has the errors without and with it on ``run``."""
+    payload = {
+        "output": out,
+        "added": [one.cause for one in model.extensions],
+        "extensions": model.extensions,
+        "levels": model.levels,
+        **picked(found, *_EXTENDED),
+    }
+    rows = _left(found, model) | _apart(found, model)
+    if proof:
+        before, after = (one.rms_percent for one in proof)
+        payload["verified"] = {"without_percent": before, "with_percent": after}
+        rows["verified"] = (
+            f"{run} is predicted to {after:.3f} % of its span (rms), by the model as it was to {before:.3f} %"
+        )
+    return payload, f"{out}: extended model of {model.levels} levels", rows
+
+
+def _apart(found: Diagnosis, model: Model) -> dict[str, str]:
+    """Say how the extended model differs from what the diagnosis told."""
+    added = {one.cause: [p.value for p in one.parameters] for one in model.extensions}
+    rows = {
+        f"left out {one.cause}": "comes from the measurement: pulsetrainer correct"
+        if one.cause in found.correctable
+        else "; ".join(one.doubts) or "does not last"
+        for one in found.found
+        if one.cause not in added
+    }
+    told = {one.cause: [p.value for p in one.parameters] for one in found.found}
+    if any(len(told[name]) == len(now) and told[name] != now for name, now in added.items() if name in told):
+        rows["parameters"] = "fitted again as the model is used: from rest"
+    return rows
+
+
+def _left(found: Diagnosis, model: Model) -> dict[str, str]:
+    """Say what both models leave of the recordings, rms of single samples."""
+    assert found.extended is not None
+    if not math.isfinite(found.extended_rms_percent) or found.extended.extensions != model.extensions:
+        return {}  # a file of 0.1; or --verify took a cause out
+    return {
+        "error before": f"{found.rms_percent:.3f} % of the span, rms of single samples",
+        "error now": f"{found.extended_rms_percent:.3f} %; noise alone is {found.noise_percent:.3f} %",
+    }
