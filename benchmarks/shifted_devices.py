@@ -66,7 +66,8 @@ def main() -> None:
             pair = error_percent(updated(model, found), there), error_percent(calibrated(there), there)
             ratios.append(pair[0] / pair[1])
             line.append(f"updated {pair[0]:.3f} % fresh {pair[1]:.3f} %")
-            with pt.open_device(f"bench:?seed={asked.first + number + 1000}") as device:
+            inside = f"seed={asked.first + number + 1000}&serial={asked.first + number}"
+            with pt.open_device(f"bench:?{inside}") as device:
                 other = pt.check(model, device)
             try:
                 updated(model, other)

@@ -1,5 +1,5 @@
 """``python -m pulsetrainer``."""
 
-from pulsetrainer.cli.app import main
+from pulsetrainer.cli.starting import main
 
 main()

@@ -66,7 +66,8 @@ def save(artefact: Any, path: Path | str, *, overwrite: bool = False, title: str
     """
     header = provenance.make_header(
         title or f"{artefact.kind} saved from Python",
-        argv=("python",),
+        program="Python",  # what was done there nobody can tell but whoever did it
+        argv=("pulsetrainer.save", artefact.kind, str(path)),
         now=datetime.now(UTC),
         libraries=provenance.library_versions(),
     )

@@ -77,6 +77,10 @@ def at_once() -> dict[str, Mistake]:
         "no such smoothing": ("identify", "run.h5", "-o", "out.h5", "--smoothing", "much"),
         "a figure of no format": ("plot", "run.h5", "-o", "out.txt"),
         "an option without its value": ("tune", "--drive"),
+        "answers that no quiz asks for": (
+            *("session", "--model", "model.h5", "-o", "out.h5"),
+            *("--answers", "answers.txt"),
+        ),
         "a value where none goes": ("capture", "identification", "-o", "out.h5", "--live=yes"),
         "an artefact named like a table": ("identify", "run.h5", "-o", "out.csv"),
         "a page named like a figure": (
@@ -105,7 +109,7 @@ def at_once() -> dict[str, Mistake]:
         "--periods",
         "--slew",
     }
-    named |= {"--seed", "--beat", "--smoothing", "--port", "--resample"}
+    named |= {"--answers", "--seed", "--beat", "--smoothing", "--port", "--resample"}
     found |= {
         name: Mistake(line, 2, next((word for word in line if word in named), ""))
         for name, line in words.items()

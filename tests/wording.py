@@ -95,6 +95,7 @@ MESSAGES = {
     "no such rate": Message("the rate", "1000, 2000 or 5000 Hz", expected="10000 Hz", got="{got} Hz"),
     "too slow": Message("a path of", "speed", got="{got} samples"),
     "too fast": Message("from one sample to the next", "speed", expected="1.5", got="1e+297"),
+    "longer than the device plays": Message("the device stays on", "{next}", expected="900 s", got="{got} s"),
     "too many samples": Message(
         "samples", "fewer", expected="more than {most}", got="{times} times {samples}"
     ),
@@ -103,7 +104,7 @@ MESSAGES = {
     ),
     "no such beat": Message("beat", "--beat", "fingerbp_AAC3_3", "6 ", "9"),
     "not such an argument": Message("{argument} must", "", got="{got}"),
-    "too few samples": Message("from one sample to the next", "a lower speed", got="{got}"),
+    "too few samples": Message("from one sample to the next", "a lower `speed_A_per_s`", got="{got}"),
     "method too large": Message("dense", "", got="{method}"),
     "plane too large": Message("dense", ""),
     "too few blocks": Message("at least 2 blocks", "a shorter block"),
@@ -139,8 +140,10 @@ MESSAGES = {
     "nothing in common": Message("in common", "evaluat"),
     # --- settings ----------------------------------------------------------------------------------------
     "no such setting": Message("setting", "{next}", "pulsetrainer.toml", got="'{got}'"),
-    "not such a setting": Message("must be", "the file", "pulsetrainer.toml", "{expected}", "{got}"),
-    "not TOML": Message("cannot be read", "the file", "pulsetrainer.toml", got="line 1"),
+    "not such a setting": Message(
+        "must be", "write, for instance", "pulsetrainer.toml", "{expected}", "{got}"
+    ),
+    "not TOML": Message("cannot be read", "write it as TOML", "pulsetrainer.toml", got="line 1"),
     "no file of settings": Message("settings", "--settings", "{file}"),
     # --- device ------------------------------------------------------------------------------------------
     "no such port": Message("no port", "pulsetrainer ports", "{port}"),
@@ -204,6 +207,7 @@ MESSAGES = {
     "limit below the model's range": Message(
         "the current goes up", "--limit-current", expected="the limit in force is {limit} A", got="{got} A"
     ),
+    "lost on the wire": Message("samples of the", "check the cable", got="were lost on the wire"),
     "tuning is no play": Message("force", "off the device while it is tuned", "during"),
     "a supply that sags": Message("cannot follow the pulses (voltage)", "a supply", got="sags"),
     # --- gates and bugs ----------------------------------------------------------------------------------

@@ -149,7 +149,7 @@ class Model(Shown):
         if self.form not in FORMS:
             raise DataError(
                 f"the form of a model is one of {', '.join(FORMS)}, this one has {self.form!r}",
-                hint="identify the model again: pulsetrainer identify RUN.h5 -o model.h5",
+                hint="identify the model again, with pulsetrainer identify",
             )
         units = (self.input_unit, self.output_unit)
         edges, offset = units[::-1] if self.form == "dual" else units
@@ -160,7 +160,7 @@ class Model(Shown):
             raise DataError(
                 f"a model with {n_h} levels has {n_h * (n_h + 1) // 2} cells, "
                 f"but weights holds {np.size(self.weights)}",
-                hint="identify the model again: pulsetrainer identify RUN.h5 -o model.h5",
+                hint="identify the model again, with pulsetrainer identify",
             )
 
     @property

@@ -56,7 +56,10 @@ def root(
     debug: Annotated[bool, typer.Option("--debug", help="Show the whole traceback of an error.")] = False,
     verbose: Annotated[bool, typer.Option("--verbose", help="Say on stderr what is being done.")] = False,
 ) -> None:
-    """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate."""
+    """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate.
+
+    Begin, without a device: pulsetrainer capture identification -o run.h5
+    """
     if context.resilient_parsing or {"-h", "--help"} & set(sys.argv):
         return  # help and completion need no settings, and a bad file must not hide them
     file = setting_files.find(settings_file, os.environ)

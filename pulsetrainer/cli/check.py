@@ -76,7 +76,13 @@ def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, 
         "error": f"{error.before:.2f} % of the span, {error.after:.2f} % with this offset and gain",
         **{f"reason {number}": reason for number, reason in enumerate(found.reasons, 1)},
     }
-    if found.verdict == "shifted" and updatable and out is None:
+    if out is not None:
+        rows["next"] = (
+            f"use {out} in the place of {model}, and invert drives again with it"
+            if found.verdict == "shifted"
+            else f"go on with {model}: nothing moved that a device would not by itself, {out} is no better"
+        )
+    elif found.verdict == "shifted" and updatable:
         rows["next"] = f"pulsetrainer check {shlex.quote(str(model))} --update -o updated.h5"
     elif found.verdict == "changed" or (found.verdict == "shifted" and not updatable):
         rows["next"] = "identify again: pulsetrainer capture identification, then pulsetrainer identify"

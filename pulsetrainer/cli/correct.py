@@ -25,9 +25,9 @@ def correct(
 ) -> None:
     """Take the faults of the measurement out of a run.
 
-    Those that a diagnosis has found.
+    Those that a diagnosis has found; where it found none there is nothing to correct.
 
-    Example: pulsetrainer correct diagnostic.h5 --diagnosis diagnosis.h5 -o corrected.h5
+    Example: pulsetrainer correct drifting.h5 --diagnosis drift.h5 -o corrected.h5
     """
     job = Job(context, inputs=(run, diagnosis), outputs=(out,))
     with job.working("correcting"):

@@ -17,6 +17,7 @@ from typing import Any
 
 from pulsetrainer.cli.console import say
 from pulsetrainer.cli.next_step import as_options, next_step
+from pulsetrainer.cli.starting import loaded
 from pulsetrainer.cli.usage import usage_of
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
 
@@ -34,6 +35,7 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     words = [{"--force": "--overwrite"}.get(w, w) for w in argv if w not in ("--debug", "--verbose")]
     problem: PulsetrainerError
     try:
+        loaded()
         code = _run(program, words)
         sys.stdout.flush()  # here, not at the end of the process, where a full disk has no words
     except PulsetrainerError as error:
@@ -50,7 +52,7 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
         if type(error).__name__ == "NoArgsIsHelpError":  # a bare command is not wrong: this is its help
             sys.stdout.write(f"{error}\n")
             return UsageError.exit_code
-        problem = usage_of(error) or _problem_of(error)
+        problem = usage_of(error, _command_in(words)) or _problem_of(error)
         _trace(debug)
     else:
         return int(code or 0)

@@ -22,16 +22,15 @@ def invert(
     method: Annotated[
         Literal["continuous", "closest-match", "extended"] | None,
         typer.Option(
-            help="continuous (default), closest-match as in the paper, or extended (default if it is)."
+            help="continuous (default), closest-match as in the paper, or extended (default of an extended "
+            "model)."
         ),
     ] = None,
     force_min: Annotated[
         float | None,
-        typer.Option(help="Output at the foot of the pulse, such as N; default: the lowest."),
+        typer.Option(help="Force (or other output) at the foot of the pulse; default: the lowest."),
     ] = None,
-    force_max: Annotated[
-        float | None, typer.Option(help="Output at its top, such as N; default: the highest.")
-    ] = None,
+    force_max: Annotated[float | None, typer.Option(help="Force at its top; default: the highest.")] = None,
     beat: Annotated[
         str | None,
         typer.Option(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import typer
 
 from pulsetrainer.cli.console import Screen, plain
-from pulsetrainer.cli.next_step import as_options
+from pulsetrainer.cli.next_step import as_options, with_files
 from pulsetrainer.errors import UsageError
 from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
@@ -31,6 +31,7 @@ _FORMATS = {
     *(".h5", ".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".npz", ".mat", ".wav"),
     *(".png", ".svg", ".pdf", ".html", ".htm"),
 }
+_IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
 _WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
 # what is no parameter of the work: files have digests, a port may hold what no file may know
 _NOT_PARAMETERS = {"json", "overwrite", "port", "dry_run", "resume", "out", "html"}
@@ -71,11 +72,13 @@ class Job:
         written = [path for path in outputs if path is not None]
         for path in written:
             check_ending(path, context)
-            check_output(path, self.overwrite)
         if len({path.resolve() for path in written}) < len(written):
             raise UsageError(
                 f"{written[0]} was named for two outputs", hint="name another file for one of them"
             )
+        check_keeps_inputs(written, [*inputs, *filter(None, tables)], context)
+        for path in written:
+            check_output(path, self.overwrite)
         for path in inputs:
             check_artefact(path)
         for table in filter(None, tables):
@@ -251,7 +254,19 @@ class Job:
     def notes(self, lines: Sequence[str]) -> None:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
-            self.screen.note(as_options(line))
+            self.screen.note(as_options(with_files(line, self._parameters)))
+
+
+def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context: typer.Context) -> None:
+    """Refuse to write what a command makes over what it makes that from, which nobody could get back."""
+    if context.info_name in _IN_PLACE:
+        return
+    for path in outputs:
+        if any(path.resolve() == given.resolve() for given in inputs):
+            raise UsageError(
+                f"{path} is what {context.info_name} works on and would be lost: it cannot be the output",
+                hint="name another file",
+            )
 
 
 def check_ending(path: Path, context: typer.Context) -> None:

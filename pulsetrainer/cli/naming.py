@@ -11,8 +11,8 @@ from typing import Any
 import typer
 from typer.core import TyperCommand
 
-from pulsetrainer.cli.next_step import MAKES
-from pulsetrainer.errors import AbsentError, ExistsError, Interrupted
+from pulsetrainer.cli.next_step import to_make, with_files
+from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError
 from pulsetrainer.files.input_file import is_sound, near_names
 
 # what the file of an argument holds; others take any artefact, or a table
@@ -71,6 +71,10 @@ class Command(TyperCommand):
             given = _given_as(ctx, error.path)
             if given is not None:
                 _name(error, given, ctx)
+            error.hint = with_files(error.hint, ctx.params)
+            raise
+        except PulsetrainerError as error:
+            error.hint = with_files(error.hint, ctx.params)
             raise
 
 
@@ -114,7 +118,7 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     if near:
         error.hint = f"{' or '.join(kinds) or 'pulsetrainer'} files {where}: {', '.join(near)}"
     elif kinds:
-        usual = f"to make one: {MAKES[kinds[0]]}"
+        usual = f"to make one: {to_make(kinds[0], error.path)}"
         instead = _RUN_FOR.get(command, usual) if kinds == ("run",) else usual
         error.hint = f"there is no {' or '.join(kinds)} file {where}; {instead}"
     else:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import itertools
 import re
 import shlex
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from pulsetrainer.errors import (
     DamagedFileError,
@@ -14,6 +16,7 @@ from pulsetrainer.errors import (
     PulsetrainerError,
     WrongKindError,
 )
+from pulsetrainer.files.input_file import near_names
 
 _TABLES = (".csv", ".tsv", ".txt", ".dat")
 
@@ -45,6 +48,11 @@ _NEXT = {
     "then `pulsetrainer evaluate played.h5 -o evaluation.h5`",
     ("diagnosis", "run"): "run `pulsetrainer diagnose {file} --model model.h5 -o diagnosis.h5`",
     ("diagnosis", "model"): "run `pulsetrainer diagnose RUN.h5 --model {file} -o diagnosis.h5`",
+    (
+        "run",
+        "playback",
+    ): "a run comes from `pulsetrainer capture`; of a playback the errors are told by "
+    "`pulsetrainer evaluate {file} -o evaluation.h5`",
     ("run", "model"): "give the run it was identified from: `pulsetrainer show {file}` tells its history",
     ("run", "diagnosis"): "give the run that was diagnosed: `pulsetrainer show {file}` tells its history",
 }
@@ -59,12 +67,23 @@ def next_step(problem: PulsetrainerError) -> str:
         return _after_wrong_kind(problem)
     if isinstance(problem, DamagedFileError):
         how = (
-            f"with `{MAKES[problem.artefact]}`" if problem.artefact in MAKES else "(see pulsetrainer --help)"
+            f"with `{to_make(problem.artefact, problem.path)}`"
+            if problem.artefact in MAKES
+            else "(see pulsetrainer --help)"
         )
         return f"restore it from a copy, or make it again {how}"
     if isinstance(problem, NotAnArtefactError):
         return _after_foreign_file(problem.path)
     return problem.hint
+
+
+def to_make(kind: str, path: Path) -> str:
+    """Return the command that makes a file of this kind and name; of a single run beside it, from that."""
+    line, _, _ = MAKES[kind].rpartition(" ")
+    runs = near_names(path.with_name("RUN.h5"), ("run",)) if "RUN.h5" in line else []
+    if len(runs) == 1:
+        line = line.replace("RUN.h5", shlex.quote(str(path.with_name(runs[0]))))
+    return f"{line} {shlex.quote(str(path))}"
 
 
 def _free(path: Path) -> Path:
@@ -82,6 +101,25 @@ _PARAMETER = re.compile(r"`([a-z]+(?:_[a-z]+)*)(?:_[A-Z]\w*)?`")  # without the 
 def as_options(text: str) -> str:
     """Return a text with the parameters in it as options: ```force_min_N``` is ``--force-min`` here."""
     return _PARAMETER.sub(lambda found: f"--{found[1].replace('_', '-')}", text)
+
+
+# what a hint calls a file that the command line may name: the parameter that does
+_PLACEHOLDERS = {
+    "RUN.h5": ("run", "runs"),
+    "DIAGNOSIS.h5": ("diagnosis",),
+    "REFINED.h5": ("learnt",),
+}
+
+
+def with_files(text: str, parameters: Mapping[str, Any]) -> str:
+    """Return a text with the files that a command was given in the place of RUN.h5 and the like."""
+    for placeholder, names in _PLACEHOLDERS.items():
+        given: Any = next((value for name in names if (value := parameters.get(name))), None)
+        if isinstance(given, list | tuple) and len(given) == 1:
+            given = given[0]
+        if isinstance(given, str | Path):
+            text = text.replace(placeholder, shlex.quote(str(given)))
+    return text
 
 
 def _after_wrong_kind(problem: WrongKindError) -> str:

@@ -35,7 +35,6 @@ def refine(
     Example: pulsetrainer refine drive.h5 -o refined.h5
     """
     job = Job(context, inputs=(drive,), outputs=(out,))
-    from pulsetrainer.device.limits import check_peak
     from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
     from pulsetrainer.steps.refine import check, plan
 
@@ -47,14 +46,13 @@ def refine(
         rows = {
             "passes": f"at most {passes}, {planned.seconds:.1f} s in all",
             "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
+            "rehearsed": "the first pass, which plays the drive as it is; what it shows decides the others",
         }
         job.would(f"refine {waveform.name}", planned, rows, name=waveform.name, passes=passes)
         return
     stopped: PulsetrainerError | None = None
     with job.working(f"refining {drive.name}") as progress, job.open_device() as device:
         info = device.info
-        hint = "invert again with a lower `force_max`"
-        check_peak(waveform.compensated, info.current_limit_A, hint=hint)
         try:
             refined = pt.refine(waveform, device, passes=passes, progress=progress)
         except (DeviceError, Interrupted) as error:

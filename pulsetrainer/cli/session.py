@@ -51,7 +51,7 @@ def session(
         int | None,
         typer.Option(
             min=0,
-            help="Of the rhythm and of the quiz's order; default: 0, for a quiz drawn.",
+            help="Seed of the rhythm and of a quiz's order; default: 0, for a quiz a new one each time.",
             show_default=False,
         ),
     ] = None,
@@ -84,7 +84,9 @@ def session(
     Example: pulsetrainer session --model extended.h5 -o session.h5 --pulses normal,bifid --minutes 2
     """
     from pulsetrainer.files.pulses import pulse_file
+    from pulsetrainer.steps.asked import check_asked_for
 
+    check_asked_for(answers, quiz)
     names = [name for name in (part.strip() for part in pulses.split(",")) if name]
     tables = [pulse_file(name) for name in names]
     job = Job(context, inputs=(model,), tables=(changes, answers), outputs=(out, html))

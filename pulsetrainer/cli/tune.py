@@ -76,7 +76,7 @@ def tune(
     if out is not None:
         measured = {"resistance_ohm": found.resistance_ohm, "inductance_H": found.inductance_H}
         write_tuned(out, found.serial, measured | found.gains.values(), overwrite=overwrite)
-    _show(job, out, found)
+    _show(job, out, found, supply_V)
 
 
 def _would(
@@ -109,7 +109,7 @@ def _would(
     job.would("tune the device", planned, rows)
 
 
-def _show(job: Job, out: Path | None, found: Tuned) -> None:
+def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> None:
     from pulsetrainer.device.codes import PARAMETERS
 
     units = {parameter.name: parameter.unit for parameter in PARAMETERS}
@@ -122,7 +122,7 @@ def _show(job: Job, out: Path | None, found: Tuned) -> None:
         f"{out}: {found.serial}" if out else f"{found.serial} (gains not kept)",
         {
             "coil": f"{found.resistance_ohm:.2f} ohm, {1e3 * found.inductance_H:.1f} mH, supply "
-            f"{found.supply_V:.1f} V",
+            f"{found.supply_V:.1f} V {'by the diode' if supply_V is None else 'as given'}",
             **{name: f"{value} {units[name]}" for name, value in found.gains.values().items()},
             "margins": f"gain {found.margins.gain:.1f}, phase {found.margins.phase_deg:.0f} degrees",
             "tracking": f"{after:.2f} % of the range at worst"

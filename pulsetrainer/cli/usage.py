@@ -17,13 +17,23 @@ _EXAMPLES = {
     "--smoothing": "--smoothing auto, or a share of the input's range such as --smoothing 0.02",
     "--resample": "--resample even for the median time step, or a rate such as --resample 1000",
 }
+# what is often given as an argument to a command that has none of that kind
+_INSTEAD = {
+    "session": "several pulses are separated by commas: --pulses normal,bifid",
+    "tune": "a drive is an option: pulsetrainer tune --drive {extra}",
+    "ports": "to look at one: pulsetrainer doctor --port {extra}",
+    "doctor": "a port is an option: pulsetrainer doctor --port {extra}",
+}
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 
 
-def usage_of(error: Exception) -> UsageError | None:
-    """Return what the parser objects to, or None when the error is not the parser's."""
+def usage_of(error: Exception, named: str = "") -> UsageError | None:
+    """Return what the parser objects to, or None when the error is not the parser's.
+
+    ``named`` is the command, which the parser does not always tell.
+    """
     explain = getattr(error, "format_message", None)
     if explain is None:
         return None
@@ -32,22 +42,29 @@ def usage_of(error: Exception) -> UsageError | None:
     parameter: Any = getattr(error, "param", None)
     kind, help_ = type(error).__name__, f"{command} --help"
     if kind == "NoSuchOption":
-        near = getattr(error, "possibilities", None)
+        near = getattr(error, "possibilities", None) or _beginning_alike(error, context)
         said = f"{command} has no option {getattr(error, 'option_name', '')}"
         return UsageError(said, hint=f"did you mean {' or '.join(near)}?" if near else help_)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
         return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
-    named = getattr(error, "param_hint", None)  # of what a command finds out itself
-    if kind == "BadParameter" and isinstance(named, str):
-        said = f"{named} {str(getattr(error, 'message', error)).rstrip('.')}"
-        return UsageError(said, hint=_EXAMPLES.get(named, help_))
+    option = getattr(error, "param_hint", None)  # of what a command finds out itself
+    if kind == "BadParameter" and isinstance(option, str):
+        said = f"{option} {str(getattr(error, 'message', error)).rstrip('.')}"
+        return UsageError(said, hint=_EXAMPLES.get(option, help_))
     return (
-        _with_or_without_value(error)
+        _with_or_without_value(error, named)
         if kind == "BadOptionUsage"
         else _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
     )
+
+
+def _beginning_alike(error: Exception, context: Any) -> list[str]:
+    """Return the options that begin with the letter of a short one that there is not."""
+    given = str(getattr(error, "option_name", ""))
+    names = [name for one in getattr(getattr(context, "command", None), "params", ()) for name in one.opts]
+    return [name for name in names if len(given) == 2 and name.startswith(f"--{given[1:]}")]
 
 
 def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
@@ -63,11 +80,12 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     return UsageError(said, hint=like)
 
 
-def _with_or_without_value(error: Exception) -> UsageError:
+def _with_or_without_value(error: Exception, command: str) -> UsageError:
     """A value where none goes, or none where one does; the parser does not tell of which command."""
     takes = "takes no value" if "not take" in str(getattr(error, "message", "")) else "needs a value"
     return UsageError(
-        f"{getattr(error, 'option_name', 'an option')} {takes}", hint="pulsetrainer COMMAND --help"
+        f"{getattr(error, 'option_name', 'an option')} {takes}",
+        hint=" ".join(("pulsetrainer", *filter(None, [command]), "--help")),
     )
 
 
@@ -90,6 +108,10 @@ def _other(said: str, command: str, parsed: Any) -> UsageError:
     unknown = _UNKNOWN.match(said)
     if unknown is None:
         return UsageError(said, hint=help_)
+    if unknown[1] == "help":
+        return UsageError(
+            "there is no command 'help'", hint="pulsetrainer --help, or pulsetrainer identify --help"
+        )
     near = f"did you mean {unknown[2]}? All commands: " if unknown[2] else ""
     return UsageError(f"there is no command {unknown[1]!r}", hint=f"{near}{help_}")
 
@@ -97,10 +119,11 @@ def _other(said: str, command: str, parsed: Any) -> UsageError:
 def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     """What stands behind the arguments that a command takes."""
     taken = [p.human_readable_name for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
+    instead = _INSTEAD.get(command.rpartition(" ")[2], "{command} --help")
     beside = "one file at a time; evaluations or sessions side by side: pulsetrainer compare a.h5 b.h5"
     return UsageError(
         f"{command} takes {' and '.join(taken) or 'options only'}, got {extra} besides",
-        hint=beside if taken == ["FILE.h5"] else f"{command} --help",
+        hint=beside if taken == ["FILE.h5"] else instead.format(command=command, extra=extra),
     )
 
 

@@ -72,12 +72,15 @@ def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:
     return done
 
 
-def minor_coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> float:
+def minor_coverage(plane: Plane, inputs: Sequence[ArrayLike], noise: float = 0.0) -> float:
     """Share of the cells within the plane that minor loops tell apart; the major loop alone tells none.
 
     A record tells the weight of a cell where the corner (alpha, beta) of its remembered extremes passes
     through it: from a maximum in band i down to band j, or from a minimum in band j up to band i. Corners on
     the two outer edges of the plane are those of the major loop; their cells are not counted.
+
+    ``noise``, input unit, is how far noise moves a turn. One so near an edge is taken for one on it, with a
+    minimum in the band above the edge and a maximum in that below. What lies beyond the plane is at its end.
 
     Raises
     ------
@@ -86,16 +89,18 @@ def minor_coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> float:
     """
     passed = np.zeros((plane.n_h, plane.n_h), dtype=bool)
     for values in inputs:
-        path = np.concatenate(([plane.low], finite_vector("input", values)))
-        _mark_corners(plane, path[turning_points(path)], passed)
+        path = np.concatenate(([plane.low], np.clip(finite_vector("input", values), plane.low, plane.high)))
+        _mark_corners(plane, path[turning_points(path)], noise, passed)
     i, j = plane.cell_indices
     within = (i < plane.n_h - 1) & (j > 0)
     return float(np.mean(passed[i, j][within])) if within.any() else 0.0
 
 
-def _mark_corners(plane: Plane, turns: FloatArray, passed: NDArray[np.bool_]) -> None:
+def _mark_corners(plane: Plane, turns: FloatArray, noise: float, passed: NDArray[np.bool_]) -> None:
     """Mark the cells (n_h, n_h) that corners of the memory pass, rising first, from negative saturation."""
-    bands = np.clip(np.searchsorted(plane.edges, turns, side="right") - 1, 0, plane.n_h - 1).tolist()
+    inwards = min(noise, 0.5 * float(np.diff(plane.edges).min())) * np.where(np.arange(turns.size) % 2, 1, -1)
+    bands = np.searchsorted(plane.edges, turns + inwards, side="right") - 1
+    bands = np.clip(bands, 0, plane.n_h - 1).tolist()
     last = plane.n_h - 1
     # remembered extremes and their bands; the outermost of both kinds are those of saturation
     maxima, minima = [(np.inf, last)], [(-np.inf, 0)]

@@ -127,8 +127,9 @@ def _check_step(step: float, reach: float) -> None:
     """Raise ArgumentError where the signal would jump over its whole range (``reach``) between samples."""
     if step > reach:
         raise ArgumentError(
-            f"from one sample to the next the signal would go {step:.3g}, but its range is {reach:.3g}",
-            hint="a lower speed or a higher rate",
+            f"from one sample to the next the signal would go {step:.3g}, more than its whole range of "
+            f"{reach:.3g}",
+            hint="give a lower `speed_A_per_s`, or a higher `rate_Hz`",
         )
 
 

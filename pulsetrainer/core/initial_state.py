@@ -55,8 +55,8 @@ def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high
     if left <= 0:
         return ""
     return (
-        f"the first stroke runs elsewhere than the later ones from there: its {left} samples are left out "
-        "(cycle the device once before a recording)"
+        "the first stroke is unlike all later ones from the same end, as of a device that was not cycled "
+        f"before; its {left} samples are not counted, so the result does not suffer"
     )
 
 

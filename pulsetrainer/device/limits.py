@@ -67,14 +67,16 @@ def checked_wire(
     return wire
 
 
-def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str) -> None:
+def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str = "") -> None:
     """Raise ArgumentError where a reference (n,) in A goes beyond the limit in force.
 
-    ``hint`` says what else to play; to raise the limit is a way out only where the device allows the current.
+    ``hint`` says what else to play, if it was not made from a model; to raise the limit is a way out only
+    where the device allows the current.
     """
+    hint = hint or less_current(f"`current_max_A` at most {limit_A:g}")
     peak = float(np.max(reference_A, initial=0.0))
     if limit_A < CURRENT_A and peak <= CURRENT_A + codes.CURRENT_UNIT_A / 2:
-        hint += f", or raise `limit_current_A` to {peak:.4g} where it was lowered"
+        hint = f"raise `limit_current_A` to {peak:.4g} where it was lowered, or {hint}"
     if peak > limit_A + codes.CURRENT_UNIT_A / 2:
         raise ArgumentError(
             f"the current goes up to {peak:.4g} A; the limit in force is {limit_A:g} A", hint=hint
@@ -118,14 +120,15 @@ class Rehearsal:
                 hint="play fewer repeats, or at a lower current",
             )
         self._warm(current, rate_Hz)
+        foretold = expected_N is not None
         if expected_N is None:
-            expected_N = least_force(current, rate_Hz)  # where nobody foretells it
-        self._press(expected_N, "raise `limit_force_N`, or invert again with a lower `force_max`")
+            expected_N = least_force(current, rate_Hz)
+        self._press(current, expected_N, foretold=foretold)
 
     def stream(self, reference_A: FloatArray, rate_Hz: float, expected_N: FloatArray) -> None:
         """Take the next piece (n,) of a reference without a known end as played; otherwise as ``play``."""
         current = codes.CURRENT_UNIT_A * to_wire(reference_A, limit_A=self.current_A).astype(float)
-        self._press(expected_N, "raise `limit_force_N`, or take a model that was captured with less current")
+        self._press(current, expected_N)
         if self._warm(current, rate_Hz) > 1.0:
             raise DeviceError(
                 "the device would stop: the coil becomes too hot in the middle of a beat",
@@ -140,14 +143,25 @@ class Rehearsal:
         self.most_heat = max(self.most_heat, most)
         return most
 
-    def _press(self, expected_N: FloatArray, hint: str) -> None:
+    def _press(self, current_A: FloatArray, expected_N: FloatArray, *, foretold: bool = True) -> None:
         most = float(np.nanmax(expected_N))
         if most > self.force_N:
+            # a slower stroke creeps higher, and sensors have noise: a tenth of the limit is left to them
+            told_A = math.floor(100 * current_A[int(np.argmax(expected_N > 0.9 * self.force_N))]) / 100
+            lower = f"`current_max_A` at most {told_A:g}" if foretold else "a lower `current_max_A`"
             raise DeviceError(
                 f"the device would stop: {most:.3g} N are foretold, and its force limit is "
                 f"{self.force_N:g} N",
-                hint=hint,
+                hint=f"raise `limit_force_N`, or {less_current(lower)}",
             )
+
+
+def less_current(than: str) -> str:
+    """Say how less is pressed in all that is made from a model: a lower pulse does not do it."""
+    return (
+        f"capture with {than}, then identify and invert again: whatever is made from a model begins with a "
+        "stroke over its whole range"
+    )
 
 
 def too_hot_ever() -> ArgumentError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -91,8 +92,12 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
     number = getattr(error, "errno", None) or next(iter(getattr(error.__context__, "args", error.args)), None)
     text = str(error)
     if "://" in port:
+        whole = not re.fullmatch(r"socket://[^:/]+/?", port)
         return DeviceError(
-            f"cannot reach {port}: {text}", hint="check host and port number, and that the other side listens"
+            f"cannot reach {port}: {text if whole else 'it names no port number'}",
+            hint="check host and port number, and that the other side listens"
+            if whole
+            else f"give the port number too, such as {port.rstrip('/')}:5000",
         )
     if number == errno.EACCES and os.name == "posix":
         return DeviceError(

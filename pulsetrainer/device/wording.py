@@ -7,12 +7,13 @@ from enum import IntEnum
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
+from pulsetrainer.device.limits import less_current
 
 FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
 # What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
-    codes.Fault.OVER_FORCE: "press less (`force_max` of invert, `amplitude` of session, "
-    "`current_max_A` of capture), or raise `limit_force_N` where it was lowered",
+    codes.Fault.OVER_FORCE: "raise `limit_force_N` where it was lowered, or "
+    + less_current("`current_max_A` well below the current told here"),
     codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where supply or "
     "coil are others than before, set the gains for them: pulsetrainer tune -o pulsetrainer.toml",
     codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",

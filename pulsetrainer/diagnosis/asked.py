@@ -71,7 +71,7 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
     if model.reading != "continuous":
         raise DataError(
             f"{model_name} reads its weights as relays, whose steps would be mistaken for causes",
-            hint="identify it with the continuous operator: pulsetrainer identify RUN.h5 -o model.h5",
+            hint="identify it with `reading` continuous, which is the default",
         )
     low, high = input_range(model)
     u, slack = run.input[np.isfinite(run.input)], LIMITS.beyond_range * (high - low)

@@ -118,6 +118,10 @@ ADVICE: Mapping[str, str] = {
         "These recordings could not have shown {names} of {matters:.2g} % of the span. Record the same for "
         "{times:.2g} times as long, or with less noise, and diagnose that."
     ),
+    "far too noisy": (
+        "These recordings could not have shown {names} of {matters:.2g} % of the span, and longer ones would "
+        "hardly do so. Record with less noise: averaged, with a finer sensor, or over a wider range."
+    ),
     "inconclusive": (
         "These recordings could not have shown {names} of {matters:.2g} % of the span. "
         f"To see it, {AGAIN}"
@@ -149,7 +153,7 @@ ADVICE: Mapping[str, str] = {
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
     ),
     "identify anew": (
-        "Identify the device again in this condition (pulsetrainer identify RUN.h5 -o model.h5), and "
+        "Identify the device again in this condition (a new run, then pulsetrainer identify), and "
         "diagnose with the new model."
     ),
 }

@@ -168,6 +168,7 @@ def make_header(
     ancestors: Sequence[Header] = (),
     device: Device | None = None,
     libraries: Mapping[str, str] | None = None,
+    program: str = PROGRAM,
 ) -> Header:
     """Return the header of a new artefact.
 
@@ -184,6 +185,7 @@ def make_header(
             f"the time {now.isoformat()} has no time zone", hint="pass datetime.now(UTC), not datetime.now()"
         )
     provenance = Provenance(
+        program=program,
         argv=tuple(argv),
         parameters=parameters or {},
         seed=seed,

@@ -16,6 +16,10 @@ from pulsetrainer.errors import UsageError
 
 FILE_NAME = "pulsetrainer.toml"
 VARIABLE = "PULSETRAINER_SETTINGS"
+_TOML_LINES = {
+    "settings": 'port = "/dev/ttyUSB0"',
+    "bounds": '"normal.continuous.mean_error_reduction_percent" = [90, 100]',
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +61,9 @@ def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
     chosen = named or environment.get(VARIABLE)
     if chosen:
         if not Path(chosen).is_file():
+            is_what = "is a folder" if Path(chosen).is_dir() else "does not exist"
             raise UsageError(
-                f"the file of settings {chosen} does not exist",
+                f"the file of settings {chosen} {is_what}",
                 hint="check its name, or leave --settings out"
                 if named
                 else f"check its name, or take the variable {VARIABLE} away",
@@ -77,7 +82,10 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise UsageError(f"the {what} in {path} cannot be read: {error}", hint="correct the file") from error
+        raise UsageError(
+            f"the {what} in {path} cannot be read: {error}",
+            hint=f"write it as TOML, a line each, such as: {_TOML_LINES[what]}",
+        ) from error
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -117,8 +125,11 @@ def _value(path: Path, key: str, value: Any) -> Any:
         value = float(value)
     if type(value) is not setting.kind or (isinstance(value, int | float) and not value > 0):
         wanted = {str: "text", int: "a whole number above 0", float: f"a number of {setting.unit} above 0"}
+        table, _, name = key.rpartition(".")
+        usual = {str: '"bench:"', int: "5", float: "1.0"}[setting.kind]
         raise UsageError(
-            f"{path} sets {key} = {value!r}; it must be {wanted[setting.kind]}", hint="correct the file"
+            f"{path} sets {key} = {value!r}; it must be {wanted[setting.kind]}",
+            hint=f"write, for instance, {name} = {usual}" + (f" below [{table}]" if table else ""),
         )
     return value
 

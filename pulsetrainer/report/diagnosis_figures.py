@@ -27,6 +27,7 @@ from pulsetrainer.report.style import (
 )
 
 _MOST_BARS = 10
+SEEN = 0.05  # % that a cause explains: less reads 0.0
 _WHOLE = 100.0 + 1e-9  # %
 _SHADES = {"yes": BLUE, "in doubt": GREEN, "no": MUTED}
 _MANY = 1.5  # decades: over fewer, an even scale shows more
@@ -126,7 +127,7 @@ def dependence(one: Dependence, output_quantity: str = "") -> Figure:
 @styled
 def ranking(found: Diagnosis) -> Figure:
     """Return how much of the error beyond noise each cause explains, whether it was found, and why not."""
-    shown = [one for one in found.causes if one.found or explains(one, found) > 0][:_MOST_BARS][::-1]
+    shown = [one for one in found.causes if one.found or explains(one, found) > SEEN][:_MOST_BARS][::-1]
     figure = Figure(figsize=(COLUMN_IN, 1.0 + 0.34 * max(len(shown), 1)), layout="constrained")
     axes = figure.add_subplot()
     share = [max(one.explains_percent, 1e-3) for one in shown]

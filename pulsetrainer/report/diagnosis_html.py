@@ -7,6 +7,7 @@ from typing import Any
 
 from pulsetrainer.artefacts import Diagnosis
 from pulsetrainer.report import diagnosis_text
+from pulsetrainer.report.diagnosis_figures import SEEN
 from pulsetrainer.report.diagnosis_text import explains, in_doubt
 from pulsetrainer.report.html import page
 
@@ -22,7 +23,7 @@ def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header
         commands=commands,
         headline=headline(found),
         shown=shown,
-        ranked=any(one.found or explains(one, found) > 0 for one in shown),
+        ranked=any(one.found or explains(one, found) > SEEN for one in shown),
     )
 
 

@@ -76,7 +76,7 @@ _LOOPS = {
     "counterclockwise": "counterclockwise, the output lags",
     "clockwise": "clockwise, the output leads",
     "butterfly": "a butterfly, it crosses itself",
-    "none": "none, the output follows the input",
+    "none": "no loop, the output follows the input",
 }
 
 

@@ -167,7 +167,7 @@ def evaluation(errors: Evaluation) -> Figure:
     if rows == 0:
         raise DataError(
             "this evaluation holds neither played waveforms nor models, so there is nothing to draw",
-            hint="evaluate again: pulsetrainer evaluate PLAYED.h5 -o EVALUATION.h5",
+            hint="evaluate again, with pulsetrainer evaluate",
         )
     figure = _sheet(2 * COLUMN_IN, _ROW_IN * rows)
     cells = figure.subfigures(rows, 2, squeeze=False)

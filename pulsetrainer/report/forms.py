@@ -19,7 +19,8 @@ def figure_form(path: Path, what: str, *more: str) -> str:
     if form not in (*FORMATS, *more):
         known = [*FORMATS, *more]
         raise UsageError(
-            f"{what} is written as {', '.join(known[:-1])} or {known[-1]}, but {path} ends in {form!r}",
+            f"{what} is written as {', '.join(known[:-1])} or {known[-1]}, but {path} "
+            + (f"ends in {form!r}" if form else "has no such ending"),
             hint=f"name it {path.parent / (path.stem or 'figure')}.png",
         )
     return form

@@ -27,7 +27,7 @@ from pulsetrainer.artefacts.evaluation import METRICS, PUBLISHED
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import diagnosis_figures, figures, heat_figures, panels, session_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
-from pulsetrainer.report.names import NAMES, OVERVIEW
+from pulsetrainer.report.names import NAMES, OVERVIEW, digits
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
 
@@ -44,17 +44,21 @@ class Number:
     published: bool = False  # somebody else's: not of this evaluation
 
 
-def number(value: float | None, metric: str = "", digits: str = ".2f", *, published: bool = False) -> Number:
-    """Return a number for the page; NaN, the mean of nothing, is said in words; None is an empty place."""
+def number(value: float | None, metric: str = "", form: str = "", *, published: bool = False) -> Number:
+    """Return a number for the page, in a form or with its usual digits.
+
+    NaN, the mean of nothing, is said in words; None is an empty place.
+    """
     if value is None:
         return Number("")
-    text = format(value, digits).replace("-", "−") if math.isfinite(value) else "no value"
+    printed = format(value, form) if form else digits(value)
+    text = printed.replace("-", "−") if math.isfinite(value) else "no value"
     return Number(text, repr(float(value)), metric, published)
 
 
-def known(value: float | None, metric: str, digits: str) -> Number:
+def known(value: float | None, metric: str, form: str) -> Number:
     """Return a number for the page; an empty place where it was not measured."""
-    return number(value if value is not None and math.isfinite(value) else None, metric, digits)
+    return number(value if value is not None and math.isfinite(value) else None, metric, form)
 
 
 def count(value: int, metric: str) -> Number:
@@ -62,9 +66,9 @@ def count(value: int, metric: str) -> Number:
     return Number(str(value), str(value), metric)
 
 
-def metric(played: WaveformEvaluation, dotted: str, digits: str = ".2f") -> Number:
+def metric(played: WaveformEvaluation, dotted: str, stem: str, form: str = "") -> Number:
     """Return a figure of a played waveform by its name within it: ``scaled.max_abs_error_percent``."""
-    return number(attrgetter(dotted)(played), f"{played.name}.{played.inversion}.{dotted}", digits)
+    return number(attrgetter(dotted)(played), f"{stem}.{dotted}", form)
 
 
 def picture(figure: Figure, identifier: str, title: str, words: Markup) -> Markup:
@@ -132,11 +136,15 @@ def render_evaluation(
     return page(
         "evaluation.html.j2",
         **header,
-        waveforms=[(f"waveform-{k}", one) for k, one in enumerate(played, start=1)],
+        waveforms=[
+            (f"waveform-{k}", one, stem)
+            for k, (one, stem) in enumerate(zip(played, evaluation.stems, strict=False), start=1)
+        ],
         published=published,
         model=evaluation.model,
         model_title=f"Model{last}",
         predicted=evaluation.models,
+        model_stems=evaluation.stems[len(played) :],
     )
 
 
@@ -151,8 +159,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    made.filters |= {"unbroken": unbroken, "unit": shown, "stem": lambda name: PurePath(name).stem}
-    made.filters["digits"] = format
+    made.filters |= {"unbroken": unbroken, "unit": shown, "digits": format, "rounded": digits}
     made.tests["of_a_curve"] = of_a_curve
     made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS, "Number": Number}
     for tool in (number, known, count, metric, picture, reach, densest, label, panels.titled, panels.scale):

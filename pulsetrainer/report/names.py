@@ -82,3 +82,8 @@ def split(dotted: str) -> tuple[str, Named]:
 def headed(kind: str, title: str) -> str:
     """Return a title that says of which kind the artefact is, once."""
     return title if title.lower().startswith(kind) else f"{kind}: {title}"
+
+
+def digits(value: float) -> str:
+    """Return a figure with two decimals; a small one with three significant digits, never as nothing."""
+    return f"{value:.3g}" if 0.0 < abs(value) < 0.1 else f"{value:.2f}"

@@ -27,6 +27,7 @@ from pulsetrainer.artefacts import (
 )
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.core.metrics import beats
+from pulsetrainer.report.names import digits
 from pulsetrainer.report.style import (
     COMPENSATED,
     ERROR,
@@ -262,7 +263,7 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
     for one, style in zip(played, cycle(METHODS)):
         size = min(time.size, one.target.size)
         x, measured, target = time[:size], one.compensated.output[:size], one.target[:size]
-        shown = f"{one.inversion}, mean error {one.compensated.mean_abs_error_percent:.2f} %"
+        shown = f"{one.inversion}, mean error {digits(one.compensated.mean_abs_error_percent)} %"
         trace(above, x, measured, **style, label=shown)
         trace(below, x, 100.0 * (measured - target) / one.full_force, **style)
     above.set_ylabel(label("force", first.output_unit))
@@ -292,7 +293,7 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
         drawn.append((one.inversion if several else "compensated", one, one.compensated, style))
     for name, one, drive, style in drawn:
         beat = slice(0, one.target.size // beats(one.target))
-        shown = f"{name}, loop area {drive.hysteresis_percent:.2f} %"
+        shown = f"{name}, loop area {digits(drive.hysteresis_percent)} %"
         orbit(axes, one.target[beat], drive.output[beat], **style, label=shown)
     axes.set_aspect("equal")
     axes.set_xlabel(label("target", first.output_unit))

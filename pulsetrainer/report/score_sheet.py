@@ -12,14 +12,14 @@ from pulsetrainer.report.html import number, page
 from pulsetrainer.report.names import NAMES
 
 _FIGURES = (
-    ("mean_abs_error_percent", ".2f"),
-    ("max_abs_error_percent", ".2f"),
+    ("mean_abs_error_percent", ""),
+    ("max_abs_error_percent", ""),
     ("error_jnd", ".3f"),
-    ("nrmse_percent", ".2f"),
-    ("beat_timing_max_ms", ".2f"),
+    ("nrmse_percent", ""),
+    ("beat_timing_max_ms", ""),
     ("rate_cv_percent", ".3f"),
-    ("amplitude_cv_percent", ".2f"),
-    ("augmentation_index_error_percent", ".2f"),
+    ("amplitude_cv_percent", ""),
+    ("augmentation_index_error_percent", ""),
 )
 _RHYTHM = (
     ("variability", "intervals vary by {:g} % (standard deviation)"),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import isnan
 from typing import Any
 
-from pulsetrainer.report.names import NAMES, split
+from pulsetrainer.report.names import NAMES, digits, split
 
 ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
 _BROAD = 10_000  # as wide as the table needs: figures are never cut
@@ -124,7 +124,7 @@ def text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.2f}" if 0.1 <= abs(value) < 1e5 or value == 0 else f"{value:.3g}"
+        return digits(value) if abs(value) < 1e5 else f"{value:.3g}"
     if isinstance(value, list | tuple):
         return ", ".join(text(item) for item in value) or "none"
     return str(value)

@@ -6,6 +6,7 @@ import contextlib
 import difflib
 import math
 import os
+import re
 import select
 import subprocess
 import sys
@@ -20,7 +21,7 @@ from pulsetrainer.simulation.build import firmware_executable
 from pulsetrainer.simulation.options import BenchOptions, number_in, parse_bench
 
 BENCH_PORT = "bench:"
-_OWN = ("ideal", "speed", "break", "wire", "wire-seed")
+_OWN = ("ideal", "speed", "break", "wire", "wire-seed", "serial")
 _START_S = 10.0
 _LEAVE_S = 2.0
 
@@ -50,6 +51,12 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
             within = f"{low} to {high} {unit}".removesuffix(" 1")
             most = sys.float_info.max
             amiss = "is not a number from" if math.isnan(number_in(value, -most, most)) else "is outside"
+            if re.search(r"[,;]\w+=", value):
+                return UsageError(
+                    f"`port`: the bench parameter {name}={value} {amiss} {within}",
+                    hint="put & between parameters, and quotes around them: "
+                    f"`port` 'bench:?{name}={re.sub('[,;]', '&', value)}'",
+                )
             return UsageError(
                 f"`port`: the bench parameter {name}={value} {amiss} {within}",
                 hint=f"give {name} ({meaning}) a value in that range",

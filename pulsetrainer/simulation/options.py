@@ -88,6 +88,7 @@ class BenchOptions:
     settings: tuple[tuple[str, str], ...] = ()
     breaks: tuple[str, ...] = ()
     wire: Wire = GOOD_WIRE
+    serial: str = ""  # its number, where that is not the seed's: a known device with another inside
 
     def arguments(self) -> list[str]:
         """Return the firmware process's command-line arguments."""
@@ -96,7 +97,24 @@ class BenchOptions:
             words += ["--set", f"{name}={value}"]
         for what in self.breaks:
             words += ["--break", what]
-        return words
+        return words + (["--serial", self.serial] if self.serial else [])
+
+
+def _switch(text: str) -> bool:
+    if text not in {"", "1", "0"}:
+        raise UsageError(
+            f"`port`: the bench parameter ideal takes no value, got {text!r}", hint='`port` "bench:?ideal"'
+        )
+    return text != "0"
+
+
+def _number_of_device(text: str) -> str:
+    if not re.fullmatch(r"\d{1,8}", text):
+        raise UsageError(
+            f"`port`: the bench parameter serial={text} is not a whole number of up to eight digits",
+            hint='`port` "bench:?seed=4&serial=3"',
+        )
+    return text
 
 
 def parse_bench(port: str) -> BenchOptions:
@@ -110,18 +128,13 @@ def parse_bench(port: str) -> BenchOptions:
             f"`port`: {port!r} is not a bench port",
             hint='like this: `port` "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
-    ideal, speed = False, "max"
+    ideal, speed, serial = False, "max", ""
     wire = GOOD_WIRE
     settings: list[tuple[str, str]] = []
     breaks: list[str] = []
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
         if name == "ideal":
-            if value not in {"", "1", "0"}:
-                raise UsageError(
-                    f"`port`: the bench parameter ideal takes no value, got {value!r}",
-                    hint='`port` "bench:?ideal"',
-                )
-            ideal = value != "0"
+            ideal = _switch(value)
         elif name == "speed":
             if value not in _SPEEDS:
                 raise UsageError(
@@ -133,9 +146,11 @@ def parse_bench(port: str) -> BenchOptions:
             breaks.append(value)
         elif name in ("wire", "wire-seed"):
             wire = wire.told("bench", name, value)
+        elif name == "serial":
+            serial = _number_of_device(value)
         else:
             settings.append((name, value))
-    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), wire)
+    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), wire, serial)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +201,11 @@ def _setting(name: str, text: str) -> float:
 
 def serial_of(port: str) -> str:
     """Return the serial number of a simulated device by its port; empty for one that must be asked."""
-    return {"bench": "BENCH-0", "qemu": "QEMU-0"}.get(port.partition(":")[0], "")
+    if not port.startswith("bench:"):
+        return "QEMU-0" if port.startswith("qemu:") else ""
+    options = parse_bench(port)
+    number = options.serial or dict(options.settings).get("seed", "0")
+    return f"BENCH-{int(number)}" if number.isdecimal() else ""
 
 
 def check_port(port: str) -> None:

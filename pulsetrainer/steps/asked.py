@@ -27,6 +27,15 @@ def check_force_range(low: float | None, high: float | None) -> None:
         )
 
 
+def check_asked_for(answers: object, quiz: int) -> None:
+    """Raise UsageError for answers that no quiz asks for."""
+    if answers and not quiz:
+        raise UsageError(
+            "`answers` were given, but no quiz asks for them",
+            hint="give `quiz` with the number of questions, or leave `answers` out",
+        )
+
+
 def check_several(evaluations: Sequence[object]) -> None:
     """Raise UsageError where there are fewer than two to compare."""
     if len(evaluations) < 2:

@@ -21,7 +21,7 @@ from pulsetrainer.errors import DataError
 from pulsetrainer.steps.heat import check_same_device, rest_force, thermal_of, thermometer
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import condition
-from pulsetrainer.steps.stopped import raise_if_stopped
+from pulsetrainer.steps.stopped import raise_if_lost, raise_if_stopped
 
 if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
@@ -127,13 +127,13 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     check_same_device(model, device)
     operator = operator_of(model)  # the edges of a dual model are forces
     low, high = operator.low, operator.high
-    hint = "a check plays the whole range of the model: check a model of less range"
-    check_peak(np.asarray([low, high]), device.info.current_limit_A, hint=hint)
+    check_peak(np.asarray([low, high]), device.info.current_limit_A)
     condition(device, high, RATE_HZ)
     progress(0.2)
     reference = signal(max(low, 0.0), high)
     trace = device.play(reference, RATE_HZ)
     raise_if_stopped(trace.fault, trace.remedy, "the check")
+    raise_if_lost(trace.samples, trace.dropped_samples, "the check")
     progress(0.9)
     at = 10 * np.arange(reference.size)  # in ticks; lost samples lie between their neighbours
     current, force = (np.interp(at, trace.tick, told) for told in (trace.current_A, trace.force_N))

@@ -58,7 +58,7 @@ def extend(
         )
         if diagnosis.correctable:
             hint = (
-                "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis diagnosis.h5 -o corrected.h5"
+                "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis DIAGNOSIS.h5 -o corrected.h5"
             )
         elif diagnosis.quick:
             hint = "diagnose without `quick`"

@@ -147,7 +147,7 @@ def identify(
     remembered = [x for x, _ in (exchanged(_signals(measured)) if dual else _signals(measured))]
     covered = coverage(plane, remembered)
     notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
-    minor_percent = 100.0 * minor_coverage(plane, remembered)
+    minor_percent = 100.0 * minor_coverage(plane, remembered, _unsure(measured, cleaned, dual=dual))
     warning = fit_notes.warning(fitted, measured, form, minor_percent)
     little = fit_notes.of_no_minor_loops(fitted, measured[0], minor_percent)
     notes += little if warning else [*fit_notes.of_rest(fitted), *little]
@@ -288,6 +288,12 @@ def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
     return low, high
 
 
+def _unsure(runs: Sequence[Run], cleaned: Sequence[input_noise.Cleaned], *, dual: bool) -> float:
+    """How far noise moves the turns of what the operator remembers: the inputs, or of a dual the outputs."""
+    turned = [input_noise.clean(run.output) for run in runs] if dual else cleaned
+    return max(one.dead_band for one in turned)
+
+
 def _of_noise(cleaned: Sequence[input_noise.Cleaned], unit: str) -> list[str]:
     """Say how many reversals of the input were noise."""
     removed = sum(clean.removed for clean in cleaned)
@@ -296,8 +302,8 @@ def _of_noise(cleaned: Sequence[input_noise.Cleaned], unit: str) -> list[str]:
     worst = max(cleaned, key=lambda clean: clean.removed)
     sigma, band = with_unit(f"{worst.sigma:.2g}", unit), with_unit(f"{worst.dead_band:.2g}", unit)
     kept = sum(clean.kept for clean in cleaned)
-    found = f"the measured input has noise of {sigma}"
-    return [f"{found}: {removed} false reversals below {band} taken out, {kept} left"]
+    found = f"noise of {sigma} in the measured input"
+    return [f"{found} made {removed} false reversals, all below {band}: taken out; {kept} real ones are left"]
 
 
 def _of_offsets(names: Sequence[str], fitted: Fitted, runs: Sequence[Run]) -> list[str]:

@@ -119,7 +119,9 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
         false_reversals=cleaned.removed,
         input_noise=cleaned.sigma if np.isfinite(cleaned.sigma) else None,
         coverage_percent=100.0 * float(np.mean(covered)),
-        minor_percent=0.0 if plane is None else 100.0 * minor_coverage(plane, [cleaned.input]),
+        minor_percent=0.0
+        if plane is None
+        else 100.0 * minor_coverage(plane, [cleaned.input], cleaned.dead_band),
         every=every,
     )
 

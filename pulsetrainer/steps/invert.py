@@ -14,6 +14,7 @@ from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
+from pulsetrainer.device.limits import ON_TIME_S
 from pulsetrainer.diagnosis.prediction import extended_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
 from pulsetrainer.steps.asked import check_force_range
@@ -26,6 +27,8 @@ from pulsetrainer.steps.progress import Progress, silent
 Inversion = Literal["continuous", "closest-match", "extended"]
 
 DEVICE_SLEW_A_PER_S = 30.0  # as fast as the coil of our own device follows
+_SLIGHT = 1.0  # % of full force: below what presses and sensors of such devices repeat
+_AROUND_S = 3.0  # of a drive beside its beats: the stroke before them, ramps, rest
 EXPECTED = 5.0  # % of full force: a larger error that the model itself expects is a warning
 _NORMALISED = 0.02  # how far the ends of a mere shape may lie from 0 and 1
 DEVICE_RATE_HZ = 1000.0  # as our own device plays; the parts around the beats have samples for it
@@ -105,6 +108,7 @@ def invert(
     own_Hz = DEVICE_RATE_HZ if rate_Hz is None else rate_Hz  # of what comes before and after the beats
     rate_Hz = _rate_for(shape, model, notes) if rate_Hz is None else rate_Hz
     _check_sampled(shape, rate_Hz)
+    _check_length(shape, model, periods)
     _check_describes(model, name, despite_warning=despite_warning)
     chosen = _method(method, model, name)
     part = invertible(model, own_Hz)
@@ -120,8 +124,6 @@ def invert(
         exact, clipped = _tracked(model, part, layout, notes, BAND_HZ * (rate_Hz / own_Hz))
     else:
         exact, clipped = _compensated(part, chosen, layout)
-    if clipped:
-        notes.append(f"{clipped} samples of the target were out of reach and were clipped")
     limit = slew_limit(slew, model)
     current = exact if limit is None else inversion.slew_limited(exact, rate_Hz, limit)
     compensated = np.concatenate((part.lead, current, part.tail))
@@ -182,6 +184,20 @@ def _check_sampled(shape: Shape, rate_Hz: float) -> None:
         )
 
 
+def _check_length(shape: Shape, model: Model, periods: int) -> None:
+    """Refuse for our own device what it could not play in one go."""
+    longest_s = ON_TIME_S - _AROUND_S
+    if model.input_unit == "A" and model.captured and periods * shape.period_s > longest_s:
+        most = int(longest_s / shape.period_s)
+        raise ArgumentError(
+            f"{periods} periods of {shape.name} last {periods * shape.period_s:.5g} s; the device stays on "
+            f"for at most {ON_TIME_S:g} s at a time",
+            hint=f"give `periods` at most {most}; pulsetrainer session presses for as long as you like"
+            if most
+            else "a pulse this long is mostly one whose time is not in seconds",
+        )
+
+
 def slew_limit(asked: float | None, model: Model) -> float | None:
     """Return the limit that was asked for, else that of our own device for its own models, else none.
 
@@ -195,11 +211,11 @@ def slew_limit(asked: float | None, model: Model) -> float | None:
 
 
 def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
-    """Warn where the model itself expects a large error of the drive, with the reason."""
+    """Say what error the model itself expects of a drive: with a reason where it is large."""
     error = drive.predicted_max_error_percent
-    if not error > EXPECTED:
-        return []
     full = f"full {drive.model.output_quantity if drive.model else 'force'}"
+    if not error > EXPECTED:
+        return _of_clipped(drive.clipped_samples, f"{error:.2g} % of {full}", slight=error <= _SLIGHT)
     if limit is not None and slowed > 0:
         unit = with_unit(f"{limit:g}", f"{drive.input_unit}/s")
         why = f"the drive may move at most {unit}, which this pulse exceeds"
@@ -213,6 +229,19 @@ def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
     else:
         why = "the model's output does not follow the pulse even without a limit"
     return [f"warning: the model itself expects errors of up to {error:.1f} % of {full}: {why}"]
+
+
+def _of_clipped(samples: int, error: str, *, slight: bool) -> list[str]:
+    """Say what it costs that the drive stays at an end of its range; nothing where it never has to."""
+    if not samples:
+        return []
+    found = f"for {samples} samples the drive would have to leave the model's range, and stays at its end"
+    matters = (
+        f"this does not matter, the model expects errors of at most {error}"
+        if slight
+        else f"the model expects errors of up to {error}; a smaller pulse (`force_min`, `force_max`) has less"
+    )
+    return [f"{found}: {matters}"]
 
 
 def _method(asked: Inversion | None, model: Model, name: str) -> Inversion:
@@ -344,8 +373,7 @@ def _tracked(
     )
     left, static = (with_unit(f"{rms:.3g}", model.output_unit) for rms in (found.rms, found.rms_static))
     notes.append(
-        f"the extended model expects an rms error of {left} after {found.steps} steps, and of {static} with "
-        "the static inverse"
+        f"by the extended model the drive misses the pulse by {left} (rms), the static inverse by {static}"
     )
     if found.steps == 0:
         notes.append("no step improved on the static inverse, which is kept")

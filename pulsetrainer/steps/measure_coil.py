@@ -17,7 +17,7 @@ from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.errors import ArgumentError, DeviceError
 from pulsetrainer.steps.loop_gains import OPEN_LOOP
 from pulsetrainer.steps.progress import Progress
-from pulsetrainer.steps.stopped import raise_if_stopped
+from pulsetrainer.steps.stopped import raise_if_lost, raise_if_stopped
 
 RATE_HZ = 1000.0
 # The firmware compares voltage and current over 205 ms; a coil that nobody knows yet must be told sooner.
@@ -188,14 +188,13 @@ class Measurement:
         """Play a current (n,) in A to its end, and return what was measured."""
         trace = self._device.play(reference_A, RATE_HZ, decimation=decimation)
         _raise_if_stopped(trace, what)
-        if trace.samples == 0:
-            raise DeviceError("the device told no samples", hint="check the line to it")
         return trace
 
 
 def _raise_if_stopped(trace: Trace, what: str) -> None:
     remedy = _SENSOR if trace.remedy == FORCE_REMEDY else trace.remedy
     raise_if_stopped(trace.fault, _REMEDY.get(trace.fault_code, remedy), what)
+    raise_if_lost(trace.samples, trace.dropped_samples, what)
 
 
 def _shorted(why: str) -> DeviceError:

@@ -23,7 +23,7 @@ from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach
 from pulsetrainer.steps.recording import PAUSE_S
-from pulsetrainer.steps.stopped import INTERRUPTED
+from pulsetrainer.steps.stopped import INTERRUPTED, in_part
 
 # what is wrong where a part ends without a beat, and what to do
 TOO_SHORT = ("the device stays on too short for one beat", "raise its on-time limit, or press shorter beats")
@@ -149,7 +149,9 @@ class Performance:
                 break
             self._parts += 1
             self._dropped = dropped + trace.dropped_samples
-            self._fault, self._remedy, self._underruns = trace.fault, trace.remedy, int(trace.underrun)
+            begun_s = self._begins_s[-1] + PAUSE_S * (self._parts - 1)
+            self._fault = in_part(trace.fault, begun_s)
+            self._remedy, self._underruns = trace.remedy, int(trace.underrun)
             if self._implausible:
                 self._fault, self._remedy = self._implausible, FORCE_REMEDY
             if not self._fault and not conductor.ended and conductor.idle:

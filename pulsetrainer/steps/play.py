@@ -47,7 +47,7 @@ def plan(
     """Return what ``play`` would play on a device as it is delivered, with a cold coil; fails as ``play``."""
     _check(drive, repeats)
     rehearsal = Rehearsal(limits or Limits())
-    _check_peak(drive, rehearsal.current_A)
+    check_peak(np.concatenate((drive.compensated, drive.scaled)), rehearsal.current_A)
     if _is_remade(drive, track_heat):
         coil_of(drive.model, asked=track_heat)
     for _ in range(repeats):
@@ -102,7 +102,7 @@ def play(
     (True, 1)
     """
     _check(drive, repeats)
-    _check_peak(drive, device.info.current_limit_A)
+    check_peak(np.concatenate((drive.compensated, drive.scaled)), device.info.current_limit_A)
     currents = {"compensated": drive.compensated, "scaled": drive.scaled}
     kept: dict[str, list[FloatArray]] = {name: [] for name in DRIVES}
     dropped, fault, remedy = 0, "", ""
@@ -201,12 +201,6 @@ def _check(drive: Waveform, repeats: int) -> None:
         raise ArgumentError(f"repeats must be at least 1, got {repeats}", hint="5 is usual")
     check_size(repeats, 2 * drive.compensated.size)
     check_current(drive)
-
-
-def _check_peak(drive: Waveform, limit_A: float) -> None:
-    # the scaled drive spans the range of the model, whatever force is asked for
-    hint = f"invert with a model that was captured with `current_max_A` at most {limit_A:g}"
-    check_peak(np.concatenate((drive.compensated, drive.scaled)), limit_A, hint=hint)
 
 
 def check_current(drive: Waveform) -> None:

@@ -30,7 +30,7 @@ from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.asked import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
-from pulsetrainer.steps.stopped import raise_if_stopped
+from pulsetrainer.steps.stopped import in_part, raise_if_stopped
 
 _LOG = logging.getLogger(__name__)
 CONDITIONING_SPEED_A_PER_S = 3.0
@@ -228,7 +228,8 @@ def record(
         # a Ctrl-C in the middle of writing costs what was being written: it is counted, not passed over
         sink.dropped_samples += played.dropped_samples + played.samples - (sink.samples - before)
         if played.fault or not played.complete:
-            return Ending(complete=False, fault=played.fault, remedy=played.remedy, parts=parts)
+            fault = in_part(played.fault, begun_s)
+            return Ending(complete=False, fault=fault, remedy=played.remedy, parts=parts)
     told = record_of(windows) if begun_cold and parts == 1 else None
     coil = Coil(**asdict(told), serial=info.serial) if told is not None else None
     return Ending(complete=True, fault="", remedy="", parts=parts, coil=coil)

@@ -12,7 +12,7 @@ from pulsetrainer.artefacts import BoolArray, Model, RefinePass, Waveform
 from pulsetrainer.core import inversion, learning, metrics
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.device.limits import Limits, Rehearsal
+from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.errors import ArgumentError, DataError, Interrupted
 from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
@@ -93,6 +93,7 @@ def refine(
     True
     """
     model = check(drive, passes)
+    check_peak(drive.compensated, device.info.current_limit_A)
     part = invertible(model, drive.rate_Hz)
     middle = slice(part.lead.size, drive.time_s.size - part.tail.size)
     limit = slew_limit(slew, model)
@@ -169,6 +170,7 @@ def plan(drive: Waveform, *, passes: int = 5, limits: Limits | None = None) -> P
     """
     invertible(check(drive, passes), drive.rate_Hz)
     rehearsal = Rehearsal(limits or Limits())
+    check_peak(drive.compensated, rehearsal.current_A)
     for _ in range(FEWEST):
         rehearsal.play(drive.compensated, drive.rate_Hz, drive.predicted)
     return Plan(

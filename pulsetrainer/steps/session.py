@@ -18,6 +18,7 @@ from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, check_peak
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
+from pulsetrainer.steps.asked import check_asked_for
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Pause, Play, Reach
 from pulsetrainer.steps.heat import coil_of, rest_force, take_temperature, thermometer_of
 from pulsetrainer.steps.invertible import major_loop
@@ -97,12 +98,6 @@ def reach_of(model: Model, pulses: Sequence[Pulse], rates: Sequence[float | None
     return Reach(max(lows), min(highs))
 
 
-def _check_top(model: Model, limit_A: float) -> None:
-    """Refuse a model beyond the current limit: every part begins with all of its range."""
-    hint = f"give a model that was captured with `current_max_A` at most {limit_A:g}"
-    check_peak(model.edges, limit_A, hint=hint)
-
-
 @one_thread
 def perform(
     model: Model,
@@ -140,7 +135,7 @@ def perform(
         The device cannot be talked to, or its firmware knows no open-ended waves.
     """
     check_model(model)
-    _check_top(model, device.info.current_limit_A)
+    check_peak(model.edges, device.info.current_limit_A)
     beating = [Pulse(shape) for shape in pulses]
     reach = reach_of(model, beating, rates)
     meter = thermometer_of(model, device, asked=track_heat)
@@ -187,7 +182,7 @@ def plan(
     """
     check_model(model)
     rehearsal = Rehearsal(limits or Limits())
-    _check_top(model, rehearsal.current_A)
+    check_peak(model.edges, rehearsal.current_A)
     beating = [Pulse(shape) for shape in pulses]
     reach = reach_of(model, beating, rates)
     coil_of(model, asked=track_heat)
@@ -334,11 +329,7 @@ def programme(
             hint="name some of the library: normal,bifid",
         )
     _check_length(minutes, beats)
-    if not quiz and answers and not callable(answers):
-        raise UsageError(
-            "`answers` were given, but no quiz asks for them",
-            hint="give `quiz` with the number of questions, or leave `answers` out",
-        )
+    check_asked_for(None if callable(answers) else answers, quiz)
     if minutes is None and beats is None:
         minutes = 5.0
     seconds = None if minutes is None else 60.0 * minutes

@@ -20,3 +20,20 @@ def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> No
         hint=remedy or "remove the cause; the next command clears the fault",
         kept=kept,
     )
+
+
+def in_part(fault: str, begun_s: float) -> str:
+    """Say of a fault, whose own time counts from the beginning of its part, when a later part began."""
+    if begun_s == 0 or fault in ("", INTERRUPTED):
+        return fault
+    return f"{fault}, in the part that began at {begun_s:.1f} s"
+
+
+def raise_if_lost(samples: int, dropped: int, what: str) -> None:
+    """Raise DeviceError where less than half of a play came back: too little to tell anything by."""
+    if samples == 0 or dropped > samples:
+        raise DeviceError(
+            f"of {samples + dropped} samples of {what} {dropped} were lost on the wire",
+            hint="check the cable to the device and close what else keeps the computer busy, then run the "
+            "command again",
+        )

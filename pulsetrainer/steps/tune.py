@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from pulsetrainer.device.device import Device
 
 _DIODE_V = (0.15, 2.0)  # what any diode drops
+_SUPPLY_OFF = 0.05  # share of the supply: what the diode's drop tells is hardly better
 _FOLLOWS = 0.01  # of the range: what nobody can do better than is no fault of the gains
 _SINE_HZ = 4.0
 _SINE = (0.5, 0.25)  # of the range: middle and amplitude
@@ -113,7 +114,7 @@ def _check(pulses: Sequence[Shape | Waveform], supply_V: float | None, limit_A: 
     for pulse in pulses:
         if isinstance(pulse, Waveform):
             check_current(pulse)
-            check_peak(pulse.compensated, limit_A, hint="invert again with a lower `force_max`")
+            check_peak(pulse.compensated, limit_A)
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,6 +247,12 @@ class _Tuning(Measurement):
                 f"a supply of {self._supply_V:g} V does not fit the coil's current: the free-wheeling diode "
                 f"would drop {drop_V:.2g} V, expected {low:g} to {high:g} V",
                 hint="measure the supply again, or leave `supply_V` out",
+            )
+        if abs(self._supply_V / coil.supply_V - 1.0) > _SUPPLY_OFF:
+            self.notes.append(
+                f"a supply of {self._supply_V:g} V was taken as given, as the device does not measure it; a "
+                f"diode of the usual {electrical.DIODE_V:g} V makes it {coil.supply_V:.1f} V. Ohms and "
+                "henries are as good as the volts, the loop gains are the same with either"
             )
         return (*coil.scaled_to(self._supply_V), self._supply_V)
 

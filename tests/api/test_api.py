@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 
 import pulsetrainer as pt
 from pulsetrainer.errors import ArgumentError, DataError, NotAnArtefactError, UsageError
+from pulsetrainer.files import store
 from wording import raises
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
@@ -73,6 +74,8 @@ def test_errors_are_python_exceptions(tmp_path, capfd):
     with pytest.raises(NotAnArtefactError):
         pt.load(tmp_path / "table.csv")
     pt.save(model, tmp_path / "m.h5")
+    header = store.read_header(tmp_path / "m.h5")
+    assert header.history[-1].split()[1:4] == ["Python", "pulsetrainer.save", "model"]  # no command line
     with pytest.raises(UsageError):
         pt.save(model, tmp_path / "m.h5")
     assert capfd.readouterr() == ("", "")

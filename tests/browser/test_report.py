@@ -214,6 +214,14 @@ def test_paper_has_everything(opened, report):
 
 
 @pytest.mark.slow
+def test_letters_on_paper_can_be_read(opened):
+    """Of the text and of all figures, at the width of a sheet: five points at least."""
+    page = opened(width=round(182 / 25.4 * 96))
+    page.emulate_media(media="print")
+    assert [one for one in measure(page, "texts") if 0.75 * one["px"] < 5.0] == []
+
+
+@pytest.mark.slow
 def test_the_keyboard_reaches_everything_in_order(opened):
     """Tab visits what a mouse can use, in the order of the page, each with a ring around it."""
     page = opened(width=360, height=740)

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
+import pulsetrainer as pt
 from program import PROGRAM, Ran, pulsetrainer
 from wording import refusal
 
 MODEL = ("--model", "model.h5", "-o", "x.h5")
+OUT = ("-o", "x.h5")
+KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 
 
 @pytest.fixture
@@ -200,7 +205,7 @@ def test_tables_of_signals_and_pulses_are_refused_by_line(ready, words, value, r
     [
         ("1e308", "1", "beyond all numbers", {"column": "t_s"}),
         ("3", "1e308", "beyond all numbers", {"column": "p"}),
-        ("1e90", "1", "too many samples", {"times": 4, "samples": "1e+93", "most": "1e+08"}),
+        ("1e90", "1", "longer than the device plays", {"got": "4e+90", "next": "in seconds"}),
     ],
 )
 def test_pulses_beyond_all_numbers_are_refused_in_words(ready, time, top, name, names):
@@ -240,7 +245,6 @@ def test_a_signal_in_milliseconds_is_one(ready):
     ("words", "samples", "most"),
     [
         (("capture", "identification", "--repeats", "1000000"), "98001", "1e+09"),
-        (("invert", "normal", "--model", "model.h5", "--periods", "1000000"), "800", "1e+08"),
         (("play", "drive.h5", "--repeats", "1000000"), "", "1e+08"),
     ],
 )
@@ -304,3 +308,66 @@ def test_control_c_stops_the_output_and_keeps_what_was_recorded(tmp_path):
     shown = pulsetrainer(tmp_path, "show", "run.h5", "--json")
     assert shown.json["facts"]["samples"] == kept
     assert shown.json["facts"]["complete"] is False
+
+
+def test_a_hint_names_the_files_that_were_given(ready):
+    """None that stands for one, where the command line names it or there is but one of its kind."""
+    for path in ready.iterdir():
+        if path.name != "run.h5":
+            path.unlink()
+    shutil.copy(KEPT / "diagnosis.h5", ready / "why not.h5")
+    for words, hint in (
+        (("invert", "normal", "--model", "mine.h5", "-o", "x.h5"), "identify run.h5 -o mine.h5"),
+        (("capture", "identification", "-o", "x.h5", "--live=yes"), "pulsetrainer capture --help"),
+        (("correct", "absent.h5", "--diagnosis", "why not.h5", "-o", "x.h5"), "run.h5"),
+    ):
+        assert hint in pulsetrainer(ready, *words, "--json").json["error"]["hint"]
+    (ready / "run.h5").unlink()
+    assert "show 'why not.h5'" in pulsetrainer(ready, *words, "--json").json["error"]["hint"]
+
+
+@pytest.mark.parametrize("words", [["identify", "run.h5"], ["correct", "run.h5", "--diagnosis", "why.h5"]])
+def test_what_was_measured_is_never_the_output(ready, words):
+    """Not even with --overwrite: nobody could measure it again."""
+    shutil.copy(KEPT / "diagnosis.h5", ready / "why.h5")
+    before = (ready / "run.h5").read_bytes()
+    told = pulsetrainer(ready, *words, "-o", "./run.h5", "--overwrite", "--json")
+    assert (told.code, "would be lost" in told.json["error"]["message"]) == (2, True)
+    assert (ready / "run.h5").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "hint"),
+    [
+        (["identify", "run.h5", "-o", "run.h5"], 2, "name another file"),
+        (["capture", "identification", "--speed", "1e6", *OUT], 3, "a lower --speed, or a higher --rate"),
+        (["capture", "identification", "--port", "socket://localhost", *OUT], 4, "socket://localhost:5000"),
+        (["invert", "normal", "-m", "model.h5", *OUT], 2, "--model"),
+        (["session", "--model", "model.h5", "--pulses", "normal", "bifid", *OUT], 2, "--pulses normal,bifid"),
+        (["tune", "drive.h5"], 2, "--drive drive.h5"),
+        (["ports", "COM3"], 2, "doctor --port COM3"),
+        (["help", "identify"], 2, "pulsetrainer identify --help"),
+        (["--settings", "mine.json", "ports"], 2, "TOML"),
+        (["--settings", "mine.toml", "ports"], 2, "current_A = 1.0 below [limits]"),
+        (["diagnose", "played.h5", "--model", "model.h5", *OUT], 3, "evaluate played.h5"),
+    ],
+)
+def test_the_next_step_is_one_that_helps(ready, words, code, hint):
+    """It names what to type, not only where to read."""
+    (ready / "mine.json").write_text("{}")
+    (ready / "mine.toml").write_text('[limits]\ncurrent_A = "x"\n')
+    told = pulsetrainer(ready, *words, "--json")
+    assert (told.code, hint in told.json["error"]["hint"]) == (code, True), told
+
+
+def test_a_drive_longer_than_the_device_plays_is_refused_at_once(ready):
+    """Instead of a minute's work for a file that no device takes; as many as it says are accepted."""
+    model = pt.load(KEPT / "model.h5")
+    pt.save(replace(model, captured=True), ready / "ours.h5")
+    words = ["invert", "normal", "--model", "ours.h5", "--json", "-o"]
+    told = pulsetrainer(ready, *words, "x.h5", "--periods", 100_000).json["error"]
+    assert (told["kind"], "80000 s" in told["message"]) == ("argument", True)
+    most = int(re.search(r"--periods at most (\d+)", told["hint"])[1])
+    assert pulsetrainer(ready, *words, "y.h5", "--periods", most).code == 0
+    played = pulsetrainer(ready, "play", "y.h5", "-o", "z.h5", "--repeats", 1, "--dry-run")
+    assert "stays on" not in played.err

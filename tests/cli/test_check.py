@@ -46,6 +46,15 @@ def test_the_contract_and_the_update(run, calibrated, tmp_path):
     assert again.json["verdict"] == "true"
 
 
+@pytest.mark.parametrize(("offset", "better"), [(0.3, "updated.h5"), (0.0, "model.h5")])
+def test_it_is_said_which_model_to_use_after_an_update(run, calibrated, offset, better):
+    """The updated one where something moved; where nothing did, the one that there was."""
+    port = f"bench:?condition-offset={offset}&noise-seed=4"
+    done = run("check", calibrated / "model.h5", "--port", port, "--update", "-o", "updated.h5")
+    (row,) = (line for line in done.out.splitlines() if line.startswith("  next "))
+    assert row.split()[row.split().index("use" if offset else "with") + 1].strip(":,").endswith(better)
+
+
 def test_a_stronger_force_is_told_by_how_much(run, calibrated):
     """By which share it moved, and what the limit is."""
     done = run("check", calibrated / "model.h5", "--port", "bench:?condition-gain=0.052")
@@ -55,7 +64,7 @@ def test_a_stronger_force_is_told_by_how_much(run, calibrated):
 
 def test_another_device_is_not_updated(run, calibrated, tmp_path):
     """A changed density: exit 3, nothing written; the verdict alone is no error. The limit is told."""
-    words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9")
+    words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9&serial=0")
     shown = run(*words)
     assert shown.code == 0
     tells(shown.out, "changed")

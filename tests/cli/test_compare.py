@@ -87,6 +87,17 @@ def test_bad_input(run, built_small):
     refusal(done, 3, "wrong kind", **names)
 
 
+def test_a_file_beside_itself_or_a_copy_is_told(run, built_small, tmp_path):
+    """No difference is not a finding then."""
+    one, other = (built_small / f"evaluation-{name}.h5" for name in ("relay", "continuous"))
+    copy = tmp_path / "copy.h5"
+    copy.write_bytes(one.read_bytes())
+    for files, told in (((one, one), True), ((other, one, copy), True), ((one, other), False)):
+        done = run("compare", *files)
+        assert done.code == 0
+        assert ("are the same file" in done.err) is told
+
+
 def test_two_evaluations_without_a_common_figure(run, built_small, tmp_path):
     """A pulse against a prediction: nothing to compare, said so."""
     model = built_small / "model-continuous.h5"

@@ -91,3 +91,13 @@ def test_extend_points_at_correct(folder):
     done = pulsetrainer(folder, "extend", "diagnosis.h5", "--model", "model.h5", "-o", "no.h5", "--json")
     assert done.code == 3
     assert "pulsetrainer correct" in done.json["error"]["hint"]
+
+
+def test_the_way_on_names_the_diagnosis_that_was_given(folder):
+    """Not one that stands for it."""
+    plane = np.linspace(0.0, 1.0, 3)
+    model = pt.Model(plane, np.ones(3), 0.0, np.ones(3, bool))
+    pt.save(replace(pt.load(folder / "none.h5"), extended=model), folder / "not at fault.h5")
+    done = pulsetrainer(folder, "correct", "run.h5", "--diagnosis", "not at fault.h5", "-o", "x.h5", "--json")
+    assert done.code == 3
+    assert "extend 'not at fault.h5' --model" in done.json["error"]["hint"]

@@ -213,6 +213,7 @@ def test_a_quiz_by_file(run, tmp_path):
         (("--variability", "60"), 2, "--variability must be a number from 0 to 25, got 60"),
         (("--ectopic", "-1"), 2, "--ectopic"),
         (("--answers", "right.txt"), 2, "leave --answers out"),
+        (("--answers", "wrong.txt"), 2, "leave --answers out"),
         (("--quiz", "4"), 2, "two pulses"),
         (("--quiz", "4", "--pulses", "normal,bifid"), 2, "terminal"),
         (("--quiz", "4", "--pulses", "normal,bifid", "--answers", "short.txt"), 3, "4 questions"),

@@ -75,8 +75,9 @@ RUN = {
     HOW_TO / "track-heat.md": ("drive.h5", "model.h5"),
     HOW_TO / "check.md": ("model.h5",),
     HOW_TO / "batches.md": ("workflow",),
-}  # those of how-to/diagnose.md are those of the README, and the slowest: test_pages.py holds that they exist
-SLOW = ("README", "measured", "tutorial", "own-bench", "ci", "teach")
+    HOW_TO / "diagnose.md": ("model.h5", "other.h5"),
+}
+SLOW = ("README", "measured", "tutorial", "own-bench", "ci", "teach", "diagnose")
 PAGES = [
     pytest.param(page, id=page.stem, marks=pytest.mark.slow if page.stem in SLOW else ()) for page in RUN
 ]

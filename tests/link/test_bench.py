@@ -17,7 +17,7 @@ from pulsetrainer.device.opening import open_device
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation import build
 from pulsetrainer.simulation.bench import Bench
-from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, BenchOptions, Wire, parse_bench
+from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, BenchOptions, Wire, parse_bench, serial_of
 from wording import raises
 
 
@@ -29,6 +29,7 @@ from wording import raises
         ("bench:?ideal", BenchOptions(ideal=True)),
         ("bench:?ideal=1&speed=real", BenchOptions(ideal=True, speed="real")),
         ("bench:?seed=3&creep=0.05", BenchOptions(settings=(("seed", "3"), ("creep", "0.05")))),
+        ("bench:?seed=3&serial=4", BenchOptions(settings=(("seed", "3"),), serial="4")),
         ("bench:?break=reset@2", BenchOptions(breaks=("reset@2",))),
         ("bench:?wire=1e-4&wire-seed=3", BenchOptions(wire=Wire(1e-4, 3))),
     ],
@@ -49,6 +50,7 @@ def test_ports_that_make_sense(port, options):
         "bench:?wire=0.2",
         "bench:?wire=nan",
         "bench:?wire-seed=-1",
+        "bench:?serial=A1",
     ],
 )
 def test_ports_that_do_not(port):
@@ -62,10 +64,15 @@ def test_ports_that_do_not(port):
     ("port", "message", "hint"),
     [
         ("bench:?crep=1", "no parameter 'crep'", "creep"),
-        ("bench:?zzzz=1", "no parameter 'zzzz'", "there are: ideal, speed, break, wire, wire-seed, seed"),
+        (
+            "bench:?zzzz=1",
+            "no parameter 'zzzz'",
+            "there are: ideal, speed, break, wire, wire-seed, serial, seed",
+        ),
         ("bench:?creep=7", "creep=7 is outside 0 to 0.5", "give creep ("),
         ("bench:?creep=lots", "creep=lots is not a number from 0 to 0.5", ""),
         ("bench:?creep=", "creep= is not a number from 0 to 0.5", ""),
+        ("bench:?seed=3,creep=0.1", "seed=3,creep=0.1 is not", "put & between"),
         ("bench:?break=leg@1", "cannot break 'leg@1'", "current-rail"),
         ("bench:?break=reset@soon", "cannot break 'reset@soon'", "WHAT@SECONDS"),
     ],
@@ -253,3 +260,19 @@ def test_the_firmware_refuses_bad_arguments(words):
     )
     assert done.returncode == 2
     assert done.stderr.strip()
+
+
+@pytest.mark.parametrize(
+    ("port", "serial"),
+    [
+        ("bench:", "BENCH-0"),
+        ("bench:?seed=3&noise-seed=5", "BENCH-3"),
+        ("bench:?seed=16777215", "BENCH-16777215"),
+        ("bench:?seed=9&serial=4", "BENCH-4"),
+    ],
+)
+def test_another_seed_is_another_device(port, serial):
+    """By its serial number, so that gains, heat and models of one are not taken for those of another."""
+    with open_device(port) as device:
+        assert device.info.serial == serial
+    assert serial_of(port) == serial

@@ -289,7 +289,7 @@ def test_the_port_is_redacted_for_provenance():
 def test_nothing_hidden_is_readable(wire):
     """Two benches that differ in every hidden parameter are one and the same to ask."""
     told = []
-    for port in ("bench:?ideal", "bench:?seed=3&creep=0.05&noise=0.01&coulomb=1&speed=real"):
+    for port in ("bench:?seed=3&ideal", "bench:?seed=3&creep=0.05&noise=0.01&coulomb=1&speed=real"):
         one = wire(port)
         hello = one.session.hello()
         status = one.status()

@@ -8,6 +8,7 @@ few tenths of its limit.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -272,3 +273,30 @@ def test_a_dry_run_ends_as_the_run_does(ready, tmp_path, command, seed):
     run = pulsetrainer(tmp_path, *line.words, "--json", env=line.env)
     print(command.__name__, seed, *line.words, line.settings, line.env, verdict(dry), verdict(run))
     assert verdict(dry) == verdict(run), (dry.err, run.err)
+
+
+@pytest.mark.parametrize("limit", ["--limit-force", "--limit-current"])
+@pytest.mark.parametrize(
+    "words",
+    [("play", "drive.h5"), ("refine", "drive.h5"), ("session", "--model", "model.h5")],
+    ids=lambda words: words[0],
+)
+def test_what_a_limit_hints_at_helps(ready, tmp_path, words, limit):
+    """All of them begin with a stroke over the model's range, so that no lower pulse keeps below a limit."""
+    value = "5" if limit == "--limit-force" else "0.7"
+    limited = (limit, value, "-o", "out.h5")
+    for path in ready.glob("*.h5"):
+        (tmp_path / path.name).symlink_to(path)
+    dry = pulsetrainer(tmp_path, *words, *limited, "--dry-run", "--json")
+    run = pulsetrainer(tmp_path, *words, *limited, "--json")
+    assert dry.code == run.code > 0
+    hints = [done.json["error"]["hint"] for done in (dry, run)]
+    assert all(limit in hint and "--current-max" in hint for hint in hints)
+    top = re.search(r"--current-max at most ([\d.]+)", hints[0])[1]
+    capture = ("capture", "identification", "--current-max", top, "--levels", "4", *limited)
+    identify = ("identify", "out.h5", "-o", "low-model.h5", "--levels", "8")
+    invert = ("invert", "normal", "--model", "low-model.h5", "-o", "low-drive.h5")
+    instead = {"drive.h5": "low-drive.h5", "model.h5": "low-model.h5"}
+    again = (*(instead.get(word, word) for word in words), *limited, "--overwrite", "--dry-run")
+    for line in (capture, identify, invert, again):
+        assert (done := pulsetrainer(tmp_path, *line)).code == 0, done.err

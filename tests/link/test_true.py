@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -38,7 +39,7 @@ def test_the_model_knows_its_coil(model):
     assert model.coil.duty_per_A == pytest.approx(5 / 12.6, rel=2e-3)
     assert model.coil.duty_offset == pytest.approx(0.6 / 12.6, rel=0.02)
     assert model.coil.rise_per_A2 == pytest.approx(0.012, rel=0.15)
-    assert model.coil.serial == "BENCH-0"
+    assert model.coil.serial == "BENCH-1"
 
 
 @pytest.mark.parametrize(
@@ -70,7 +71,7 @@ def test_what_moved_is_told(model, moved, verdict, offset, gain, kelvin):
 @pytest.mark.parametrize("seed", [101, 123])
 def test_another_density_is_changed_and_not_updated(model, seed):
     """No offset and no gain makes one device another; the second is the next but one of sixty."""
-    with pt.open_device(f"bench:?seed={seed}") as device:
+    with pt.open_device(f"bench:?seed={seed}&serial=1") as device:
         found = pt.check(model, device)
     assert found.verdict == "changed"
     with raises(DataError, "another shape"):
@@ -94,7 +95,7 @@ def test_a_coarse_and_fast_calibration_stays_true():
         run = pt.capture("identification", device, levels=12, speed_A_per_s=4.0)
     coarse = pt.identify(run, levels=12)
     verdicts = []
-    for port in ("bench:?seed=4&noise-seed=3", "bench:?seed=104"):
+    for port in ("bench:?seed=4&noise-seed=3", "bench:?seed=104&serial=4"):
         with pt.open_device(port) as device:
             verdicts.append(pt.check(coarse, device).verdict)
     assert verdicts == ["true", "changed"]
@@ -207,3 +208,50 @@ def test_a_beat_starts_where_its_samples_are(model):
         of_beat = (since_s > -1e-6) & (since_s < interval_s - 1e-6)
         error = np.abs(pressed.output - pressed.target)[of_beat].mean()
         assert error == pytest.approx(told, rel=1e-6)
+
+
+@pytest.mark.parametrize("verb", ["session", "capture"])
+def test_a_fault_in_a_later_part_says_when_that_began(model, monkeypatch, verb):
+    """Its own time counts from the beginning of the part; the file's from that of the recording."""
+    with pt.open_device("bench:?seed=1") as device:
+        device.set_parameter("on_time", 6)
+        name = "stream" if verb == "session" else "play"
+        played, longest = getattr(type(device), name), []
+
+        def stops(self, reference, *given, **options):
+            trace = played(self, reference, *given, **options)
+            if verb == "session" or options.get("on_block"):  # no conditioning
+                longest.append(1)
+            return replace(trace, fault="too much (at 1.0 s)") if len(longest) == 2 else trace
+
+        monkeypatch.setattr(type(device), name, stops)
+        run = {
+            "session": lambda: pt.session(model, device, pulses="normal", beats=12),
+            "capture": lambda: pt.capture("identification", device, levels=6, speed_A_per_s=1.0),
+        }
+        with pytest.raises(DeviceError) as caught:
+            run[verb]()
+    kept = caught.value.kept
+    (seam,) = np.flatnonzero(np.diff(kept.time_s) > 0.5)
+    began_s = float(re.search(r"began at ([\d.]+) s", caught.value.message)[1])
+    assert began_s == pytest.approx(kept.time_s[seam + 1], abs=0.06)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+@pytest.mark.parametrize("verb", ["check", "tune"])
+def test_what_the_wire_lost_is_no_measurement(model, monkeypatch, verb, share):
+    """Nothing, or less than half, came back of a play: it is told so, by how many samples."""
+    with pt.open_device("bench:?seed=1") as device:
+        played = type(device).play
+
+        def loses(self, reference, *given, **options):
+            trace = played(self, reference, *given, **options)
+            kept = slice(int(share * trace.tick.size))
+            names = ("tick", "reference_A", "current_A", "force_N", "duty")
+            arrays = {name: getattr(trace, name)[kept] for name in names}
+            left = arrays["tick"].size
+            return replace(trace, **arrays, samples=left, dropped_samples=trace.samples - left)
+
+        monkeypatch.setattr(type(device), "play", loses)
+        with raises(DeviceError, "lost on the wire"):
+            {"check": lambda: pt.check(model, device), "tune": lambda: pt.tune(device)}[verb]()

@@ -134,10 +134,15 @@ def test_limits_that_were_lowered_hold_while_it_is_tuned():
 
 
 def test_a_measured_supply_makes_the_ohms():
-    """A diode of another drop would scale all by the same: the given voltage is the yardstick then."""
+    """A diode of another drop would scale all by the same: the given voltage is the yardstick then.
+
+    It is said where a usual diode makes it another one, and that the loop gains do not mind.
+    """
     with pt.open_device("bench:") as device:
-        found = pt.tune(device, supply_V=24.0)
+        found, usual = pt.tune(device, supply_V=24.0), pt.tune(device, supply_V=12.1)
     assert (found.resistance_ohm, found.inductance_H) == pytest.approx((10.0, 0.024), rel=0.01)
+    assert [note for note in found.notes if "24 V" in note and "12.0 V" in note]
+    assert not usual.notes
 
 
 def test_a_supply_that_no_diode_explains_is_refused():

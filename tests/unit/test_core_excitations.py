@@ -46,9 +46,9 @@ def test_identification_visits_every_edge(n_h):
 def test_a_signal_must_not_jump_over_its_range():
     """One step as wide as the range is just possible."""
     assert excitations.identification(0.0, 1.0, n_h=2, speed=10.0, rate_Hz=10.0).value.max() == 1.0
-    with raises(ArgumentError, "too few samples", got="its range is 1"):
+    with raises(ArgumentError, "too few samples", got="its whole range of 1"):
         excitations.identification(0.0, 1.0, n_h=2, speed=10.1, rate_Hz=10.0)
-    with raises(ArgumentError, "too few samples", got="its range is 1"):
+    with raises(ArgumentError, "too few samples", got="its whole range of 1"):
         excitations.diagnostic(1.0, 2.0, rate_Hz=0.99 * max(excitations._RATES))
     for rate in (0.0, -0.5):
         with raises(ArgumentError, "not such an argument", argument="rate", got=f"{rate:g}"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,6 +25,7 @@ from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import _log_tail, p_value
+from pulsetrainer.diagnosis.stages import advice
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 
@@ -607,10 +609,20 @@ def test_every_kind_of_evidence_and_advice_has_words():
             assert "{" not in said
             assert ("delay, creep and step" in said) is (
                 kind.startswith("tied")
-                or kind in ("inconclusive", "too noisy", "correct", "extend, correct", "correct, extend")
+                or kind in ("inconclusive", "too noisy", "far too noisy", "correct")
+                or kind in ("extend, correct", "correct, extend")
             )
             # only our own device plays our signals
             assert ("capture" in said) is (bench.ours and kind in ("tied", "lacks", "inconclusive"))
+
+
+@pytest.mark.parametrize(("shown_from", "longer"), [(2.0, True), (50.0, False), (np.inf, False)])
+def test_nobody_is_asked_for_a_recording_without_end(shown_from, longer):
+    """Four times as long is advice; a thousand times, or for ever, is none."""
+    state = SimpleNamespace(limits={"delay": shown_from * LIMITS.matters}, blind=("delay",), lacks=())
+    said = wording.advice(advice._to_see_more(state), wording.Bench(Scale(), "A", ours=True))
+    assert ("4 times as long" in said, "less noise" in said) == (longer, True)
+    assert not re.search(r"\binf\b|e\+", said)
 
 
 @pytest.mark.parametrize("name", wording.EXPERIMENTS)

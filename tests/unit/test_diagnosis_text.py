@@ -11,6 +11,7 @@ import store_examples
 from pulsetrainer.artefacts import Cause, Parameter
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report import tables
+from pulsetrainer.report.diagnosis_figures import ranking
 from pulsetrainer.report.diagnosis_text import answer, explains, parameters, sections
 
 NAN = float("nan")
@@ -78,3 +79,14 @@ def test_its_tables_fit_a_terminal_of_eighty_columns():
     ]
     assert len(drawn) == 2
     assert max(len(line) for text in drawn for line in text.splitlines()) <= 80
+
+
+def test_the_chart_shows_what_explains_something():
+    """Causes that were found, and those that look like some of it: not the many that explain 0.0 %."""
+    found = store_examples.diagnosis()
+    strong, weak, none = (
+        replace(_cause(0.5), cause=name, explains_percent=share)
+        for name, share in (("delay", 30.0), ("viscous", 0.2), ("step", 0.04))
+    )
+    axes = ranking(replace(found, causes=(strong, weak, none))).axes[0]
+    assert {label.get_text() for label in axes.get_yticklabels()} == {"delay", "viscous"}

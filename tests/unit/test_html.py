@@ -204,6 +204,25 @@ def test_two_playbacks_of_one_waveform_do_not_collide():
     assert len(ids) == len(set(ids))
 
 
+def test_each_figure_of_repeated_playbacks_and_models_has_a_name_of_its_own():
+    """Two weeks of one pulse, and two models of one file name: a name has one value, that of the file."""
+    one = EVALUATION.waveforms[1]
+    later = replace(
+        one, compensated=replace(one.compensated, mean_abs_error_percent=2.5), repeats=one.repeats + 1
+    )
+    models = examples.model_comparison().models
+    twice = Evaluation(waveforms=(one, later), models=(models[0], replace(models[1], name=models[0].name)))
+    values = {}
+    for _, attributes in Page(render(twice)).elements:
+        if "data-metric" in attributes:
+            values.setdefault(attributes["data-metric"], set()).add(float(attributes["data-value"]))
+    assert all(len(known) == 1 for known in values.values()), values
+    for name, value in twice.figures().items():
+        assert values.get(name, {value}) == {value}
+    assert any("#2" in name and name.startswith(one.name) for name in values)
+    assert any("#2" in name and name.startswith(models[0].short_name) for name in values)
+
+
 def test_nothing_is_fetched(text):
     """No address but the names of XML name spaces, no script, no import."""
     outside = set(re.findall(r"(?:https?:)?//[\w.-]+\.\w+[^\"'\s<)]*", text))

@@ -5,10 +5,11 @@ from __future__ import annotations
 from bisect import bisect
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pulsetrainer.core import excitations
+from pulsetrainer.core import excitations, input_noise
 from pulsetrainer.core.coverage import coverage, minor_coverage
 from pulsetrainer.core.plane import Plane
 
@@ -85,3 +86,19 @@ def _slowly(u: np.ndarray) -> float:
         at = value
     i, j = PLANE.cell_indices
     return float(np.mean(passed[i, j][(i < 11) & (j > 0)]))
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("falling", [False, True])
+def test_noise_in_the_turns_costs_no_cell(seed, falling):
+    """Reversal curves from every edge of the plane tell all apart, whichever side of it noise puts a turn.
+
+    Nor does it matter that the record begins a little below the plane.
+    """
+    edges, sigma = PLANE.edges, 1e-4
+    turns = [x for edge in (edges[1:-1] if falling else edges[-2:0:-1]) for x in (falling, edge)]
+    turns = np.asarray([0.0, *turns, falling, not falling])
+    u = np.interp(np.arange(80 * turns.size - 79) / 80, np.arange(turns.size), turns)
+    noisy = u + np.random.default_rng(seed).normal(0.0, sigma, u.size)
+    cleaned = input_noise.clean(np.concatenate(([-3 * sigma], noisy)))
+    assert minor_coverage(PLANE, [cleaned.input], cleaned.dead_band) == 1.0

@@ -12,8 +12,9 @@ import report_examples as examples
 from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.session import FIGURES
+from pulsetrainer.report import figures, html
 from pulsetrainer.report.names import FORCE, NAMES, headed, split
-from pulsetrainer.report.tables import label
+from pulsetrainer.report.tables import label, text
 from pulsetrainer.report.text import tables_of
 from pulsetrainer.steps.compare import compare
 
@@ -88,3 +89,21 @@ def test_no_verdict_within_the_spread_between_repeats(spread, better):
     metrics = compare([Evaluation(waveforms=(one,)) for one in (before, after)])
     name = "compensated.mean_abs_error_percent"
     assert [m.better for m in metrics if m.name.endswith(name)] == [better]
+
+
+def test_a_small_figure_reads_the_same_wherever_it_is_shown():
+    """In the table, on the page, in a figure's legend and in the words beside it; never as nothing."""
+    whole = EVALUATION.waveforms[0]
+    one = replace(whole, compensated=replace(whole.compensated, hysteresis_percent=0.00553))
+    (table,) = tables_of(Evaluation(waveforms=(one,)))
+    (row,) = (row for row in table.rows if row[0] == "loop area, compensated")
+    legend = " ".join(shown.get_text() for shown in figures.loops([one]).legends[0].get_texts())
+    page = html.render_evaluation(Evaluation(waveforms=(one,)), title="", created="", provenance_json="{}")
+    shown = [
+        text(row[-1]),
+        html.metric(one, "compensated.hysteresis_percent", "").text,
+        *re.findall(r"compensated, loop area (\S+) %", legend),
+        *re.findall(r"compensated drive one of (\S+) %", page),
+    ]
+    assert set(shown) == {"0.00553"}
+    assert len(shown) >= 4

@@ -73,3 +73,15 @@ def test_forces_that_are_proposed_are_within_reach(unit):
     low, high = (float(words[words.index(name, 5) + 1]) for name in ("`force_min`", "`force_max`"))
     assert high - low > 0.95 * 7.0 * unit
     assert pt.invert("normal", model, force_min=low, force_max=high).clipped_samples == 0
+
+
+@pytest.mark.parametrize(("top_N", "matters"), [(13.0, False), (13.7, True)])
+def test_targets_beyond_the_range_are_told_with_what_they_cost(top_N, matters):
+    """A few clipped samples at the foot cost nothing that is seen; at the top they do."""
+    model = pt.load("tests/data/files-0.1/model-extended.h5")
+    drive = pt.invert("normal", model, periods=2, force_max=top_N)
+    assert drive.clipped_samples > 0
+    assert (drive.predicted_max_error_percent > 1.0) is matters
+    (said,) = (note for note in drive.notes if f"{drive.clipped_samples} samples" in note)
+    assert ("does not matter" in said, "force_max" in said) == (not matters, matters)
+    assert f"{drive.predicted_max_error_percent:.2g} %" in said

@@ -34,6 +34,7 @@ static uint32_t nonce;
 static uint64_t ticks;
 static uint64_t fed_at;
 static struct hal_kept kept;
+static char serial[16] = "";
 
 /* --- provoked faults -------------------------------------------------------------------------- */
 
@@ -105,8 +106,15 @@ static void start_firmware(uint8_t reset_cause)
     app_init();
 }
 
+void board_number(unsigned long number)
+{
+    snprintf(serial, sizeof serial, "BENCH-%lu", number);
+}
+
 void board_init(const struct solenoid_params *p, uint8_t reset_cause)
 {
+    if (serial[0] == '\0')
+        board_number((unsigned long)p->seed);
     solenoid_init(&plant, p);
     start_firmware(reset_cause);
 }
@@ -244,7 +252,7 @@ uint32_t hal_build_hash(void)
 
 const char *hal_serial(void)
 {
-    return "BENCH-0"; /* whatever is simulated: the parameters are the user's secret */
+    return serial; /* which device; whatever else is simulated is the user's secret */
 }
 
 /* --- the other end of the UART ---------------------------------------------------------------- */

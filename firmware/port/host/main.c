@@ -1,6 +1,6 @@
 /* The firmware as a process of this computer, on a pty.
  *
- *   firmware [--ideal] [--set NAME=VALUE]... [--speed real|max] [--break WHAT@SECONDS]... [--leash]
+ *   firmware [--ideal] [--set NAME=VALUE]... [--speed real|max] [--break WHAT@SECONDS]... [--serial N] [--leash]
  *   firmware --list          the plant's parameters and what can be broken
  *
  * Prints the pty's path on its first line and serves it until the host program closes it. --leash: also
@@ -168,6 +168,8 @@ int main(int argc, char **argv)
         } else if (strcmp(option, "--set") == 0 && value != NULL) {
             if (set_parameter(&params, argv[++k]) != 0)
                 return 2;
+        } else if (strcmp(option, "--serial") == 0 && value != NULL) {
+            board_number(strtoul(argv[++k], NULL, 10) % 100000000u);
         } else if (strcmp(option, "--break") == 0 && value != NULL) {
             if (!board_break(argv[++k]))
                 return complain("nothing to break", value);

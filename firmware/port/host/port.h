@@ -8,6 +8,7 @@
 #include "solenoid.h"
 
 /* board.c: the hardware behind the HAL. */
+void board_number(unsigned long number);        /* its serial number; otherwise that of the seed */
 void board_init(const struct solenoid_params *p, uint8_t reset_cause);
 void board_tick(void);                          /* one 100 us tick: interrupt, then the plant */
 void board_receive(const uint8_t *bytes, int32_t count);

@@ -25,6 +25,7 @@ _ANOTHER_MODEL = {
     "changed": "identify anew",
     "reversed": "identify anew",
 }
+_LONGER = 20.0  # times as long as it was: nobody records for longer to see one cause
 
 
 def stage(state: State) -> State:
@@ -74,6 +75,7 @@ def _after_verdict(state: State) -> Evidence:
 def _to_see_more(state: State) -> Evidence:
     """Ask for what the records lack to show the causes that they could not have shown."""
     worst = max(state.limits.get(name, np.inf) for name in state.blind)
-    figures = {"matters": PERCENT * LIMITS.matters, "times": (worst / LIMITS.matters) ** 2}
-    kind = "inconclusive" if state.lacks else "too noisy"
+    times = (worst / LIMITS.matters) ** 2
+    kind = "inconclusive" if state.lacks else "too noisy" if times <= _LONGER else "far too noisy"
+    figures = {"matters": PERCENT * LIMITS.matters, "times": times}
     return Evidence(kind, figures=figures, names=(*state.blind, *state.lacks))

@@ -1,0 +1,42 @@
+"""The way in: Ctrl-C while the program loads ends it with one line, as it does later with more to say."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from types import FrameType
+
+_EXIT = 130  # of errors.Interrupted; that is not here yet
+_SAID = "stopped by you; nothing was written"
+_AS_JSON = '{"schema": 1, "command": "", "error": {"kind": "interrupted", "message": "%s", "hint": "%s"}}\n'
+_AGAIN = "run the command again"
+
+
+def _stop(_number: int, _frame: FrameType | None) -> None:
+    """End at once: a library in the middle of its import would tell it in its own way, or not at all."""
+    if "--json" in sys.argv:
+        os.write(1, (_AS_JSON % (_SAID, _AGAIN)).encode())
+    os.write(2, f"error: {_SAID}\n  try: {_AGAIN}\n".encode())
+    os._exit(_EXIT)
+
+
+def main() -> None:
+    """Load the program and run it."""
+    heard = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # not in the background of a shell
+    if heard:
+        signal.signal(signal.SIGINT, _stop)
+    # after the handler: it is this that takes its time
+    from pulsetrainer.cli.app import main as run
+
+    try:
+        run()
+    finally:
+        if heard:  # all is said: to end needs no words
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def loaded() -> None:
+    """Let Ctrl-C be an exception from now on, which commands know how to end with."""
+    if signal.getsignal(signal.SIGINT) is _stop:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
