@@ -25,7 +25,6 @@ _ANOTHER_MODEL = {
     "changed": "identify anew",
     "reversed": "identify anew",
 }
-_LONGER = 20.0  # times as long as it was: nobody records for longer to see one cause
 
 
 def stage(state: State) -> State:
@@ -76,6 +75,6 @@ def _to_see_more(state: State) -> Evidence:
     """Ask for what the records lack to show the causes that they could not have shown."""
     worst = max(state.limits.get(name, np.inf) for name in state.blind)
     times = (worst / LIMITS.matters) ** 2
-    kind = "inconclusive" if state.lacks else "too noisy" if times <= _LONGER else "far too noisy"
+    kind = "inconclusive" if state.lacks else "too noisy" if times <= LIMITS.longer else "far too noisy"
     figures = {"matters": PERCENT * LIMITS.matters, "times": times}
     return Evidence(kind, figures=figures, names=(*state.blind, *state.lacks))
