@@ -3,7 +3,8 @@
 A triangle wave turns at any moment. The samples on both sides of it miss its tip by up to half a step, the
 memory keeps the tip, and the output of the whole way back tells of it. Where the input runs straight up to a
 turn and straight on from it, the tip is where the two lines meet. An input that is made of steps, one a
-sample, has its tips at samples. A record tells which: its ends, reached again and again, lie at one value.
+sample, has its tips at samples. Which of the two it is, the ends of the record tell, which are reached again
+and again, and the output.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, finite_vector
+from pulsetrainer.core.memory import turning_points
+from pulsetrainer.core.plane import BoolArray, FloatArray, finite_vector
+from pulsetrainer.core.wild import fits_better
 
-_ROUNDING = 1e-6  # of a step: tips so near to a sample lie at it
-_AGAIN = 3  # turns at one end of the record tell whether they lie at samples
+_AGAIN = 3  # turns within one step of an end of the record: they are meant to end there
+_SAME = 0.02  # of a step
 _STRAIGHT = 0.2  # of the rate beside a turn: by more than this the rate before it must not differ
 
 
@@ -27,8 +30,7 @@ def reached(values: ArrayLike, time_s: FloatArray | None = None) -> FloatArray:
 
     with t between the two samples a and b = a + 1, r_a the rate up to the first and r_b that from the second
     on. The extreme sample gets the value u* where the rates before and after change by less than a fifth in
-    one step, so that rounded turns stay as they are. All stay where those at the ends of the record agree
-    better as they were sampled.
+    one step, so that rounded turns stay as they are.
 
     Parameters
     ----------
@@ -54,28 +56,57 @@ def reached(values: ArrayLike, time_s: FloatArray | None = None) -> FloatArray:
     )
     a, before, after = (one[turns & straight] for one in (a, before, after))
     since = (u[a + 1] - u[a] - after * (t[a + 1] - t[a])) / (before - after)
-    between = t[a + 1] - t[a]
-    inside = (since >= -_ROUNDING * between) & (since <= (1.0 + _ROUNDING) * between)
-    a, before, after, since = (one[inside] for one in (a, before, after, since))
+    inside = (since >= 0) & (since <= t[a + 1] - t[a])
+    a, before, since = (one[inside] for one in (a, before, since))
     tip, rising = u[a] + before * since, before > 0
     extreme = np.where((u[a] > u[a + 1]) == rising, a, a + 1)
-    step = np.maximum(np.abs(before), np.abs(after)) * (t[a + 1] - t[a])
-    ends = [_at_the_end(np.where(rising, tip, -tip), step, side) for side in (rising, ~rising)]
-    told = [own for own in ends if own.size >= _AGAIN]
-    if told and _scatter(u[extreme], told) <= _scatter(tip, told):
-        return found
     # beside a tip the line through it is bent, and meets the next one nearer to the sample
     order = np.argsort(np.abs(tip - u[extreme]), kind="stable")
     found[extreme[order]] = tip[order]
     return found
 
 
-def _at_the_end(outward: FloatArray, step: FloatArray, side: BoolArray) -> IntArray:
-    """Return which turns of one side (k,) lie within one of their steps of the outermost."""
-    own = np.flatnonzero(side)
-    return own[outward[own] > np.max(outward[own], initial=-np.inf) - step[own]]
+def at_their_tips(
+    signals: Sequence[tuple[FloatArray, FloatArray]],
+    times: Sequence[FloatArray | None],
+    kept: Sequence[BoolArray],
+) -> list[FloatArray]:
+    """Return the inputs of some records (n,) with their turns as ``reached``, where the records say so.
+
+    A device that is driven sample by sample never sees tips between samples: then the turns at an end of the
+    record agree better as they were measured, and the inputs as they were measured leave less of the outputs.
+
+    Parameters
+    ----------
+    signals
+        Input and output of each record, both (n,).
+    times
+        Of the samples (n,); None: the record knows none, and stays as it is.
+    kept
+        Samples (n,) whose output counts.
+    """
+    measured = [u for u, _ in signals]
+    tips = [u if t is None else reached(u, t) for u, t in zip(measured, times, strict=True)]
+    tips = [u if _ends_lie_at_samples(u, tip) else tip for u, tip in zip(measured, tips, strict=True)]
+    if all(map(np.array_equal, tips, measured)):
+        return measured
+    lost = [(np.zeros(own.size, dtype=bool), ~own) for own in kept]
+    told = any(own.any() for own in kept)
+    return tips if not told or fits_better(signals, tips, lost) else measured
 
 
-def _scatter(values: FloatArray, groups: Sequence[IntArray]) -> float:
-    """Sum of distances of values (k,) from the median of each group: some turns of it are meant elsewhere."""
-    return sum(float(np.sum(np.abs(values[own] - np.median(values[own])))) for own in groups)
+def _ends_lie_at_samples(u: FloatArray, tips: FloatArray) -> bool:
+    """Whether most turns at the ends of an input (n,) lie at one value as measured, fewer at their tips."""
+    turns = turning_points(u)[:-1]
+    if turns.size == 0:
+        return False
+    step = np.maximum(np.abs(u[turns] - u[turns - 1]), np.abs(u[turns + 1] - u[turns]))
+    near = [turns[u[turns] > u.max() - step], turns[u[turns] < u.min() + step]]
+    told = [own for own in near if own.size >= _AGAIN]
+    measured, moved = (sum(_alike(one[own], float(np.median(step))) for own in told) for one in (u, tips))
+    return measured > moved and measured > 0.5 * sum(own.size for own in told)
+
+
+def _alike(values: FloatArray, step: float) -> int:
+    """How many of the values (k,) are the same, within a small share of a step."""
+    return int(np.count_nonzero(np.abs(values - np.median(values)) < _SAME * step))

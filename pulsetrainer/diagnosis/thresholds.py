@@ -125,6 +125,7 @@ class Thresholds:
     pieces: int = 5  # whole ones, of the time, each predicted from the others
     rates: int = 4  # groups of blocks by their rate, each predicted from the others
     repeated: float = 0.5  # of what the fit gains: a smaller gain on the pieces is chance
+    mends: float = 0.1  # of what can be explained: less, of a strength that may be nothing, is not found
     piece_worse: float = 0.1  # of that gain: no piece may be predicted worse by more
     piece_told: float = 0.02  # weight of a piece that is left out: enough where the others tell nothing
     wander_pieces: int = 10  # of the time: a gain and an offset of each show that the record wanders ...
@@ -218,6 +219,7 @@ class Thresholds:
     feedback_passes: int = 6  # each multiplies the error of a fed back output by some per cent
     feedback_settled: float = 1e-9  # of the span: passes end when they change less
     trace_samples: int = 6000  # kept for the figures
+    longer: float = 20.0  # times as long as it was: nobody records for longer to see one cause
     experiment_Hz: float = 200.0  # sample rate of the experiments tried on paper
 
     # Progress bar only

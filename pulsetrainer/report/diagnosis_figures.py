@@ -134,12 +134,12 @@ def ranking(found: Diagnosis) -> Figure:
     axes.barh(
         [one.cause for one in shown],
         share,
-        color=[_SHADES[answer(one, quick=found.quick).partition(":")[0]] for one in shown],
+        color=[_SHADES[answer(one, found).partition(":")[0]] for one in shown],
         height=0.62,
     )
     for k, one in enumerate(shown):
         axes.annotate(
-            answer(one, quick=found.quick),
+            answer(one, found),
             (max(one.explains_percent, 1e-3), k),
             xytext=(4, 0),
             textcoords="offset points",

@@ -65,15 +65,18 @@ def stands(found: Diagnosis, fields: Sequence[str]) -> bool:
     return "extended_percent" not in fields or bool(found.found and not found.quick)
 
 
-def answer(one: Cause, *, quick: bool) -> str:
+def answer(one: Cause, found: Diagnosis) -> str:
     """Say whether a cause was found, and if not, why."""
     if one.found:
         return "in doubt" if one.doubts else "yes"
+    instead = [other.cause for other in found.found if one.cause in other.confounded_with]
+    if instead:
+        return f"no: it could be instead of {instead[0]}"
     if one.p_value is None:
         return "no"
     if one.p_value > LIMITS.p_max:
         return "no: noise does as much"
-    return "no: another explains more" if quick else "no: too small or no better"
+    return "no: another explains more" if found.quick else "no: too small or no better"
 
 
 def parameters(several: Sequence[Parameter]) -> dict[str, str]:
@@ -122,7 +125,7 @@ def explains(one: Cause, found: Diagnosis) -> float:
 def _row(one: Cause, found: Diagnosis) -> tuple[Any, ...]:
     gain = one.held_out_gain_percent if one.found else math.nan
     share = _figure(explains(one, found), ".1f")
-    return (one.cause, answer(one, quick=found.quick), share, _figure(gain, ".1f"))
+    return (one.cause, answer(one, found), share, _figure(gain, ".1f"))
 
 
 def _figure(value: float, form: str) -> str | None:

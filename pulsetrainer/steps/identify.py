@@ -209,18 +209,9 @@ def _without_wild(
 
 
 def to_their_tips(runs: list[Run]) -> list[Run]:
-    """Return runs with turns of the input at their tips between samples, where that fits better.
-
-    A device that is driven sample by sample never sees those tips.
-    """
-    tips = [run.input if run.time_s is None else turns.reached(run.input, run.time_s) for run in runs]
-    if all(map(np.array_equal, tips, [run.input for run in runs])):
-        return runs
-    nowhere = [np.zeros(run.input.size, dtype=bool) for run in runs]
-    masked = [none if run.masked is None else run.masked for run, none in zip(runs, nowhere, strict=True)]
-    told = not all(mask.all() for mask in masked)
-    if told and not wild.fits_better(_signals(runs), tips, list(zip(nowhere, masked, strict=True))):
-        return runs
+    """Return runs with turns of the input at their tips between samples, where that fits better."""
+    kept = [np.ones(run.input.size, dtype=bool) if run.masked is None else ~run.masked for run in runs]
+    tips = turns.at_their_tips(_signals(runs), [run.time_s for run in runs], kept)
     return [replace(run, input=tip) for run, tip in zip(runs, tips, strict=True)]
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pulsetrainer.core.turns import reached
+from pulsetrainer.core.turns import at_their_tips, reached
 from pulsetrainer.errors import ArgumentError
 
 
@@ -83,27 +83,58 @@ def test_rounded_turns_stay_as_they_are(per_turn):
     np.testing.assert_array_equal(reached(rest), rest)
 
 
-@pytest.mark.parametrize("stepped", [True, False])
-def test_the_ends_of_a_record_tell_an_input_that_is_made_of_steps(stepped):
-    """A ramp that is cut short at its target, at a sample; or the same targets reached between samples."""
-    targets = [0.0, 1.0, 0.0, 1.0, 0.45, 1.0, 0.0, 0.62, 0.0]
-    u = [0.0]
-    for target in targets[1:]:
-        way = target - u[-1]
-        count = abs(way) / 0.07
-        ramp = np.append(np.arange(1, np.floor(count) + 1), count)
-        u += (u[-1] + np.sign(way) * 0.07 * ramp).tolist()
-    if stepped:
-        np.testing.assert_array_equal(reached(u), u)
-        return
-    corners = np.append(0.0, np.cumsum(np.abs(np.diff(targets)) / 0.07))
-    found = reached(np.interp(np.arange(0.3, corners[-1]), corners, targets))
-    for level in (0.0, 0.45, 0.62, 1.0):
-        assert np.min(np.abs(found - level)) < 1e-12
-
-
 def test_what_is_no_input_is_refused():
     """As everywhere in the core."""
     with pytest.raises(ArgumentError):
         reached([1.0, np.nan])
     np.testing.assert_array_equal(reached([0.0, 1.0, 0.0]), [0.0, 1.0, 0.0])
+
+
+def _followed(tips: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Minor loops of a triangle wave, seven samples a stroke; three plays that see all of it, or samples."""
+    rng = np.random.default_rng(11)
+    corners = np.cumsum(np.append(0.0, rng.uniform(6.2, 7.8, 120)))
+    levels = np.where(
+        np.arange(corners.size) % 2, rng.uniform(0.5, 1.0, corners.size), rng.uniform(0.0, 0.4, 121)
+    )
+    t = np.arange(0.0, corners[-1])
+    fine = np.arange(0.0, corners[-1], 1.0 / 64.0) if tips else t
+    seen = np.interp(fine, corners, levels)
+    at, widths = np.zeros(3), np.asarray([0.05, 0.12, 0.2])
+    y = np.empty_like(seen)
+    for k, one in enumerate(seen):
+        at = np.clip(at, one - widths, one + widths)
+        y[k] = at.sum()
+    return np.interp(t, corners, levels), y[:: 64 if tips else 1], t
+
+
+@pytest.mark.parametrize("tips", [True, False])
+def test_the_output_tells_whether_the_device_saw_the_tips(tips):
+    """What is driven sample by sample keeps its input; without time, and where nothing moves, all do."""
+    u, y, t = _followed(tips)
+    kept = np.ones(u.size, dtype=bool)
+    (found,) = at_their_tips([(u, y)], [t], [kept])
+    np.testing.assert_array_equal(found, reached(u, t) if tips else u)
+    assert np.count_nonzero(reached(u, t) != u) > 60
+    (untimed,) = at_their_tips([(u, y)], [None], [kept])
+    np.testing.assert_array_equal(untimed, u)
+
+
+@pytest.mark.parametrize("stepped", [True, False])
+def test_the_ends_of_a_record_tell_an_input_that_is_made_of_steps(stepped):
+    """A ramp that is cut short at its target, at a sample; or the same targets between samples."""
+    targets = [0.0, 1.0, 0.0, 1.0, 0.45, 1.0, 0.0, 0.62, 0.0]
+    corners = np.append(0.0, np.cumsum(np.abs(np.diff(targets)) / 0.07))
+    if stepped:
+        u = [0.0]
+        for target in targets[1:]:
+            way = target - u[-1]
+            ramp = np.append(np.arange(1, np.floor(abs(way) / 0.07) + 1), abs(way) / 0.07)
+            u += (u[-1] + np.sign(way) * 0.07 * ramp).tolist()
+    else:
+        u = np.interp(np.arange(0.3, corners[-1]), corners, targets)
+    u = np.asarray(u)
+    t = np.arange(float(u.size))
+    (found,) = at_their_tips([(u, np.zeros(u.size))], [t], [np.zeros(u.size, dtype=bool)])
+    np.testing.assert_array_equal(found, u if stepped else reached(u))
+    assert np.any(reached(u) != u)

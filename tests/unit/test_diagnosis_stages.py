@@ -1245,6 +1245,22 @@ def test_where_all_repeat_the_model_is_that_of_the_search(monkeypatch):
     assert state.repeated is state.current
 
 
+@pytest.mark.parametrize(
+    ("explains", "beside", "found"), [(9.9, (), False), (10.1, (), True), (9.9, (rivals.WORSE,), True)]
+)
+def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, beside, found):
+    """Only where it matters little, and the other one is in no doubt."""
+    monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    findings = (
+        _finding("creep", 80.0, doubts=beside),
+        _finding("viscous", explains, doubts=(rivals.MAY_BE_NOTHING,)),
+    )
+    after = repetition.stage(_state(_fit(500.0, "creep", "viscous"), findings=findings))
+    assert [one.found for one in after.findings] == [True, found]
+    assert after.repeated.names == (("creep",) if not beside else ())
+
+
 def test_what_equal_loops_show_is_not_asked_again(monkeypatch):
     """It was tested by itself: blocks that are predicted worse take a creep out, and not this."""
     monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pulsetrainer.core.record import Record
-from pulsetrainer.core.turns import reached
+from pulsetrainer.core.turns import at_their_tips
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
@@ -55,7 +55,11 @@ def stage(question: Question) -> Masked:
     ]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
     even = [evenly(record, times) for record, times in zip(masked, stamps, strict=True)]
-    even = [replace(one, input=reached(one.input)) if one.timed else one for one in even]
+    times = [np.asarray(one.step * np.arange(one.input.size)) if one.timed else None for one in even]
+    inputs = at_their_tips(
+        [(one.input, one.output) for one in even], times, [one.sample_weight > 0 for one in even]
+    )
+    even = [replace(one, input=u) for one, u in zip(even, inputs, strict=True)]
     scale = scale_of(even, low, high, second)
     firings = tuple((k, one) for k, fired in enumerate(found) for one in fired)
     return Masked(question, tuple(scale.shrunk(record) for record in even), firings, scale)

@@ -9,17 +9,20 @@ repeat: it is told with these words, and is not added to the model; nor is one t
 another reason (`rivals`). What equal loops show was tested by itself.
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
-been fitted beside it.
+been fitted beside it. One whose strength may be nothing, and that explains less than a tenth beside a cause
+without a doubt, was not found: it mends the formula of that cause.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
+from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 DOUBT = "does not repeat"
 
@@ -37,7 +40,14 @@ def stage(state: State) -> State:
     findings = tuple(
         replace(one, doubts=(*one.doubts, DOUBT)) if one.cause.id in told else one for one in state.findings
     )
+    if any(one.found and not one.in_doubt for one in findings):
+        findings = tuple(replace(one, found=one.found and not _is_nothing(one)) for one in findings)
     return replace(state, findings=findings, repeated=kept)
+
+
+def _is_nothing(finding: Finding) -> bool:
+    """Whether a finding may be nothing, and would matter little."""
+    return MAY_BE_NOTHING in finding.doubts and finding.explains_percent < PERCENT * LIMITS.mends
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:

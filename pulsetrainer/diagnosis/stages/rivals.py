@@ -29,6 +29,7 @@ from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 WORSE, WANDERS, NO_LOOPS = "predicts worse", "wanders", "no equal loops"
+MAY_BE_NOTHING = "spans zero"
 
 
 def stage(state: State) -> State:
@@ -71,7 +72,7 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
             yield WANDERS
     strengths = known[: cause.strengths]
     if strengths and all(one.lower <= 0 <= one.upper for one in strengths):
-        yield "spans zero"
+        yield MAY_BE_NOTHING
     bounds = cause.quantities(state.problem.frames[0])
     if any(value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)):
         yield "at bound"
