@@ -41,12 +41,13 @@ TEXTS: Mapping[str, str] = {
     "slow noise": (
         "What is taken for noise here is slow: short averages have {white:.2g} % of the span of it, "
         "{times:.1f} times what the noise from sample to sample would leave. If the sensor does not do that "
-        "by itself, something that was not recorded acts on the device"
+        "by itself, something acts on the device that was not recorded, or the device is of a kind that the "
+        "model cannot follow"
     ),
     "bursts": (
         "What is left comes and goes, or jumps, as no noise does: short averages have {white:.2g} % of the "
-        "span of it, {times:.1f} times what the noise from sample to sample would leave. Something that was "
-        "not recorded acts on the device or on the sensor"
+        "span of it, {times:.1f} times what the noise from sample to sample would leave. Something acts on "
+        "the device or the sensor that was not recorded, or the model cannot follow a device of this kind"
     ),
     "not accepted": (
         "Noise alone hardly looks like {names} (p = {p:.3f}). But once the model is fitted together with it, "
@@ -55,7 +56,7 @@ TEXTS: Mapping[str, str] = {
     ),
     "not repeated": (
         "What is left can be fitted by a learned dependence, but that did not repeat when whole pieces of "
-        "the time were left out: it is no property of the device"
+        "the time were left out: it is not taken for a property of the device"
     ),
     "largest": "The remaining error is largest {place}, {times:.1f} times its smallest value.",
     "quick": "Quick screen: no model was fitted again, so the strengths are rough and come out too small.",
