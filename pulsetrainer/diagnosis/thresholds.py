@@ -95,7 +95,6 @@ class Thresholds:
     burstiness: float = 4.5  # kurtosis in octaves: drawn noises have 2.9 to 4, bursts and loads 5.5 to 8
     bursts_span: float = 0.004  # of the span: plants of other kinds leave less that comes in bursts
     matters: float = 0.005  # of the span: an effect so large must show, or nothing can be said
-    longer: float = 20.0  # times as long as it was: nobody records for longer to see one cause
     draws: int = 1999  # of the noise: the smallest p is a twentieth of the limit
     probes: int = 12  # white signals that tell how much of a spectrum the weights and the library take away
     band: float = 1.15  # of its frequency: width of a band of the noise's spectrum ...
