@@ -553,6 +553,7 @@ def test_a_new_cause_is_one_file(tmp_path, monkeypatch):
     """Put into the folder of the causes it is in the library, and is diagnosed with its strength."""
     (tmp_path / "toy_cause.py").write_text(TOY)
     monkeypatch.setattr(causes, "__path__", [*causes.__path__, str(tmp_path)])
+    before = library()
     library.cache_clear()
     try:
         plane = Plane.uniform(0.0, 1.5, 24)
@@ -571,6 +572,7 @@ def test_a_new_cause_is_one_file(tmp_path, monkeypatch):
         assert found.findings[0].parameters[0].value == pytest.approx(0.3, rel=0.02)
     finally:
         library.cache_clear()
+        library().update(before)  # the very causes that other tests hold
 
 
 def test_an_output_that_jumps_with_its_input_is_no_fault():
