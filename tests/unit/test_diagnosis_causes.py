@@ -571,7 +571,7 @@ def test_a_new_cause_is_one_file(tmp_path, monkeypatch):
         assert found.verdict == "toy"
         assert found.findings[0].parameters[0].value == pytest.approx(0.3, rel=0.02)
     finally:
-        library.cache_clear()
+        library().clear()
         library().update(before)  # the very causes that other tests hold
 
 
