@@ -83,7 +83,7 @@ def test_a_density_a_quarter_of_a_percent_away_is_changed():
     with pt.open_device("bench:?seed=736") as device:
         own = pt.identify(pt.capture("identification", device))
     verdicts = []
-    for port in ("bench:?seed=736&noise-seed=7", "bench:?seed=1736"):
+    for port in ("bench:?seed=736&noise-seed=7", "bench:?seed=1736&serial=736"):
         with pt.open_device(port) as device:
             verdicts.append(pt.check(own, device).verdict)
     assert verdicts == ["true", "changed"]
