@@ -162,7 +162,7 @@ def _stopped(*_: object, **__: object) -> None:
 
 @pytest.mark.parametrize(
     ("place", "written"),
-    [("job.Job.load", "nothing"), ("job.Job.device", "nothing"), ("play._show", "played.h5")],
+    [("job.Job.load", "nothing"), ("job.Job.open_device", "nothing"), ("job.Job.show", "played.h5")],
     ids=["while it loads", "before it saves", "after it saved"],
 )
 def test_ctrl_c_while_nothing_is_played(tmp_path, monkeypatch, capsys, place, written):
