@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -55,7 +54,7 @@ def compare(
             from pulsetrainer.report import comparison_figure, render
 
             job.write(out, render.encode(comparison_figure.draw(labels, values), form))
-    job.notes(_alike(evaluations))
+    job.alike(evaluations)
     sources = [
         {"file": path, **picked(header, "title", "created")}
         for path, header in zip(evaluations, headers, strict=True)
@@ -78,17 +77,3 @@ def compare(
             "change: ", "from the first to the last; within the spread between repeats no verdict"
         )
     job.wrote(out)
-
-
-def _alike(files: Sequence[Path]) -> list[str]:
-    """Say which files are the same, byte for byte: between them nothing can differ."""
-    from pulsetrainer.files.provenance import sha256_of
-
-    same: dict[str, list[str]] = {}
-    for path in files:
-        same.setdefault(sha256_of(path), []).append(str(path))
-    return [
-        f"{' and '.join(names)} are the same file, so nothing differs between them"
-        for names in same.values()
-        if len(names) > 1
-    ]

@@ -65,6 +65,7 @@ def evaluate(
         problem = f"{len(broken)} of {len(limits)} bounds of {bounds} are broken: {listed}"
         hint = "look at what changed; if the new figure is right, change the bound knowingly"
         failed = QualityError(problem, hint=hint)
+    job.alike(model)
     job.notes(evaluation.notes)
     job.screen.result(
         evaluated(evaluation)

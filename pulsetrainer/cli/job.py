@@ -19,7 +19,7 @@ from pulsetrainer.files.atomic_write import check_output
 from pulsetrainer.files.input_file import check_artefact, check_file
 
 if TYPE_CHECKING:
-    from pulsetrainer.artefacts import FloatArray
+    from pulsetrainer.artefacts import FloatArray, Model
     from pulsetrainer.cli.loop_view import LoopView
     from pulsetrainer.device.device import Device
     from pulsetrainer.device.identity import DeviceInfo
@@ -103,8 +103,11 @@ class Job:
             yield progress
         self.seconds = time.perf_counter() - begun
 
-    def open_device(self) -> Device:
-        """Open a device, as ``api.open_device``, with the gains that the file of settings has for it."""
+    def open_device(self, model: Model | None = None) -> Device:
+        """Open a device, as ``api.open_device``, with the gains that the file of settings has for it.
+
+        It is said where what is to be played was made for another one: with a ``model`` of that.
+        """
         from pulsetrainer.api import open_device
         from pulsetrainer.device.gains import DELIVERED
 
@@ -118,7 +121,20 @@ class Job:
             if known and device.info.serial not in known:
                 said = f"{self._settings} has gains for {', '.join(known)} and none for {device.info.serial}"
                 self.notes([f"{said}, which plays with those delivered; `pulsetrainer tune` measures it"])
+        of = model.coil.serial if model is not None and model.coil is not None else ""
+        if of not in ("", device.info.serial):
+            self.notes([f"the model is of {of}, and this is {device.info.serial}, whose force is another"])
         return device
+
+    def alike(self, files: Sequence[Path]) -> None:
+        """Say which files are the same, byte for byte: between them nothing can differ."""
+        from pulsetrainer.files.provenance import sha256_of
+
+        same: dict[str, list[str]] = {}
+        for path in files:
+            same.setdefault(sha256_of(path), []).append(str(path))
+        twice = [" and ".join(names) for names in same.values() if len(names) > 1]
+        self.notes([f"{names} are the same file, so nothing differs between them" for names in twice])
 
     def check_device(self) -> None:
         """Refuse what ``open_device`` would by port, limits and file of settings alone: nothing is opened."""

@@ -73,7 +73,7 @@ def play(
     top = max(waveform.compensated.max(), waveform.scaled.max())
     view = job.view(1.05 * float(top), 1.1 * float(waveform.target.max()), live=live)  # a little room
     watch = _shown_by(view, waveform) if view else None
-    with job.working(f"playing {drive.name}", view) as progress, job.open_device() as device:
+    with job.working(f"playing {drive.name}", view) as progress, job.open_device(waveform.model) as device:
         info = device.info
         try:
             played = pt.play(

@@ -51,7 +51,7 @@ def refine(
         job.would(f"refine {waveform.name}", planned, rows, name=waveform.name, passes=passes)
         return
     stopped: PulsetrainerError | None = None
-    with job.working(f"refining {drive.name}") as progress, job.open_device() as device:
+    with job.working(f"refining {drive.name}") as progress, job.open_device(waveform.model) as device:
         info = device.info
         try:
             refined = pt.refine(waveform, device, passes=passes, progress=progress)

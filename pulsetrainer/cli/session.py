@@ -146,7 +146,7 @@ def session(
         return
     said = "a session that was cut off: look with `pulsetrainer show {left}`, and delete it"
     job.left_over(out, pt.Session, said)
-    with job.open_device() as device, job.working("session") as progress, steered.screen:
+    with job.open_device(loaded) as device, job.working("session") as progress, steered.screen:
 
         def watch(now: Now) -> None:
             steered.view(now)

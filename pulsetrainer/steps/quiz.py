@@ -35,7 +35,7 @@ def order(choices: int, questions: int, seed: int) -> list[int]:
         raise UsageError("a quiz needs at least two pulses to choose from", hint="name more in `pulses`")
     if questions < choices:
         raise UsageError(
-            f"a quiz of {questions} questions cannot ask each of {choices} pulses",
+            f"a quiz of {questions} question{'s' * (questions != 1)} cannot ask each of {choices} pulses",
             hint=f"ask at least {choices}",
         )
     rng = np.random.default_rng((seed, questions, choices))

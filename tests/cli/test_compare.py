@@ -96,6 +96,8 @@ def test_a_file_beside_itself_or_a_copy_is_told(run, built_small, tmp_path):
         done = run("compare", *files)
         assert done.code == 0
         assert ("are the same file" in done.err) is told
+    models = ("--model", KEPT / "model.h5") * 2
+    assert "are the same file" in run("evaluate", KEPT / "run.h5", *models).err
 
 
 def test_two_evaluations_without_a_common_figure(run, built_small, tmp_path):

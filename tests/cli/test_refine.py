@@ -10,6 +10,7 @@ import pytest
 
 import pulsetrainer as pt
 from program import pulsetrainer
+from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.errors import Interrupted
 from wording import refusal, tells
 
@@ -148,3 +149,16 @@ def test_what_was_learnt_is_kept_when_it_is_stopped(passes):
     assert (kept is None) == (passes == 1)
     if kept is not None:
         assert (len(kept.passes), kept.kept, kept.inversion) == (2, 2, "refined")
+
+
+def test_a_drive_for_another_device_is_told(run, tmp_path):
+    """By the serial number of its model; on its own device nothing is said."""
+    model = pt.load(KEPT / "model.h5")
+    coil = Coil(0.4, 0.05, 0.001, 0.1, 0.01, 60.0, "BENCH-0")
+    pt.save(pt.invert("normal", replace(model, coil=coil), periods=1), tmp_path / "drive.h5")
+    for seed, told in ((0, False), (4, True)):
+        for verb in ("play", "refine"):
+            given = ("--passes", 1) if verb == "refine" else ("--repeats", 1)
+            done = run(verb, "drive.h5", "-o", f"{verb}-{seed}.h5", *given, "--port", f"bench:?seed={seed}")
+            assert done.code == 0, done.err
+            assert ("the model is of BENCH-0, and this is BENCH-4" in done.err) is told
