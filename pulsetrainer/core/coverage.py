@@ -89,7 +89,10 @@ def minor_coverage(plane: Plane, inputs: Sequence[ArrayLike], noise: float = 0.0
     """
     passed = np.zeros((plane.n_h, plane.n_h), dtype=bool)
     for values in inputs:
-        path = np.concatenate(([plane.low], np.clip(finite_vector("input", values), plane.low, plane.high)))
+        u = finite_vector("input", values)
+        path = np.empty(u.size + 1)
+        path[0] = plane.low
+        np.clip(u, plane.low, plane.high, out=path[1:])  # in place: the record may be long
         _mark_corners(plane, path[turning_points(path)], noise, passed)
     i, j = plane.cell_indices
     within = (i < plane.n_h - 1) & (j > 0)

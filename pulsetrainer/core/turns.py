@@ -4,7 +4,7 @@ A triangle wave turns at any moment. The samples on both sides of it miss its ti
 memory keeps the tip, and the output of the whole way back tells of it. Where the input runs straight up to a
 turn and straight on from it, the tip is where the two lines meet. An input that is made of steps, one a
 sample, has its tips at samples. Which of the two it is, the ends of the record tell, which are reached again
-and again, and the output.
+and again, and the output. A device that remembers its output keeps no tips of its input.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pulsetrainer.core.input_noise import clean
 from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import BoolArray, FloatArray, finite_vector
-from pulsetrainer.core.wild import fits_better
+from pulsetrainer.core.wild import fits_better, left_by_a_quick_fit
 
 _AGAIN = 3  # turns within one step of an end of the record: they are meant to end there
 _SAME = 0.02  # of a step
@@ -90,9 +91,32 @@ def at_their_tips(
     tips = [u if _ends_lie_at_samples(u, tip) else tip for u, tip in zip(measured, tips, strict=True)]
     if all(map(np.array_equal, tips, measured)):
         return measured
+    if not any(own.any() for own in kept):
+        return tips
     lost = [(np.zeros(own.size, dtype=bool), ~own) for own in kept]
-    told = any(own.any() for own in kept)
-    return tips if not told or fits_better(signals, tips, lost) else measured
+    if not fits_better(signals, tips, lost) or _remembers_its_output(signals, kept):
+        return measured
+    return tips
+
+
+def _remembers_its_output(
+    signals: Sequence[tuple[FloatArray, FloatArray]], kept: Sequence[BoolArray]
+) -> bool:
+    """Whether the inputs (n,) follow from the outputs (n,) better than the outputs from the inputs.
+
+    Each side is measured by its own span. As an input, the output would be remembered with its noise.
+    """
+    lost = [~own for own in kept]
+    swapped = [(clean(y).input, u) for u, y in signals]
+    return left_by_a_quick_fit(swapped, lost) / _span([u for u, _ in signals]) < left_by_a_quick_fit(
+        signals, lost
+    ) / _span([y for _, y in signals])
+
+
+def _span(signals: Sequence[FloatArray]) -> float:
+    """Return the range of some signals together; infinity where they never move."""
+    span = max(float(one.max()) for one in signals) - min(float(one.min()) for one in signals)
+    return span or float("inf")
 
 
 def _ends_lie_at_samples(u: FloatArray, tips: FloatArray) -> bool:

@@ -263,19 +263,27 @@ def fits_better(
     found
         For each record which samples (n,) are wild in the input, and in the output: the latter do not count.
     """
+    lost = [in_output & ~in_input for in_input, in_output in found]
+    others = [(u, y) for u, (_, y) in zip(inputs, signals, strict=True)]
+    return left_by_a_quick_fit(others, lost) < left_by_a_quick_fit(signals, lost)
 
-    def left(given: Sequence[FloatArray]) -> float:
-        # one input that is far off would leave all others in one cell of a common plane
-        low, high = min(float(u.min()) for u in given), max(float(u.max()) for u in given)
-        if not high > low:
-            return float("inf")
-        plane = Plane.uniform(low, high, _QUICK_LEVELS)
-        records = [
-            Record(u, y, np.where(in_output & ~in_input, 0.0, 1.0))
-            for u, (_, y), (in_input, in_output) in zip(given, signals, found, strict=True)
-        ]
-        equations = normal_equations(plane, levelled(records)[0], "continuous")
-        masses = nnls.solve_signed(*smoothed(equations, _QUICK_SMOOTHING))
-        return equations.rms(masses, equations.offset(masses))
 
-    return left(inputs) < left([u for u, _ in signals])
+def left_by_a_quick_fit(signals: Sequence[tuple[FloatArray, FloatArray]], lost: Sequence[BoolArray]) -> float:
+    """Return the rms that a coarse fit of weights of either sign leaves of the outputs, output unit.
+
+    Parameters
+    ----------
+    signals
+        Input and output of each record, both (n,). Infinity where no input moves.
+    lost
+        Samples (n,) of each record whose output does not count.
+    """
+    # one input that is far off would leave all others in one cell of a common plane
+    low, high = min(float(u.min()) for u, _ in signals), max(float(u.max()) for u, _ in signals)
+    if not high > low:
+        return float("inf")
+    plane = Plane.uniform(low, high, _QUICK_LEVELS)
+    records = [Record(u, y, np.where(bad, 0.0, 1.0)) for (u, y), bad in zip(signals, lost, strict=True)]
+    equations = normal_equations(plane, levelled(records)[0], "continuous")
+    masses = nnls.solve_signed(*smoothed(equations, _QUICK_SMOOTHING))
+    return equations.rms(masses, equations.offset(masses))

@@ -130,7 +130,7 @@ def test_a_dual_model_predicts_within_the_noise(draw, seed):
 
 
 @pytest.mark.parametrize(
-    "seed", [7301, *(pytest.param(s, marks=pytest.mark.slow) for s in range(7500, 7512))]
+    "seed", [7301, 7508, *(pytest.param(s, marks=pytest.mark.slow) for s in range(7500, 7512) if s != 7508)]
 )
 def test_steep_branches_of_a_dual_model_are_predicted_within_the_noise(seed):
     """The output is remembered with its noise, which a fit to the input takes for exact."""
