@@ -57,7 +57,7 @@ def played(model, port: str, minutes: float, *, track: bool, ambient: float):
     time_s, _, _, current, _ = np.concatenate(sink.blocks, axis=1)
     share = -np.expm1(-1e-3 / TAU_S)
     heat = scipy.signal.lfilter([share], [1.0, share - 1.0], current**2)
-    told_s, told = np.array(done.temperature).T
+    told_s, told = done.temperature_s, done.temperature_K
     own = 2 * DRIFT_PER_A2 * np.interp(told_s - 0.5, time_s, heat) / COPPER_PER_K
     return error, (told_s, told, own + ambient)
 
