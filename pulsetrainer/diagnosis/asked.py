@@ -86,9 +86,11 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
 
 
 def input_range(model: Model) -> tuple[float, float]:
-    """Return the range of the input that was identified."""
-    operator = operator_of(model)
-    return operator.low, operator.high
+    """Return the range of the input that was identified; that of a dual operator is only near it."""
+    operator, fit = operator_of(model), model.fit
+    if model.form != "dual" or fit is None or fit.input.size == 0:
+        return operator.low, operator.high
+    return min(operator.low, float(fit.input.min())), max(operator.high, float(fit.input.max()))
 
 
 def measured_of(

@@ -114,6 +114,7 @@ class Thresholds:
     nearly: float = 0.75  # of the relevant fall: a candidate that gains so much is refitted to its end first
     held_out_least: float = 0.05  # of the reducible part: a smaller fall of the held-out error is no gain
     held_out_kept: float = 0.33  # of that part: on foreign plants true causes reach 0.43, false ones 0.28
+    half: float = 0.5  # of that part: steps of foreign plants reach 0.55, what is none there 0.44
     least_share: float = 0.002  # of what all causes explain: less is what the formulas of the others miss
     blocks: int = 20  # of a record, cut where its memory is wiped out
     jackknife: int = 10  # parts left out in turn for the intervals

@@ -74,6 +74,12 @@ TEXTS: Mapping[str, str] = {
         "The model as given predicts these recordings better than any extension that was tried, so none is "
         "proposed."
     ),
+    "not carried over": (
+        "A Preisach model fitted anew leaves {refitted:.2g} % of the span of these recordings, but "
+        "{left_out:.2g} % of parts that were left out of that fit; the model as given leaves {given:.2g} %. "
+        "So it cannot be told whether the device has changed: it may be of a kind that no Preisach model "
+        "describes well, or the recordings are too short to fit one"
+    ),
     "no gain": (
         "Extended by {names} and used from rest, the model would predict these recordings little or no "
         "better than as it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is "
@@ -162,6 +168,10 @@ DOUBTS: Mapping[str, str] = {
     "predicts worse": "with it, parts of the recordings that were left out are predicted worse",
     "does not repeat": "it fits, but does not repeat: it is not added to the model",
     "wanders": "what is left wanders still, so it may be a piece of that: it is neither added nor taken out",
+    "predicts little": (
+        "on parts of the recordings that were left out it takes away less than half of what could be, as "
+        "anything may where the model cannot follow a device of this kind"
+    ),
     "spans zero": "its strength may be nothing, as the interval spans zero",
     "no equal loops": "no minor loop was traced three times in equal time, which alone would show it",
     "at bound": "a parameter is at the end of the range that was searched",

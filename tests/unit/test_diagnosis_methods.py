@@ -594,6 +594,8 @@ def test_every_kind_of_evidence_and_advice_has_words():
             "times",
             "extended",
             "given",
+            "refitted",
+            "left_out",
         ],
         1.25,
     )

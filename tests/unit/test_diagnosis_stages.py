@@ -1346,7 +1346,16 @@ RAMP = np.linspace(0.0, 10.0, 1000)
 
 
 def _given(
-    monkeypatch, predicted, *, left=0.01, refitted=0.01, wrong=None, direction=1.0, polarity=1, **more
+    monkeypatch,
+    predicted,
+    *,
+    left=0.01,
+    refitted=0.01,
+    left_out=0.01,
+    wrong=None,
+    direction=1.0,
+    polarity=1,
+    **more,
 ):
     """Judge a model that predicts this of a ramp from 0 to 10; the search leaves ``left``."""
     speed = velocity.Comparison(1.0, 0.5 if wrong is None else wrong, 100.0 if wrong is None else 10.0)
@@ -1361,8 +1370,8 @@ def _given(
         findings=findings,
         verdict="creep",
         evidence=(Evidence("static"), Evidence("tested", "creep"), Evidence("extended")),
-        current=SimpleNamespace(rms=left),
-        baseline=SimpleNamespace(rms=refitted),
+        current=SimpleNamespace(rms=left, terms=()),
+        baseline=SimpleNamespace(rms=refitted, squares=100.0 * (1.0 + left_out**2)),  # beside the noise
         floor=replace(state.floor, noise=0.0),
         by_contrast={"load-dependence": ()},
     )
@@ -1460,6 +1469,43 @@ def test_a_change_from_record_to_record_is_not_said_twice(monkeypatch):
     assert "condition-change" not in _found(after)
 
 
+@pytest.mark.parametrize(("left_out", "changed"), [(0.99, True), (1.01, False), (float("nan"), True)])
+@pytest.mark.parametrize(("before", "after"), [("none", "unknown"), ("creep", "creep")])
+def test_weights_that_only_follow_what_they_were_fitted_to_show_no_change(
+    monkeypatch, left_out, changed, before, after
+):
+    """On blocks that were left out they leave more than a fifth of what the model as given leaves, 5."""
+    told = _given(monkeypatch, RAMP + 5.0, refitted=0.5, left_out=left_out, verdict=before)
+    assert told.verdict == ("condition-change" if changed else after)
+    if not changed:
+        assert told.evidence[0].kind == "not carried over"
+        assert told.evidence[0].figures == pytest.approx({"given": 50.0, "refitted": 5.0, "left_out": 10.1})
+
+
+@pytest.mark.parametrize(
+    ("gain", "doubts", "changed"), [(0.15, (), False), (0.1, (), True), (0.15, ("x",), True)]
+)
+def test_causes_that_bring_the_given_model_near_are_no_change_of_the_device(
+    monkeypatch, gain, doubts, changed
+):
+    """A gain that a slow cause takes away, which the refitted weights hold; not one that is in doubt."""
+
+    class Simulator:
+        def full(self, terms):
+            return [self.inner(())[0] * (1.0 - gain if terms else 1.0)]
+
+        def inner(self, terms):
+            return [RAMP]
+
+    current = SimpleNamespace(rms=0.01, terms=(_term("creep"),), simulator=Simulator())
+    record = SimpleNamespace(sample_weight=np.ones(RAMP.size))
+    judged = given_model._Judged
+    monkeypatch.setattr(given_model, "_Judged", lambda _, *rest: judged([record], *rest))
+    findings = (replace(_finding("creep", 20.0), doubts=doubts),)
+    told = _given(monkeypatch, 1.15 * RAMP, refitted=0.1, current=current, findings=findings)
+    assert (told.verdict == "condition-change") is changed
+
+
 def test_what_needs_no_time_is_named_where_there_is_none(monkeypatch):
     """Only these causes were tried."""
     state = _given(monkeypatch, RAMP + 0.05)
@@ -1537,6 +1583,18 @@ def test_of_two_as_good_the_simpler_is_tried_first(monkeypatch, apart, first):
 
 
 # --- what speaks against a cause that is slow
+@pytest.mark.parametrize(
+    ("name", "gain", "said"), [("step", 0.49, True), ("step", 0.51, False), ("creep", 0.49, False)]
+)
+def test_a_slow_fault_that_predicts_less_than_half_is_doubted(monkeypatch, name, gain, said):
+    """A step takes a part of what a device of another kind leaves; a cause of the device must repeat."""
+    monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
+    state = _state(_fit(1.0, name), held_out=HeldOut(gain), estimates={name: ()})
+    object.__setattr__(state.current, "residual", np.zeros(3))
+    doubts = set(rivals._doubts(state, state.current.terms[0], 1.0, 1.0))
+    assert ("predicts little" in doubts) is said
+
+
 @pytest.mark.parametrize(
     ("share", "times", "said"), [(0.34, 2.9, True), (0.32, 2.9, False), (0.34, 3.5, False)]
 )

@@ -23,7 +23,7 @@ from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values
 _TRIED = 0.003  # of the span, and of the gain
 # Against the model as given
 _FAR = 0.01  # of the output's span: a model nearer than this is not in question
-_REFITTED = 0.2  # of what the given weights leave: refitted ones must leave less
+_REFITTED = 0.2  # of what the given weights leave: refitted ones must leave less, left out blocks too
 _ALL_BUT = 0.001  # of the squared error: beside such a change nothing that is left over matters
 _GAIN = 2.0 * _FAR  # about the middle of the output, this gain alone would put the model in question
 _BLOCKS = 10  # of the jackknife: neighbouring samples are not independent
@@ -108,6 +108,16 @@ def left_by(measured: FloatArray, predicted: FloatArray | float, noise_rms: floa
     return float(np.sqrt(max(float(np.mean((measured - predicted) ** 2)) - noise_rms**2, 0.0)))
 
 
+def is_near(measured: FloatArray, predicted: FloatArray, noise_rms: float) -> bool:
+    """Whether a prediction (n,) leaves less than 1 % of the span, the white noise of single samples apart."""
+    return bool(left_by(measured, predicted, noise_rms) < _FAR * np.ptp(measured))
+
+
+def follows(refitted_rms: float, given_rms: float) -> bool:
+    """Whether refitted weights leave so much less than those given that these are the trouble."""
+    return refitted_rms <= _REFITTED * given_rms
+
+
 def against_model(
     measured: FloatArray, predicted: FloatArray, refitted_rms: float, noise_rms: float
 ) -> Change | None:
@@ -123,7 +133,7 @@ def against_model(
         White noise of single samples, output unit: nobody's fault.
     """
     given = left_by(measured, predicted, noise_rms)
-    if given < _FAR * np.ptp(measured) or refitted_rms > _REFITTED * given:
+    if is_near(measured, predicted, noise_rms) or not follows(refitted_rms, given):
         return None
     return _carried_over(measured, predicted, refitted_rms, given)
 

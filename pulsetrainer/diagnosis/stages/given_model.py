@@ -12,7 +12,9 @@ records.
   only: they are withdrawn. What the given one leaves may still be more than noise, and is then `unknown`.
 - If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), the
   device is in another condition: `condition-change` comes first. Where that is all but a thousandth of the
-  squared error, other causes would only repair the rest of it, and are withdrawn.
+  squared error, other causes would only repair the rest of it, and are withdrawn. It is none where the
+  causes found, added to what the model as given says, bring it near; nor where refitted weights are far off
+  too on blocks that were left out: then no Preisach model describes the device, and that is `unknown`.
 
 What the raw data show stays, and so does what equal loops show, unless the model is of the wrong kind.
 """
@@ -30,7 +32,13 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import velocity
 from pulsetrainer.diagnosis.causes import condition_change, library
-from pulsetrainer.diagnosis.causes.condition_change import Change, against_model, left_by
+from pulsetrainer.diagnosis.causes.condition_change import (
+    Change,
+    against_model,
+    follows,
+    is_near,
+    left_by,
+)
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.prediction import operator_of, predict
@@ -77,8 +85,8 @@ def stage(state: State) -> State:
         if state.verdict == "none" and _unexplained(state, left):
             state = replace(state, verdict="unknown")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
-    if changed is not None:
-        state, more = _in_another_condition(state, changed, judged.polarity)
+    if changed is not None and not _brought_near(state, judged, noise):
+        state, more = _far_off(state, judged, changed, noise)
         said += more
     return replace(state, evidence=(*said, *state.evidence))
 
@@ -117,6 +125,39 @@ def _judged(state: State, given: Given) -> _Judged:
         velocity.compare(core, steps, residuals),
         model.polarity,
     )
+
+
+def _brought_near(state: State, judged: _Judged, noise_rms: float) -> bool:
+    """Whether the causes found, added to what the model as given says, describe the records."""
+    found = {one.cause.id for one in state.findings if one.found and not one.in_doubt}
+    terms = [term for term in state.current.terms if term.cause.id in found]
+    if not terms or not state.extends:
+        return False
+    simulator = state.current.simulator
+    pairs = zip(simulator.full(terms), simulator.inner(()), judged.records, strict=True)
+    added = np.concatenate([(full - plain)[record.sample_weight > 0] for full, plain, record in pairs])
+    return is_near(judged.measured, judged.predicted + state.scale.span * added, noise_rms)
+
+
+def _far_off(
+    state: State, judged: _Judged, changed: Change, noise_rms: float
+) -> tuple[State, list[Evidence]]:
+    """Tell another condition from a device that no refitted weights describe where they have not seen it."""
+    span, percent = state.scale.span, PERCENT / changed.span
+    given = left_by(judged.measured, judged.predicted, noise_rms)
+    left_out = span * _left_out(state)
+    if np.isnan(left_out) or follows(left_out, given):
+        return _in_another_condition(state, changed, judged.polarity)
+    figures = {"given": given, "refitted": span * state.baseline.rms, "left_out": left_out}
+    said = Evidence("not carried over", figures={name: percent * size for name, size in figures.items()})
+    nothing = state.verdict in ("none", "inconclusive")
+    return (replace(state, verdict="unknown") if nothing else state), [said]
+
+
+def _left_out(state: State) -> float:
+    """Rms error of refitted weights on blocks that were left out, less noise; NaN for too few blocks."""
+    floor = state.floor.quick
+    return float(np.sqrt(max(state.held_out.error(state.baseline) / floor.count - floor.white**2, 0.0)))
 
 
 def _unexplained(state: State, left: float) -> bool:

@@ -8,8 +8,9 @@ here: equal loops differ by nothing else that is known.
 
 What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
 than the model without it, the interval of its strength spans zero, a parameter sits on its bound, it is
-slow and what is left still wanders from one tenth of the time to the next, or only equal loops would show it
-and there are none.
+slow and what is left still wanders from one tenth of the time to the next, it is slow, belongs to the record,
+and all causes together take away less than half of what can be lowered on blocks that were left out (which a
+device of another kind leaves), or only equal loops would show it and there are none.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
-WORSE, WANDERS, NO_LOOPS = "predicts worse", "wanders", "no equal loops"
+WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
 MAY_BE_NOTHING = "spans zero"
 
 
@@ -70,6 +71,9 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         left = residual.wander(state.current.residual, state.problem.measured)
         if left > max(LIMITS.wander_left * state.current.squares, LIMITS.wander_fall * fall):
             yield WANDERS
+        of_all = state.held_out.gain(state.baseline, state.current, state.floor)
+        if not cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
+            yield LITTLE
     strengths = known[: cause.strengths]
     if strengths and all(one.lower <= 0 <= one.upper for one in strengths):
         yield MAY_BE_NOTHING
