@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
+from pulsetrainer.report.results import pressed
 from pulsetrainer.report.tables import picked
 
 if TYPE_CHECKING:
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from pulsetrainer.device.identity import DeviceInfo
     from pulsetrainer.files.provenance import Header
     from pulsetrainer.steps.performance import Performed
-    from pulsetrainer.steps.session import Plan
 
 
 def sheet(job: Job, html: Path, session: pt.Session, header: Header) -> None:
@@ -45,30 +43,12 @@ def say(job: Job, path: Path, html: Path | None, session: pt.Session) -> None:
     job.wrote(html)
 
 
-def would(job: Job, planned: Plan) -> None:
-    """Say what a session would press, as far as no key changes it."""
-    pauses = sum(pause.seconds for pause in planned.pauses)
-    limit = f"the device stays on for {planned.longest_part_s / 60:.0f} minutes in one go"
-    rows = {
-        "beats": ", ".join(f"{count} of {name}" for name, count in planned.pulses.items()),
-        "length": f"{planned.seconds / 60:.1f} minutes, {planned.seconds:.0f} s",
-        "parts": f"{planned.parts}: {limit}",
-        "heat": f"{planned.heat_percent:.0f} % of the limit at most, from cold; "
-        + (f"{len(planned.pauses)} pauses to cool, {pauses:.0f} s in all" if pauses else "no pause to cool"),
-        "force": f"{planned.peak_force_N:.2f} N at most, by the model",
-    }
-    if job.limits.force_N is not None:
-        rows["force"] += f"; above {job.limits.force_N:g} N the device stops"
-    job.would("press a session", planned, rows)
-
-
 def tell(
     job: Job, out: Path, html: Path | None, done: Performed, quiz: Quiz | None, info: DeviceInfo
 ) -> None:
     """Write the sheet and say what came out, also where the session was stopped."""
     from pulsetrainer.errors import PulsetrainerError
     from pulsetrainer.files import store
-    from pulsetrainer.report.facts import warmth_words
     from pulsetrainer.steps.stopped import raise_if_stopped
 
     job.notes(done.notes)
@@ -94,28 +74,9 @@ def tell(
         **picked(info, "serial", "firmware"),
         **quizzed,
     }
-    rows: dict[str, Any] = {
-        "beats": f"{payload['beats']} in {done.parts} part{'s' if done.parts > 1 else ''}",
-        "force": f"{done.reach.low:.2f} .. {done.reach.high:.2f} N at full amplitude",
-        "error": f"{done.figures['mean_abs_error_percent']:.2f} % mean, "
-        f"{done.figures['max_abs_error_percent']:.2f} % at most, of full force",
-        "timing": f"beats begin within {done.figures['beat_timing_max_ms']:.2g} ms of their time",
-        "as asked": _spread(done.figures),
-        "underruns": done.underruns,
-    }
-    if kelvins:
-        rows["coil"] = warmth_words(kelvins)
+    rows = pressed(done.figures, payload["beats"], done.parts, payload["force_range_N"], kelvins)
+    rows["underruns"] = done.underruns
     job.show(payload, f"{out}: a session on {info.serial}", rows | right)
-
-
-def _spread(figures: Mapping[str, float]) -> str | None:
-    """Say how far rate and height went from what was asked; None where one beat alone tells nothing."""
-    known = [
-        f"{what} within {figures[name]:.2g} %"
-        for what, name in (("rate", "rate_cv_percent"), ("height", "amplitude_cv_percent"))
-        if math.isfinite(figures[name])
-    ]
-    return f"{', '.join(known)} (standard deviation)" if known else None
 
 
 def _quizzed(quiz: Quiz | None) -> tuple[dict[str, Any], dict[str, str]]:

@@ -94,11 +94,12 @@ def session(
         if str(path) == name:
             job.uses(path)
     from pulsetrainer.cli.hands import Hands
-    from pulsetrainer.cli.score import tell, would
+    from pulsetrainer.cli.score import tell
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes
     from pulsetrainer.files.pulses import read_pulse
     from pulsetrainer.recorded import session_into
+    from pulsetrainer.report.results import to_be_pressed
     from pulsetrainer.steps.programme import Change
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, programme
@@ -142,7 +143,7 @@ def session(
             planned = plan(
                 loaded, shapes, chosen, limits=job.limits, watch=lambda s: progress(share(s)), **asked
             )
-        would(job, planned)
+        job.would("press a session", planned, to_be_pressed(planned, job.limits.force_N))
         return
     said = "a session that was cut off: look with `pulsetrainer show {left}`, and delete it"
     job.left_over(out, pt.Session, said)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -116,6 +116,43 @@ def played(out: Path, made: Playback, serial: str, firmware: str) -> Said:
         **({"coil": warmth_words(kelvin)} if kelvin is not None and kelvin.size else {}),
     }
     return payload, f"{out}: {drive_title(drive)} on {serial}", rows
+
+
+def to_be_pressed(plan: Any, limit_N: float | None) -> dict[str, str]:
+    """Say what a session would press; the device stops above ``limit_N``."""
+    pauses = sum(pause.seconds for pause in plan.pauses)
+    limit = f"the device stays on for {plan.longest_part_s / 60:.0f} minutes in one go"
+    above = "" if limit_N is None else f"; above {limit_N:g} N the device stops"
+    return {
+        "beats": ", ".join(f"{count} of {name}" for name, count in plan.pulses.items()),
+        "length": f"{plan.seconds / 60:.1f} minutes, {plan.seconds:.0f} s",
+        "parts": f"{plan.parts}: {limit}",
+        "heat": f"{plan.heat_percent:.0f} % of the limit at most, from cold; "
+        + (f"{len(plan.pauses)} pauses to cool, {pauses:.0f} s in all" if pauses else "no pause to cool"),
+        "force": f"{plan.peak_force_N:.2f} N at most, by the model{above}",
+    }
+
+
+def pressed(
+    figures: Mapping[str, float], beats: int, parts: int, reach_N: tuple[float, float], warmth_K: list[float]
+) -> dict[str, Any]:
+    """Say what a session pressed, by its main figures; ``warmth_K`` is empty where heat was not tracked."""
+    spread = [
+        f"{what} within {figures[name]:.2g} %"
+        for what, name in (("rate", "rate_cv_percent"), ("height", "amplitude_cv_percent"))
+        if math.isfinite(figures[name])  # one beat alone tells nothing
+    ]
+    error = (
+        f"{figures['mean_abs_error_percent']:.2f} % mean, {figures['max_abs_error_percent']:.2f} % at most"
+    )
+    return {
+        "beats": f"{beats} in {parts} part{'s' if parts > 1 else ''}",
+        "force": f"{reach_N[0]:.2f} .. {reach_N[1]:.2f} N at full amplitude",
+        "error": f"{error}, of full force",
+        "timing": f"beats begin within {figures['beat_timing_max_ms']:.2g} ms of their time",
+        "as asked": f"{', '.join(spread)} (standard deviation)" if spread else None,
+        **({"coil": warmth_words(warmth_K)} if warmth_K else {}),
+    }
 
 
 def evaluated(evaluation: Evaluation) -> dict[str, Any]:
