@@ -52,9 +52,15 @@ def extend(
 
 
 def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
-    """Say which causes were added although something speaks against them."""
+    """Say which causes were added although something speaks against them, or were seen at one rate only."""
+    from pulsetrainer.diagnosis.causes import library
+
     added = {one.cause for one in extended.extensions}
-    return [
+    at_one_rate = [name for name in sorted(added) if "rates" in found.lacks and library()[name].widens]
+    rates = (
+        "was seen at one rate of change only, and at others it is a guess: `verify` RUN.h5 at others tells"
+    )
+    return [f"{name} {rates}" for name in at_one_rate] + [
         f"{one.cause} is in doubt ({'; '.join(one.doubts)}): `verify` RUN.h5, a run that was not diagnosed, "
         "tells whether it repeats"
         for one in found.found

@@ -20,6 +20,7 @@ from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.noise import burstiness
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.raw import Firing
+from pulsetrainer.diagnosis.residual import RATES
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import Score, Screen, Sight
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -94,8 +95,11 @@ class State:
 
     @property
     def families(self) -> set[str]:
-        """Families of the causes in the model."""
-        return {term.cause.family for term in self.current.terms}
+        """Families of the causes in the model; at one single rate all that widen the loop are one."""
+        known = {term.cause.family for term in self.current.terms}
+        if RATES in self.lacks and any(term.cause.widens for term in self.current.terms):
+            known |= {cause.family for cause in library().values() if cause.widens}
+        return known
 
     @property
     def jagged(self) -> bool:

@@ -345,6 +345,16 @@ def test_a_step_has_loops_on_both_sides():
             assert 5.0 <= step.sharpened(start, [frame], [left])[2] <= 95.0
 
 
+@pytest.mark.parametrize(("periods", "told"), [(2.9, False), (3.1, True)])
+def test_what_is_not_left_alone_for_three_periods_is_no_resonance(periods, told):
+    """Strokes of two seconds, and a rest of one at a turn; in any of the records."""
+    up = np.linspace(0.0, 4.0, 201)
+    strokes = np.concatenate([up, np.full(100, 4.0), up[::-1], up])
+    frames = [_frame(strokes), _frame(np.tile([0.0, 4.0], 50))]
+    assert CAUSE["resonance"].can_be_told((periods / 3.0, 0.1), frames) is told
+    assert not CAUSE["resonance"].can_be_told((periods / 3.0, 0.1), frames[1:])
+
+
 @pytest.mark.parametrize(("values", "times", "fires"), [(250, 2, True), (252, 2, False), (200, 1, False)])
 def test_coarse_steps_are_a_two_hundred_and_fiftieth_and_come_again(values, times, fires):
     """0.4 % of the span; each value twice on average, or a short record would seem to have steps."""

@@ -13,6 +13,7 @@ from pulsetrainer.diagnosis import design, fitting, residual, velocity, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.congruency import Contrast
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
@@ -1506,6 +1507,20 @@ def test_causes_that_bring_the_given_model_near_are_no_change_of_the_device(
     assert (told.verdict == "condition-change") is changed
 
 
+@pytest.mark.parametrize(("name", "changed"), [("unlisted", False), ("creep", True)])
+def test_a_learned_curve_is_known_but_for_a_constant(monkeypatch, name, changed):
+    """The offset of the weights and that of the curve are one number."""
+    cause = Unlisted() if name == "unlisted" else CAUSE[name]
+    simulator = SimpleNamespace(full=lambda terms: [RAMP], inner=lambda terms: [RAMP])
+    current = SimpleNamespace(rms=0.01, terms=(SimpleNamespace(cause=cause),), simulator=simulator)
+    record = SimpleNamespace(sample_weight=np.ones(RAMP.size))
+    judged = given_model._Judged
+    monkeypatch.setattr(given_model, "_Judged", lambda _, *rest: judged([record], *rest))
+    found = (Finding(cause, found=True),)
+    told = _given(monkeypatch, RAMP + 5.0, refitted=0.1, current=current, findings=found)
+    assert (told.verdict == "condition-change") is changed
+
+
 def test_what_needs_no_time_is_named_where_there_is_none(monkeypatch):
     """Only these causes were tried."""
     state = _given(monkeypatch, RAMP + 0.05)
@@ -1580,6 +1595,13 @@ def test_of_two_as_good_the_simpler_is_tried_first(monkeypatch, apart, first):
     found = joint_fit.stage(_state(_fit(500.0), scores=scores))
     rest = [name for name in ("resonance", "step", "delay") if name != first]
     assert [score.cause.id for _, score in found.trials] == [first, *rest]
+
+
+@pytest.mark.parametrize(("lacks", "others"), [((), set()), (("rates",), {"lag"})])
+def test_at_one_rate_all_that_widen_the_loop_are_one_family(lacks, others):
+    """A viscous force and a lag against it fit anything there, and mislead at other rates."""
+    assert _state(_fit(1.0, "viscous"), lacks=lacks).families == {"viscous"} | others
+    assert _state(_fit(1.0, "creep"), lacks=lacks).families == {"slow memory"}
 
 
 # --- what speaks against a cause that is slow

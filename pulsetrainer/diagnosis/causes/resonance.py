@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import signal
 
+from pulsetrainer.core.input_noise import real_turns
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Values, remember, remembered
 
@@ -15,6 +16,8 @@ _TRIED_Hz = (3.0, 80.0, 20)  # from, to, how many
 _TRIED_DAMPING = (0.07, 0.25)  # rings long, rings short
 _FASTEST = 0.2  # of the sample rate: faster ringing is not sampled
 _KEPT = 128  # filters: the grid above and those of some fits
+_TURN = 0.02  # of the range: smaller turns of the input are noise
+_PERIODS = 3.0  # between two turns, where they are farthest apart: with less nothing is seen to ring
 
 
 class Resonance(Cause):
@@ -42,6 +45,10 @@ class Resonance(Cause):
         grid = np.geomspace(*_TRIED_Hz).tolist()
         return [[(f, zeta)] for f in grid if f < fastest for zeta in _TRIED_DAMPING]
 
+    def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
+        """Return whether the input leaves it alone for some periods: else the loop itself leads or lags."""
+        return any(values[0] * _longest_stroke_s(frame) >= _PERIODS for frame in frames)
+
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         """Output (n,) after this cause."""
         b, a = _filter(*values, frame.dt_s)
@@ -50,6 +57,12 @@ class Resonance(Cause):
         moved, state = signal.lfilter(b, a, y, axis=0, zi=state)
         remember(frame.past, self.id, state)
         return np.asarray(moved)
+
+
+def _longest_stroke_s(frame: Frame) -> float:
+    """Longest time between two turns of the input, with the rests in it."""
+    turns = real_turns(frame.input, _TURN * frame.reach)
+    return float(np.diff(turns, prepend=0, append=frame.input.size - 1).max()) * frame.dt_s
 
 
 @lru_cache(maxsize=_KEPT)

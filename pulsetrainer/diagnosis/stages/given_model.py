@@ -39,6 +39,7 @@ from pulsetrainer.diagnosis.causes.condition_change import (
     is_near,
     left_by,
 )
+from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.prediction import operator_of, predict
@@ -136,7 +137,10 @@ def _brought_near(state: State, judged: _Judged, noise_rms: float) -> bool:
     simulator = state.current.simulator
     pairs = zip(simulator.full(terms), simulator.inner(()), judged.records, strict=True)
     added = np.concatenate([(full - plain)[record.sample_weight > 0] for full, plain, record in pairs])
-    return is_near(judged.measured, judged.predicted + state.scale.span * added, noise_rms)
+    said = judged.predicted + state.scale.span * added
+    if Unlisted.id in found:  # a learned curve is known but for a constant
+        said = said + np.mean(judged.measured - said)
+    return is_near(judged.measured, said, noise_rms)
 
 
 def _far_off(
