@@ -77,6 +77,8 @@ def at_once() -> dict[str, Mistake]:
         "no such smoothing": ("identify", "run.h5", "-o", "out.h5", "--smoothing", "much"),
         "a figure of no format": ("plot", "run.h5", "-o", "out.txt"),
         "an option without its value": ("tune", "--drive"),
+        "an option in the place of a file": ("tune", "--drive", "--json"),
+        "an option in the place of an output": ("capture", "identification", "-o", "--json"),
         "answers that no quiz asks for": (
             *("session", "--model", "model.h5", "-o", "out.h5"),
             *("--answers", "answers.txt"),

@@ -109,7 +109,7 @@ MESSAGES = {
     "plane too large": Message("dense", ""),
     "too few blocks": Message("at least 2 blocks", "a shorter block"),
     "did not settle": Message("did not settle", "", expected="within {steps}"),
-    "no beat of that number": Message("no beat", "1 .. {count}", got="{count} whole beats"),
+    "no beat of that number": Message("no beat", "from 1 to {count}", got="{count} whole beats"),
     "no whole beat": Message("no whole beat", ""),
     "no such unit": Message("{argument}", "{argument}", "{place}"),
     "provenance itself": Message("provenance", ""),

@@ -53,7 +53,7 @@ class Beats:
             held = f"{self.count} whole beat{'s' if self.count != 1 else ''}"
             raise DataError(
                 f"{self.record.name} has no beat {number}: it holds {held}",
-                hint=f"give `beat` 1 .. {self.count}, or mean",
+                hint=f"give `beat` {'1' if self.count == 1 else f'from 1 to {self.count}'}, or mean",
             )
         begin, end = int(self.feet[number - 1]), int(self.feet[number])
         time_s = self.record.time_s[begin:end] - self.record.time_s[begin]

@@ -81,8 +81,8 @@ def find_opener(port: str) -> Opener | None:
 def redact(port: str) -> str:
     """Return the port without its parameters, which must never reach a file: they may hold what is hidden.
 
-    The seed stays: it says which device, and a command can be replayed by it.
+    Seed and serial number stay: they say which device, and a command can be replayed by them.
     """
     name, _, parameters = port.partition("?")
-    seeds = [one for one in parameters.split("&") if re.fullmatch(r"seed=\d{1,9}", one)]
-    return f"{name}?{seeds[-1]}" if seeds else name
+    kept = [one for one in parameters.split("&") if re.fullmatch(r"(seed|serial)=\d{1,9}", one)]
+    return f"{name}?{'&'.join(kept)}" if kept else name

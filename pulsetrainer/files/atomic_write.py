@@ -12,6 +12,7 @@ from pathlib import Path
 
 from pulsetrainer.errors import DataError, ExistsError, UsageError
 from pulsetrainer.files.file_lock import Lease, create_locked, sweep
+from pulsetrainer.files.input_file import check_no_option
 
 _LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
 
@@ -19,9 +20,10 @@ _LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
 def check_output(path: Path | str, overwrite: bool = False) -> None:
     """Raise UsageError BEFORE the work that would be lost, where an output cannot be written.
 
-    It exists and ``overwrite`` is not set, or its folder is missing or not writable.
+    It exists and ``overwrite`` is not set, or its folder is missing or not writable, or it is an option.
     """
     path = Path(path)
+    check_no_option(path)
     try:
         folder = path.resolve().parent if path.is_symlink() else path.parent
         _check_target(path, folder, overwrite=overwrite)

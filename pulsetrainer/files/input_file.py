@@ -38,6 +38,12 @@ def check_artefact(path: Path | str) -> None:
         raise NotAnArtefactError(f"{path} is not an HDF5 file", path=path)
 
 
+def check_no_option(path: Path) -> None:
+    """Raise UsageError for an option in the place of a file: the parser took it for a value."""
+    if str(path).startswith("--"):
+        raise UsageError(f"{path} is an option, expected a file", hint="name the file before it")
+
+
 def is_journal(path: Path | str) -> bool:
     """Whether a file is a recording under way, or one that was cut off; raises as ``check_file``."""
     return _first_bytes(Path(path)) == JOURNAL
@@ -47,8 +53,9 @@ def _first_bytes(path: Path) -> bytes:
     """Return as many bytes as tell what a file is."""
     try:
         if path.is_dir():
-            raise DataError(f"{path} is a folder, expected a file", hint=_names_in(path, path))
+            raise DataError(f"{path} is a folder, expected a file", hint=_files_in(path))
         if not path.exists():
+            check_no_option(path)
             raise AbsentError(path, hint=_names_in(path.parent, path))
         if not path.is_file():
             raise DataError(f"{path} is not an ordinary file", hint="name a file on disk")
@@ -63,6 +70,13 @@ def unreadable(path: Path | str, error: OSError) -> DataError:
     return DataError(
         f"{path} cannot be read: {error.strerror or error}", hint="check the name and its permissions"
     )
+
+
+def _files_in(folder: Path) -> str:
+    """Return a hint with the first few files of a folder that was given in place of a file."""
+    files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+    sound = list(islice((str(path) for path in files if is_sound(path)), 5))
+    return f"name a file in it: {', '.join(sound)}" if sound else "it holds no file that can be read"
 
 
 def _names_in(folder: Path, path: Path) -> str:

@@ -33,24 +33,23 @@ _LIBRARIES = ("numpy", "scipy", "h5py")
 # From the question mark to the END of the text, not to the next blank: a quoted value may hold blanks,
 # and a title cut short costs less than a parameter let through.
 _QUERY = re.compile(r"([\"']?)((?:bench|qemu):[^?\s\"']*)\?(.*)", re.IGNORECASE | re.DOTALL)
-_SEED = re.compile(
-    r"(?:.*&)?(seed=\d{1,9})(?![^&\s\"'])", re.DOTALL
-)  # of which device: no secret, and needed to replay
+_WHICH_DEVICE = re.compile(r"(seed|serial)=\d{1,9}")  # no secret, and needed to replay
 _CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f]")
 
 
 def redact(text: str) -> str:
-    """Return the text without what follows the ``?`` of a simulated device's URL, but for its seed.
+    """Return the text without what follows the ``?`` of a simulated device's URL, but for which device it is.
 
     A quote that was opened before the URL is closed after it.
     """
-    return _QUERY.sub(_seed_only, text)
+    return _QUERY.sub(_device_only, text)
 
 
-def _seed_only(url: re.Match[str]) -> str:
+def _device_only(url: re.Match[str]) -> str:
     quote, port, parameters = url.groups()
-    seed = _SEED.match(parameters)
-    return f"{quote}{port}?{seed[1]}{quote}" if seed else f"{quote}{port}{quote}"
+    given = re.split(r"[\s\"']", parameters, maxsplit=1)[0].split("&")
+    kept = "&".join(one for one in given if _WHICH_DEVICE.fullmatch(one))
+    return f"{quote}{port}?{kept}{quote}" if kept else f"{quote}{port}{quote}"
 
 
 def clean(text: str) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.run import seam_of
 from pulsetrainer.artefacts.time_steps import GAP, gaps_of, steps_of
-from pulsetrainer.artefacts.units import same_units, with_seconds
+from pulsetrainer.artefacts.units import same_units, with_seconds, with_unit
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage, minor_coverage
 from pulsetrainer.core.excitations import MOST_SAMPLES
@@ -83,7 +83,7 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
         del run
         rate_Hz = None if resample == "even" else float(resample)
         run, _ = joined([resampled(part, rate_Hz) for part in parts])
-    return Imported(run, report, (*notes, *_notes_on_time(run.signal, report)))
+    return Imported(run, report, (*notes, *_still(run.signal, report), *_notes_on_time(run.signal, report)))
 
 
 def report_of(whole: Run, *, resampled: bool = False) -> Report:
@@ -124,6 +124,13 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
         else 100.0 * minor_coverage(plane, [cleaned.input], cleaned.dead_band),
         every=every,
     )
+
+
+def _still(name: str, report: Report) -> list[str]:
+    low, high = report.input_range
+    if high > low:
+        return []
+    return [f"the input of {name} never moves: it is {with_unit(f'{low:g}', report.input_unit)} throughout"]
 
 
 def _notes_on_time(name: str, report: Report) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -141,6 +143,15 @@ def test_one_loop_is_said_to_be_one_loop(tmp_path):
     assert report["coverage_percent"] == 100.0
     assert report["minor_percent"] == 0.0
     assert report["input_unit"] == "kOhm"
+
+
+def test_an_input_that_never_moves_is_said_to(tmp_path):
+    """A column mixed up: nothing can be learnt from such a record, and the reader must know."""
+    _written(tmp_path / "a.csv", [[row[0], 1.0, row[2]] for row in _rows()])
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "r.h5")
+    assert done.code == 0
+    assert "the input of a.csv never moves: it is 1 kOhm throughout" in done.err
+    assert re.search(r"told apart by minor loops +none$", done.out, re.MULTILINE)
 
 
 @pytest.mark.parametrize(
