@@ -174,10 +174,7 @@ def make_header(
     The time is that of making, with its time zone; ``ancestors`` are the headers of the artefacts that this
     one was made from, whose histories are taken over; the rest is as in ``Provenance``.
 
-    Raises
-    ------
-    ArgumentError
-        ``now`` has no time zone.
+    ArgumentError where ``now`` has no time zone.
     """
     if now.tzinfo is None:
         raise ArgumentError(

@@ -44,10 +44,7 @@ class SessionWriter:
 def session_of(path: Path, samples: Mapping[str, FloatArray], blocks: Sequence[bytes]) -> Session:
     """Return the session in a journal, not complete, from its samples and what ``SessionWriter`` gave.
 
-    Raises
-    ------
-    DamagedFileError
-        The blocks are not what it gives.
+    DamagedFileError where the blocks are not what it gives.
     """
     try:
         said = [json.loads(block) for block in blocks]

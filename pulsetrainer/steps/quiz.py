@@ -26,10 +26,7 @@ def order(choices: int, questions: int, seed: int) -> list[int]:
 
     Which ones are asked once more, and the order, are drawn from the seed.
 
-    Raises
-    ------
-    UsageError
-        There are fewer than two choices, or fewer questions than choices.
+    UsageError where there are fewer than two choices, or fewer questions than choices.
     """
     if choices < 2:
         raise UsageError("a quiz needs at least two pulses to choose from", hint="name more in `pulses`")
@@ -48,10 +45,7 @@ def order(choices: int, questions: int, seed: int) -> list[int]:
 def from_list(answers: Sequence[str], choices: Sequence[str], questions: int) -> Answer:
     """Return answers that were written down beforehand, one for each question.
 
-    Raises
-    ------
-    DataError
-        There are too few, or one names no pulse that can be asked.
+    DataError where there are too few, or one names no pulse that can be asked.
     """
     for line, said in enumerate(answers, start=1):
         if said not in choices:
