@@ -16,6 +16,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.core.temperature import Thermometer
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.device.plausibility import judge_against
 from pulsetrainer.device.trace import Block
 from pulsetrainer.device.wording import FORCE_REMEDY
@@ -23,7 +24,7 @@ from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach
 from pulsetrainer.steps.recording import PAUSE_S
-from pulsetrainer.steps.stopped import INTERRUPTED, in_part
+from pulsetrainer.steps.stopped import in_part
 
 # what is wrong where a part ends without a beat, and what to do
 TOO_SHORT = ("the device stays on too short for one beat", "raise its on-time limit, or press shorter beats")

@@ -15,6 +15,7 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.temperature import Thermometer
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.trace import Block, Trace
@@ -23,7 +24,7 @@ from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.heat import Correction, coil_of, take_temperature, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
-from pulsetrainer.steps.stopped import INTERRUPTED, raise_if_stopped
+from pulsetrainer.steps.stopped import raise_if_stopped
 
 _LOG = logging.getLogger(__name__)
 DRIVES = ("compensated", "scaled")
