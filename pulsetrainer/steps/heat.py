@@ -17,6 +17,7 @@ from pulsetrainer.diagnosis.prediction import extended_of, operator_of
 from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
 from pulsetrainer.steps.invertible import invertible
+from pulsetrainer.steps.own_device import check_same_device
 from pulsetrainer.steps.recording import conditioning_loop
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -82,16 +83,6 @@ def thermometer(coil: Coil, thermal: Thermal | None) -> Thermometer:
     known = asdict(coil)
     del known["serial"]
     return Thermometer(CoilRecord(**known), thermal)
-
-
-def check_same_device(model: Model, device: Device) -> None:
-    """Raise DataError for a model that was captured on another device, where it knows its serial number."""
-    serial = model.coil.serial if model.coil is not None else ""
-    if serial and serial != device.info.serial:
-        raise DataError(
-            f"the model is of the device {serial}, this is {device.info.serial}",
-            hint="give the model of this device, or connect that one",
-        )
 
 
 def take_temperature(device: Device, thermometer: Thermometer, high_A: float) -> None:

@@ -22,6 +22,7 @@ from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Paus
 from pulsetrainer.steps.heat import coil_of, rest_force, take_temperature, thermometer_of
 from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.one_thread import one_thread
+from pulsetrainer.steps.own_device import check_units
 from pulsetrainer.steps.performance import TOO_SHORT, Now, Performance, Performed, Sink
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.progress import Progress, silent
@@ -51,12 +52,7 @@ class Memory:
 
 def check_model(model: Model) -> None:
     """Raise DataError for a model of another device or another form, or whose weights are read as relays."""
-    if (model.input_unit, model.output_unit) != ("A", "N"):
-        raise DataError(
-            f"the model is of a device from {model.input_unit} to {model.output_unit}; a session drives a "
-            "current in A and presses a force in N",
-            hint="identify a run that was captured on the device",
-        )
+    check_units(model, "a session drives a current in A and presses")
     if model.form != "direct":
         raise DataError(
             f"the model has the form {model.form}; a session carries the memory of direct models only",
