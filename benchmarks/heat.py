@@ -20,7 +20,7 @@ from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.report.heat_figures import temperature
 from pulsetrainer.steps.programme import Programme
-from pulsetrainer.steps.session import Memory, perform
+from pulsetrainer.steps.session import InMemory, perform
 
 DRIFT_PER_A2, TAU_S = 0.006, 20.0  # of the as-built bench
 COPPER_PER_K = 0.0039
@@ -45,7 +45,7 @@ def played(model, port: str, minutes: float, *, track: bool, ambient: float):
     A play that ends because this computer was busy with something else for seconds is played again.
     """
     for _ in range(_PLAYS):
-        sink = Memory()
+        sink = InMemory()
         done = _once(model, port, minutes, sink, track=track)
         if not done.fault:
             break
@@ -62,7 +62,7 @@ def played(model, port: str, minutes: float, *, track: bool, ambient: float):
     return error, (told_s, told, own + ambient)
 
 
-def _once(model, port: str, minutes: float, sink: Memory, *, track: bool):
+def _once(model, port: str, minutes: float, sink: InMemory, *, track: bool):
     """Press the pulses of ``NAMES``, each for half of the time."""
     programme = Programme(NAMES, rate=None, amplitude=100.0, seconds=60.0 * minutes)
     with pt.open_device(port) as device:

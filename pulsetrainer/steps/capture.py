@@ -20,7 +20,7 @@ from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.steps.asked import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import (
-    Memory,
+    InMemory,
     Tally,
     check_top,
     conditioning_loop,
@@ -82,11 +82,11 @@ def capture(
     played = excitation(
         signal, levels=levels, current_max_A=current_max_A, speed_A_per_s=speed_A_per_s, rate_Hz=rate_Hz
     )
-    memory, tally = Memory(), tally_of(played, levels)
+    kept, tally = InMemory(), tally_of(played, levels)
     ending = record(
-        Course(played, repeats), device, memory, tally, condition_first=condition, progress=progress
+        Course(played, repeats), device, kept, tally, condition_first=condition, progress=progress
     )
-    run = memory.run(played.name, complete=ending.complete, coil=ending.coil)
+    run = kept.run(played.name, complete=ending.complete, coil=ending.coil)
     raise_if_stopped(ending.fault, ending.remedy, "the capture", run)
     if run is None:
         raise DeviceError("the device told no samples", hint="check the line to it")

@@ -69,7 +69,7 @@ class Sink(Protocol):
         ...
 
 
-class Memory:
+class InMemory:
     """A sink that keeps the recording in memory."""
 
     def __init__(self) -> None:

@@ -36,7 +36,7 @@ _SETTLED = 4.0  # of the slowest time constant of a model
 _LONGEST_SETTLING_S = 300.0
 
 
-class Memory:
+class InMemory:
     """A sink that keeps everything."""
 
     def __init__(self) -> None:
@@ -277,7 +277,7 @@ def session(
         answers=answers,
         seed=seed,
     )
-    sink, rhythm = Memory(), Rhythm(variability / 100.0, respiration / 100.0, ectopic / 100.0, seed)
+    sink, rhythm = InMemory(), Rhythm(variability / 100.0, respiration / 100.0, ectopic / 100.0, seed)
 
     def watch(now: Now) -> None:
         if isinstance(chosen, Programme):
@@ -334,7 +334,7 @@ def programme(
     return Blind(names, asked, answer, Play(0, amplitude / 100.0, rate)), (rate,)
 
 
-def _session(sink: Memory, done: Performed, asked: Quiz | None) -> Session | None:
+def _session(sink: InMemory, done: Performed, asked: Quiz | None) -> Session | None:
     if not sink.blocks:
         return None
     time_s, target, reference, current, force = np.concatenate(sink.blocks, axis=1)

@@ -49,7 +49,7 @@ class RefusedError(DeviceError):
         )
 
 
-class Session:
+class Exchange:
     """One command at a time; telemetry goes to ``on_telemetry`` whenever it comes."""
 
     def __init__(
