@@ -283,17 +283,9 @@ class Plane:
         Raises
         ------
         ArgumentError
-            There is not one value for each node below the diagonal.
+            As ``unpack``.
         """
-        if nodes.shape != (self.n_q,):
-            raise ArgumentError(
-                f"node values must have shape ({self.n_q},) for {self.n_h} levels, got {nodes.shape}",
-                hint="node values and edges must come from the same model",
-            )
-        grid = np.zeros((self.n_h + 1, self.n_h + 1))
-        i, j = self.cell_indices
-        grid[i + 1, j] = nodes
-        return grid
+        return np.pad(self.unpack(nodes), ((1, 0), (0, 1)))  # node (i + 1, j) is numbered like cell (i, j)
 
     def bands(self, values: FloatArray) -> tuple[IntArray, FloatArray]:
         """Band and fraction in [0, 1] of input values (n,), each (n,); those outside are clipped to the ends.

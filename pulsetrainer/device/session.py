@@ -160,10 +160,7 @@ class Session:
     def hello(self) -> m.HelloReply:
         """Find out who is there, from whatever state and noise the line is in.
 
-        Raises
-        ------
-        DeviceError
-            if nobody answers, somebody else does, or the protocol's major version differs.
+        DeviceError where nobody answers, somebody else does, or the protocol's major version differs.
         """
         self._transport.discard()
         self._reader.clear()

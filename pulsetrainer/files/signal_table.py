@@ -40,10 +40,7 @@ def signal_file(signal: str, known: Sequence[str]) -> Path | None:
 def read_signal(path: Path, rate_Hz: float) -> Signal:
     """Return a signal out of a table whose first two columns are time and current, at even steps.
 
-    Raises
-    ------
-    DataError
-        The table cannot be used.
+    DataError where the table cannot be used.
     """
     # so that a mistyped name is answered at once
     import numpy as np  # noqa: PLC0415

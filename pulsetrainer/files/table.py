@@ -92,10 +92,7 @@ class Table:
     def check_finite(self, name: str, *, remedy: str = _AGAIN) -> FloatArray:
         """Return a column in which every value is finite; ``remedy`` is what may be done but removing rows.
 
-        Raises
-        ------
-        DataError
-            A value is NaN, infinite or missing: line and column are named.
+        DataError where a value is NaN, infinite or missing: line and column are named.
         """
         values = self.column(name)
         bad = np.flatnonzero(~np.isfinite(values))
@@ -119,10 +116,7 @@ class Table:
     def index(self, name: str) -> int:
         """Return the place of a column of numbers; ``force_N`` is the heading ``force [N]`` too.
 
-        Raises
-        ------
-        DataError
-            There is no such column (similar names are offered), or it holds text.
+        DataError where there is no such column (similar names are offered), or it holds text.
         """
         bare = [split_unit(own)[0].lower() for own in self.names]
         wanted, unit = split_unit(name)
@@ -179,11 +173,8 @@ def read_table(
     memory; all by default. With ``bad_rows`` a row of too few or too many cells, or with text in a column of
     numbers, lacks numbers; without, ``remedy`` is what may be done but removing such rows.
 
-    Raises
-    ------
-    DataError
-        The file cannot be read, is empty or no table, has bad rows, or two decimal signs (line and column
-        are named).
+    DataError where the file cannot be read, is empty or no table, has bad rows, or two decimal signs (line
+    and column are named).
     """
     path = Path(path)
     try:

@@ -173,10 +173,8 @@ def signal(low_A: float, high_A: float) -> FloatArray:
 def updated(model: Model, checked: Checked) -> Model:
     """Return a model with offset and gain as a check found them; its coil counts from the heat of now.
 
-    Raises
-    ------
-    DataError
-        The shape changed, which ten seconds do not mend, or the model has causes that a gain would change.
+    DataError where the shape changed, which ten seconds do not mend, or the model has causes that a gain
+    would change.
     """
     if checked.verdict == "changed":
         raise DataError(
@@ -205,13 +203,7 @@ def updated(model: Model, checked: Checked) -> Model:
 
 
 def check_updatable(model: Model) -> None:
-    """Refuse a model that an offset and a gain do not mend.
-
-    Raises
-    ------
-    DataError
-        It has another form than direct, or causes that do not scale with the force.
-    """
+    """Raise DataError for a model that an offset and a gain do not mend, as ``hindrance`` says."""
     if what := hindrance(model):
         raise DataError(
             f"a model with {what} is not mended by an offset and a gain", hint="identify it again"

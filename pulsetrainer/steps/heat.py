@@ -85,13 +85,7 @@ def thermometer(coil: Coil, thermal: Thermal | None) -> Thermometer:
 
 
 def check_same_device(model: Model, device: Device) -> None:
-    """Refuse a model that was captured on another device, where it knows.
-
-    Raises
-    ------
-    DataError
-        The serial numbers differ.
-    """
+    """Raise DataError for a model that was captured on another device, where it knows its serial number."""
     serial = model.coil.serial if model.coil is not None else ""
     if serial and serial != device.info.serial:
         raise DataError(

@@ -159,10 +159,7 @@ def _notes_on_time(name: str, report: Report) -> list[str]:
 def resampled(run: Run, rate_Hz: float | None) -> Run:
     """Return a run on even time steps, straight between samples; None: at its median step.
 
-    Raises
-    ------
-    UsageError
-        The run has no time, or the rate is not positive or would make too many samples.
+    UsageError where the run has no time, or the rate is not positive or would make too many samples.
     """
     if run.time_s is None:
         raise UsageError("a run without time cannot be resampled", hint="give `time` or `rate_Hz`")
@@ -191,10 +188,7 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
 def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
     """Return the parts as one run, with a seam wherever one does not continue the part before; and notes.
 
-    Raises
-    ------
-    DataError
-        Some parts have a time or a reference and others have none, or their units differ.
+    DataError where some parts have a time or a reference and others have none, or their units differ.
     """
     first = parts[0]
     if len(parts) == 1:

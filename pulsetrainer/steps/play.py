@@ -40,6 +40,17 @@ class Plan:
     peak_current_A: float
     rms_current_A: float
 
+    @classmethod
+    def of(cls, drive: Waveform, currents: FloatArray, plays: int) -> Plan:
+        """Plan so many plays on the samples of a drive, with ``currents`` (..., n) in A."""
+        return cls(
+            samples=drive.time_s.size,
+            seconds=drive.time_s.size / drive.rate_Hz * plays,
+            rate_Hz=drive.rate_Hz,
+            peak_current_A=float(np.abs(currents).max()),
+            rms_current_A=root_mean_square(currents),
+        )
+
 
 def plan(
     drive: Waveform, *, repeats: int = 5, track_heat: bool | None = None, limits: Limits | None = None
@@ -47,20 +58,14 @@ def plan(
     """Return what ``play`` would play on a device as it is delivered, with a cold coil; fails as ``play``."""
     _check(drive, repeats)
     rehearsal = Rehearsal(limits or Limits())
-    check_peak(np.concatenate((drive.compensated, drive.scaled)), rehearsal.current_A)
+    drives = np.stack((drive.compensated, drive.scaled))
+    check_peak(drives, rehearsal.current_A)
     if _is_remade(drive, track_heat):
         coil_of(drive.model, asked=track_heat)
     for _ in range(repeats):
         rehearsal.play(drive.compensated, drive.rate_Hz, drive.predicted)
         rehearsal.play(drive.scaled, drive.rate_Hz)
-    drives = np.stack((drive.compensated, drive.scaled))
-    return Plan(
-        samples=drive.time_s.size,
-        seconds=drive.time_s.size / drive.rate_Hz * repeats * len(DRIVES),
-        rate_Hz=drive.rate_Hz,
-        peak_current_A=float(np.abs(drives).max()),
-        rms_current_A=root_mean_square(drives),
-    )
+    return Plan.of(drive, drives, repeats * len(DRIVES))
 
 
 def play(

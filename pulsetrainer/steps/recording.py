@@ -316,10 +316,7 @@ def samples_played(run: Run, course: Course) -> int:
 
     What follows the course no more is the way down after a fault.
 
-    Raises
-    ------
-    DataError
-        The recording has no time or no reference, or it is one of another signal.
+    DataError where the recording has no time or no reference, or it is one of another signal.
     """
     if run.time_s is None or run.reference is None:
         raise DataError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -328,31 +327,15 @@ def programme(
             "a session needs pulses, each named once, got " + (", ".join(names) or "none"),
             hint="name some of the library: normal,bifid",
         )
-    _check_length(minutes, beats)
     check_asked_for(None if callable(answers) else answers, quiz)
-    if minutes is None and beats is None:
-        minutes = 5.0
-    seconds = None if minutes is None else 60.0 * minutes
     programme = Programme(
-        names, rate=rate, amplitude=amplitude, beats=beats, seconds=seconds, changes=changes
+        names, rate=rate, amplitude=amplitude, beats=beats, minutes=minutes, changes=changes
     )
     if not quiz:
         return programme, programme.rates
     asked = order(len(names), quiz, seed)
     answer = answers if callable(answers) else from_list(answers, names, quiz)
     return Blind(names, asked, answer, Play(0, amplitude / 100.0, rate)), (rate,)
-
-
-def _check_length(minutes: float | None, beats: int | None) -> None:
-    if minutes is not None and beats is not None:
-        raise UsageError(
-            f"a session ends after minutes or after beats, got both: `minutes` {minutes:g}, `beats` {beats}",
-            hint="give one of the two",
-        )
-    if beats is not None and beats < 1:
-        raise UsageError(f"`beats` must be 1 or more, got {beats}", hint="20 last a quarter of a minute")
-    if minutes is not None and not 0 < minutes < math.inf:
-        raise UsageError(f"`minutes` must be a finite number above 0, got {minutes:g}", hint="5 are usual")
 
 
 def _session(sink: Memory, done: Performed, asked: Quiz | None) -> Session | None:
