@@ -2,9 +2,10 @@
 
     python benchmarks/heat.py [--first 1] [--devices 10] [--minutes 15] [--figure heat.svg]
 
-Each device is calibrated and diagnosed at 0 K; then it plays at 0 K as it was calibrated, and at a room
-drawn from -20 to 20 K, without and with tracking. The true temperature is that of the simulated copper; the
-figure shows it beside the one that the last device told.
+Each device is calibrated and diagnosed at 0 K; then it plays at 0 K as it was calibrated, and in its room,
+without and with tracking. The rooms spread over -20 to 20 K: as many equal parts of it as there are devices,
+one drawn from each. The true temperature is that of the simulated copper; the figure shows it beside the one
+that the last device told.
 """
 
 from __future__ import annotations
@@ -78,6 +79,12 @@ def _once(model, port: str, minutes: float, sink: InMemory, *, track: bool):
         )
 
 
+def rooms(first: int, devices: int):
+    """Temperature of each device's room in K: drawn from a part of -20 to 20 K of its own, in drawn order."""
+    rng = np.random.default_rng(first)
+    return -20.0 + 40.0 * (rng.permutation(devices) + rng.uniform(size=devices)) / devices
+
+
 def main() -> None:
     """Print a line for each device, and the worst."""
     parser = argparse.ArgumentParser()
@@ -87,8 +94,7 @@ def main() -> None:
     parser.add_argument("--figure", help="file for the last device's temperature, true and told")
     asked = parser.parse_args()
     rows = []
-    for seed in range(asked.first, asked.first + asked.devices):
-        ambient = float(np.random.default_rng(seed).uniform(-20, 20))
+    for seed, ambient in enumerate(rooms(asked.first, asked.devices), asked.first):
         port = f"bench:?seed={seed}"
         model = calibrated(port)
         room = f"{port}&ambient={ambient:.2f}"

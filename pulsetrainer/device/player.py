@@ -184,6 +184,7 @@ class Player:
                 hint=remedy_of(status.fault) or "remove the cause; the next command clears the fault",
             )
         self._request(m.ClearFault(*self.seen))
+        self.seen = (0, 0)  # nor is it that of this play
 
     def _send_chunk(self, credit: int) -> bool:
         """Send the next samples if the device has room for a whole frame of them."""

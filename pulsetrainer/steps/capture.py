@@ -16,7 +16,7 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.device.codes import TICK_RATE_HZ
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal
-from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.errors import DeviceError, Interrupted, UsageError
 from pulsetrainer.steps.asked import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import (
@@ -83,9 +83,13 @@ def capture(
         signal, levels=levels, current_max_A=current_max_A, speed_A_per_s=speed_A_per_s, rate_Hz=rate_Hz
     )
     kept, tally = InMemory(), tally_of(played, levels)
-    ending = record(
-        Course(played, repeats), device, kept, tally, condition_first=condition, progress=progress
-    )
+    try:
+        ending = record(
+            Course(played, repeats), device, kept, tally, condition_first=condition, progress=progress
+        )
+    except (DeviceError, Interrupted) as error:  # between two parts
+        error.kept = kept.run(played.name, complete=False)
+        raise
     run = kept.run(played.name, complete=ending.complete, coil=ending.coil)
     raise_if_stopped(ending.fault, ending.remedy, "the capture", run)
     if run is None:

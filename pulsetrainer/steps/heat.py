@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.core import inversion
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.temperature import CoilRecord, Thermal, Thermometer
+from pulsetrainer.core.temperature import WINDOW_S, CoilRecord, Thermal, Thermometer
 from pulsetrainer.diagnosis.prediction import extended_of, operator_of
 from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
@@ -86,20 +87,25 @@ def thermometer(coil: Coil, thermal: Thermal | None) -> Thermometer:
 
 
 def take_temperature(device: Device, thermometer: Thermometer, high_A: float) -> None:
-    """Take the temperature before a play: once around the major loop, which comes first in every play anyway.
+    """Take the temperature before a play: around the major loop, which comes first in every play anyway.
 
     Raises
     ------
     DeviceError, Interrupted
-        The loop could not be completed, or no room explains what it tells.
+        The loop could not be completed, it tells nothing, or no room explains what it tells.
     """
-    for _ in range(2):  # a loop lasts about as long as a window
-        trace = device.play(conditioning_loop(high_A, _RATE_HZ), _RATE_HZ)
-        raise_if_stopped(trace.fault, trace.remedy, "taking the temperature")
-        thermometer.add(trace.time_s, trace.reference_A, trace.current_A, trace.duty)
-        if thermometer.known:
-            _check_plausible(thermometer.temperature_K)
-            return
+    loop = conditioning_loop(high_A, _RATE_HZ)
+    loops = 1 + math.floor(WINDOW_S * _RATE_HZ / loop.size)  # a window lies in one play, however low it is
+    trace = device.play(np.tile(loop, loops), _RATE_HZ)
+    raise_if_stopped(trace.fault, trace.remedy, "taking the temperature")
+    thermometer.add(trace.time_s, trace.reference_A, trace.current_A, trace.duty)
+    if not thermometer.known:
+        raise DeviceError(
+            f"the duty does not tell the coil's temperature: {trace.samples} samples came back, "
+            f"{trace.dropped_samples} were lost",
+            hint="check the cable to the device, then run the command again; `no_track_heat` leaves heat out",
+        )
+    _check_plausible(thermometer.temperature_K)
 
 
 def _check_plausible(kelvin: float) -> None:

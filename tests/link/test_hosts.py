@@ -80,6 +80,28 @@ def test_a_fault_that_nobody_was_told_of_is_told_before_it_is_cleared():
         assert usual_ack is not answer
 
 
+def test_a_fault_that_was_cleared_is_not_that_of_the_next_play():
+    """The play before ended in an underrun; this one because the device has gone."""
+    script = ScriptedDevice()
+    told = {"fault": Fault.UNDERRUN, "worst": Fault.UNDERRUN}
+    script.status = told
+
+    def answer(command, usual):
+        if isinstance(usual, m.Ack) and script.status:
+            usual = m.Ack(usual.credit, State.FAULT, Fault.UNDERRUN, usual.session, usual.tick, 0)
+        if isinstance(command, m.ClearFault):
+            script.status = {}
+        return None if isinstance(command, m.Start) else usual
+
+    with script.open() as device:
+        script.answer = answer
+        trace = device.play(np.full(100, 0.1), 1000)
+        assert script.when(m.ClearFault)
+        script.answer = lambda _, usual: usual
+    assert "did not answer Start" in trace.fault
+    assert (trace.underrun, trace.fault_code) == (False, 0)
+
+
 def test_a_fault_of_the_last_play_is_cleared_by_the_next(device):
     """It was told when the play ended."""
     device.set_parameter("current_trip", 4000)
