@@ -102,12 +102,8 @@ def excitation(
 ) -> Signal:
     """Return the signal that is played.
 
-    Raises
-    ------
-    UsageError
-        There is no excitation of that name.
-    ArgumentError
-        No device samples at that rate, or a parameter is out of its range.
+    UsageError where there is no excitation of that name; ArgumentError where no device samples at that rate,
+    or a parameter is out of its range.
     """
     decimation_for(TICK_RATE_HZ, rate_Hz)
     if isinstance(signal, Signal):
@@ -156,11 +152,8 @@ def plan(
 ) -> Plan:
     """Return what a capture would play from sample ``at`` on, on a device as it is delivered and cold.
 
-    Raises
-    ------
-    ArgumentError, DeviceError
-        It would be longer than anything that can be recorded, or the device would refuse it; how large the
-        force will be, nobody knows before it is measured.
+    ArgumentError or DeviceError where it is longer than anything that can be recorded, or the device would
+    refuse it. How large the force will be nobody knows before it is measured.
     """
     course = Course(signal, repeats)
     rehearsal = Rehearsal(limits or Limits())

@@ -45,12 +45,8 @@ def thermometer_of(model: Model | None, device: Device, *, asked: bool | None) -
     ``asked`` None: it is where the model has a thermal term, was captured with the duty, and the device tells
     it.
 
-    Raises
-    ------
-    DataError
-        It is asked for and the model does not know the coil.
-    DeviceError
-        It is asked for and the device does not tell the duty.
+    DataError where it is asked for and the model does not know the coil; DeviceError where it is asked for
+    and the device does not tell the duty.
     """
     coil = coil_of(model, asked=asked)
     if coil is None or model is None:
@@ -89,10 +85,8 @@ def thermometer(coil: Coil, thermal: Thermal | None) -> Thermometer:
 def take_temperature(device: Device, thermometer: Thermometer, high_A: float) -> None:
     """Take the temperature before a play: around the major loop, which comes first in every play anyway.
 
-    Raises
-    ------
-    DeviceError, Interrupted
-        The loop could not be completed, it tells nothing, or no room explains what it tells.
+    DeviceError, Interrupted where the loop could not be completed, it tells nothing, or no room explains what
+    it tells.
     """
     loop = conditioning_loop(high_A, _RATE_HZ)
     loops = 1 + math.floor(WINDOW_S * _RATE_HZ / loop.size)  # a window lies in one play, however low it is
