@@ -329,7 +329,7 @@ def programme(
             hint="name some of the library: normal,bifid",
         )
     _check_length(minutes, beats)
-    check_asked_for(None if callable(answers) else answers, quiz)
+    check_asked_for(None if callable(answers) else answers, quiz, len(names))
     if minutes is None and beats is None:
         minutes = 5.0
     seconds = None if minutes is None else 60.0 * minutes
