@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pulsetrainer.artefacts.units import is_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import time_stamps as stamps
 
@@ -24,6 +25,7 @@ _REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
 _SAMPLE_LINES = 200
 _LAST_BYTES = 4096
 _TABLE = 10  # rows of one kind make a table of what stands below a text
+_REMARK_HEADINGS = frozenset(["comment", "comments", "remark", "remarks", "kommentar", "bemerkung"])
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
 _FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
@@ -116,23 +118,20 @@ def column_words(name: str) -> str:
 def detect(path: Path) -> Dialect:
     """Return how a file is to be read.
 
-    Raises
-    ------
-    DataError
-        It is no text, or no table.
-    OSError
-        It cannot be read.
+    DataError where it is no text, or no table; OSError where it cannot be read.
     """
     encoding = _encoding(path)
     comments: list[tuple[int, str]] = []
     lines: list[tuple[int, str]] = []
     declared: str | None = None
+    remarked: set[int] = set()
     with path.open(encoding=encoding, errors="surrogateescape", newline=None) as stream:
         for count, line in enumerate(stream, 1):
             text = line.strip()
             if count == 1 and (found := _SIGNED_DELIMITER.fullmatch(text)):
                 declared = found[1]
             elif text.startswith(_REMARKS):
+                remarked.add(count)
                 if len(lines) <= 2:
                     comments.append((count, _remark(text)))
             elif text:
@@ -147,7 +146,8 @@ def detect(path: Path) -> Dialect:
     lines = [(count, line) for count, line in lines if not line.startswith(remarks)]
     if not lines:
         raise DataError(f"{path} is empty", hint="export the recording again")
-    above = _above([split(line, delimiter) for _, line in lines])
+    parted = [count - 1 in remarked for count, _ in lines]
+    above = _above([split(line, delimiter) for _, line in lines], parted)
     comments += [(count, line.strip()) for count, line in lines[:above]]
     dialect = _with_header(path, encoding, delimiter, lines[above:], sorted(comments))
     return replace(dialect, remarks=remarks)
@@ -194,29 +194,35 @@ def _delimiter(lines: list[str]) -> str | None:
         if max(map(len, rows)) < 2:
             return -1.0
         cells = [cell for row in rows for cell in row if cell]
-        return float(np.mean([number(cell) is not None for cell in cells])) if cells else 0.0
+        # a blank between thousands may be the delimiter instead
+        whole = [not _is_text(cell) and (" " not in cell or number(cell) is not None) for cell in cells]
+        return float(np.mean(whole)) if cells else 0.0
 
     shares = [share(delimiter) for delimiter in _DELIMITERS]
     return "," if max(shares) < 0 else _DELIMITERS[int(np.argmax(shares))]
 
 
-def _above(rows: list[list[str]]) -> int:
+def _above(rows: list[list[str]], parted: list[bool]) -> int:
     """Return how many lines stand above the table and its headings: what an instrument says about itself.
 
     The table is the rows at the end of the sample that are of one kind, ten or more. Rows of numbers above,
-    or headings of another count, are in error, and 0 is returned.
+    or headings of another count, are in error, and 0 is returned. Names stand directly above their units:
+    ``parted`` says above which lines there is a remark.
     """
     kinds = [[_is_text(cell) for cell in row] for row in rows]
     width = len(rows[-1])
     start = len(rows)
     while start and _is_row(rows[start - 1], rows[-1]):
         start -= 1
-    if len(rows) - start < _TABLE or not all(any(kind) for kind in kinds[:start]):
+    words = (any(kind) or not any(row) for kind, row in zip(kinds[:start], rows, strict=False))
+    if len(rows) - start < _TABLE or not all(words):
         return 0
     named = width - (not rows[-1][-1])  # a delimiter at the end makes no column
     head = start
     while head > max(start - 2, 0) and len(kinds[head - 1]) >= named:
-        if not (all(kinds[head - 1][:named]) or (head == start and _is_heading(rows[head - 1]))):
+        line = rows[head - 1]
+        other = _is_heading(line) if head == start else _numbers(line, rows[head])
+        if not (other or all(kinds[head - 1][:named])) or (head < start and parted[head]):
             break
         head -= 1
     misfit = 0 < head == start and len(kinds[head - 1]) > 1 and all(kinds[head - 1])
@@ -240,6 +246,12 @@ def _is_heading(row: list[str]) -> bool:
     return any(map(_is_text, row)) and not any(map(_is_number, row))
 
 
+def _numbers(names: list[str], below: list[str]) -> bool:
+    """Whether a line numbers the channels above their units: ``x-axis,1,2`` over ``second,Volt,Volt``."""
+    numbered = _is_text(names[0]) and all(len(name) == 1 and name.isdigit() for name in names[1:])
+    return numbered and len(names) == len(below) > 1 and all(is_unit(symbol_of(cell)) for cell in below)
+
+
 def _with_header(
     path: Path,
     encoding: str,
@@ -260,13 +272,16 @@ def _with_header(
     comments = tuple(comment for count, comment in commented if count < lines[heads][0])
     names = rows[0] if heads else _commented_names(comments, delimiter, len(first))
     names, first = _without_end(names, first)
-    if len(names) != len(first):
+    unremarked = len(names) == len(first) + 1 and names[-1].lower() in _REMARK_HEADINGS
+    if len(names) != len(first) and not unremarked:
         raise DataError(
             f"{path} has {len(names)} column names, but {len(first)} columns in line {lines[heads][0]}",
             hint="correct the header; decimal commas need another delimiter, such as a semicolon",
         )
     columns = [_filled(k, body) for k in range(len(names))]
     of_text = frozenset(k for k, cells in enumerate(columns) if _mostly_text(cells))
+    if unremarked:
+        of_text |= {len(first)}
     if len(of_text) == len(names):
         raise DataError(
             f"{path} has no column of numbers: line {lines[heads][0]} is {lines[heads][1][:60]!r}",
@@ -349,6 +364,8 @@ def _cut_settings(rows: list[list[str]]) -> float | None:
 def _heading_lines(text: list[list[bool]], rows: list[list[str]]) -> int:
     """Return how many lines stand above the first row: names, and units below; ``text``: cell is text."""
     below = rows[1] if len(rows) > 1 else []
+    if len(rows) > 2 and _numbers(rows[0], below):
+        return 2
     if not (all(text[0]) or any(a and _is_number(b) for a, b in zip(text[0], below, strict=False))):
         return 0
     return 2 if len(text) > 2 and _is_heading(below) and not all(text[2]) else 1

@@ -248,10 +248,9 @@ def _own_column(table: Table, used: Collection[int]) -> int | None:
         return None
     words = [split_unit(name)[0].rpartition(".")[2].lower() for name in table.names]
     candidates = [k for k, word in enumerate(words) if word in _TIME_NAMES]
-    if (
-        table.shifts
-    ):  # of a text, where columns have an order: the first, or the one behind a number of the row
-        candidates = [*candidates, 0] if words[0] in _ROW_NAMES else [0]
+    if table.shifts:  # of a text, where columns have an order: the first, or behind a row's number or date
+        passed = words[0] in _ROW_NAMES or table.names[0] in table.text_names
+        candidates = [*candidates, 0] if passed else [0]
     free = (k for k in candidates if k not in used and table.names[k] not in table.text_names)
     return next(free, None)
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -96,10 +94,7 @@ class Blind:
     def told(self, beats: Beats) -> Beats:
         """Return the beats of the questions that are answered: one of the others would tell what is asked."""
         is_open = len(self._answers) < len(self._begun)
-        told = slice(self._first if is_open else None)
-        names = [field.name for field in fields(beats) if field.name != "output_unit"]
-        columns: dict[str, Any] = {name: getattr(beats, name)[told] for name in names}
-        return replace(beats, **columns)
+        return Beats.of(beats.columns[:, : self._first], beats.output_unit) if is_open else beats
 
     def quiz(self, learner: str = "") -> Quiz | None:
         """Return what was asked and answered so far; None where that is nothing."""

@@ -245,6 +245,21 @@ _TABS = _POINT.replace(",", "\t").replace(".", ",")
         ("; generator 0.5\n; 2 channels\nt,u,y\n" + _POINT, ("t", "u", "y"), {}),
         ("t|u|y\n" + _POINT.replace(",", "|"), ("t", "u", "y"), {}),
         ('t,u,y\n"0,00","0,0","0,00"\n' + '"0,01","0,5","0,25"\n', ("t", "u", "y"), {}),
+        (
+            "Model,MSO44\n\nHorizontal Units,s\nProbe,1,1\n,\nLabel,,\nTIME,CH1,CH2\n" + _POINT,
+            ("TIME", "CH1", "CH2"),
+            {},
+        ),
+        (
+            "x-axis,1,2\nsecond,Volt,Volt\n" + _POINT,
+            ("x-axis", "1", "2"),
+            {"x-axis": "s", "1": "V", "2": "V"},
+        ),
+        (
+            "LECROY,1,Wave\nSegments,1,Size,12\nSegment,Trig,Since\n#1,04-Mar-2024,0\nTime,U,F\n" + _POINT,
+            ("Time", "U", "F"),
+            {},
+        ),
         (_POINT.replace(",", "D+00  ").replace("\n", "d0\n"), ("column1", "column2", "column3"), {}),
     ],
 )
@@ -256,6 +271,15 @@ def test_habits_of_instruments(table, text, names, units):
     np.testing.assert_array_equal(_numbers(read), _ROWS[: read.rows])
     assert read.rows in (2, 12)
     assert text.splitlines()[read.line_of(read.rows - 1) - 1] == text.splitlines()[-1]
+
+
+@pytest.mark.parametrize("remark", ["", "\tbegin"])
+def test_a_heading_of_remarks_may_have_no_cells(table, remark):
+    """LabVIEW names a column of comments and ends its rows before it, most often all of them."""
+    first, rest = _TABS.split("\n", 1)
+    read = table(f"X\tU\tF\tComment\n{first}{remark}\n{rest}")
+    assert read.text_names == {"Comment"}
+    np.testing.assert_array_equal([read.column(name) for name in "XUF"], np.transpose(_ROWS))
 
 
 @pytest.mark.parametrize("end", ["", ","])
@@ -337,6 +361,13 @@ def test_numbers_of_the_rows_before_the_time_are_no_time(table):
     for heading in (",time,u,y\n", "index,t,u,y\n", "Sample,t (s),u,y\n"):
         run = read_run(table(heading + rows).path, input="u", output="y")
         np.testing.assert_allclose(np.diff(run.time_s), 0.02)
+
+
+def test_a_time_behind_a_date_is_found(table):
+    """A data logger writes both in columns of their own; a date alone is text."""
+    rows = "".join(f"28.02.2024;23:59:{30 + k},500;{k % 7},5;{k % 5},0\n" for k in range(20))
+    run = read_run(table(f"Date;Time;u;y\n{rows}").path, input="u", output="y")
+    np.testing.assert_allclose(np.diff(run.time_s), 1.0)
 
 
 @pytest.mark.parametrize("cell", ["1e101", "-1e308"])
@@ -431,6 +462,13 @@ def test_separators_of_thousands_are_told_as_such(table, cell, rows, place):
     text = "".join(f"{k};{cell if k >= place else 7};{cell if k >= place else 9}\n" for k in range(rows))
     with raises(DataError, "separator of thousands", cell=cell, column="u", line=str(place + 2)):
         table(f"t;u;y\n{text}")
+
+
+def test_thousands_beside_decimal_commas_are_told_as_such(table):
+    """Split at its commas such a table would have more numbers than at its semicolons."""
+    rows = "".join(f"{k},0000;-4.{k:03},0000;1.120,{k}\n" for k in range(20))
+    with raises(DataError, "separator of thousands", cell="-4.000,0000", column="u", line="2"):
+        table(f"t;u;y\n{rows}")
 
 
 def test_a_late_decimal_comma_is_found(table):
