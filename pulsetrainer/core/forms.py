@@ -70,8 +70,8 @@ def asked_forms(
 ) -> tuple[Form, ...]:
     """Return the form to fit: the one asked for, or with "auto" the one that the records ask for.
 
-    Two, the simpler one first, where a coarse plane does not tell: weights of either sign follow sharp corners
-    of a loop that leads better there than the dual form does. In full both are fitted, and then compared.
+    Two, the simpler one first, where a coarse plane does not tell: there weights of either sign follow sharp
+    corners of a loop that leads better than the dual form does. Both are then fitted in full, and compared.
 
     Parameters
     ----------
