@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.artefacts.data import Data, FloatArray, check_equal_length, check_time
 from pulsetrainer.artefacts.shown import Shown
@@ -34,6 +34,20 @@ class Beats:
     max_error: Annotated[FloatArray, Data("@output_unit", "largest absolute error", "beat")]
     output_unit: str = "N"
 
+    @classmethod
+    def of(cls, columns: ArrayLike, output_unit: str = "N") -> Self:
+        """Return the beats of some columns (``BEAT_COLUMNS``, b) of numbers."""
+        told: dict[str, Any] = dict(zip(BEAT_COLUMNS, np.asarray(columns, dtype=np.float64), strict=True))
+        return cls(**told | {"pulse": told["pulse"].astype(np.int64)}, output_unit=output_unit)
+
+    @property
+    def columns(self) -> FloatArray:
+        """All but the unit, shape (``BEAT_COLUMNS``, b)."""
+        return np.stack([getattr(self, name) for name in BEAT_COLUMNS])
+
+
+BEAT_COLUMNS = tuple(field.name for field in fields(Beats) if field.name != "output_unit")
+
 
 @dataclass(frozen=True, slots=True)
 class Quiz:
@@ -42,9 +56,8 @@ class Quiz:
     choices: tuple[str, ...]
     asked: tuple[str, ...]
     answered: tuple[str, ...]
-    response_s: Annotated[
-        FloatArray, Data("s", "time from the first beat to the answer", "question")
-    ]  # (q,) NaN: the answer came from a file
+    # (q,) NaN: the answer came from a file
+    response_s: Annotated[FloatArray, Data("s", "time from the first beat to the answer", "question")]
     learner: str = ""
 
     @property

@@ -31,11 +31,6 @@ class Signal:
         return np.arange(self.value.size) / self.rate_Hz
 
     @property
-    def duration_s(self) -> float:
-        """Length of the signal."""
-        return self.value.size / self.rate_Hz
-
-    @property
     def reversals(self) -> int:
         """Number of times the signal turns."""
         return max(turning_points(self.value).size - 1, 0)

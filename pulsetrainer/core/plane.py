@@ -223,15 +223,19 @@ class Plane:
         ArgumentError
             There is not one value for each cell.
         """
+        self._check_cells(packed)
+        i, j = self.cell_indices
+        square = np.zeros((*packed.shape[:-1], self.n_h, self.n_h))
+        square[..., i, j] = packed
+        return square
+
+    def _check_cells(self, packed: FloatArray) -> None:
+        """Raise ArgumentError unless there is one value for each cell."""
         if packed.shape[-1:] != (self.n_q,):
             raise ArgumentError(
                 f"cell values must have shape (..., {self.n_q}) for {self.n_h} levels, got {packed.shape}",
                 hint="cell values and edges must come from the same model",
             )
-        i, j = self.cell_indices
-        square = np.zeros((*packed.shape[:-1], self.n_h, self.n_h))
-        square[..., i, j] = packed
-        return square
 
     def everett_nodes(self, masses: FloatArray) -> FloatArray:
         """Everett values at the nodes, packed (..., n_q), from masses of cells (..., n_q), both output unit.
@@ -262,11 +266,16 @@ class Plane:
         ArgumentError
             As ``unpack``.
         """
-        square = self.unpack(node_values)
-        square = np.cumsum(square[..., ::-1, :], axis=-2)[..., ::-1, :]
-        np.cumsum(square, axis=-1, out=square)
+        self._check_cells(node_values)
         i, j = self.cell_indices
-        return square[..., i, j]
+        # row by row with the leading axes last: many at once take a tenth of the time of two cumulative sums
+        square = np.zeros((self.n_h, self.n_h, *node_values.shape[:-1]))
+        square[i, j] = np.moveaxis(node_values, -1, 0)
+        for k in range(self.n_h - 1, 0, -1):
+            square[k - 1] += square[k]
+        for k in range(1, self.n_h):
+            square[:, k] += square[:, k - 1]
+        return np.moveaxis(square[i, j], 0, -1)
 
     def everett_grid(self, nodes: FloatArray) -> FloatArray:
         """Everett values (n_q,) on the full (n_h + 1, n_h + 1) grid of nodes, zero on and above the diagonal.
@@ -274,17 +283,9 @@ class Plane:
         Raises
         ------
         ArgumentError
-            There is not one value for each node below the diagonal.
+            As ``unpack``.
         """
-        if nodes.shape != (self.n_q,):
-            raise ArgumentError(
-                f"node values must have shape ({self.n_q},) for {self.n_h} levels, got {nodes.shape}",
-                hint="node values and edges must come from the same model",
-            )
-        grid = np.zeros((self.n_h + 1, self.n_h + 1))
-        i, j = self.cell_indices
-        grid[i + 1, j] = nodes
-        return grid
+        return np.pad(self.unpack(nodes), ((1, 0), (0, 1)))  # node (i + 1, j) is numbered like cell (i, j)
 
     def bands(self, values: FloatArray) -> tuple[IntArray, FloatArray]:
         """Band and fraction in [0, 1] of input values (n,), each (n,); those outside are clipped to the ends.

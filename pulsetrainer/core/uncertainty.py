@@ -32,6 +32,7 @@ from pulsetrainer.errors import ArgumentError
 # More blocks cost memory and time, and do not change the intervals any more.
 _MOST_BLOCKS = 400
 _FEWEST_BLOCKS = 20
+LEVEL = 0.9  # of the draws, which an interval holds
 
 
 class Interval(NamedTuple):
@@ -50,23 +51,19 @@ class Ensemble:
     offsets: FloatArray  # (B,) y0, output unit
     block: int  # samples a block
 
-    def weight_interval(self, level: float = 0.9) -> Interval:
-        """Ends (n_q,) of the intervals of every weight that hold ``level`` of the refits."""
-        return _interval(self.weights, level)
+    def weight_interval(self) -> Interval:
+        """Ends (n_q,) of the 90 % interval of every weight."""
+        return interval(self.weights)
 
-    def offset_interval(self, level: float = 0.9) -> Interval:
-        """Ends () of the interval of the offset."""
-        return _interval(self.offsets, level)
-
-    def output_band(self, values: ArrayLike, level: float = 0.9, *, start: State | None = None) -> Interval:
-        """Ends (n,) of the band of the predicted output for an input (n,) from ``start``, output unit.
+    def output_band(self, values: ArrayLike, *, start: State | None = None) -> Interval:
+        """Ends (n,) of the 90 % band of the predicted output for an input (n,) from ``start``, output unit.
 
         It holds the output without the noise of a measurement. None: from negative saturation.
 
         Raises
         ------
         ArgumentError
-            The input is no finite vector, or ``level`` is not between 0 and 1.
+            The input is no finite vector.
         """
         operator = self.operator
         rising = outputs(
@@ -77,13 +74,12 @@ class Ensemble:
             start=start,
             reading=operator.reading,
         )
-        return _interval(operator.polarity * rising, level)
+        return interval(operator.polarity * rising)
 
 
-def _interval(draws: FloatArray, level: float) -> Interval:
-    if not 0 < level < 1:
-        raise ArgumentError(f"level must be between 0 and 1, got {level:g}", hint="0.9 is usual")
-    lower, upper = np.quantile(draws, [0.5 * (1 - level), 0.5 * (1 + level)], axis=0)
+def interval(draws: FloatArray) -> Interval:
+    """Ends (...) between which nine tenths of the draws (B, ...) lie."""
+    lower, upper = np.quantile(draws, [0.5 * (1 - LEVEL), 0.5 * (1 + LEVEL)], axis=0)
     return Interval(lower, upper)
 
 

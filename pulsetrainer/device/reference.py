@@ -12,10 +12,7 @@ from pulsetrainer.errors import ArgumentError
 def ticks_per_sample(rate_Hz: float, tick_rate_Hz: float) -> int:
     """Return how many ticks of the device lie between two samples of a reference at ``rate_Hz``.
 
-    Raises
-    ------
-    ArgumentError
-        if that is not a whole number, or more than the device can count.
+    ArgumentError where that is not a whole number, or more than the device can count.
     """
     if not (np.isfinite(rate_Hz) and rate_Hz > 0):
         raise ArgumentError(f"a sample rate of {rate_Hz} Hz is not possible", hint="1000 Hz is usual")
@@ -35,10 +32,7 @@ def ticks_per_sample(rate_Hz: float, tick_rate_Hz: float) -> int:
 def to_wire(reference_A: ArrayLike, *, limit_A: float) -> NDArray[np.int16]:
     """Return a reference, shape (n,) in A, in units of 0.1 mA.
 
-    Raises
-    ------
-    ArgumentError
-        if a sample is not a number, or outside 0 to ``limit_A``.
+    ArgumentError where a sample is not a number, or outside 0 to ``limit_A``.
     """
     reference = np.asarray(reference_A, dtype=np.float64)
     if reference.ndim != 1 or reference.size == 0:

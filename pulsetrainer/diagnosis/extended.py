@@ -60,11 +60,19 @@ def chain(terms: Sequence[Term], static: Callable[[FloatArray], FloatArray], fra
     return shown_output(terms, hysteresis(terms, static, frame), frame)
 
 
-def hysteresis(terms: Sequence[Term], static: Callable[[FloatArray], FloatArray], frame: Frame) -> FloatArray:
-    """Output (n,) of the hysteresis behind the input terms; what is fed back is passed until it settles."""
+def hysteresis(
+    terms: Sequence[Term],
+    static: Callable[[FloatArray], FloatArray],
+    frame: Frame,
+    inner: FloatArray | None = None,
+) -> FloatArray:
+    """Output (n,) of the hysteresis behind the input terms; what is fed back is passed until it settles.
+
+    ``inner`` (n,) is the output without any, where it is known.
+    """
     if not any(term.cause.feeds_back for term in terms):
         return static(seen_input(terms, frame.input, frame))
-    inner = static(frame.input)
+    inner = static(frame.input) if inner is None else inner
     for _ in range(LIMITS.feedback_passes):
         before, inner = inner, static(seen_input(terms, inner, frame))
         if np.max(np.abs(inner - before)) <= LIMITS.feedback_settled * frame.span:

@@ -119,7 +119,8 @@ class Simulator:
         if before not in self._static:
             if any(t.cause.feeds_back for t in before):
                 self._static[before] = [
-                    hysteresis(before, self.static, frame) for frame in self.problem.frames
+                    hysteresis(before, self.static, frame, alone)
+                    for frame, alone in zip(self.problem.frames, self.inner(()), strict=True)
                 ]
             else:
                 self._static[before] = [one.output(self.operator) for one in self.problem.paths(before)]

@@ -8,6 +8,7 @@ the cells that are positive there.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,17 +32,12 @@ class HeldOut:
         self.count = problem.bins.count
         self.block = _blocks_of(problem)
         self._by_rate = _sorted_by_rate(problem, self.block)
-        self._errors: list[tuple[Fitted, float]] = []
+        self._known: WeakKeyDictionary[Fitted, dict[tuple[int, str], FloatArray]] = WeakKeyDictionary()
 
     def error(self, fitted: Fitted) -> float:
         """Sum of squares on both halves of the blocks, each predicted from the other; NaN for few blocks."""
-        for known, value in self._errors:
-            if known is fitted:
-                return value
-        halves = list(self._left_out(fitted, _HALVES))
-        total = sum(float(error @ error) for error, _ in halves) if len(halves) == _HALVES else float("nan")
-        self._errors = [*self._errors[-LIMITS.most_causes :], (fitted, total)]
-        return total
+        halves = self._squares(fitted, _HALVES, "in turn")
+        return float(halves.sum()) if halves.size == _HALVES else float("nan")
 
     def gain(self, before: Fitted, after: Fitted, floor: Floor) -> float:
         """Share of the reducible held-out error that the extension removes, at most all of it."""
@@ -53,15 +49,23 @@ class HeldOut:
 
         Blocks that alternate interpolate what wanders slowly; whole pieces have to predict it.
         """
-        return np.asarray([float(error @ error) for error, _ in self._left_out(fitted, count, whole=True)])
+        return self._squares(fitted, count, "pieces")
 
     def rates(self, fitted: Fitted, count: int) -> FloatArray:
         """Sums of squares (count,) on the slowest to the fastest blocks, each predicted from the others.
 
         Empty for too few blocks. A formula that only holds at the rates of a record misleads at others.
         """
-        errors = self._left_out(fitted, count, whole=True, block=self._by_rate)
-        return np.asarray([float(error @ error) for error, _ in errors])
+        return self._squares(fitted, count, "rates")
+
+    def _squares(self, fitted: Fitted, folds: int, how: str) -> FloatArray:
+        """Sum of squares of each fold, or nothing for too few blocks; made once for all who ask."""
+        known = self._known.setdefault(fitted, {})
+        if (folds, how) not in known:
+            block = self._by_rate if how == "rates" else self.block
+            errors = self._left_out(fitted, folds, whole=how != "in turn", block=block)
+            known[folds, how] = np.asarray([float(error @ error) for error, _ in errors])
+        return known[folds, how]
 
     def piece_of(self, count: int) -> IntArray:
         """Return the number of the piece of the time that each average (count,) is in."""
@@ -72,19 +76,20 @@ class HeldOut:
 
         Efron and Stein, Annals of Statistics 9, 1981. None where a tenth cannot be left out.
         """
-        changes = np.asarray([change for _, change in self._left_out(fitted, LIMITS.jackknife)])
+        parts = self._left_out(fitted, LIMITS.jackknife, block=self.block)
+        changes = np.asarray([change for _, change in parts])
         if changes.shape[0] < LIMITS.jackknife:
             return None
         return (1.0 - 1.0 / LIMITS.jackknife) * np.sum((changes - changes.mean(axis=0)) ** 2, axis=0)
 
     def _left_out(
-        self, fitted: Fitted, folds: int, *, whole: bool = False, block: IntArray | None = None
+        self, fitted: Fitted, folds: int, *, block: IntArray, whole: bool = False
     ) -> Iterator[tuple[FloatArray, FloatArray]]:
         """For each fold its errors, and the changes (p,) of the parameters, when it is left out."""
         fold_of = _fold_of(folds, whole=whole)
         design, free = fitted.design, fitted.projector.cells
         extra, starts = fitted.slopes.shape[1], design.bins.free.shape[1]
-        test = fold_of[self.block if block is None else block][:, None] == np.arange(folds)  # (count, folds)
+        test = fold_of[block][:, None] == np.arange(folds)  # (count, folds)
         size = free.size + extra + starts
         if np.any((self.count - test.sum(axis=0) < LIMITS.rows_per_unknown * size) | ~test.any(axis=0)):
             return

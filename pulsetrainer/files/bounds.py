@@ -11,10 +11,7 @@ from pulsetrainer.files.settings import leaves, read_toml
 def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
     """Return the two-sided bounds of a TOML file by metric name.
 
-    Raises
-    ------
-    UsageError
-        The file cannot be read, is no TOML, or a bound is not a pair low <= high.
+    UsageError where the file cannot be read, is no TOML, or a bound is not a pair low <= high.
     """
     if not path.exists():
         raise UsageError(

@@ -18,11 +18,8 @@ def read_changes(
 ) -> list[tuple[float, float | None, float | None, str | None]]:
     """Return time (s), rate, amplitude (%) and pulse of each line; None where nothing changes.
 
-    Raises
-    ------
-    DataError
-        The file cannot be read, or a line is not one of these, comes before the line above it, or asks for
-        what a session of these ``pulses`` cannot press.
+    DataError where the file cannot be read, or a line is not one of these, comes before the line above it, or
+    asks for what a session of these ``pulses`` cannot press.
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
@@ -94,10 +91,8 @@ def _change(
 def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str]:
     """Return the answers of a quiz, one pulse name a line; empty lines do not count.
 
-    Raises
-    ------
-    DataError
-        The file cannot be read, a line is none of the ``choices``, or there are fewer than ``questions``.
+    DataError where the file cannot be read, a line is none of the ``choices``, or there are fewer than
+    ``questions``.
     """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()

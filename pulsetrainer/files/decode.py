@@ -42,10 +42,7 @@ def decode(
     ``samples`` is the length of the time axis of this group, where the file says it; ``inherited`` that of
     the group above.
 
-    Raises
-    ------
-    DataError
-        Something is missing, or is not what it must be.
+    DataError where something is missing, or is not what it must be.
     """
     plans = plan_of(cls)
     lengths: dict[str, int] = {}

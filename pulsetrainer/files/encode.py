@@ -43,10 +43,7 @@ def encode(group: h5py.Group, cls: type, values: Mapping[str, Any], *, inherited
 
     ``inherited`` is the axis ``time`` of the group above, used where the dataclass has none of its own.
 
-    Raises
-    ------
-    DataError
-        A value does not fit its annotation.
+    DataError where a value does not fit its annotation.
     """
     plans = plan_of(cls)
     axes: Axes = dict(inherited or {})

@@ -161,37 +161,21 @@ def make_header(
     *,
     argv: Sequence[str],
     now: datetime,
-    parameters: Mapping[str, Any] | None = None,
-    seed: int | None = None,
-    inputs: Mapping[str, str] | None = None,
     ancestors: Sequence[Header] = (),
-    device: Device | None = None,
-    libraries: Mapping[str, str] | None = None,
-    program: str = PROGRAM,
+    **made: Any,
 ) -> Header:
-    """Return the header of a new artefact.
+    """Return the header of a new artefact, with what ``made`` it: the fields of ``Provenance``.
 
     The time is that of making, with its time zone; ``ancestors`` are the headers of the artefacts that this
-    one was made from, whose histories are taken over; the rest is as in ``Provenance``.
+    one was made from, whose histories are taken over.
 
-    Raises
-    ------
-    ArgumentError
-        ``now`` has no time zone.
+    ArgumentError where ``now`` has no time zone.
     """
     if now.tzinfo is None:
         raise ArgumentError(
             f"the time {now.isoformat()} has no time zone", hint="pass datetime.now(UTC), not datetime.now()"
         )
-    provenance = Provenance(
-        program=program,
-        argv=tuple(argv),
-        parameters=parameters or {},
-        seed=seed,
-        inputs=inputs or {},
-        libraries=libraries or {},
-        device=device,
-    )
+    provenance = Provenance(argv=tuple(argv), **made)
     created = now.astimezone(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
     # two inputs share ancestors; the sort is stable, so lines of one second keep their order
     lines = dict.fromkeys(line for header in ancestors for line in header.history)

@@ -283,10 +283,8 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
 
     Rows of a record may be left out, and its time is in seconds where its unit is not known.
 
-    Raises
-    ------
-    DataError
-        Its unit is none of time, a value is not finite, or it does not increase: the line is named.
+    DataError where its unit is none of time, a value is not finite, or it does not increase: the line is
+    named.
     """
     unit = _unit_of_time(table, name) or ("" if of_record else _unknown_unit(table, name))
     if unit not in SECONDS:

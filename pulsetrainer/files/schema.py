@@ -89,10 +89,7 @@ def _role(hint: Any, *, is_dataset: bool) -> tuple[Role, Any]:
 def plan_of(cls: type) -> tuple[FieldPlan, ...]:
     """Return the plan of every field of an artefact dataclass, in order.
 
-    Raises
-    ------
-    TypeError
-        A field has a type that the store does not know: a mistake in ``kinds``.
+    TypeError where a field has a type that the store does not know: a mistake in ``artefacts``.
     """
     hints = get_type_hints(cls, include_extras=True)
     plans = []

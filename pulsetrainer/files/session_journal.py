@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from pulsetrainer.artefacts import Beats, FloatArray, Quiz, Session
+from pulsetrainer.artefacts.session import BEAT_COLUMNS
 from pulsetrainer.errors import DamagedFileError
 
 CUT_OFF = "the record ends before the session does: it was cut off, or is still going on"
-_BEAT = ("start_s", "interval_s", "pulse", "amplitude", "gain", "late", "mean_error", "max_error")
 _WINDOW = ("temperature_s", "temperature_K")
 
 
@@ -31,7 +31,7 @@ class SessionWriter:
     def block(self, fields: Mapping[str, Any]) -> bytes:
         """Return the next block, from the fields of a session that are no samples."""
         beats, quiz = fields["beats"], fields["quiz"]
-        rows = np.stack([getattr(beats, name) for name in _BEAT], axis=1)[self._beats :]
+        rows = beats.columns.T[self._beats :]
         told = [np.zeros(0) if fields[name] is None else fields[name] for name in _WINDOW]
         windows = np.stack(told, axis=1)[self._windows :]
         self._beats, self._windows = self._beats + len(rows), self._windows + len(windows)
@@ -44,16 +44,12 @@ class SessionWriter:
 def session_of(path: Path, samples: Mapping[str, FloatArray], blocks: Sequence[bytes]) -> Session:
     """Return the session in a journal, not complete, from its samples and what ``SessionWriter`` gave.
 
-    Raises
-    ------
-    DamagedFileError
-        The blocks are not what it gives.
+    DamagedFileError where the blocks are not what it gives.
     """
     try:
         said = [json.loads(block) for block in blocks]
         rows = np.asarray([row for one in said for row in one["beats"]], dtype=np.float64)
-        told = dict(zip(_BEAT, rows.reshape(-1, len(_BEAT)).T, strict=True))
-        beats = Beats(**(told | {"pulse": told["pulse"].astype(np.int64)}))  # type: ignore[arg-type]
+        beats = Beats.of(rows.reshape(-1, len(BEAT_COLUMNS)).T)
         windows = np.asarray([row for one in said for row in one["windows"]], dtype=np.float64)
         warm = dict(zip(_WINDOW, windows.reshape(-1, len(_WINDOW)).T, strict=True)) if windows.size else {}
         plain = {name: _tupled(value) for name, value in said[-1]["fields"].items()}

@@ -91,10 +91,8 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
 def read(path: Path) -> dict[str, Any]:
     """Return the settings of a file by dotted key.
 
-    Raises
-    ------
-    UsageError
-        The file cannot be read, is no TOML, has a key that is not known, or a value of the wrong type.
+    UsageError where the file cannot be read, is no TOML, has a key that is not known, or a value of the wrong
+    type.
     """
     tree = read_toml(path)
     tree.pop("tuned", None)  # what `tune` wrote: looked at when a device is opened

@@ -18,12 +18,8 @@ if TYPE_CHECKING:
 def signal_file(signal: str, known: Sequence[str]) -> Path | None:
     """Return the file that a signal is read from; None where it is one of the ``known`` excitations.
 
-    Raises
-    ------
-    UsageError
-        The signal is neither an excitation nor a file.
-    DataError
-        It is a CSV file that cannot be read.
+    UsageError where the signal is neither an excitation nor a file; DataError where it is a CSV file that
+    cannot be read.
     """
     if signal in known:
         return None
@@ -40,10 +36,7 @@ def signal_file(signal: str, known: Sequence[str]) -> Path | None:
 def read_signal(path: Path, rate_Hz: float) -> Signal:
     """Return a signal out of a table whose first two columns are time and current, at even steps.
 
-    Raises
-    ------
-    DataError
-        The table cannot be used.
+    DataError where the table cannot be used.
     """
     # so that a mistyped name is answered at once
     import numpy as np  # noqa: PLC0415

@@ -1,7 +1,7 @@
 """Artefacts on disk: any kind into HDF5 and back, whole or not at all.
 
 The file format: root attributes ``kind``, ``format_version``, ``title``, ``created``, ``history``,
-``provenance`` (JSON), ``samples`` where the kind has a time axis; then the kind's fields as ``kinds`` says.
+``provenance`` (JSON), ``samples`` where the kind has a time axis; then the kind's fields as ``schema`` says.
 """
 
 from __future__ import annotations
@@ -38,12 +38,8 @@ K = TypeVar("K")
 def write(path: Path | str, artefact: Any, header: Header, *, overwrite: bool = False) -> None:
     """Write an artefact under its final name, or leave everything as it was.
 
-    Raises
-    ------
-    UsageError
-        See ``check_output``.
-    DataError
-        The artefact does not fit its own annotations, or the disk is full or failed.
+    UsageError as ``check_output``; DataError where the artefact does not fit its own annotations, or the disk
+    is full or failed.
     """
     write_fields(path, type(artefact), values_of(artefact), header, overwrite=overwrite)
 
@@ -100,10 +96,7 @@ def _write_root(file: h5py.File, cls: type, header: Header, *, samples: int | No
 def read(path: Path | str, kind: type[K]) -> K:
     """Read an artefact that must be of this kind.
 
-    Raises
-    ------
-    DataError
-        The file is absent, unreadable, damaged, of another kind, or of a newer format.
+    DataError where the file is absent, unreadable, damaged, of another kind, or of a newer format.
     """
     artefact: K = read_one_of(path, kind)
     return artefact
@@ -127,10 +120,7 @@ def read_one_of(path: Path | str, *kinds: type) -> Any:
 def read_any(path: Path | str) -> Any:
     """Read an artefact of whatever kind it is.
 
-    Raises
-    ------
-    DataError
-        The file is absent, unreadable, damaged, not an artefact, or of a newer format.
+    DataError where the file is absent, unreadable, damaged, not an artefact, or of a newer format.
     """
     return read_one_of(path, *KINDS.values())
 

@@ -92,10 +92,7 @@ class Table:
     def check_finite(self, name: str, *, remedy: str = _AGAIN) -> FloatArray:
         """Return a column in which every value is finite; ``remedy`` is what may be done but removing rows.
 
-        Raises
-        ------
-        DataError
-            A value is NaN, infinite or missing: line and column are named.
+        DataError where a value is NaN, infinite or missing: line and column are named.
         """
         values = self.column(name)
         bad = np.flatnonzero(~np.isfinite(values))
@@ -119,10 +116,7 @@ class Table:
     def index(self, name: str) -> int:
         """Return the place of a column of numbers; ``force_N`` is the heading ``force [N]`` too.
 
-        Raises
-        ------
-        DataError
-            There is no such column (similar names are offered), or it holds text.
+        DataError where there is no such column (similar names are offered), or it holds text.
         """
         bare = [split_unit(own)[0].lower() for own in self.names]
         wanted, unit = split_unit(name)
@@ -179,11 +173,8 @@ def read_table(
     memory; all by default. With ``bad_rows`` a row of too few or too many cells, or with text in a column of
     numbers, lacks numbers; without, ``remedy`` is what may be done but removing such rows.
 
-    Raises
-    ------
-    DataError
-        The file cannot be read, is empty or no table, has bad rows, or two decimal signs (line and column
-        are named).
+    DataError where the file cannot be read, is empty or no table, has bad rows, or two decimal signs (line
+    and column are named).
     """
     path = Path(path)
     try:
@@ -255,14 +246,8 @@ def write_table(
 ) -> None:
     """Write columns as CSV: a header of their names, numbers that read back to the last bit.
 
-    Raises
-    ------
-    UsageError
-        The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
-    DataError
-        The disk is full or failed.
-    ArgumentError
-        The columns differ in length.
+    UsageError where the file exists and ``overwrite`` is not set, or its folder is missing or not writable;
+    DataError where the disk is full or failed; ArgumentError where the columns differ in length.
     """
     arrays = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in columns.values()]
     if len({array.shape for array in arrays}) != 1 or arrays[0].ndim != 1:

@@ -8,13 +8,10 @@ from pulsetrainer.errors import UsageError
 
 
 def check_timing(time: str | None, rate_Hz: float | None, *, no_time: bool, resampled: bool = False) -> None:
-    """Refuse what contradicts itself, before a long table is read.
+    """Raise UsageError for what contradicts itself, before a long table is read.
 
-    Raises
-    ------
-    UsageError
-        More than one of a time column, a rate and no time; a rate that is not positive; no time, but
-        even steps of it.
+    More than one of a time column, a rate and no time; a rate that is not positive; no time, but even steps
+    of it.
     """
     if time is not None and rate_Hz is not None:
         raise UsageError(

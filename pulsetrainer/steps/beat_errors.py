@@ -115,16 +115,9 @@ class Ledger:
         """Whether what is being measured belongs to a beat."""
         return bool(self._given) and self._given[0].beat is not None
 
-    @property
-    def count(self) -> int:
-        """Beats that are over."""
-        return len(self._rows) // 8
-
     def beats(self, unit: str) -> Beats:
         """Return every beat that is over."""
-        columns = np.array(self._rows).reshape(-1, 8).T  # a copy: the rows go on growing
-        start, interval, pulse, amplitude, gain, late, mean, most = columns
-        return Beats(start, interval, pulse.astype(np.int64), amplitude, gain, late, mean, most, unit)
+        return Beats.of(np.array(self._rows).reshape(-1, 8).T, unit)  # a copy: the rows go on growing
 
     @property
     def full_force(self) -> float:

@@ -70,12 +70,8 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
     resample
         Rate in Hz, ``"even"`` for that of the median step, None to leave the time stamps as they are.
 
-    Raises
-    ------
-    UsageError
-        The run has no time to resample, or the rate would make too many samples.
-    DataError
-        The parts differ in units, or only some have a time or a reference.
+    UsageError where the run has no time to resample, or the rate would make too many samples; DataError where
+    the parts differ in units, or only some have a time or a reference.
     """
     run, notes = joined(parts)
     report = report_of(run, resampled=resample is not None)
@@ -159,10 +155,7 @@ def _notes_on_time(name: str, report: Report) -> list[str]:
 def resampled(run: Run, rate_Hz: float | None) -> Run:
     """Return a run on even time steps, straight between samples; None: at its median step.
 
-    Raises
-    ------
-    UsageError
-        The run has no time, or the rate is not positive or would make too many samples.
+    UsageError where the run has no time, or the rate is not positive or would make too many samples.
     """
     if run.time_s is None:
         raise UsageError("a run without time cannot be resampled", hint="give `time` or `rate_Hz`")
@@ -191,10 +184,7 @@ def resampled(run: Run, rate_Hz: float | None) -> Run:
 def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
     """Return the parts as one run, with a seam wherever one does not continue the part before; and notes.
 
-    Raises
-    ------
-    DataError
-        Some parts have a time or a reference and others have none, or their units differ.
+    DataError where some parts have a time or a reference and others have none, or their units differ.
     """
     first = parts[0]
     if len(parts) == 1:

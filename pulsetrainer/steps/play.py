@@ -15,15 +15,16 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.temperature import Thermometer
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
-from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.errors import ArgumentError, DataError, DeviceError
 from pulsetrainer.steps.heat import Correction, coil_of, take_temperature, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
-from pulsetrainer.steps.stopped import INTERRUPTED, raise_if_stopped
+from pulsetrainer.steps.stopped import raise_if_stopped
 
 _LOG = logging.getLogger(__name__)
 DRIVES = ("compensated", "scaled")
@@ -40,6 +41,17 @@ class Plan:
     peak_current_A: float
     rms_current_A: float
 
+    @classmethod
+    def of(cls, drive: Waveform, currents: FloatArray, plays: int) -> Plan:
+        """Plan so many plays on the samples of a drive, with ``currents`` (..., n) in A."""
+        return cls(
+            samples=drive.time_s.size,
+            seconds=drive.time_s.size / drive.rate_Hz * plays,
+            rate_Hz=drive.rate_Hz,
+            peak_current_A=float(np.abs(currents).max()),
+            rms_current_A=root_mean_square(currents),
+        )
+
 
 def plan(
     drive: Waveform, *, repeats: int = 5, track_heat: bool | None = None, limits: Limits | None = None
@@ -47,20 +59,14 @@ def plan(
     """Return what ``play`` would play on a device as it is delivered, with a cold coil; fails as ``play``."""
     _check(drive, repeats)
     rehearsal = Rehearsal(limits or Limits())
-    check_peak(np.concatenate((drive.compensated, drive.scaled)), rehearsal.current_A)
+    drives = np.stack((drive.compensated, drive.scaled))
+    check_peak(drives, rehearsal.current_A)
     if _is_remade(drive, track_heat):
         coil_of(drive.model, asked=track_heat)
     for _ in range(repeats):
         rehearsal.play(drive.compensated, drive.rate_Hz, drive.predicted)
         rehearsal.play(drive.scaled, drive.rate_Hz)
-    drives = np.stack((drive.compensated, drive.scaled))
-    return Plan(
-        samples=drive.time_s.size,
-        seconds=drive.time_s.size / drive.rate_Hz * repeats * len(DRIVES),
-        rate_Hz=drive.rate_Hz,
-        peak_current_A=float(np.abs(drives).max()),
-        rms_current_A=root_mean_square(drives),
-    )
+    return Plan.of(drive, drives, repeats * len(DRIVES))
 
 
 def play(
@@ -133,6 +139,11 @@ def play(
             progress((number + 1) / (repeats * len(DRIVES)))
         except KeyboardInterrupt:  # between two plays: what was played is kept all the same
             fault = INTERRUPTED
+            break
+        except DeviceError as error:  # the coil is too hot for the next one, the port is gone
+            if not kept["scaled"]:
+                raise
+            fault, remedy = error.message, error.hint
             break
     whole = min(len(rows) for rows in kept.values())
     known = operator_of(drive.model) if drive.model else None

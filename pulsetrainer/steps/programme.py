@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.errors import UsageError
 from pulsetrainer.steps.conductor import Decision, Play
+
+USUAL_MINUTES = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,18 @@ def check_amplitude(amplitude: float | None) -> None:
         )
 
 
+def _check_length(minutes: float | None, beats: int | None) -> None:
+    if minutes is not None and beats is not None:
+        raise UsageError(
+            f"a session ends after minutes or after beats, got both: `minutes` {minutes:g}, `beats` {beats}",
+            hint="give one of the two",
+        )
+    if beats is not None and beats < 1:
+        raise UsageError(f"`beats` must be 1 or more, got {beats}", hint="20 last a quarter of a minute")
+    if minutes is not None and not 0 < minutes < math.inf:
+        raise UsageError(f"`minutes` must be a finite number above 0, got {minutes:g}", hint="5 are usual")
+
+
 def number_of(name: str, pulses: Sequence[str]) -> int:
     """Return the place of a pulse in the session's list; UsageError where it is not there."""
     if name in pulses:
@@ -54,8 +67,8 @@ def number_of(name: str, pulses: Sequence[str]) -> int:
 class Programme:
     """Plays the pulses one after the other, each for an equal share of the time, until something changes.
 
-    It ends after so many ``beats`` or ``seconds``, one of the two. A change of the pulse ends the taking of
-    turns. UsageError where a rate, an amplitude or a pulse cannot be played, or there is no end.
+    It ends after so many ``beats`` or ``minutes``; neither: after five minutes. A change of the pulse ends
+    the taking of turns. UsageError where a rate, an amplitude or a pulse cannot be played, or no end is told.
     """
 
     def __init__(
@@ -65,20 +78,18 @@ class Programme:
         rate: float | None = None,
         amplitude: float = 100.0,
         beats: int | None = None,
-        seconds: float | None = None,
+        minutes: float | None = None,
         changes: Sequence[Change] = (),
     ) -> None:
+        _check_length(minutes, beats)
         check_rate(rate)
         check_amplitude(amplitude)
-        if (beats is None) == (seconds is None):
-            raise UsageError("a session ends after minutes or after beats", hint="give one of the two")
-        if (beats is not None and beats < 1) or (seconds is not None and not 0 < seconds < np.inf):
-            raise UsageError("a session needs at least one beat", hint="give more `beats` or `minutes`")
         for change in changes:
             check_rate(change.rate)
             check_amplitude(change.amplitude)
         self._names = tuple(pulses)
-        self._beats, self._seconds = beats, seconds
+        self._beats = beats
+        self._seconds = 60.0 * (USUAL_MINUTES if minutes is None else minutes)
         self._start = Play(0, amplitude / 100.0, rate)
         self._changes = [
             (change, None if change.pulse is None else number_of(change.pulse, pulses))
@@ -92,7 +103,7 @@ class Programme:
 
     def _share(self, number: int, time_s: float) -> float:
         """How much of it is over."""
-        return number / self._beats if self._beats else time_s / (self._seconds or np.inf)
+        return number / self._beats if self._beats else time_s / self._seconds
 
     def share_at(self, time_s: float) -> float:
         """How much of it is over at a time; 0 where beats are counted."""

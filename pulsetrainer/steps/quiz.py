@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -26,10 +24,7 @@ def order(choices: int, questions: int, seed: int) -> list[int]:
 
     Which ones are asked once more, and the order, are drawn from the seed.
 
-    Raises
-    ------
-    UsageError
-        There are fewer than two choices, or fewer questions than choices.
+    UsageError where there are fewer than two choices, or fewer questions than choices.
     """
     if choices < 2:
         raise UsageError("a quiz needs at least two pulses to choose from", hint="name more in `pulses`")
@@ -48,10 +43,7 @@ def order(choices: int, questions: int, seed: int) -> list[int]:
 def from_list(answers: Sequence[str], choices: Sequence[str], questions: int) -> Answer:
     """Return answers that were written down beforehand, one for each question.
 
-    Raises
-    ------
-    DataError
-        There are too few, or one names no pulse that can be asked.
+    DataError where there are too few, or one names no pulse that can be asked.
     """
     for line, said in enumerate(answers, start=1):
         if said not in choices:
@@ -107,10 +99,7 @@ class Blind:
     def told(self, beats: Beats) -> Beats:
         """Return the beats of the questions that are answered: one of the others would tell what is asked."""
         is_open = len(self._answers) < len(self._begun)
-        told = slice(self._first if is_open else None)
-        names = [field.name for field in fields(beats) if field.name != "output_unit"]
-        columns: dict[str, Any] = {name: getattr(beats, name)[told] for name in names}
-        return replace(beats, **columns)
+        return Beats.of(beats.columns[:, : self._first], beats.output_unit) if is_open else beats
 
     def quiz(self, learner: str = "") -> Quiz | None:
         """Return what was asked and answered so far; None where that is nothing."""

@@ -69,7 +69,7 @@ class Sink(Protocol):
         ...
 
 
-class Memory:
+class InMemory:
     """A sink that keeps the recording in memory."""
 
     def __init__(self) -> None:
@@ -187,14 +187,8 @@ def record(
 
     ``watch`` is shown the current and the force as they come.
 
-    Raises
-    ------
-    ArgumentError
-        The device cannot play the course.
-    DataError
-        The disk is full or failed.
-    DeviceError, Interrupted
-        The device could not be conditioned; what was recorded before is kept.
+    ArgumentError where the device cannot play the course; DataError where the disk is full or failed;
+    DeviceError, Interrupted where the device could not be conditioned; what was recorded before is kept.
     """
     info, rate_Hz = device.info, course.signal.rate_Hz
     check_top(course.signal, info.current_limit_A)
@@ -316,10 +310,7 @@ def samples_played(run: Run, course: Course) -> int:
 
     What follows the course no more is the way down after a fault.
 
-    Raises
-    ------
-    DataError
-        The recording has no time or no reference, or it is one of another signal.
+    DataError where the recording has no time or no reference, or it is one of another signal.
     """
     if run.time_s is None or run.reference is None:
         raise DataError(

@@ -10,7 +10,6 @@ import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Model, RefinePass, Waveform
 from pulsetrainer.core import inversion, learning, metrics
-from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.errors import ArgumentError, DataError, Interrupted
@@ -173,13 +172,7 @@ def plan(drive: Waveform, *, passes: int = 5, limits: Limits | None = None) -> P
     check_peak(drive.compensated, rehearsal.current_A)
     for _ in range(FEWEST):
         rehearsal.play(drive.compensated, drive.rate_Hz, drive.predicted)
-    return Plan(
-        samples=drive.time_s.size,
-        seconds=drive.time_s.size / drive.rate_Hz * (FEWEST + MOST * (passes - 1)),
-        rate_Hz=drive.rate_Hz,
-        peak_current_A=float(np.abs(drive.compensated).max()),
-        rms_current_A=root_mean_square(drive.compensated),
-    )
+    return Plan.of(drive, drive.compensated, FEWEST + MOST * (passes - 1))
 
 
 def check(drive: Waveform, passes: int) -> Model:

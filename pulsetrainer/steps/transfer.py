@@ -96,13 +96,7 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
 
 
 def check_transfer(drive: Waveform, refined: Waveform) -> Model:
-    """Return the model of both drives; refuse drives between which nothing can be carried over.
-
-    Raises
-    ------
-    DataError
-        As ``transfer``.
-    """
+    """Return the model of both drives; DataError, as of ``transfer``, where nothing can be carried over."""
     model, of_refined = check(drive, passes=1), check(refined, passes=1)
     if not refined.passes:
         raise DataError(

@@ -62,7 +62,7 @@ def _random(seed, minutes):
     times = np.cumsum(rng.uniform(0.3, 2.0, 40))
     return Programme(
         NAMES,
-        seconds=60 * minutes,
+        minutes=minutes,
         changes=[
             Change(float(t), float(rng.uniform(20, 240)), float(rng.uniform(1, 100)), NAMES[rng.integers(3)])
             for t in times
@@ -221,7 +221,7 @@ def test_the_ledger_finds_what_was_done_to_a_force():
         np.testing.assert_array_equal(shown, target[block])
         begun += step
     figures, beats = ledger.figures(), ledger.beats("N")
-    assert ledger.count == 60
+    assert beats.start_s.size == 60
     assert figures["beat_timing_max_ms"] == pytest.approx(0.7, abs=0.15)
     assert np.median(beats.late) == pytest.approx(0.7e-3, abs=2e-5)
     assert np.median(beats.gain) == pytest.approx(0.98, abs=1e-3)
@@ -257,7 +257,7 @@ def test_beats_that_were_lost_as_a_whole_have_no_figures():
     for piece in given:
         ledger.give(piece)
     ledger.measure(np.asarray([given[-1].first]), np.zeros(1))
-    assert ledger.count == 2
+    assert ledger.beats("N").start_s.size == 2
     assert np.isnan([ledger.full_force, ledger.mean_force, *ledger.figures().values()]).all()
 
 
@@ -270,16 +270,16 @@ def test_beats_that_were_lost_as_a_whole_have_no_figures():
         {"amplitude": 0.0},
         {"amplitude": 101.0},
         {"beats": 0},
-        {"seconds": -1.0},
-        {"beats": 5, "seconds": 5.0},
+        {"minutes": -1.0},
+        {"beats": 5, "minutes": 5.0},
         {"changes": [Change(1.0, rate=300.0)]},
         {"changes": [Change(1.0, pulse="normla")]},
     ],
 )
 def test_what_cannot_be_played_is_refused(options):
-    """Rates outside 20 to 240, more than the reach, no end or two, a pulse that is not there."""
+    """Rates outside 20 to 240, more than the reach, two ends or a bad one, a pulse that is not there."""
     with pytest.raises(UsageError):
-        Programme(NAMES, **({"seconds": 60.0} if not {"beats", "seconds"} & set(options) else {}) | options)
+        Programme(NAMES, **options)
 
 
 def test_a_model_of_another_device_is_refused():

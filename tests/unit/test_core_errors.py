@@ -104,7 +104,7 @@ BAD = {
     "repeated levels": (lambda: Plane(np.array([0.0, 0.5, 0.5, 1.0])), ["edges", "strictly increase"]),
     "falling levels": (lambda: Plane(np.array([1.0, 0.5, 0.0])), ["edges", "strictly increase", "-0.5"]),
     "masses of the wrong length": (lambda: PLANE.everett_nodes(np.ones(9)), ["(..., 10)", "(9,)"]),
-    "nodes of the wrong length": (lambda: PLANE.everett_grid(np.ones(11)), ["(10,)", "(11,)"]),
+    "nodes of the wrong length": (lambda: PLANE.everett_grid(np.ones(11)), ["(..., 10)", "(11,)"]),
     # the operator
     "weights of the wrong length": (lambda: Preisach(PLANE, np.ones(9)), ["weights", "(10,)", "(9,)"]),
     "square weights": (lambda: Preisach(PLANE, np.ones((4, 4))), ["weights", "(10,)", "(4, 4)"]),

@@ -39,8 +39,8 @@ def test_identification_visits_every_edge(n_h):
     assert signal.reversals == 2 * n_h - 1
     assert (signal.value[0], signal.value[-1]) == (-1.0, -1.0)
     length = np.abs(np.diff([-1.0, *expected])).sum()
-    assert signal.duration_s == pytest.approx(length / 1.5, abs=0.01)
-    assert signal.time_s[[0, 1, -1]] == pytest.approx([0.0, 0.005, signal.duration_s - 0.005])
+    assert signal.value.size / signal.rate_Hz == pytest.approx(length / 1.5, abs=0.01)
+    assert signal.time_s[[0, 1, -1]] == pytest.approx([0.0, 0.005, (signal.value.size - 1) / signal.rate_Hz])
 
 
 def test_a_signal_must_not_jump_over_its_range():

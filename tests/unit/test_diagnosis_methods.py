@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from types import SimpleNamespace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
@@ -265,7 +266,7 @@ def test_errors_of_folds_are_those_of_as_many_fits(name, values, whole, by_rate)
             held_out.rates(fitted, folds),
             [e @ e for e, _ in held_out._left_out(fitted, folds, whole=True, block=held_out._by_rate)],
         )
-    block = held_out._by_rate if by_rate else None
+    block = held_out._by_rate if by_rate else held_out.block
     for fold, (error, _) in enumerate(held_out._left_out(fitted, folds, whole=whole, block=block)):
         told = LIMITS.piece_told if whole else 0.0
         weight = np.where(fold_of == fold, told, 1.0)
@@ -276,10 +277,14 @@ def test_errors_of_folds_are_those_of_as_many_fits(name, values, whole, by_rate)
         np.testing.assert_allclose(error, (fitted.residual - columns @ change)[fold_of == fold], atol=2e-6)
 
 
+class _Fit:
+    """A fit that is the same as itself only."""
+
+
 def _told(folds: dict[int, list]) -> HeldOut:
     held_out = HeldOut.__new__(HeldOut)
-    held_out._errors = []
-    held_out._left_out = lambda fitted, number: iter(folds[number])
+    held_out.block, held_out._by_rate, held_out._known = None, None, WeakKeyDictionary()
+    held_out._left_out = lambda fitted, number, **how: iter(folds[number])
     return held_out
 
 
@@ -287,11 +292,27 @@ def test_the_held_out_gain_is_a_share_of_what_is_reducible():
     """Both halves, each from the other; at least what is relevant is taken for reducible."""
     error = np.asarray([3.0, 4.0])
     halves = _told({2: [(error, None), (error, None)]})
-    assert halves.error("a fit") == pytest.approx(50.0)
-    assert np.isnan(_told({2: [(error, None)]}).error("a fit"))
-    halves._errors = [("before", 110.0), ("after", 20.0)]
-    assert halves.gain("before", "after", Floor(10, 1.0, 1.0, 1.0)) == pytest.approx(90.0 / 100.0)
-    assert halves.gain("after", "before", Floor(19, 1.0, 1.0, 1.0)) == pytest.approx(-90.0 / (19 * 0.09))
+    assert halves.error(_Fit()) == pytest.approx(50.0)
+    assert np.isnan(_told({2: [(error, None)]}).error(_Fit()))
+    before, after = _Fit(), _Fit()
+    halves._known = {
+        before: {(2, "in turn"): np.asarray([60.0, 50.0])},
+        after: {(2, "in turn"): np.asarray([12.0, 8.0])},
+    }
+    assert halves.gain(before, after, Floor(10, 1.0, 1.0, 1.0)) == pytest.approx(90.0 / 100.0)
+    assert halves.gain(after, before, Floor(19, 1.0, 1.0, 1.0)) == pytest.approx(-90.0 / (19 * 0.09))
+
+
+def test_what_was_left_out_once_is_not_left_out_again():
+    """Halves, pieces and rates of one fit are asked for by many stages."""
+    u = np.tile(_loops(), 4)
+    problem = problem_for([Record(u, 3.0 * u, dt_s=0.01)], 0.0, 1.5)
+    held_out, fitted, asked = HeldOut(problem), refit(problem, (), None), []
+    left_out = held_out._left_out
+    held_out._left_out = lambda *one, **how: (asked.append(one), left_out(*one, **how))[1]
+    for _ in range(3):
+        held_out.error(fitted), held_out.pieces(fitted, 5), held_out.rates(fitted, 4)
+    assert [folds for _, folds in asked] == [2, 5, 4]
 
 
 def test_the_jackknife_leaves_out_a_tenth_at_a_time():
