@@ -2,9 +2,10 @@
 
     python benchmarks/heat.py [--first 1] [--devices 10] [--minutes 15] [--figure heat.svg]
 
-Each device is calibrated and diagnosed at 0 K; then it plays at 0 K as it was calibrated, and at a room
-drawn from -20 to 20 K, without and with tracking. The true temperature is that of the simulated copper; the
-figure shows it beside the one that the last device told.
+Each device is calibrated and diagnosed at 0 K; then it plays at 0 K as it was calibrated, and in its room,
+without and with tracking. The rooms spread over -20 to 20 K: as many equal parts of it as there are devices,
+one drawn from each. The true temperature is that of the simulated copper; the figure shows it beside the one
+that the last device told.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.report.heat_figures import temperature
 from pulsetrainer.steps.programme import Programme
-from pulsetrainer.steps.session import Memory, perform
+from pulsetrainer.steps.session import InMemory, perform
 
 DRIFT_PER_A2, TAU_S = 0.006, 20.0  # of the as-built bench
 COPPER_PER_K = 0.0039
@@ -45,7 +46,7 @@ def played(model, port: str, minutes: float, *, track: bool, ambient: float):
     A play that ends because this computer was busy with something else for seconds is played again.
     """
     for _ in range(_PLAYS):
-        sink = Memory()
+        sink = InMemory()
         done = _once(model, port, minutes, sink, track=track)
         if not done.fault:
             break
@@ -62,7 +63,7 @@ def played(model, port: str, minutes: float, *, track: bool, ambient: float):
     return error, (told_s, told, own + ambient)
 
 
-def _once(model, port: str, minutes: float, sink: Memory, *, track: bool):
+def _once(model, port: str, minutes: float, sink: InMemory, *, track: bool):
     """Press the pulses of ``NAMES``, each for half of the time."""
     programme = Programme(NAMES, rate=None, amplitude=100.0, seconds=60.0 * minutes)
     with pt.open_device(port) as device:
@@ -78,6 +79,12 @@ def _once(model, port: str, minutes: float, sink: Memory, *, track: bool):
         )
 
 
+def rooms(first: int, devices: int):
+    """Temperature of each device's room in K: drawn from a part of -20 to 20 K of its own, in drawn order."""
+    rng = np.random.default_rng(first)
+    return -20.0 + 40.0 * (rng.permutation(devices) + rng.uniform(size=devices)) / devices
+
+
 def main() -> None:
     """Print a line for each device, and the worst."""
     parser = argparse.ArgumentParser()
@@ -87,8 +94,7 @@ def main() -> None:
     parser.add_argument("--figure", help="file for the last device's temperature, true and told")
     asked = parser.parse_args()
     rows = []
-    for seed in range(asked.first, asked.first + asked.devices):
-        ambient = float(np.random.default_rng(seed).uniform(-20, 20))
+    for seed, ambient in enumerate(rooms(asked.first, asked.devices), asked.first):
         port = f"bench:?seed={seed}"
         model = calibrated(port)
         room = f"{port}&ambient={ambient:.2f}"

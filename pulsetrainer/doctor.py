@@ -21,6 +21,7 @@ from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.core import excitations
 from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.device.gains import DELIVERED
 from pulsetrainer.device.opening import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
@@ -29,7 +30,7 @@ from pulsetrainer.device.trace import Trace
 from pulsetrainer.diagnosis import gates, wording
 from pulsetrainer.errors import Interrupted, PulsetrainerError
 from pulsetrainer.simulation import build
-from pulsetrainer.steps.stopped import INTERRUPTED, raise_if_stopped
+from pulsetrainer.steps.stopped import raise_if_stopped
 from pulsetrainer.version import __version__
 
 State = Literal["ok", "warning", "problem"]

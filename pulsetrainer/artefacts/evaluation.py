@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 from typing import Annotated, ClassVar
 
 from pulsetrainer.artefacts.data import Data, FloatArray
@@ -42,9 +43,8 @@ class DriveError:
     current_tracking_max_percent: Annotated[
         float, Data("percent", "largest current tracking error, of the range")
     ]
-    output: Annotated[
-        FloatArray, Data("@output_unit", "mean measured output over the repeats", "time")
-    ]  # (n,)
+    # (n,)
+    output: Annotated[FloatArray, Data("@output_unit", "mean measured output over the repeats", "time")]
     output_unit: str = "N"
 
 
@@ -63,9 +63,10 @@ class WaveformEvaluation:
     full_force: Annotated[float, Data("@output_unit", "full applied force")]
     noise_percent: Annotated[float, Data("percent", "spread between repeats, of full force")]
     output_unit: str = "N"
+    # of the drive of which it is larger
     error_spread_percent: Annotated[
         float, Data("percent", "standard deviation of the mean error from repeat to repeat, of full force")
-    ] = float("nan")  # of the drive of which it is larger
+    ] = nan
     # (r,) before each compensated drive, where the heat was tracked
     temperature_K: Annotated[
         FloatArray | None, Data("K", "copper warmer than at calibration", "repeat", path="temperature")
@@ -92,14 +93,14 @@ class ModelEvaluation:
     predicted: Annotated[FloatArray, Data("@output_unit", "predicted output", "time")]
     output_unit: str = "N"
     # how far the measured output lies above the predicted one, and what is left when that is taken out
-    offset: Annotated[float, Data("@output_unit", "offset of the run against the model")] = float("nan")
+    offset: Annotated[float, Data("@output_unit", "offset of the run against the model")] = nan
     shape_rms_percent: Annotated[
         float, Data("percent", "rms prediction error with the run's own offset, of the output span")
-    ] = float("nan")
+    ] = nan
     # what a user has who sets the zero first: nothing of the half that is scored was known
     second_half_percent: Annotated[
         float, Data("percent", "rms prediction error of the second half, with the zero of the first half")
-    ] = float("nan")
+    ] = nan
     start: str = "known"  # the state before the run: known, or which one was estimated
     outside_percent: Annotated[float, Data("percent", "samples outside the range of the model")] = 0.0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from importlib import import_module
+from math import nan
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -45,15 +46,12 @@ class Fit:
     predicted_upper: Annotated[
         FloatArray | None, Data("@output_unit", "upper end of the predicted output", "time")
     ] = None
-    max_percent: Annotated[float, Data("percent", "largest error of the fit, of the output span")] = float(
-        "nan"
-    )
+    max_percent: Annotated[float, Data("percent", "largest error of the fit, of the output span")] = nan
     # standard deviation; NaN where the records cannot tell
-    input_noise: Annotated[float, Data("@input_unit", "noise of the measured input")] = float("nan")
+    input_noise: Annotated[float, Data("@input_unit", "noise of the measured input")] = nan
     false_reversals: int = 0  # taken out of the input before the fit
-    offsets: tuple[
-        float, ...
-    ] = ()  # of each run's output against their mean; zeros where one offset serves all
+    # of each run's output against their mean; zeros where one offset serves all
+    offsets: tuple[float, ...] = ()
     spacing: str = "even"  # of the levels: "even", or "crowded" where the loop is steep
     stiffness: float = 0.0  # t, how alike the loops are along the diagonal; 0: the density is free
     warning: str = ""  # that this kind of model is the wrong one, in words; empty where it is not
@@ -62,7 +60,7 @@ class Fit:
     wild_input: Annotated[FloatArray | None, Data("@input_unit", "input of wild samples", "wild")] = None
     wild_output: Annotated[FloatArray | None, Data("@output_unit", "output of wild samples", "wild")] = None
     # of the cells within the range, told apart by minor loops, and not by the major loop only; NaN: unknown
-    minor_percent: float = float("nan")
+    minor_percent: float = nan
     loop: str = ""  # "counterclockwise" | "clockwise" | "butterfly" | "none"; empty in files of 0.1
     notes: tuple[str, ...] = ()  # what a person should know about the fit
 
@@ -113,13 +111,11 @@ class Model(Shown):
 
     kind: ClassVar[str] = "model"
 
+    # (L,), (q,) in the order of core.plane
     edges: Annotated[
-        FloatArray,
-        Data("@edges_unit", "levels: edges of the cells", "level", path="levels", finite=True),
-    ]  # (L,)
-    weights: Annotated[
-        FloatArray, Data("@weights_unit", "Preisach weights mu", "cell", finite=True)
-    ]  # (q,), order of core.plane
+        FloatArray, Data("@edges_unit", "levels: edges of the cells", "level", path="levels", finite=True)
+    ]
+    weights: Annotated[FloatArray, Data("@weights_unit", "Preisach weights mu", "cell", finite=True)]
     offset: Annotated[float, Data("@offset_unit", "offset y0", finite=True)]
     covered: Annotated[BoolArray, Data("1", "cell was switched on and off", "cell")]  # (q,)
     weights_unit: str = "N/A^2"

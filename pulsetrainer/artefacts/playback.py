@@ -39,9 +39,8 @@ class Playback(Shown):
     waveform: Waveform
     compensated: DrivePlayback
     scaled: DrivePlayback
-    input_range: Annotated[
-        float, Data("@input_unit", "full range of the drive current")
-    ]  # for tracking in percent
+    # for tracking in percent
+    input_range: Annotated[float, Data("@input_unit", "full range of the drive current")]
     input_unit: str = "A"
     complete: bool = True
     dropped_samples: int = 0

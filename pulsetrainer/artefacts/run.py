@@ -45,9 +45,8 @@ class Run(Shown):
     time_s: Annotated[FloatArray | None, Data("s", "time", "time", path="time")]  # (n,), None: index only
     input: Annotated[FloatArray, Data("@input_unit", "@input_quantity", "time")]  # (n,) what was measured
     output: Annotated[FloatArray, Data("@output_unit", "@output_quantity", "time")]  # (n,) what was measured
-    reference: Annotated[FloatArray | None, Data("@input_unit", "reference", "time")] = (
-        None  # (n,) what was asked
-    )
+    # (n,) what was asked for
+    reference: Annotated[FloatArray | None, Data("@input_unit", "reference", "time")] = None
     # (n,) true at the first sample of each part but the first: before it the device was off, for a time that
     # the record does not tell, and then replayed the extremes that its memory should hold. None: one part
     seam: Annotated[BoolArray | None, Data("1", "first sample after a pause", "time")] = None

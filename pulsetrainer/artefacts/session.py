@@ -56,9 +56,8 @@ class Quiz:
     choices: tuple[str, ...]
     asked: tuple[str, ...]
     answered: tuple[str, ...]
-    response_s: Annotated[
-        FloatArray, Data("s", "time from the first beat to the answer", "question")
-    ]  # (q,) NaN: the answer came from a file
+    # (q,) NaN: the answer came from a file
+    response_s: Annotated[FloatArray, Data("s", "time from the first beat to the answer", "question")]
     learner: str = ""
 
     @property

@@ -39,15 +39,14 @@ class Waveform(Shown):
 
     time_s: Annotated[FloatArray, Data("s", "time", "time", path="time")]  # (n,) even steps
     target: Annotated[FloatArray, Data("@output_unit", "target", "time", finite=True)]  # (n,)
-    compensated: Annotated[
+    compensated: Annotated[  # (n,), as are those that follow
         FloatArray, Data("@input_unit", "compensated drive", "time", path="drive/compensated", finite=True)
-    ]  # (n,)
+    ]
     scaled: Annotated[
         FloatArray, Data("@input_unit", "scaled drive", "time", path="drive/scaled", finite=True)
-    ]  # (n,)
-    predicted: Annotated[
-        FloatArray, Data("@output_unit", "output expected of the compensated drive", "time")
-    ]  # (n,) by the model; of a refined drive what the device gave
+    ]
+    # by the model; of a refined drive what the device gave
+    predicted: Annotated[FloatArray, Data("@output_unit", "output expected of the compensated drive", "time")]
     scored: Annotated[BoolArray, Data("1", "sample counts in the evaluation", "time")]  # (n,) not the lead-in
     name: str
     source: str  # where the shape comes from, in words

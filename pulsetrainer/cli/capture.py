@@ -19,7 +19,6 @@ from pulsetrainer.cli.options import (
     ShowLive,
     setting,
 )
-from pulsetrainer.report.tables import picked
 
 # what must be the same when a capture is resumed
 _SAME = ("signal", "levels", "current_max_A", "speed_A_per_s", "rate_Hz", "condition", "repeats")
@@ -69,6 +68,8 @@ def capture(
     from pulsetrainer.core.course import Course
     from pulsetrainer.files.resume import earlier_of
     from pulsetrainer.recorded import capture_into
+    from pulsetrainer.report.planned import to_be_captured
+    from pulsetrainer.report.results import captured
     from pulsetrainer.steps.capture import excitation, plan
     from pulsetrainer.steps.recording import samples_played
 
@@ -94,20 +95,9 @@ def capture(
             planned = plan(
                 played, levels=levels, condition=condition, repeats=repeats, limits=job.limits, at=at
             )
-            length = f"{planned.seconds - planned.conditioning_s:.1f} s"
-            if condition:
-                length += f", after {planned.conditioning_s:.1f} s around the major loop"
-            rows = {
-                "length": length,
-                "samples": f"{planned.samples}, {planned.rate_Hz:g} a second",
-                "reversals": planned.reversals,
-                "cells switched": f"{planned.coverage_percent:.1f} %",
-            }
-            if limit_force_N is not None:
-                rows["force"] = f"known once it is measured; above {limit_force_N:g} N the device stops"
             share = 100 * at / course.size
             does = f"continue {played.name} at {share:.0f} %" if at else f"play {played.name}"
-            job.would(does, planned, rows)
+            job.would(does, planned, to_be_captured(planned, limit_force_N))
             return
         view = job.view(float(played.value.max()), live=live)
         with job.working(f"capturing {signal}", view) as progress, job.open_device() as device:
@@ -125,15 +115,4 @@ def capture(
             )  # fmt: skip
     if got.dropped_samples:
         job.notes([f"{got.dropped_samples} samples were lost on the wire; the rest is right"])
-    job.show(
-        {"output": out, "signal": played.name, **got._asdict(), **picked(info, "serial", "firmware")},
-        f"{out}: {played.name} on {info.serial}, firmware {info.firmware}",
-        {
-            "samples": f"{got.samples} in {got.seconds:.1f} s, {got.rate_Hz:g} a second",
-            "current": "{:.3f} .. {:.3f} A".format(*got.current_range_A),
-            "force": "{:.3f} .. {:.3f} N".format(*got.force_range_N),
-            "reversals": got.reversals,
-            **({"parts": got.parts} if got.parts > 1 else {}),
-            "cells switched": f"{got.coverage_percent:.1f} %",
-        },
-    )
+    job.show(*captured(out, played.name, got, info))

@@ -11,7 +11,7 @@ import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
-from pulsetrainer.report.forms import figure_form
+from pulsetrainer.report.figure_formats import figure_format
 from pulsetrainer.report.tables import picked
 from pulsetrainer.steps.asked import check_several
 
@@ -36,7 +36,7 @@ def compare(
     Example: pulsetrainer compare before.h5 after.h5 -o change.png
     """
     check_several(evaluations)
-    form = figure_form(out, "a comparison", "csv") if out is not None else ""
+    form = figure_format(out, "a comparison", "csv") if out is not None else ""
     job = Job(context, inputs=evaluations, outputs=(out,))
     from pulsetrainer.files import store
     from pulsetrainer.report import names

@@ -42,12 +42,8 @@ class Job:
 
     Making it checks port, outputs and, by their first bytes, inputs: before anything heavy is loaded.
 
-    Raises
-    ------
-    UsageError
-        The port makes no sense, or an output exists and ``overwrite`` is not set, or it cannot be written.
-    DataError
-        An input is not there or cannot be what it should be.
+    UsageError where the port makes no sense, or an output exists and ``overwrite`` is not set, or it cannot
+    be written; DataError where an input is not there or cannot be what it should be.
     """
 
     def __init__(

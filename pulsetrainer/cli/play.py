@@ -53,6 +53,7 @@ def play(
     """
     job = Job(context, inputs=(drive,), outputs=(out,))
     from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
+    from pulsetrainer.report.planned import to_be_played
     from pulsetrainer.report.results import drive_title
     from pulsetrainer.report.results import played as said_of
     from pulsetrainer.steps.play import plan
@@ -62,12 +63,8 @@ def play(
     if dry_run:
         job.check_device()
         planned = plan(waveform, repeats=repeats, track_heat=track_heat, limits=job.limits)
-        rows = {
-            "repeats": f"{repeats} of each drive, {planned.seconds:.1f} s in all",
-            "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
-        }
         what = {"name": waveform.name, "inversion": waveform.inversion, "repeats": repeats}
-        job.would(f"play {title}", planned, rows, **what)
+        job.would(f"play {title}", planned, to_be_played(planned, repeats), **what)
         return
     stopped: PulsetrainerError | None = None
     top = max(waveform.compensated.max(), waveform.scaled.max())

@@ -9,7 +9,7 @@ import typer
 
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
-from pulsetrainer.report.forms import figure_form
+from pulsetrainer.report.figure_formats import figure_format
 
 
 def plot(
@@ -29,7 +29,7 @@ def plot(
     Example: pulsetrainer plot model.h5
     """
     out = out or file.with_suffix(".png")
-    form = figure_form(out, "a figure")
+    form = figure_format(out, "a figure")
     table = out.with_suffix(".csv") if data else None
     job = Job(context, inputs=(file,), outputs=(out, table))
     artefact = job.load_any(file)

@@ -36,6 +36,7 @@ def refine(
     """
     job = Job(context, inputs=(drive,), outputs=(out,))
     from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
+    from pulsetrainer.report.planned import to_be_refined
     from pulsetrainer.steps.refine import check, plan
 
     waveform = job.load(drive, pt.Waveform)
@@ -43,11 +44,7 @@ def refine(
     if dry_run:
         job.check_device()
         planned = plan(waveform, passes=passes, limits=job.limits)
-        rows = {
-            "passes": f"at most {passes}, {planned.seconds:.1f} s in all",
-            "samples": f"{planned.samples} a repeat, {planned.rate_Hz:g} a second",
-            "rehearsed": "the first pass, which plays the drive as it is; what it shows decides the others",
-        }
+        rows = to_be_refined(planned, passes)
         job.would(f"refine {waveform.name}", planned, rows, name=waveform.name, passes=passes)
         return
     stopped: PulsetrainerError | None = None

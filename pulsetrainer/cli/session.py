@@ -99,7 +99,7 @@ def session(
     from pulsetrainer.files.changes import read_answers, read_changes
     from pulsetrainer.files.pulses import read_pulse
     from pulsetrainer.recorded import session_into
-    from pulsetrainer.report.results import to_be_pressed
+    from pulsetrainer.report.planned import to_be_pressed
     from pulsetrainer.steps.programme import Change
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, programme

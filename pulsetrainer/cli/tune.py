@@ -86,6 +86,7 @@ def _would(
     from pulsetrainer.device.opening import DEFAULT_PORT
     from pulsetrainer.files.pulses import read_pulse
     from pulsetrainer.files.tuning import check_tuned, read_tuned
+    from pulsetrainer.report.planned import to_be_tuned
     from pulsetrainer.simulation.options import serial_of
     from pulsetrainer.steps.tune import plan
 
@@ -98,15 +99,7 @@ def _would(
         elif known and not overwrite:
             job.notes([f"{out} has gains for {known}: a device of that serial needs --overwrite"])
     planned = plan(drives or list(map(read_pulse, _FOLLOWED)), supply_V=supply_V, limits=job.limits)
-    rows = {
-        f"{number}. {step.what}": f"{step.seconds:.2f} s up to {step.peak_A:.3f} A"
-        + ("" if step.gains == "none" else f", gains {step.gains}")
-        for number, step in enumerate(planned.steps, 1)
-    }
-    rows["length"] = f"{planned.seconds:.1f} s at most"
-    rows["limits"] = f"{planned.current_limit_A:g} A; above {planned.force_limit_N:g} N the device stops"
-    rows["heat"] = f"{planned.heat_percent:.0f} % of the limit at most, from cold"
-    job.would("tune the device", planned, rows)
+    job.would("tune the device", planned, to_be_tuned(planned))
 
 
 def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> None:

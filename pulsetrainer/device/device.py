@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
+from pulsetrainer.device.exchange import Exchange
 from pulsetrainer.device.feed import Feed
 from pulsetrainer.device.follower import STOPPED, Follower
 from pulsetrainer.device.gains import DELIVERED, Gains
@@ -24,7 +25,6 @@ from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire
 from pulsetrainer.device.player import Player, tells_duty
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
 from pulsetrainer.device.schemes import OpenPort
-from pulsetrainer.device.session import Session
 from pulsetrainer.device.trace import Block, FloatArray, Trace
 from pulsetrainer.device.wording import (
     NOT_OFF_REMEDY,
@@ -61,7 +61,7 @@ class Device:
         self._now = now
         self._memory = memory or HeatMemory()
         self._seen = (0, 0)  # first and worst fault that whoever opened the device can know of
-        self._session = Session(port.transport, port.name, monotonic=monotonic, timeouts_s=port.timeouts_s)
+        self._exchange = Exchange(port.transport, port.name, monotonic=monotonic, timeouts_s=port.timeouts_s)
         self._monotonic = monotonic
         self._sleep = sleep
         self._player: Player | None = None
@@ -71,7 +71,7 @@ class Device:
 
     def _greet(self) -> None:
         with self._turn:
-            self._hello = self._session.hello()
+            self._hello = self._exchange.hello()
         status = self._rest()
         if flows_A(status):
             raise DeviceError(describe_not_off(status), hint=NOT_OFF_REMEDY)
@@ -87,7 +87,7 @@ class Device:
         status = self._status()
         while (status.state == codes.State.RAMPING or flows_A(status)) and self._monotonic() < deadline:
             with self._turn:
-                self._session.receive()
+                self._exchange.receive()
             status = self._status()
         return status
 
@@ -161,7 +161,7 @@ class Device:
             if self._player is not None:
                 self._player.stop(STOPPED)
             else:
-                self._session.request(m.Stop())
+                self._exchange.request(m.Stop())
 
     def _ask(self, command: m.Message) -> Any:
         """Ask while nothing is played: one thread talks to the device at a time."""
@@ -171,7 +171,7 @@ class Device:
                     f"the device is playing; {type(command).__name__} has to wait",
                     hint="wait for the play to end, or stop() it",
                 )
-            return self._session.request(command)
+            return self._exchange.request(command)
 
     def _status(self) -> m.StatusReply:
         status: m.StatusReply = self._ask(m.Status())
@@ -315,7 +315,7 @@ class Device:
 
     def _player_of(self, feed: Feed, ticks: int, decimation: int) -> Player:
         return Player(
-            self._session,
+            self._exchange,
             feed,
             ticks,
             decimation,

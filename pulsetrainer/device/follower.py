@@ -10,7 +10,7 @@ from pulsetrainer.device.player import Player
 from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 
-INTERRUPTED = "interrupted"
+INTERRUPTED = "interrupted"  # the fault of a play that the user stopped
 STOPPED = "stopped"
 _TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
 

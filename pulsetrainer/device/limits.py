@@ -96,12 +96,8 @@ class Rehearsal:
 
         None: no more than that a lower force would be implausible.
 
-        Raises
-        ------
-        ArgumentError
-            The device would not play it.
-        DeviceError
-            It would stop: the coil becomes too hot by then, or the force too high.
+        ArgumentError where the device would not play it; DeviceError where it would stop: the coil becomes
+        too hot by then, or the force too high.
         """
         wire = checked_wire(
             reference_A,
@@ -175,12 +171,8 @@ def too_hot_ever() -> ArgumentError:
 def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed: bool) -> None:
     """Refuse a reference (n,) in A that the heat of the coil would cut off, and say how long to wait.
 
-    Raises
-    ------
-    ArgumentError
-        Even a cold coil would be too hot.
-    DeviceError
-        The coil is; ``assumed``: as far as is known.
+    ArgumentError where even a cold coil would be too hot; DeviceError where this one is, as far as is known
+    where that is ``assumed``.
     """
     seconds = wait_s(heat, reference_A, rate_Hz)
     if math.isinf(seconds):

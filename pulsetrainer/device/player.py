@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
+from pulsetrainer.device.exchange import AbandonedError, Exchange, NoAnswerError, RefusedError
 from pulsetrainer.device.feed import Feed
-from pulsetrainer.device.session import AbandonedError, NoAnswerError, RefusedError, Session
 from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.device.wording import (
     NOT_OFF_REMEDY,
@@ -59,7 +59,7 @@ class Player:
 
     def __init__(
         self,
-        session: Session,
+        exchange: Exchange,
         feed: Feed,
         ticks_per_sample: int,
         decimation: int,
@@ -69,7 +69,7 @@ class Player:
         monotonic: Callable[[], float],
         piece_s: float = float("inf"),
     ) -> None:
-        self._session = session
+        self._exchange = exchange
         self.seen = seen  # first and worst fault that whoever plays has been told of
         self._feed = feed
         self._ticks_per_sample = ticks_per_sample
@@ -119,13 +119,13 @@ class Player:
 
     def run(self) -> None:
         """Play; leaves ``outcome`` or ``error``."""
-        self._session.on_telemetry = self._take
+        self._exchange.on_telemetry = self._take
         try:
             self.outcome = self._play()
         except BaseException as error:  # noqa: BLE001 - carried over to the caller's thread
             self.error = error
         finally:
-            self._session.on_telemetry = lambda _: None
+            self._exchange.on_telemetry = lambda _: None
             self.ended.set()
 
     def _take(self, block: m.Telemetry) -> None:
@@ -147,14 +147,14 @@ class Player:
         """Ask; once the play is to be stopped nothing but STOP is still waited for."""
         self._tick_at_send = self._tick
         urgent = isinstance(command, m.Stop)
-        reply: m.Ack = self._session.request(command, None if urgent else self._stop.is_set)
+        reply: m.Ack = self._exchange.request(command, None if urgent else self._stop.is_set)
         self._ack = reply
         if reply.session == self._play_session:
             self._tick = max(self._tick, reply.tick)
         return reply
 
     def _status(self) -> m.StatusReply:
-        status: m.StatusReply = self._session.request(m.Status())
+        status: m.StatusReply = self._exchange.request(m.Status())
         return status
 
     # --- the steps of a play ---------------------------------------------------------------------
@@ -163,7 +163,7 @@ class Player:
         self._request(m.Stop())  # whatever an earlier program left half done
         deadline = self._monotonic() + _RAMP_S
         while self._ack.state == codes.State.RAMPING and self._monotonic() < deadline:
-            self._session.receive()
+            self._exchange.receive()
             self._request(m.Stop())
         if self._ack.fault:
             self._clear(self._status())
@@ -184,6 +184,7 @@ class Player:
                 hint=remedy_of(status.fault) or "remove the cause; the next command clears the fault",
             )
         self._request(m.ClearFault(*self.seen))
+        self.seen = (0, 0)  # nor is it that of this play
 
     def _send_chunk(self, credit: int) -> bool:
         """Send the next samples if the device has room for a whole frame of them."""
@@ -215,7 +216,7 @@ class Player:
 
     def _beat_due(self) -> bool:
         beat_s = self._hello.heartbeat_ms / 1000 / _BEATS
-        if self._monotonic() - self._session.sent_at_s >= beat_s:
+        if self._monotonic() - self._exchange.sent_at_s >= beat_s:
             return True
         return self._tick - self._tick_at_send >= beat_s * self._hello.tick_rate_Hz
 
@@ -234,9 +235,9 @@ class Player:
             if self._send_chunk(self._credit()) or self._check_sent():
                 continue
             if self._beat_due():
-                self._request(self._session.next_beat())
+                self._request(self._exchange.next_beat())
             else:
-                self._session.receive()
+                self._exchange.receive()
 
     def _finish(self) -> m.StatusReply:
         """Stop, whatever the device is thought to be doing; then wait for the ramp and the last telemetry."""
@@ -245,11 +246,11 @@ class Player:
         status = self._status()
         driven = {codes.State.RUNNING, codes.State.RAMPING}
         while (status.state in driven or flows_A(status)) and self._monotonic() < deadline:
-            self._session.receive()
+            self._exchange.receive()
             status = self._status()
         deadline = self._monotonic() + _DRAIN_S
         while not self._last_block and self._monotonic() < deadline:
-            self._session.receive()
+            self._exchange.receive()
         self.seen = (status.fault, status.worst)
         self.heat = status.heat
         return status
@@ -278,7 +279,7 @@ class Player:
             return Outcome(-1, played_to_end=False, fault=error.message, remedy=error.hint)
         finally:  # disarm, whatever happened; a device that cannot be reached does it by itself
             with contextlib.suppress(PulsetrainerError):
-                self._session.request(m.Stop())
+                self._exchange.request(m.Stop())
 
     def _judge(self, status: m.StatusReply, refused: str) -> Outcome:
         if status.boot_nonce != self._hello.boot_nonce:

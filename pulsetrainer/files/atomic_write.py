@@ -64,12 +64,8 @@ def replacing(path: Path | str, *, overwrite: bool) -> Iterator[Path]:
     Whatever goes wrong, the temporary file is removed and a file that was at ``path`` is untouched. A process
     that is killed leaves its temporary file; the next one that writes the same output removes it.
 
-    Raises
-    ------
-    UsageError
-        See ``check_output``; also when another process wrote ``path`` meanwhile and ``overwrite`` is not set.
-    DataError
-        The disk is full or failed.
+    UsageError as ``check_output``, and where another process wrote ``path`` meanwhile and ``overwrite`` is
+    not set; DataError where the disk is full or failed.
     """
     check_output(path, overwrite)
     target = Path(path).resolve()  # through a symbolic link, not over it
@@ -111,12 +107,8 @@ def _leftovers(target: Path) -> list[Path]:
 def _publish(temporary: Path, target: Path, *, overwrite: bool) -> None:
     """Give a finished file its final name, at once and for good.
 
-    Raises
-    ------
-    UsageError
-        Another process wrote ``target`` meanwhile and ``overwrite`` is not set.
-    OSError
-        The disk failed.
+    UsageError where another process wrote ``target`` meanwhile and ``overwrite`` is not set; OSError where
+    the disk failed.
     """
     _sync(temporary)
     if overwrite:

@@ -118,12 +118,7 @@ def column_words(name: str) -> str:
 def detect(path: Path) -> Dialect:
     """Return how a file is to be read.
 
-    Raises
-    ------
-    DataError
-        It is no text, or no table.
-    OSError
-        It cannot be read.
+    DataError where it is no text, or no table; OSError where it cannot be read.
     """
     encoding = _encoding(path)
     comments: list[tuple[int, str]] = []

@@ -37,12 +37,8 @@ def parse(path: Path, dialect: Dialect, keep: Sequence[int] | None = None, piece
     text in a kept column of numbers, is a misfit: what it lacks is NaN. A ``piece`` has so many characters,
     and the rest of its last line.
 
-    Raises
-    ------
-    DataError
-        The decimal sign changes, or thousands are separated: line and column are named.
-    OSError
-        The file cannot be read.
+    DataError where the decimal sign changes, or thousands are separated: line and column are named; OSError
+    where the file cannot be read.
     """
     places = list(range(len(dialect.names)) if keep is None else keep)
     reader = _Reader(path, dialect, frozenset(places))

@@ -101,12 +101,7 @@ class Journal:
 def blocks(path: Path) -> Iterator[Block]:
     """Yield the whole blocks of a journal.
 
-    Raises
-    ------
-    DamagedFileError
-        A block is not as it was written.
-    OSError
-        The file cannot be read.
+    DamagedFileError where a block is not as it was written; OSError where the file cannot be read.
     """
     with path.open("rb") as stream:
         start = stream.read(len(JOURNAL))
@@ -149,12 +144,8 @@ class Recording:
     def read(cls, path: Path) -> Self:
         """Read a whole journal.
 
-        Raises
-        ------
-        DamagedFileError
-            A block is not as it was written, or the journal has no HEAD.
-        OSError
-            The file cannot be read.
+        DamagedFileError where a block is not as it was written, or the journal has no HEAD; OSError where the
+        file cannot be read.
         """
         found = list(blocks(path))
         heads = [block for block in found if block.tag == b"HEAD"]

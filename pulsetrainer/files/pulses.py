@@ -23,12 +23,8 @@ def library() -> dict[str, Path]:
 def pulse_file(name: str) -> Path:
     """Return the file of a pulse: of the library, or the one that is named.
 
-    Raises
-    ------
-    UsageError
-        It is neither in the library nor a file.
-    DataError
-        It is a CSV file that cannot be read.
+    UsageError where it is neither in the library nor a file; DataError where it is a CSV file that cannot be
+    read.
     """
     known = library()
     path = known.get(name, Path(name))

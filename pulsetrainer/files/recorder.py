@@ -40,12 +40,7 @@ class RunRecorder:
     what was recorded as ``complete=False``; if nothing was recorded, nothing is left behind. ``earlier`` is a
     recording that was cut off, with its file: a journal goes on, an artefact is copied.
 
-    Raises
-    ------
-    UsageError
-        See ``atomic_write.check_output``.
-    DataError
-        The disk is full or failed.
+    UsageError as ``atomic_write.check_output``; DataError where the disk is full or failed.
     """
 
     _kind: ClassVar[type] = Run
@@ -105,12 +100,8 @@ class RunRecorder:
     def append(self, *batch: ArrayLike) -> None:
         """Append a batch: time, reference, input and output (n,). It now survives the death of the program.
 
-        Raises
-        ------
-        ArgumentError
-            The arrays differ in length, or the time does not increase, also from the batch before.
-        DataError
-            The disk is full or failed; what was appended before is kept.
+        ArgumentError where the arrays differ in length, or the time does not increase, also from the batch
+        before; DataError where the disk is full or failed; what was appended before is kept.
         """
         columns = [np.atleast_1d(np.asarray(a, dtype="<f8")) for a in batch]
         count = self._check_batch(columns)
@@ -186,12 +177,8 @@ class RunRecorder:
     def finish(self, *, complete: bool = True, dropped_samples: int | None = None) -> Path:
         """Give the run its final name and return it; ``complete``: all that was asked for was recorded.
 
-        Raises
-        ------
-        DataError
-            Nothing was recorded, or the disk failed: the recording is kept in ``partial``.
-        UsageError
-            Another process wrote the final name meanwhile; the recording is kept in ``partial``.
+        DataError where nothing was recorded, or the disk failed: the recording is kept in ``partial``;
+        UsageError where another process wrote the final name meanwhile; the recording is kept in ``partial``.
         """
         if dropped_samples is not None:
             self.dropped_samples = dropped_samples

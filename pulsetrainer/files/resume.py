@@ -49,12 +49,8 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
     That is the longest of the files that killed programs left beside it, or ``path`` itself if it is not
     complete.
 
-    Raises
-    ------
-    UsageError
-        There is nothing to resume, it is being written, or it was recorded with other options.
-    DataError
-        What is there cannot be read.
+    UsageError where there is nothing to resume, it is being written, or it was recorded with other options;
+    DataError where what is there cannot be read.
     """
     atomic_write.check_output(path, overwrite=True)
     check_resumable(path)

@@ -18,12 +18,8 @@ if TYPE_CHECKING:
 def signal_file(signal: str, known: Sequence[str]) -> Path | None:
     """Return the file that a signal is read from; None where it is one of the ``known`` excitations.
 
-    Raises
-    ------
-    UsageError
-        The signal is neither an excitation nor a file.
-    DataError
-        It is a CSV file that cannot be read.
+    UsageError where the signal is neither an excitation nor a file; DataError where it is a CSV file that
+    cannot be read.
     """
     if signal in known:
         return None

@@ -38,12 +38,8 @@ K = TypeVar("K")
 def write(path: Path | str, artefact: Any, header: Header, *, overwrite: bool = False) -> None:
     """Write an artefact under its final name, or leave everything as it was.
 
-    Raises
-    ------
-    UsageError
-        See ``check_output``.
-    DataError
-        The artefact does not fit its own annotations, or the disk is full or failed.
+    UsageError as ``check_output``; DataError where the artefact does not fit its own annotations, or the disk
+    is full or failed.
     """
     write_fields(path, type(artefact), values_of(artefact), header, overwrite=overwrite)
 

@@ -246,14 +246,8 @@ def write_table(
 ) -> None:
     """Write columns as CSV: a header of their names, numbers that read back to the last bit.
 
-    Raises
-    ------
-    UsageError
-        The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
-    DataError
-        The disk is full or failed.
-    ArgumentError
-        The columns differ in length.
+    UsageError where the file exists and ``overwrite`` is not set, or its folder is missing or not writable;
+    DataError where the disk is full or failed; ArgumentError where the columns differ in length.
     """
     arrays = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in columns.values()]
     if len({array.shape for array in arrays}) != 1 or arrays[0].ndim != 1:

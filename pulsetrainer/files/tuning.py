@@ -54,12 +54,8 @@ def check_tuned(path: Path, serial: str, *, overwrite: bool) -> None:
 def write_tuned(path: Path, serial: str, found: Found, *, overwrite: bool) -> None:
     """Write a device's entry into a file of settings, which is made where there is none.
 
-    Raises
-    ------
-    UsageError
-        As ``check_tuned``; or the entry stands there in a form that cannot be replaced.
-    DataError
-        The disk is full or failed.
+    UsageError as ``check_tuned``, or where the entry stands there in a form that cannot be replaced;
+    DataError where the disk is full or failed.
     """
     check_tuned(path, serial, overwrite=overwrite)
     before = path.read_text(encoding="utf-8") if path.exists() else ""

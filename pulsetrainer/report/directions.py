@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.report.fewer_points import path
 from pulsetrainer.report.style import VERMILION
-from pulsetrainer.report.thin import path
 
 _WIGGLE = 0.05  # of the range of an input: smaller strokes are not looked at for an arrow
 _ENDS = (0.44, 0.56)  # of a stroke: where an arrow begins and ends

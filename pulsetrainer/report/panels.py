@@ -27,6 +27,7 @@ from pulsetrainer.artefacts import (
 )
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.core.metrics import beats
+from pulsetrainer.report.fewer_points import extremes, path
 from pulsetrainer.report.names import digits
 from pulsetrainer.report.style import (
     COMPENSATED,
@@ -43,7 +44,6 @@ from pulsetrainer.report.style import (
     VERMILION,
     label,
 )
-from pulsetrainer.report.thin import extremes, path
 
 # A density is mostly small, with a ridge: the square root shows both. Lone spikes far beyond the
 # rest (the least squares make some) do not set the scale.

@@ -63,6 +63,20 @@ def identified(out: Path, model: Model, seconds: float) -> Said:
     return payload, f"{out}: Preisach model of {model.levels} levels, {model.weights.size} cells", rows
 
 
+def captured(out: Path, signal: str, got: Any, info: Any) -> Said:
+    """Say what a device recorded."""
+    payload = {"output": out, "signal": signal, **got._asdict(), **picked(info, "serial", "firmware")}
+    rows = {
+        "samples": f"{got.samples} in {got.seconds:.1f} s, {got.rate_Hz:g} a second",
+        "current": "{:.3f} .. {:.3f} A".format(*got.current_range_A),
+        "force": "{:.3f} .. {:.3f} N".format(*got.force_range_N),
+        "reversals": got.reversals,
+        **({"parts": got.parts} if got.parts > 1 else {}),
+        "cells switched": f"{got.coverage_percent:.1f} %",
+    }
+    return payload, f"{out}: {signal} on {info.serial}, firmware {info.firmware}", rows
+
+
 def drive_title(drive: Waveform) -> str:
     """Name a drive by its pulse and its inversion."""
     return f"{drive.name} by {drive.inversion} inversion"
@@ -116,21 +130,6 @@ def played(out: Path, made: Playback, serial: str, firmware: str) -> Said:
         **({"coil": warmth_words(kelvin)} if kelvin is not None and kelvin.size else {}),
     }
     return payload, f"{out}: {drive_title(drive)} on {serial}", rows
-
-
-def to_be_pressed(plan: Any, limit_N: float | None) -> dict[str, str]:
-    """Say what a session would press; the device stops above ``limit_N``."""
-    pauses = sum(pause.seconds for pause in plan.pauses)
-    limit = f"the device stays on for {plan.longest_part_s / 60:.0f} minutes in one go"
-    above = "" if limit_N is None else f"; above {limit_N:g} N the device stops"
-    return {
-        "beats": ", ".join(f"{count} of {name}" for name, count in plan.pulses.items()),
-        "length": f"{plan.seconds / 60:.1f} minutes, {plan.seconds:.0f} s",
-        "parts": f"{plan.parts}: {limit}",
-        "heat": f"{plan.heat_percent:.0f} % of the limit at most, from cold; "
-        + (f"{len(plan.pauses)} pauses to cool, {pauses:.0f} s in all" if pauses else "no pause to cool"),
-        "force": f"{plan.peak_force_N:.2f} N at most, by the model{above}",
-    }
 
 
 def pressed(

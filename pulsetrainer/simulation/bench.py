@@ -150,12 +150,8 @@ class Bench:
 def open_bench(port: str, monotonic: Callable[[], float], executable: Path | None = None) -> OpenPort:
     """Start a bench and open its line.
 
-    Raises
-    ------
-    UsageError
-        if the port's text makes no sense.
-    DeviceError
-        if the firmware cannot be compiled or started.
+    UsageError where the port's text makes no sense; DeviceError where the firmware cannot be compiled or
+    started.
     """
     bench = Bench(port, executable)
     try:

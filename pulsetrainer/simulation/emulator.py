@@ -188,12 +188,8 @@ class Emulator:
 def open_emulator(port: str, monotonic: Callable[[], float]) -> OpenPort:
     """Start an emulator; its line is slow, which the port says.
 
-    Raises
-    ------
-    UsageError
-        if the port's text makes no sense.
-    DeviceError
-        if there is no emulator, or no compiler for its image.
+    UsageError where the port's text makes no sense; DeviceError where there is no emulator, or no compiler
+    for its image.
     """
     emulator = Emulator(port)
     wire = emulator.options.wire

@@ -1,1 +1,1 @@
-"""One module per subcommand: options in, result out; no printing."""
+"""The verbs, one module each, and what they share: functions from nouns to nouns; no file, no printing."""

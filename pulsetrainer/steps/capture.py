@@ -16,11 +16,11 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.device.codes import TICK_RATE_HZ
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal
-from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.errors import DeviceError, Interrupted, UsageError
 from pulsetrainer.steps.asked import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import (
-    Memory,
+    InMemory,
     Tally,
     check_top,
     conditioning_loop,
@@ -82,11 +82,15 @@ def capture(
     played = excitation(
         signal, levels=levels, current_max_A=current_max_A, speed_A_per_s=speed_A_per_s, rate_Hz=rate_Hz
     )
-    memory, tally = Memory(), tally_of(played, levels)
-    ending = record(
-        Course(played, repeats), device, memory, tally, condition_first=condition, progress=progress
-    )
-    run = memory.run(played.name, complete=ending.complete, coil=ending.coil)
+    kept, tally = InMemory(), tally_of(played, levels)
+    try:
+        ending = record(
+            Course(played, repeats), device, kept, tally, condition_first=condition, progress=progress
+        )
+    except (DeviceError, Interrupted) as error:  # between two parts
+        error.kept = kept.run(played.name, complete=False)
+        raise
+    run = kept.run(played.name, complete=ending.complete, coil=ending.coil)
     raise_if_stopped(ending.fault, ending.remedy, "the capture", run)
     if run is None:
         raise DeviceError("the device told no samples", hint="check the line to it")
@@ -98,12 +102,8 @@ def excitation(
 ) -> Signal:
     """Return the signal that is played.
 
-    Raises
-    ------
-    UsageError
-        There is no excitation of that name.
-    ArgumentError
-        No device samples at that rate, or a parameter is out of its range.
+    UsageError where there is no excitation of that name; ArgumentError where no device samples at that rate,
+    or a parameter is out of its range.
     """
     decimation_for(TICK_RATE_HZ, rate_Hz)
     if isinstance(signal, Signal):
@@ -152,11 +152,8 @@ def plan(
 ) -> Plan:
     """Return what a capture would play from sample ``at`` on, on a device as it is delivered and cold.
 
-    Raises
-    ------
-    ArgumentError, DeviceError
-        It would be longer than anything that can be recorded, or the device would refuse it; how large the
-        force will be, nobody knows before it is measured.
+    ArgumentError or DeviceError where it is longer than anything that can be recorded, or the device would
+    refuse it. How large the force will be nobody knows before it is measured.
     """
     course = Course(signal, repeats)
     rehearsal = Rehearsal(limits or Limits())

@@ -18,7 +18,8 @@ from pulsetrainer.device.limits import check_peak
 from pulsetrainer.diagnosis.causes.base import low_pass
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError
-from pulsetrainer.steps.heat import check_same_device, rest_force, thermal_of, thermometer
+from pulsetrainer.steps.heat import rest_force, thermal_of, thermometer
+from pulsetrainer.steps.own_device import check_same_device, check_units
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import condition
 from pulsetrainer.steps.stopped import raise_if_lost, raise_if_stopped
@@ -118,12 +119,7 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     >>> checked.error_percent.after <= checked.error_percent.before
     True
     """
-    if (model.input_unit, model.output_unit) != ("A", "N"):
-        raise DataError(
-            f"the model is of a device from {model.input_unit} to {model.output_unit}; a check drives a "
-            "current in A and measures a force in N",
-            hint="identify a run that was captured on the device",
-        )
+    check_units(model, "a check drives a current in A and measures")
     check_same_device(model, device)
     operator = operator_of(model)  # the edges of a dual model are forces
     low, high = operator.low, operator.high

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -12,11 +13,12 @@ from pulsetrainer.artefacts.run import Coil
 from pulsetrainer.core import inversion
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.temperature import CoilRecord, Thermal, Thermometer
+from pulsetrainer.core.temperature import WINDOW_S, CoilRecord, Thermal, Thermometer
 from pulsetrainer.diagnosis.prediction import extended_of, operator_of
 from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
 from pulsetrainer.steps.invertible import invertible
+from pulsetrainer.steps.own_device import check_same_device
 from pulsetrainer.steps.recording import conditioning_loop
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -43,12 +45,8 @@ def thermometer_of(model: Model | None, device: Device, *, asked: bool | None) -
     ``asked`` None: it is where the model has a thermal term, was captured with the duty, and the device tells
     it.
 
-    Raises
-    ------
-    DataError
-        It is asked for and the model does not know the coil.
-    DeviceError
-        It is asked for and the device does not tell the duty.
+    DataError where it is asked for and the model does not know the coil; DeviceError where it is asked for
+    and the device does not tell the duty.
     """
     coil = coil_of(model, asked=asked)
     if coil is None or model is None:
@@ -84,31 +82,24 @@ def thermometer(coil: Coil, thermal: Thermal | None) -> Thermometer:
     return Thermometer(CoilRecord(**known), thermal)
 
 
-def check_same_device(model: Model, device: Device) -> None:
-    """Raise DataError for a model that was captured on another device, where it knows its serial number."""
-    serial = model.coil.serial if model.coil is not None else ""
-    if serial and serial != device.info.serial:
-        raise DataError(
-            f"the model is of the device {serial}, this is {device.info.serial}",
-            hint="give the model of this device, or connect that one",
-        )
-
-
 def take_temperature(device: Device, thermometer: Thermometer, high_A: float) -> None:
-    """Take the temperature before a play: once around the major loop, which comes first in every play anyway.
+    """Take the temperature before a play: around the major loop, which comes first in every play anyway.
 
-    Raises
-    ------
-    DeviceError, Interrupted
-        The loop could not be completed, or no room explains what it tells.
+    DeviceError, Interrupted where the loop could not be completed, it tells nothing, or no room explains what
+    it tells.
     """
-    for _ in range(2):  # a loop lasts about as long as a window
-        trace = device.play(conditioning_loop(high_A, _RATE_HZ), _RATE_HZ)
-        raise_if_stopped(trace.fault, trace.remedy, "taking the temperature")
-        thermometer.add(trace.time_s, trace.reference_A, trace.current_A, trace.duty)
-        if thermometer.known:
-            _check_plausible(thermometer.temperature_K)
-            return
+    loop = conditioning_loop(high_A, _RATE_HZ)
+    loops = 1 + math.floor(WINDOW_S * _RATE_HZ / loop.size)  # a window lies in one play, however low it is
+    trace = device.play(np.tile(loop, loops), _RATE_HZ)
+    raise_if_stopped(trace.fault, trace.remedy, "taking the temperature")
+    thermometer.add(trace.time_s, trace.reference_A, trace.current_A, trace.duty)
+    if not thermometer.known:
+        raise DeviceError(
+            f"the duty does not tell the coil's temperature: {trace.samples} samples came back, "
+            f"{trace.dropped_samples} were lost",
+            hint="check the cable to the device, then run the command again; `no_track_heat` leaves heat out",
+        )
+    _check_plausible(thermometer.temperature_K)
 
 
 def _check_plausible(kelvin: float) -> None:

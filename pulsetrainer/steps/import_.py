@@ -70,12 +70,8 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
     resample
         Rate in Hz, ``"even"`` for that of the median step, None to leave the time stamps as they are.
 
-    Raises
-    ------
-    UsageError
-        The run has no time to resample, or the rate would make too many samples.
-    DataError
-        The parts differ in units, or only some have a time or a reference.
+    UsageError where the run has no time to resample, or the rate would make too many samples; DataError where
+    the parts differ in units, or only some have a time or a reference.
     """
     run, notes = joined(parts)
     report = report_of(run, resampled=resample is not None)

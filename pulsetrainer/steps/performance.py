@@ -16,14 +16,16 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.core.temperature import Thermometer
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.device.plausibility import judge_against
 from pulsetrainer.device.trace import Block
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import extended_of
+from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Play, Reach
 from pulsetrainer.steps.recording import PAUSE_S
-from pulsetrainer.steps.stopped import INTERRUPTED, in_part
+from pulsetrainer.steps.stopped import in_part
 
 # what is wrong where a part ends without a beat, and what to do
 TOO_SHORT = ("the device stays on too short for one beat", "raise its on-time limit, or press shorter beats")
@@ -121,6 +123,7 @@ class Performance:
         self._begins_s: list[float] = []  # of the parts, without the pauses between them
         self._next = 0  # sample that comes, where none is lost
         self._parts = self._dropped = self._underruns = 0
+        self._taken = 0  # samples of the part that are kept
         self._fault = self._remedy = self._implausible = ""
         self._last: Given | None = None
 
@@ -130,7 +133,7 @@ class Performance:
         decimation = round(device.info.tick_rate_Hz / RATE_HZ)
         self._sink.judge(self._so_far().fields)
         while not conductor.ended and not self._fault:
-            dropped = self._dropped
+            dropped, self._taken = self._dropped, 0
             self._begun = self._next = round(conductor.time_s * RATE_HZ)
             self._begins_s.append(conductor.time_s)
             if self._thermometer is not None:
@@ -147,8 +150,14 @@ class Performance:
             except KeyboardInterrupt:  # while the beginning of a part is made
                 self._fault = INTERRUPTED
                 break
+            except DeviceError as error:  # between two parts: what was pressed is kept
+                if not self._parts:
+                    raise
+                self._fault, self._remedy = error.message, error.hint
+                break
             self._parts += 1
-            self._dropped = dropped + trace.dropped_samples
+            # a Ctrl-C in the middle of writing costs what was being written
+            self._dropped = dropped + trace.dropped_samples + trace.samples - self._taken
             begun_s = self._begins_s[-1] + PAUSE_S * (self._parts - 1)
             self._fault = in_part(trace.fault, begun_s)
             self._remedy, self._underruns = trace.remedy, int(trace.underrun)
@@ -198,6 +207,7 @@ class Performance:
         self._sink.append(
             sample / RATE_HZ + paused_s, target, block.reference_A, block.current_A, block.force_N
         )
+        self._taken += sample.size
         for piece, force in zip(done, measured, strict=True):
             if piece.beat is not None:
                 self._last = piece

@@ -15,15 +15,16 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.temperature import Thermometer
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
-from pulsetrainer.errors import ArgumentError, DataError
+from pulsetrainer.errors import ArgumentError, DataError, DeviceError
 from pulsetrainer.steps.heat import Correction, coil_of, take_temperature, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
-from pulsetrainer.steps.stopped import INTERRUPTED, raise_if_stopped
+from pulsetrainer.steps.stopped import raise_if_stopped
 
 _LOG = logging.getLogger(__name__)
 DRIVES = ("compensated", "scaled")
@@ -138,6 +139,11 @@ def play(
             progress((number + 1) / (repeats * len(DRIVES)))
         except KeyboardInterrupt:  # between two plays: what was played is kept all the same
             fault = INTERRUPTED
+            break
+        except DeviceError as error:  # the coil is too hot for the next one, the port is gone
+            if not kept["scaled"]:
+                raise
+            fault, remedy = error.message, error.hint
             break
     whole = min(len(rows) for rows in kept.values())
     known = operator_of(drive.model) if drive.model else None

@@ -69,7 +69,7 @@ class Sink(Protocol):
         ...
 
 
-class Memory:
+class InMemory:
     """A sink that keeps the recording in memory."""
 
     def __init__(self) -> None:
@@ -187,14 +187,8 @@ def record(
 
     ``watch`` is shown the current and the force as they come.
 
-    Raises
-    ------
-    ArgumentError
-        The device cannot play the course.
-    DataError
-        The disk is full or failed.
-    DeviceError, Interrupted
-        The device could not be conditioned; what was recorded before is kept.
+    ArgumentError where the device cannot play the course; DataError where the disk is full or failed;
+    DeviceError, Interrupted where the device could not be conditioned; what was recorded before is kept.
     """
     info, rate_Hz = device.info, course.signal.rate_Hz
     check_top(course.signal, info.current_limit_A)

@@ -22,6 +22,7 @@ from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Paus
 from pulsetrainer.steps.heat import coil_of, rest_force, take_temperature, thermometer_of
 from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.one_thread import one_thread
+from pulsetrainer.steps.own_device import check_units
 from pulsetrainer.steps.performance import TOO_SHORT, Now, Performance, Performed, Sink
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.progress import Progress, silent
@@ -35,7 +36,7 @@ _SETTLED = 4.0  # of the slowest time constant of a model
 _LONGEST_SETTLING_S = 300.0
 
 
-class Memory:
+class InMemory:
     """A sink that keeps everything."""
 
     def __init__(self) -> None:
@@ -51,12 +52,7 @@ class Memory:
 
 def check_model(model: Model) -> None:
     """Raise DataError for a model of another device or another form, or whose weights are read as relays."""
-    if (model.input_unit, model.output_unit) != ("A", "N"):
-        raise DataError(
-            f"the model is of a device from {model.input_unit} to {model.output_unit}; a session drives a "
-            "current in A and presses a force in N",
-            hint="identify a run that was captured on the device",
-        )
+    check_units(model, "a session drives a current in A and presses")
     if model.form != "direct":
         raise DataError(
             f"the model has the form {model.form}; a session carries the memory of direct models only",
@@ -281,7 +277,7 @@ def session(
         answers=answers,
         seed=seed,
     )
-    sink, rhythm = Memory(), Rhythm(variability / 100.0, respiration / 100.0, ectopic / 100.0, seed)
+    sink, rhythm = InMemory(), Rhythm(variability / 100.0, respiration / 100.0, ectopic / 100.0, seed)
 
     def watch(now: Now) -> None:
         if isinstance(chosen, Programme):
@@ -338,7 +334,7 @@ def programme(
     return Blind(names, asked, answer, Play(0, amplitude / 100.0, rate)), (rate,)
 
 
-def _session(sink: Memory, done: Performed, asked: Quiz | None) -> Session | None:
+def _session(sink: InMemory, done: Performed, asked: Quiz | None) -> Session | None:
     if not sink.blocks:
         return None
     time_s, target, reference, current, force = np.concatenate(sink.blocks, axis=1)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.errors import DeviceError, Interrupted
-
-INTERRUPTED = "interrupted"  # the fault of a recording that the user stopped
 
 
 def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.device.gains import Gains
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
-from pulsetrainer.errors import ArgumentError, DeviceError
+from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 from pulsetrainer.steps.loop_gains import MOST_PROPORTIONAL, OPEN_LOOP, from_wire, to_wire
 from pulsetrainer.steps.measure_coil import MEAN_S, RATE_HZ, Measurement, Step, check_range, planned, rest_of
 from pulsetrainer.steps.play import check_current
@@ -102,7 +103,8 @@ def tune(
     try:
         return _Tuning(device, pulses, supply_V, progress).run(before)
     except BaseException:
-        device.stop()
+        with contextlib.suppress(PulsetrainerError):  # it stops by itself; what went wrong first is told
+            device.stop()
         device.set_gains(before)
         raise
 

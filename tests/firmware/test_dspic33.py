@@ -89,6 +89,19 @@ def test_core_and_port_mean_the_same_where_int_has_16_bits(tmp_path):
         subprocess.run([*words, "-o", str(tmp_path / "unit.o")], check=True)
 
 
+@pytest.mark.parametrize("compiler", ["avr-gcc -mmcu=atmega2560", "clang --target=msp430"])
+def test_the_memory_of_the_port_is_printed_as_an_estimate(compiler, tmp_path):
+    """Two compilers with 16-bit integers and pointers: both within half of the flash, and within the RAM."""
+    if not shutil.which(compiler.split()[0]):
+        pytest.skip(f"needs {compiler.split()[0]}")
+    words = ["make", "-s", "-C", str(FIRMWARE), "dspic33-size", f"BUILD={tmp_path}", f"SIZE_CC={compiler}"]
+    printed = subprocess.check_output(words, text=True)
+    assert "an estimate" in printed
+    flash, ram = (int(found) for found in re.findall(r"(\d+) +of", printed))
+    assert 8 * 1024 < flash < FLASH_BYTES // 2
+    assert 4 * 1024 < ram < RAM_BYTES
+
+
 @functools.cache
 def _objects(folder: Path) -> tuple[Path, ...]:
     """Core and port compiled for a 32-bit machine, with their call graphs: never smaller than a dsPIC's."""

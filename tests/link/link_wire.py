@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
+from pulsetrainer.device.exchange import Exchange
 from pulsetrainer.device.schemes import TIMEOUTS_S
-from pulsetrainer.device.session import Session
 from pulsetrainer.device.transport import SerialTransport, Transport
 from pulsetrainer.simulation.bench import Bench
 from pulsetrainer.simulation.emulator import QEMU_TIMEOUTS_S, Emulator
@@ -36,7 +36,7 @@ class Wire:
         else:
             self.bench = Bench(port, executable)
             self.transport = SerialTransport(self.bench.path)
-        self.session = Session(
+        self.session = Exchange(
             self.transport, port.partition("?")[0], monotonic=time.monotonic, timeouts_s=timeouts_s
         )
         self.telemetry: list[m.Telemetry] = []

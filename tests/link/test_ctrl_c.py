@@ -19,9 +19,9 @@ from pulsetrainer.cli import guard
 from pulsetrainer.cli.app import app
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import STATUS_OUTPUT_NOT_OFF, Fault, State
+from pulsetrainer.device.exchange import Exchange
 from pulsetrainer.device.frames import FrameReader
 from pulsetrainer.device.heat import HeatMemory
-from pulsetrainer.device.session import Session
 from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import Interrupted
 from pulsetrainer.simulation.bench import Bench
@@ -73,7 +73,7 @@ class Overheard:
         self._thread.join(10)
         assert not self._thread.is_alive()
         time.sleep(0.5)
-        status = Session(self.transport, "bench:", monotonic=time.monotonic).request(m.Status())
+        status = Exchange(self.transport, "bench:", monotonic=time.monotonic).request(m.Status())
         assert isinstance(status, m.StatusReply)
         return status
 

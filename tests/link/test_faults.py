@@ -12,9 +12,9 @@ import pytest
 
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import Fault, NakCode, State
+from pulsetrainer.device.exchange import RefusedError
 from pulsetrainer.device.frames import Frame, encode
 from pulsetrainer.device.opening import open_device
-from pulsetrainer.device.session import RefusedError
 from pulsetrainer.errors import ArgumentError
 from wording import raises
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scripted import ScriptedDevice
 
-from pulsetrainer.device import codes, session
+from pulsetrainer.device import codes, exchange
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import PARAMETERS, Fault, State
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.exchange import RefusedError
 from pulsetrainer.device.frames import Frame, encode
 from pulsetrainer.device.limits import Limits
 from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.schemes import OpenPort
-from pulsetrainer.device.session import RefusedError
 from pulsetrainer.device.wording import describe_not_off, flows_A
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.simulation.build import firmware_executable
@@ -78,6 +78,28 @@ def test_a_fault_that_nobody_was_told_of_is_told_before_it_is_cleared():
         cleared = [command for _, command in script.heard if isinstance(command, m.ClearFault)]
         assert [(one.fault, one.worst) for one in cleared] == [(Fault.STRAY_CURRENT, Fault.STRAY_CURRENT)]
         assert usual_ack is not answer
+
+
+def test_a_fault_that_was_cleared_is_not_that_of_the_next_play():
+    """The play before ended in an underrun; this one because the device has gone."""
+    script = ScriptedDevice()
+    told = {"fault": Fault.UNDERRUN, "worst": Fault.UNDERRUN}
+    script.status = told
+
+    def answer(command, usual):
+        if isinstance(usual, m.Ack) and script.status:
+            usual = m.Ack(usual.credit, State.FAULT, Fault.UNDERRUN, usual.session, usual.tick, 0)
+        if isinstance(command, m.ClearFault):
+            script.status = {}
+        return None if isinstance(command, m.Start) else usual
+
+    with script.open() as device:
+        script.answer = answer
+        trace = device.play(np.full(100, 0.1), 1000)
+        assert script.when(m.ClearFault)
+        script.answer = lambda _, usual: usual
+    assert "did not answer Start" in trace.fault
+    assert (trace.underrun, trace.fault_code) == (False, 0)
 
 
 def test_a_fault_of_the_last_play_is_cleared_by_the_next(device):
@@ -189,7 +211,7 @@ def test_a_stuck_wire_does_not_keep_a_play_alive(wire, repeated):
 )
 def test_an_old_and_a_new_host_on_this_firmware(wire, monkeypatch, host, older):
     """Both versions and what to do are said; and whoever arms nevertheless is refused by the firmware."""
-    monkeypatch.setattr(session, "PROTOCOL_MAJOR", host)
+    monkeypatch.setattr(exchange, "PROTOCOL_MAJOR", host)
     one = wire("bench:")
     theirs = f"protocol {codes.PROTOCOL_MAJOR}."
     with raises(DeviceError, f"older {older}", ours=f"this program {host}.", theirs=theirs):
@@ -226,7 +248,7 @@ def test_a_greeting_of_another_layout_is_told_by_its_version(length):
         before = len(script.heard)
         write(data)
         if len(script.heard) > before and isinstance(script.heard[-1][1], m.Hello):
-            frame = next(iter(session.FrameReader().feed(data)))
+            frame = next(iter(exchange.FrameReader().feed(data)))
             script._out = encode(Frame(m.HelloReply.TYPE, frame.seq, payload))
 
     script.write = answer

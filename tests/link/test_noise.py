@@ -10,8 +10,8 @@ from link_wire import within
 
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import PARAMETERS, Fault, State
+from pulsetrainer.device.exchange import Exchange, NoAnswerError, RefusedError
 from pulsetrainer.device.opening import open_device
-from pulsetrainer.device.session import NoAnswerError, RefusedError, Session
 from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.simulation.bad_wire import KINDS, NoisyLine, NoisyTransport
 from pulsetrainer.simulation.bench import Bench
@@ -86,7 +86,7 @@ def test_a_minute_of_telemetry_through_a_bad_wire(clean, seed, capsys):
     with within(60), open_device(f"bench:?seed=3&wire={RATE}&wire-seed={seed}") as device:
         recording = device.play(_reference(), 1000)
         wire = device._port.transport
-        assert device._session.damaged > 0
+        assert device._exchange.damaged > 0
     assert isinstance(wire, NoisyTransport)
     with capsys.disabled():
         print(
@@ -120,7 +120,7 @@ def test_thousands_of_commands_on_a_worse_wire():
     """One bad byte in 300: each answer is the answer to its command, each value the last one accepted."""
     bench = Bench("bench:?ideal")
     transport = NoisyTransport(SerialTransport(bench.path), 1 / 300, 9, monotonic=time.monotonic)
-    session = Session(transport, "bench:", monotonic=time.monotonic)
+    session = Exchange(transport, "bench:", monotonic=time.monotonic)
     rng = np.random.default_rng(1)
     held = {p.id: {p.default} for p in PARAMETERS}  # what the device may hold
     given_up = 0
@@ -166,7 +166,7 @@ def test_nothing_is_accepted_that_was_not_sent():
     """Noise alone, hundreds of kilobytes of it: not one command is executed."""
     bench = Bench("bench:?ideal")
     transport = SerialTransport(bench.path)
-    session = Session(transport, "bench:", monotonic=time.monotonic)
+    session = Exchange(transport, "bench:", monotonic=time.monotonic)
     try:
         session.hello()
         before = session.request(m.Status())

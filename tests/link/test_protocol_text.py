@@ -9,7 +9,7 @@ import pytest
 from protocol_header import upper
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.session import TIMEOUTS_S
+from pulsetrainer.device.exchange import TIMEOUTS_S
 from pulsetrainer.device.transport import BAUD
 from pulsetrainer.resources import firmware_dir
 

@@ -22,8 +22,8 @@ from pulsetrainer.device.codes import (
     ResetCause,
     State,
 )
+from pulsetrainer.device.exchange import RefusedError
 from pulsetrainer.device.opening import open_device
-from pulsetrainer.device.session import RefusedError
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES
 
 QEMU = pytest.param(

@@ -13,8 +13,8 @@ import pytest
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import MAGIC, Fault, State
+from pulsetrainer.device.exchange import Exchange, NoAnswerError
 from pulsetrainer.device.frames import Frame, encode
-from pulsetrainer.device.session import NoAnswerError, Session
 from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.simulation.build import firmware_executable
@@ -38,7 +38,7 @@ def test_a_program_killed_in_mid_upload_leaves_nothing_behind(wire):
     for seq in range(5):
         one.transport.write(encode(Frame(m.Status.TYPE, seq, b"")))  # nobody reads the answers
     one.transport.write(encode(Frame(m.WaveData.TYPE, 7, m.WaveData(610, 61, bytes(122)).pack()))[:70])
-    one.session = Session(one.transport, "bench:", monotonic=time.monotonic)
+    one.session = Exchange(one.transport, "bench:", monotonic=time.monotonic)
     one.session.on_telemetry = one.telemetry.append
     one.start(np.full(200, 3000, dtype=np.int16))
     assert one.wait_for(State.IDLE).fault == Fault.NONE
@@ -150,7 +150,7 @@ def test_a_new_program_on_a_running_device_stops_it(wire):
     one = wire("bench:?speed=real")
     one.start(np.full(1000, 5000, dtype=np.int16))
     time.sleep(0.1)
-    later = Session(one.transport, "bench:", monotonic=time.monotonic)
+    later = Exchange(one.transport, "bench:", monotonic=time.monotonic)
     assert later.hello().magic == MAGIC
     one.session = later
     assert one.wait_for(State.IDLE).fault == Fault.NONE
@@ -187,7 +187,7 @@ def stranger():
 @pytest.fixture
 def impatient(monkeypatch):
     """Give up greeting early: these tests wait for exactly that."""
-    monkeypatch.setattr("pulsetrainer.device.session._HELLO_S", 0.5)
+    monkeypatch.setattr("pulsetrainer.device.exchange._HELLO_S", 0.5)
 
 
 @pytest.mark.usefixtures("impatient")
@@ -196,7 +196,7 @@ def test_a_device_that_is_not_ours_is_told(stranger, says):
     """Something talks, but it is not the firmware."""
     transport = SerialTransport(stranger(says))
     with raises(DeviceError, "not our device", port="port"):
-        Session(transport, "port", monotonic=time.monotonic).hello()
+        Exchange(transport, "port", monotonic=time.monotonic).hello()
     transport.close()
 
 
@@ -205,7 +205,7 @@ def test_nobody_is_told(stranger):
     """Silence is another message than a stranger."""
     transport = SerialTransport(stranger(b""))
     with raises(NoAnswerError, "nobody answers", port="port"):
-        Session(transport, "port", monotonic=time.monotonic).hello()
+        Exchange(transport, "port", monotonic=time.monotonic).hello()
     transport.close()
 
 

@@ -12,8 +12,8 @@ from scripted import SLICE_S, ScriptedDevice, message
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.codes import NakCode, State
+from pulsetrainer.device.exchange import Exchange
 from pulsetrainer.device.opening import open_device
-from pulsetrainer.device.session import Session
 from pulsetrainer.errors import DeviceError
 
 PLAY_S = 3.0
@@ -106,7 +106,7 @@ def test_a_device_that_goes_on_is_no_complete_play():
 def test_the_real_firmware_leaves_its_reference_as_soon_as_it_refuses(monkeypatch, kind):
     """A command refused in mid-play: the device is on its way down within 100 ms of it, in its own time."""
     refused = []
-    request = Session.request
+    request = Exchange.request
 
     def once(self, command, *rest):
         if isinstance(command, kind) and not refused and playing():
@@ -115,7 +115,7 @@ def test_the_real_firmware_leaves_its_reference_as_soon_as_it_refuses(monkeypatc
         return request(self, command, *rest)
 
     ticks = [0]
-    monkeypatch.setattr(Session, "request", once)
+    monkeypatch.setattr(Exchange, "request", once)
     with open_device("bench:?speed=real") as device:
 
         def playing():

@@ -10,10 +10,12 @@ import pytest
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts.model import Extension, Parameter
+from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.diagnosis.prediction import operator_of, predict
-from pulsetrainer.errors import DataError, DeviceError
+from pulsetrainer.errors import DataError, DeviceError, Interrupted
 from pulsetrainer.steps.check import RATE_HZ, check_updatable, signal, updated
-from pulsetrainer.steps.heat import rest_force
+from pulsetrainer.steps.heat import rest_force, take_temperature, thermometer
+from pulsetrainer.steps.session import Memory
 from wording import raises
 
 # What a diagnosis of the as-built bench finds.
@@ -169,6 +171,30 @@ def test_a_play_makes_up_for_the_room(model):
     assert abs(left) < 0.35 * moved
 
 
+@pytest.mark.parametrize("top_A", [0.3, 0.8])
+def test_the_temperature_is_told_below_the_whole_range(model, top_A):
+    """A lower range is over before a second is: the loop goes around until one window is whole."""
+    meter = thermometer(model.coil, None)
+    with pt.open_device("bench:?seed=1&ambient=15") as device:
+        take_temperature(device, meter, top_A)
+    assert meter.temperature_K == pytest.approx(15.0, abs=1.0)
+
+
+def test_a_temperature_that_was_not_told_is_no_temperature(model, monkeypatch):
+    """Where the line loses it the play does not begin as if the room were that of the calibration."""
+    meter = thermometer(model.coil, None)
+    with pt.open_device("bench:?seed=1") as device:
+        played = device.play
+
+        def lost(reference, rate_Hz):
+            whole = played(reference, rate_Hz)
+            return replace(whole, duty=np.full(whole.duty.size, np.nan))
+
+        monkeypatch.setattr(device, "play", lost)
+        with raises(DeviceError, "names it", named="does not tell the coil's temperature"):
+            take_temperature(device, meter, 1.5)
+
+
 def test_nothing_changes_where_there_is_no_thermal_term(model):
     """By default a model without it is played as it was, to the bit."""
     drive = pt.invert("normal", model, periods=2)
@@ -210,6 +236,24 @@ def test_a_beat_starts_where_its_samples_are(model):
         assert error == pytest.approx(told, rel=1e-6)
 
 
+def test_what_a_ctrl_c_took_from_a_session_is_counted(model, monkeypatch):
+    """The samples that were just being written: they are missing in the file, and it says how many."""
+    append, calls = Memory.append, []
+
+    def interrupted(self, *columns):
+        calls.append(len(columns[0]))
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        append(self, *columns)
+
+    monkeypatch.setattr(Memory, "append", interrupted)
+    with pt.open_device("bench:?seed=1") as device, pytest.raises(Interrupted) as caught:
+        pt.session(model, device, beats=8)
+    kept = caught.value.kept
+    played = round((kept.time_s[-1] - kept.time_s[0]) * 1000.0) + 1
+    assert kept.dropped_samples == played - kept.time_s.size == calls[2]
+
+
 @pytest.mark.parametrize("verb", ["session", "capture"])
 def test_a_fault_in_a_later_part_says_when_that_began(model, monkeypatch, verb):
     """Its own time counts from the beginning of the part; the file's from that of the recording."""
@@ -235,6 +279,42 @@ def test_a_fault_in_a_later_part_says_when_that_began(model, monkeypatch, verb):
     (seam,) = np.flatnonzero(np.diff(kept.time_s) > 0.5)
     began_s = float(re.search(r"began at ([\d.]+) s", caught.value.message)[1])
     assert began_s == pytest.approx(kept.time_s[seam + 1], abs=0.06)
+
+
+@pytest.mark.parametrize("verb", ["session", "capture", "play"])
+def test_what_was_recorded_is_kept_where_the_next_part_cannot_begin(model, monkeypatch, verb):
+    """The port is gone between two plays, or the coil too hot for the next: the others are in ``kept``."""
+    drive = pt.invert("normal", model, periods=2)
+    with pt.open_device("bench:?seed=1") as device:
+        device.set_parameter("on_time", 8)
+        name = "stream" if verb == "session" else "play"
+        played, recorded = getattr(type(device), name), []
+
+        def goes(self, *given, **options):
+            if recorded and recorded[-1] >= (2 if verb == "play" else 1):
+                raise PortLostError("the port is gone", hint="check cable and power")
+            trace = played(self, *given, **options)
+            if options.get("on_block"):  # no conditioning
+                recorded.append(len(recorded) + 1)
+            return trace
+
+        monkeypatch.setattr(type(device), name, goes)
+        run = {
+            "session": lambda: pt.session(model, device, pulses="normal", beats=12),
+            "capture": lambda: pt.capture("identification", device, levels=6, speed_A_per_s=1.0),
+            "play": lambda: pt.play(drive, device, repeats=3),
+        }
+        with pytest.raises(DeviceError) as caught:
+            run[verb]()
+    assert "the port is gone" in caught.value.message
+    assert caught.value.hint == "check cable and power"
+    kept = caught.value.kept
+    assert not kept.complete
+    if verb == "play":
+        assert kept.compensated.output.shape[0] == 1
+        assert "port is gone" in kept.fault
+    else:
+        assert kept.time_s.size > 4000
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])

@@ -89,6 +89,19 @@ def test_a_fault_while_tuning_calls_for_no_finger_and_no_other_force(broken):
     assert not re.search("force_max|rests on the finger", raised.value.hint)
 
 
+def test_a_device_that_cannot_be_stopped_has_its_gains_back_all_the_same(monkeypatch):
+    """Else the next play would take its current for a duty. The first error is the one that is told."""
+    with pt.open_device("bench:?resistance=100000") as device:
+
+        def stop():
+            raise DeviceError("STOP was not answered", hint="check the cable")
+
+        with monkeypatch.context() as patched, raises(DeviceError, "names it", named="no coil"):
+            patched.setattr(device, "stop", stop)
+            pt.tune(device)
+        assert device.gains == DELIVERED
+
+
 def test_a_supply_that_sags_is_told_from_one_of_too_little_voltage():
     """12 V without a load are more than the 7.5 V that the coil needs."""
     with pt.open_device("bench:?supply-sag=5") as device, raises(DeviceError, "a supply that sags"):

@@ -143,6 +143,9 @@ def test_records_share_an_offset_unless_they_differ():
     record, _ = noisy(10)
     assert offsets_between([record], PLANE).tolist() == [0.0]
     assert offsets_between([record, record], PLANE).tolist() == [0.0, 0.0]
+    rng = np.random.default_rng(4)  # noise alone shifts nothing
+    again = [Record(record.input, record.output + rng.normal(0.0, 0.1, record.output.size)) for _ in range(2)]
+    assert offsets_between(again, PLANE).tolist() == [0.0, 0.0]
     half = Record(record.input, record.output - 0.9, (np.arange(record.input.size) % 2) * 1.0)
     for sign in (1, -1):
         turned = [Record(r.input, sign * r.output, r.sample_weight) for r in (record, half)]

@@ -22,9 +22,9 @@ from pulsetrainer.artefacts import Evaluation, Profile, Run, units
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import comparison_figure, diagnosis_figures, figures
 from pulsetrainer.report.directions import directions, turns
+from pulsetrainer.report.fewer_points import MOST_POINTS, extremes, path
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
-from pulsetrainer.report.thin import MOST_POINTS, extremes, path
 from wording import raises
 
 

@@ -74,7 +74,11 @@ def test_what_one_path_says_of_another():
     truth = 0.01 - 0.004 * same.rate + 0.02 * same.relays.mean(axis=1)
     expected, variance = elsewhere(wide, missed, same)
     assert np.abs(expected - truth).max() < 0.001
-    assert told_by_the_rest(wide, missed, np.arange(at.size) * 5 // at.size) > 0.99
+    part = np.arange(at.size) * 5 // at.size
+    assert told_by_the_rest(wide, missed, part) > 0.99
+    rests = part == 4  # a part that moves nothing tells nothing, and takes nothing from what the others tell
+    held = Path(np.where(rests, 0.0, wide.rate), np.where(rests[:, None], wide.relays[0], wide.relays))
+    assert told_by_the_rest(held, 0.01 - 0.004 * held.rate + 0.02 * held.relays.mean(axis=1), part) > 0.95
     _, less = elsewhere(narrow, missed, wide)
     assert less.mean() > 3 * variance.mean()
     assert np.all(variance <= same.variance)

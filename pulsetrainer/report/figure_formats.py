@@ -10,7 +10,7 @@ from pulsetrainer.errors import UsageError
 FORMATS: Final = ("png", "svg", "pdf")
 
 
-def figure_form(path: Path, what: str, *more: str) -> str:
+def figure_format(path: Path, what: str, *more: str) -> str:
     """Return the format that the name of a figure asks for; ``more`` are those that are no figures.
 
     UsageError where it is none of them.

@@ -49,7 +49,7 @@ class RefusedError(DeviceError):
         )
 
 
-class Session:
+class Exchange:
     """One command at a time; telemetry goes to ``on_telemetry`` whenever it comes."""
 
     def __init__(
@@ -129,14 +129,8 @@ class Session:
 
         Commands are idempotent, so a lost one is simply sent again.
 
-        Raises
-        ------
-        AbandonedError
-            as soon as ``abandon`` says so; the device may have done what was asked.
-        NoAnswerError
-            if none of the tries was answered.
-        RefusedError
-            if the device said no.
+        AbandonedError as soon as ``abandon`` says so, when the device may have done what was asked;
+        NoAnswerError where none of the tries was answered; RefusedError where the device said no.
         """
         self._seq = (self._seq + 1) & 0xFF
         for timeout_s in self._timeouts_s:

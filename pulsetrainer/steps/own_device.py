@@ -1,0 +1,30 @@
+"""Whether a model is of our own device, and of the one that is connected."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pulsetrainer.artefacts import Model
+from pulsetrainer.errors import DataError
+
+if TYPE_CHECKING:
+    from pulsetrainer.device.device import Device
+
+
+def check_units(model: Model, does: str) -> None:
+    """Raise DataError for a model that is not from A to N; ``does`` says what needs it: "a check drives"."""
+    if (model.input_unit, model.output_unit) != ("A", "N"):
+        raise DataError(
+            f"the model is of a device from {model.input_unit} to {model.output_unit}; {does} a force in N",
+            hint="identify a run that was captured on the device",
+        )
+
+
+def check_same_device(model: Model, device: Device) -> None:
+    """Raise DataError for a model that was captured on another device, where it knows its serial number."""
+    serial = model.coil.serial if model.coil is not None else ""
+    if serial and serial != device.info.serial:
+        raise DataError(
+            f"the model is of the device {serial}, this is {device.info.serial}",
+            hint="give the model of this device, or connect that one",
+        )
