@@ -40,6 +40,7 @@ def test_a_wave_made_in_pieces_is_played_as_one(device, pulse):
     np.testing.assert_allclose(played, np.tile(pulse, 3), atol=CURRENT_UNIT_A)
 
 
+@pytest.mark.realtime
 def test_the_next_piece_is_asked_for_as_late_as_the_lead_allows(pulse):
     """At real speed a piece of 0.2 s is made when less than the lead is left, by telemetry 0.1 s old."""
     ahead, made, seen = [], [0], [0]
