@@ -142,4 +142,6 @@ def _nothing(diagnosis: Diagnosis, name: str) -> str:
 def _instead(diagnosis: Diagnosis) -> str:
     if diagnosis.extended is not None:
         return "extend the model: pulsetrainer extend DIAGNOSIS.h5 --model model.h5 -o extended.h5"
-    return "diagnose in full" if diagnosis.quick else "use the run as it is"
+    if diagnosis.quick:
+        return "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model model.h5 -o full.h5"
+    return "use the run as it is"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -269,9 +270,10 @@ def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) 
     figures = evaluation.figures()
     unknown = [name for name in bounds if name not in figures]
     if unknown:
+        near = difflib.get_close_matches(unknown[0], figures, n=3) or sorted(figures)[:3]
         raise UsageError(
             f"the bounds name {unknown[0]}, which this evaluation does not have",
-            hint=f"it has {', '.join(sorted(figures)[:4])}, ...",
+            hint=f"it has {', '.join(near)} and others: pulsetrainer evaluate --json lists them",
         )
     return tuple(
         Breach(name, value, low, high)

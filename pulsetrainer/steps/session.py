@@ -323,7 +323,7 @@ def programme(
             "a session needs pulses, each named once, got " + (", ".join(names) or "none"),
             hint="name some of the library: normal,bifid",
         )
-    check_asked_for(None if callable(answers) else answers, quiz)
+    check_asked_for(None if callable(answers) else answers, quiz, len(names))
     programme = Programme(
         names, rate=rate, amplitude=amplitude, beats=beats, minutes=minutes, changes=changes
     )

@@ -73,6 +73,27 @@ def test_another_device_is_not_updated(run, calibrated, tmp_path):
     assert not (tmp_path / "updated.h5").exists()
 
 
+def test_the_model_of_another_serial_number_is_refused(run, calibrated, tmp_path):
+    """Exit 3 before anything is played, both numbers, nothing written."""
+    words = ("check", calibrated / "model.h5", "--port", "bench:?seed=9", "--update", "-o", "updated.h5")
+    done = run(*words, "--json")
+    assert (done.code, done.json["error"]["kind"]) == (3, "data")
+    assert "the device BENCH-0, this is BENCH-9" in done.json["error"]["message"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_causes_that_cannot_be_updated_are_refused_before_the_device_is_opened(run, calibrated, tmp_path):
+    """Exit 3 with the cause, although no device is there; nothing written."""
+    sticking = Extension("stick-slip", (Parameter("jump", 0.3, "N", 0.2, 0.4),))
+    model = replace(pt.load(calibrated / "model.h5"), extensions=(sticking,))
+    pt.save(model, tmp_path / "sticks.h5")
+    words = ("check", "sticks.h5", "--port", "/dev/absent", "--update", "-o", "updated.h5")
+    done = run(*words, "--json")
+    assert (done.code, done.json["error"]["kind"]) == (3, "data")
+    assert "stick-slip" in done.json["error"]["message"]
+    assert not (tmp_path / "updated.h5").exists()
+
+
 def test_a_supply_that_does_not_fit_is_named(run, calibrated):
     """Half the voltage: exit 4, and what to look at."""
     done = run("check", calibrated / "model.h5", "--port", "bench:?supply=6", "--json")

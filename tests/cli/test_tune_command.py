@@ -140,8 +140,19 @@ def test_a_damaged_entry_is_refused_before_anything_is_driven(run, tmp_path, ent
     assert not (tmp_path / "run.h5").exists()
 
 
-def test_what_went_wrong_writes_nothing(run, tmp_path):
-    """No coil: exit 4 and no file."""
-    done = run("tune", "--port", "bench:?resistance=100000", "-o", "pulsetrainer.toml", "--json")
+@pytest.mark.parametrize(
+    ("device", "said"),
+    [
+        ("resistance=100000", "no coil"),
+        ("resistance=0.1&inductance=0.0001", "shorted"),
+        ("resistance=10&supply=9", "(voltage)"),
+        ("condition-offset=1.6", "where nothing should press"),
+    ],
+    ids=["no coil", "a shorted coil", "a saturated supply", "a finger on it"],
+)
+def test_what_went_wrong_writes_nothing(run, tmp_path, device, said):
+    """Exit 4, the reason, and no file."""
+    done = run("tune", "--port", f"bench:?{device}", "-o", "pulsetrainer.toml", "--json")
     assert (done.code, done.json["error"]["kind"]) == (4, "device")
-    assert not (tmp_path / "pulsetrainer.toml").exists()
+    assert said in done.json["error"]["message"]
+    assert list(tmp_path.iterdir()) == []
