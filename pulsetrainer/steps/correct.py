@@ -78,7 +78,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     if not faults and not delay_s:
         raise DataError(_nothing(diagnosis, diagnosis_name), hint=_instead(diagnosis))
     output = run.output.copy()
-    masked = np.zeros(output.size, dtype=bool) if run.masked is None else run.masked.copy()
+    masked = ~run.counts
     for where, part in parts:
         if part.fingerprint in known:
             restored = _restored(part, diagnosis, faults, known[part.fingerprint], delay_s)

@@ -243,7 +243,7 @@ def _second_half(measured: FloatArray, predicted: FloatArray) -> float:
 
 def _known(run: Run, low: float, high: float) -> BoolArray:
     """Tell which samples (n,) count: from where the memory is known, but those that are masked."""
-    kept = np.ones(run.input.size, dtype=bool) if run.masked is None else ~run.masked
+    kept = run.counts
     kept[: known_from(run.input, low, high, run.output)] = False
     return kept
 
