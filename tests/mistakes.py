@@ -157,7 +157,7 @@ _WORDS_OF_A_TIRED_HAND = {
     "a file that a look at the device does not take": ("doctor run.h5", 2, "got run.h5", "pulsetrainer show"),
     "a table that is absent": ("import absent.csv -o out.h5", 2, "absent.csv does not exist", "file here"),
     "a folder of nothing": ("identify bare -o out.h5", 3, "bare is a folder", "name another"),
-    "a folder as a page": ("evaluate played.h5 --html bare", 2, "bare is a folder", "bare/NAME"),
+    "a folder as a page": ("evaluate played.h5 --html bare", 2, "bare is a folder", "name a file in it"),
     "one run twice": ("identify run.h5 run.h5 -o out.h5", 2, "run.h5 is named twice", "each file once"),
     "a quiz of one pulse": (
         *(

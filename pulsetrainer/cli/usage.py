@@ -98,9 +98,9 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
 def _with_or_without_value(error: Exception, command: str) -> UsageError:
     """A value where none goes, or none where one does; the parser does not tell of which command."""
     option = getattr(error, "option_name", "an option")
-    if "not take" in str(getattr(error, "message", "")):
-        return UsageError(f"{option} takes no value", hint=f"write {option} alone, or leave it out")
     help_ = " ".join(("pulsetrainer", *filter(None, [command]), "--help"))
+    if "not take" in str(getattr(error, "message", "")):
+        return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
     return UsageError(f"{option} needs a value", hint=help_)
 
 
@@ -138,7 +138,7 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     name = command.rpartition(" ")[2]
     instead = _INSTEAD.get(name, "{command} --help")
     if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
-        instead = "leave it out; what is in a file tells pulsetrainer show"
+        instead = "leave it out; to look into a file: pulsetrainer show {extra}"
     beside = "one file at a time; evaluations or sessions side by side: pulsetrainer compare a.h5 b.h5"
     return UsageError(
         f"{command} takes {' and '.join(taken) or 'options'} only, got {extra} as well",
