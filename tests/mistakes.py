@@ -151,6 +151,9 @@ _WORDS_OF_A_TIRED_HAND = {
             "did you mean --pulses?",
         ),
     ),
+    "a pulse in the place of a drive": (
+        *("play normal -o out.h5", 3, "normal (argument ", "pulsetrainer invert normal"),
+    ),
     "two pulses": (
         *("invert normal bifid --model model.h5 -o out.h5", 2, "got bifid as well", "run it once for each"),
     ),

@@ -14,6 +14,7 @@ from typer.core import TyperCommand
 from pulsetrainer.cli.next_step import to_make, with_files
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError
 from pulsetrainer.files.input_file import is_sound, near_names
+from pulsetrainer.files.pulses import library
 
 # what the file of an argument holds; others take any artefact, or a table
 _HOLDS = {
@@ -106,6 +107,9 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         kinds, word = ("run",), "RUN.h5"
     typed = option or f"argument {word}"
     error.message = error.message.replace(f"{error.path} ", f"{error.path} ({typed}) ", 1)
+    if name == "drive" and str(error.path) in library():
+        error.hint = f"{error.path} is a pulse: pulsetrainer invert {error.path} --model model.h5 -o drive.h5"
+        return
     if isinstance(error, AbsentError) and name in _TABLES:
         tables = sorted(path.name for path in folder.glob("*.csv") if is_sound(path))
         near = difflib.get_close_matches(error.path.name, tables, n=1, cutoff=_NEAR)
