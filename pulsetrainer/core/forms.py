@@ -105,10 +105,7 @@ def leaves_more_than_noise(residuals: Sequence[FloatArray], span: float) -> bool
 def try_all(signals: Signals, low: float, high: float) -> Tried:
     """Fit every form to blocks of the records, pairs of input and output (n,), and judge it by the others.
 
-    Raises
-    ------
-    ConvergenceError
-        A fit did not settle.
+    ConvergenceError where a fit did not settle.
     """
     records = [record_of(u, y, low, high) for u, y in signals]
     folds = [np.where(r.sample_weight > 0, blocks(r.input, low, high) % FOLDS, -1) for r in records]

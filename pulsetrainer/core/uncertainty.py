@@ -62,10 +62,7 @@ class Ensemble:
 
         It holds the output without the noise of a measurement. None: from negative saturation.
 
-        Raises
-        ------
-        ArgumentError
-            The input is no finite vector.
+        ArgumentError where the input is no finite vector.
         """
         operator = self.operator
         rising = outputs(

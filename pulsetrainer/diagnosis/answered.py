@@ -92,7 +92,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         output_quantity=model.output_quantity,
         held_out_gain_percent=_held_out_gain(state),
         lacks=state.lacks,
-        whole=state.is_whole(extended),
+        whole=state.is_whole(extended) and state.verdict != "unknown",
         dependences=dependences,
         notes=state.question.notes,
         model=model.fingerprint,
@@ -254,7 +254,12 @@ def extended_model(state: State, model: Model) -> Model:
     assert state.question.given is not None
     assert state.repeated is not None
     scale, words = state.scale, _words(state.question.given)
-    known = [t for t in state.repeated.terms if t in lasting or t in faults_of(state)]
+    # the later records are brought to the condition of the first, of which the model goes on
+    known = [
+        t
+        for t in state.repeated.terms
+        if t in lasting or t in faults_of(state) or isinstance(t.cause, ConditionChange)
+    ]
     behind = static_behind(state.repeated, known, model, scale)
     found = behind.identified.operator
     remembered = [one.output if model.form == "dual" else one.input for one in behind.records]

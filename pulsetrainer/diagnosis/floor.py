@@ -16,7 +16,7 @@ from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.fitting import Fitted, weights_for
 from pulsetrainer.diagnosis.noise import quiet_square
 from pulsetrainer.diagnosis.problem import Problem
-from pulsetrainer.diagnosis.raw import Firing, coarse_step, noise_of
+from pulsetrainer.diagnosis.raw import Firing, coarse_step, noise_beside_hum
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY, UNIFORM
 
 
@@ -107,7 +107,7 @@ def floor_of(
         What one is in the problem, output unit.
     """
     records = problem.records
-    noise = float(np.sqrt(np.mean([noise_of(r.output, r.sample_weight) ** 2 for r in records])))
+    noise = float(np.sqrt(np.mean([noise_beside_hum(r.output, r.sample_weight) ** 2 for r in records])))
     step = max(coarse_step(r.output) for r in measured) / span
     jump = max((f.value for f in firings if f.cause == "stick-slip"), default=0.0) / span
     held = (step**2 + jump**2) / UNIFORM  # does not average out

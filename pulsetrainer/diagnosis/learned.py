@@ -15,6 +15,7 @@ from pulsetrainer.diagnosis.dependence import Bank
 from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.diagnosis.wording import figure
 
 _OFFSETS = {"input": "u", "turn": "u", "output": "y"}  # states told from the zero of the quantity
 _TEXT = (
@@ -85,16 +86,17 @@ def _curve(
 
 
 def _text(curve: _Curve, words: Mapping[str, str]) -> str:
-    """Return the dependence in words: where the output is farthest from its mean, and by how much."""
+    """Return the dependence in words: from end to end, or where it is farthest from the line between them."""
     value, unit = curve.value, unit_of(curve.part.kind.unit, words["u"], words["y"])
-    k = int(np.argmax(np.abs(value - np.median(value))))
-    first, last = LIMITS.curve_end * LIMITS.curve_places, (1.0 - LIMITS.curve_end) * LIMITS.curve_places
-    if first <= k <= last:
-        change, where = float(value[k] - np.median(value)), f"is near {_place(curve, k, unit)}"
+    # against the line between its ends: a bump or dip where that is more than what the ends differ by
+    bent = value - np.linspace(value[0], value[-1], value.size)
+    k = int(np.argmax(np.abs(bent)))
+    change = float(value[-1] - value[0])
+    if abs(bent[k]) > abs(change):
+        change, where = float(bent[k]), f"is near {_place(curve, k, unit)}"
     else:
-        change = float(value[-1] - value[0])
         where = f"goes from {_place(curve, 0, unit)} to {_place(curve, -1, unit)}"
-    size = with_unit(f"{abs(change):.2g}", words["y"])
+    size = with_unit(figure(abs(change), 2), words["y"])
     way = "lower" if change < 0 else "higher"
     return _TEXT.format(output=words["output"], way=way, size=size, state=_said(curve, words), where=where)
 
@@ -107,4 +109,4 @@ def _said(curve: _Curve, words: Mapping[str, str]) -> str:
 
 def _place(curve: _Curve, k: int, unit: str) -> str:
     value = float(curve.at[k])
-    return with_seconds(value) if curve.part.kind.saturates else with_unit(f"{value:.2g}", unit)
+    return with_seconds(value) if curve.part.kind.saturates else with_unit(figure(value, 2), unit)

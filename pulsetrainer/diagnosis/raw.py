@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import fft, ndimage, signal
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
@@ -120,13 +120,36 @@ def noise_of(y: FloatArray, weight: FloatArray | None = None) -> float:
     A smooth output hardly has any; of white noise they have twenty times the variance. Where samples
     without ``weight`` were filled in there is no noise to be seen.
     """
-    if y.size < LIMITS.noise_least:
+    third = _third_differences(y, weight)
+    if third.size == 0:
         return 0.0
+    return float(np.median(np.abs(third)) / NORMAL_MAD / np.sqrt(THIRD_DIFFERENCE))
+
+
+def noise_beside_hum(y: FloatArray, weight: FloatArray) -> float:
+    """White noise (rms) of a record as ``noise_of``, without a line that has most of it: a hum."""
+    third = _third_differences(y, weight)
+    if third.size < LIMITS.line_samples:
+        return noise_of(y, weight)
+    power = np.abs(fft.rfft(third * signal.windows.hann(third.size))) ** 2
+    k, total = int(np.argmax(power)), float(np.sum(power))
+    line = float(np.sum(power[max(k - LIMITS.line_wide, 0) : k + LIMITS.line_wide + 1]))
+    whole = noise_of(y, weight)
+    if line <= LIMITS.line_share * total:
+        return whole
+    beside = (1.0 - line / total) * float(np.mean(third**2))
+    return min(whole, float(np.sqrt(beside / THIRD_DIFFERENCE)))
+
+
+def _third_differences(y: FloatArray, weight: FloatArray | None) -> FloatArray:
+    """Third differences (k,) of samples with weight, about their median; none of a few samples."""
+    if y.size < LIMITS.noise_least:
+        return np.zeros(0)
     third = np.diff(y, DIFFERENCES)
     if weight is not None:
         known = ndimage.minimum_filter1d(weight, DIFFERENCES + 1, origin=-2)[:-DIFFERENCES] > 0
         third = third[known] if np.count_nonzero(known) >= LIMITS.noise_least else third
-    return float(np.median(np.abs(third - np.median(third))) / NORMAL_MAD / np.sqrt(THIRD_DIFFERENCE))
+    return np.asarray(third - np.median(third))
 
 
 def values_of(y: FloatArray) -> FloatArray:

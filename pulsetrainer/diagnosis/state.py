@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -138,6 +138,13 @@ class State:
         return left > max(half, small, LIMITS.unexplained_relevant * floor.relevant)
 
     @property
+    def believed(self) -> State:
+        """The same, or with no cause in the model where it has none that was found and is in no doubt."""
+        own = [one for one in self.findings if one.cause.id in self.current.names]
+        in_doubt = own and not any(one.found and not one.in_doubt for one in own)
+        return replace(self, current=self.baseline) if in_doubt else self
+
+    @property
     def blind(self) -> tuple[str, ...]:
         """Ids of the common causes of which these records would not have shown what matters."""
         if not self.question.timed or not self.limits:
@@ -194,6 +201,10 @@ class State:
     def _of_device(self, fault: Finding) -> bool:
         """Whether a fault of the measurement may be something that the device does."""
         return self.unexplained or any(library()[name].lasting for name in fault.confounded_with)
+
+    def rms_of(self, share: float) -> float:
+        """Rms of a share of what can be explained."""
+        return float(np.sqrt(share * self.floor.reducible(self.baseline) / self.floor.count))
 
     def explains(self, gain: float) -> float:
         """Per cent of what can be explained."""

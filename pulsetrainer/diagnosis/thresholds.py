@@ -40,6 +40,9 @@ class Thresholds:
     same_value: float = 1e-9  # of the span: outputs nearer than this are one value, rounded
     jump_of_input: float = 0.1  # of its range from one sample to the next: there the output jumps as well
     noise_least: int = 8  # third differences: fewer tell no noise
+    line_share: float = 0.5  # of the squares of these: one line with more is a hum, and no noise ...
+    line_samples: int = 1000  # ... of so many: of fewer one line has much by chance
+    line_wide: int = 3  # lines on each side that a window spreads it over
     coarse_noise: float = 1.5  # times the noise: larger steps of the output do not average out
 
     # Static fit
@@ -151,7 +154,6 @@ class Thresholds:
     curve_ridge: float = 1e-3  # of the mean square of a curve's columns: holds its second differences
     curve_places: int = 41  # of the figure of a curve
     curve_bulk: tuple[float, float] = (0.02, 0.98)  # quantiles of the state: beyond, a record shows little
-    curve_end: float = 0.15  # of its places: with its extreme nearer to an end a curve rises or falls
 
     # Equal loops (decision 042)
     contrast_p_max: float = 0.001  # the second of two tests: at 0.005 it alarmed in 3 of 141 controls
@@ -212,6 +214,10 @@ class Thresholds:
     hold_within: float = 0.02  # ... in which the input stays within this share of its range ...
     hold_noise: float = 10.0  # ... or within so many standard deviations of its noise
     short_s: float = 20.0  # a shorter record is called short
+
+    # Words
+    told_digits: int = 3  # significant, of rates and widths
+    told_to: float = 0.005  # of the range: levels that a person is asked to set are told as finely
 
     # The extended model
     inverse_rounds: int = 16  # of the inverse

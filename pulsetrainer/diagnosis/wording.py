@@ -27,8 +27,8 @@ TEXTS: Mapping[str, str] = {
         "squared error beyond noise. What gives it away: {signature}."
     ),
     "tested, small": (
-        "noise alone looks like it with a probability of {p:.3f}. What it explains is smaller than noise and "
-        "levels together. What gives it away: {signature}."
+        "noise alone looks like it with a probability of {p:.3f}. How much of the error it is cannot be "
+        "told: all of it is no more than noise and levels may leave. What gives it away: {signature}."
     ),
     "extended": "With these causes in the model, {left:.3f} % of the span remains (rms of short averages).",
     "would have shown": (
@@ -92,7 +92,8 @@ TEXTS: Mapping[str, str] = {
 }
 # Where an error is largest, by the quantity that it was sorted by
 PLACES: Mapping[str, str] = {
-    "rate": "at a speed of {at:.3g} ranges of the {input} per second",
+    "rest": "while the {input} rests",
+    "rate": "where the {input} moves at {at:.3g}{in_u} per second",
     "level": "where the {input} is about {at:.3g}{in_u}",
     "direction": "while the {input} {way}",
     "time": "about {at:.3g} s after the start",
@@ -117,8 +118,9 @@ ADVICE: Mapping[str, str] = {
     ),
     "lacks": f"To see what this recording cannot show, {AGAIN}",
     "unknown": (
-        "No known cause fits. Repeat the recording to see whether the remaining error repeats; if it does, "
-        "vary one thing at a time: temperature, load, amplitude."
+        "No known cause fits. Record the same again and diagnose both together. If as much is left and no "
+        "cause is found, the device may be of a kind that the model cannot follow; if not, something else "
+        "acts on it: vary one thing at a time, such as temperature, load or amplitude."
     ),
     "none": "Nothing was found on this recording beyond what is taken for noise.",
     "too noisy": (
@@ -148,12 +150,17 @@ ADVICE: Mapping[str, str] = {
     ),
     "correct": (
         "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
-        "correct), and identify the model from what that gives, or diagnose it again."
+        "correct). A model that was identified from it is identified again from what that gives; one from "
+        "a sound recording is kept."
     ),
     "correct, extend": (
         "The measurement is at fault, and the device does something that the model lacks. First take {names} "
         "out of the recording (pulsetrainer correct), and identify the model from what that gives; then "
         "diagnose the corrected recording with that model, and extend it."
+    ),
+    "conditions": (
+        "The recordings are of different conditions, such as load, zero or gain: see which of them the model "
+        "predicts (pulsetrainer evaluate), put the others right, or identify a model of each condition."
     ),
     "repair": "No model can hold this: put right what was found, and record again.",
     "other model": (
@@ -237,7 +244,7 @@ class Bench:
             **{name: self._level(share) for name, share in shares.items()},
             "levels": self._levels(experiment.LEVELS[1:-1]),
             "biases": self._levels(experiment.BIASES),
-            "width": with_unit(f"{experiment.WIDTH * self.scale.reach:.3g}", self.unit),
+            "width": with_unit(figure(experiment.WIDTH * self.scale.reach), self.unit),
             **{name: self._rate(faster * one) for name, one in rates.items()},
             **{name: self._time(one / faster) for name, one in times.items()},
         }
@@ -254,20 +261,26 @@ class Bench:
         return with_unit(f"{', '.join(rest)} and {last}", self.unit)
 
     def _number(self, share: float) -> str:
-        value = self.scale.low + share * self.scale.reach
-        return f"{0.0 if abs(value) < LIMITS.same_value * self.scale.reach else value:.4g}"
+        step = LIMITS.told_to * self.scale.reach
+        value = round((self.scale.low + share * self.scale.reach) / step) * step
+        return figure(value, LIMITS.told_digits + 1)
 
     def _rate(self, ranges: float) -> str:
         if not self.timed:
             times = ranges / min(experiment.RATES)
             return "one rate" if times == 1 else f"{times:.3g} times that rate"
         per_second = "1/s" if self.unit == "1" else f"{self.unit}/s"
-        return with_unit(f"{ranges * self.scale.reach / self.scale.second:.3g}", per_second)
+        return with_unit(figure(ranges * self.scale.reach / self.scale.second), per_second)
 
     def _time(self, seconds: float) -> str:
         if not self.timed:
             return "several times as long as a loop takes"
         return with_seconds(seconds * self.scale.second)
+
+
+def figure(value: float, digits: int = LIMITS.told_digits) -> str:
+    """Return a number with some significant digits, and without an exponent where it needs none."""
+    return f"{float(f'{value:.{digits}g}') + 0.0:g}"  # no negative zero
 
 
 def sentence(one: Evidence, words: Mapping[str, str]) -> str:

@@ -217,3 +217,19 @@ def test_a_model_is_extended_by_what_the_device_does_alone():
     assert extended < 0.3 * plain
     assert extended < 1.5 * evaluated[1].shape_rms_percent
     assert found.extended_rms_percent < 0.3 * found.rms_percent
+
+
+@pytest.mark.slow
+def test_a_model_goes_on_in_the_condition_of_the_first_record():
+    """A lag, and a second record with another zero and gain: a third one is of the first one's condition."""
+
+    def late(u, static, t, number):
+        return foreign.lagged(static, 0.012, t[1])
+
+    first, clean = _runs_of_plays(late)
+    model = pt.identify(first)
+    found = pt.diagnose([first, replace(clean, output=1.02 * clean.output + 1.0)], model)
+    assert [one.cause for one in found.found] == ["output-lag", "condition-change"]
+    plain, extended = pt.evaluate(clean, [model, pt.extend(model, found)]).models
+    assert extended.rms_percent < 0.3 * plain.rms_percent
+    assert extended.rms_percent < 1.5 * extended.shape_rms_percent

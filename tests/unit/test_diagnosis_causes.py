@@ -19,7 +19,7 @@ from pulsetrainer.diagnosis import causes, wording
 from pulsetrainer.diagnosis.causes import condition_change, library, rate_widening
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass, settled
 from pulsetrainer.diagnosis.procedure import diagnose
-from pulsetrainer.diagnosis.raw import Raw, coarse_step, noise_of, spacing_of
+from pulsetrainer.diagnosis.raw import Raw, coarse_step, noise_beside_hum, noise_of, spacing_of
 from pulsetrainer.diagnosis.state import Question
 
 CAUSE = library()
@@ -225,6 +225,16 @@ def test_noise_and_steps_of_a_record():
     assert spacing_of(np.ones(9)) == 0.0
     assert coarse_step(np.repeat(np.arange(50.0), 9)) == 1.0
     assert coarse_step(np.round(noise)) == 0.0
+
+
+def test_a_hum_is_no_noise_of_single_samples():
+    """A line at three tenths of the sample rate, ten times the noise; of a few samples nothing is told."""
+    noise = 0.1 * np.random.default_rng(1).standard_normal(20_000)
+    hum = np.sin(2 * np.pi * 0.309 * np.arange(noise.size))
+    assert noise_of(noise + hum) > 0.5
+    assert noise_beside_hum(noise + hum, np.ones(noise.size)) == pytest.approx(0.1, rel=0.2)
+    assert noise_beside_hum(noise, np.ones(noise.size)) == noise_of(noise)
+    assert noise_beside_hum(hum[:900], np.ones(900)) == noise_of(hum[:900])
 
 
 def _piled(at: int, inside: int) -> np.ndarray:

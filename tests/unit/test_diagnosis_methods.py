@@ -657,13 +657,22 @@ def test_every_experiment_is_told_in_numbers_of_the_bench(name):
     assert " V" in said
     assert " A" not in said
     told = {
-        "nested loops": ["between 20 V and 120 V", "2.5e+04 V/s", "4e+05 V/s", "about 34.1 ms in all"],
+        "nested loops": ["between 20 V and 120 V", "25000 V/s", "400000 V/s", "about 34.1 ms in all"],
         "steps and holds": ["110, 50, 90 and 30 V", "6 ms"],
-        "equal minor loops": ["15 V wide", "from 30, 50, 70 and 90 V", "5e+04 V/s"],
-        "equal cycles": ["between 40 V and 100 V", "7.5e+04 V/s"],
+        "equal minor loops": ["15 V wide", "from 30, 50, 70 and 90 V", "50000 V/s"],
+        "equal cycles": ["between 40 V and 100 V", "75000 V/s"],
         "heating": ["60 ms at 120 V", "60 ms at 20 V", "about 136 ms in all"],
     }
     assert [words for words in told[name] if words not in said] == []
+
+
+def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
+    """A range that ends at -0.3321 mA ends at 0 A for a person; large numbers need no exponent."""
+    said = wording.advice(
+        Evidence("lacks", names=("rates",)), wording.Bench(Scale(-0.0003321, 1.2003, second=1e-3), "A")
+    )
+    assert "between 0 A and 1.2 A" in said
+    assert "e+" not in said
 
 
 def test_what_a_record_lacks_is_asked_for_in_numbers():
@@ -684,9 +693,10 @@ def test_where_an_error_is_largest_is_told_with_its_quantity():
     words = {"input": "voltage", "in_u": " V"}
     told = {
         name: wording.sentence(Evidence("largest", figures={"at": at, "times": 3.0}, names=(name,)), words)
-        for name, at in {"rate": 2.0, "level": 1.5, "direction": -1.0, "time": 40.0}.items()
+        for name, at in {"rest": 0.0, "rate": 2.0, "level": 1.5, "direction": -1.0, "time": 40.0}.items()
     }
-    assert "2 ranges of the voltage per second" in told["rate"]
+    assert "while the voltage rests" in told["rest"]
+    assert "2 V per second" in told["rate"]
     assert "1.5 V" in told["level"]
     assert "falls" in told["direction"]
     assert "40 s" in told["time"]

@@ -13,7 +13,7 @@ from pulsetrainer.diagnosis import design, fitting, residual, velocity, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
-from pulsetrainer.diagnosis.causes.unlisted import Unlisted
+from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
 from pulsetrainer.diagnosis.congruency import Contrast
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
@@ -883,6 +883,19 @@ def test_what_speaks_against_a_cause_is_written_beside_it(monkeypatch, gain, int
     assert all(len(wording.DOUBTS[one]) > 10 for one in doubts)
 
 
+@pytest.mark.parametrize(("one_point", "doubts"), [((-0.1, 0.3), ("spans zero",)), ((0.1, 0.3), ())])
+def test_a_learned_curve_may_be_nothing_where_each_of_its_points_may(monkeypatch, one_point, doubts):
+    """One point that is away from zero, whatever its time constant is, and it is something."""
+    monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
+    points = [(-0.1, 0.2)] * (KNOTS - 2) + [one_point]
+    rows = [Estimate("tau", 0.5, "s", 0.4, 0.6), *(Estimate("f", 0.1, "{y}", *ends) for ends in points)]
+    cause = Unlisted((Part(0, 0.0, 1.0),))
+    current = replace(_fit(300.0), terms=(Term(cause, (0.5, *(0.1 for _ in points))),))
+    more = {"without": {"unlisted": _fit(800.0)}, "estimates": {"unlisted": tuple(rows)}}
+    state = _state(current, p_values={"unlisted": 0.003}, held_out=HeldOut(0.9), **more)
+    assert rivals.stage(state).findings[0].doubts == doubts
+
+
 def test_a_score_that_was_not_borne_out_is_explained_where_nothing_is_found(monkeypatch):
     """The table shows its p-value: a sentence says why it is not named."""
     scores = Screen((_score("thermal-drift", 900.0, 0.005), _score("step", 800.0, 0.005)))
@@ -1247,10 +1260,10 @@ def test_where_all_repeat_the_model_is_that_of_the_search(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("explains", "beside", "found"), [(9.9, (), False), (10.1, (), True), (9.9, (rivals.WORSE,), True)]
+    ("explains", "beside", "found"), [(9.9, (), False), (10.1, (), True), (9.9, (rivals.WORSE,), False)]
 )
 def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, beside, found):
-    """Only where it matters little, and the other one is in no doubt."""
+    """Only where it matters little."""
     monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
     findings = (
@@ -1260,6 +1273,18 @@ def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, 
     after = repetition.stage(_state(_fit(500.0, "creep", "viscous"), findings=findings))
     assert [one.found for one in after.findings] == [True, found]
     assert after.repeated.names == (("creep",) if not beside else ())
+
+
+@pytest.mark.parametrize(("larger", "found"), [(1.0, True), (1e4, False)])
+def test_what_may_be_nothing_and_is_small_is_not_found(monkeypatch, larger, found):
+    """All that could be explained, but less than half a per cent of the span; then the model is static."""
+    monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    findings = (_finding("field-lag", 99.0, doubts=(rivals.MAY_BE_NOTHING,)),)
+    begun = _state(_fit(500.0, "field-lag"), findings=findings)
+    after = repetition.stage(replace(begun, floor=replace(begun.floor, span=larger * begun.floor.span)))
+    assert [one.found for one in after.findings] == [found]
+    assert (after.current is after.baseline) == (not found)
 
 
 def test_what_equal_loops_show_is_not_asked_again(monkeypatch):
@@ -1371,7 +1396,7 @@ def _given(
         findings=findings,
         verdict="creep",
         evidence=(Evidence("static"), Evidence("tested", "creep"), Evidence("extended")),
-        current=SimpleNamespace(rms=left, terms=()),
+        current=SimpleNamespace(rms=left, terms=(), squares=np.inf),
         baseline=SimpleNamespace(rms=refitted, squares=100.0 * (1.0 + left_out**2)),  # beside the noise
         floor=replace(state.floor, noise=0.0),
         by_contrast={"load-dependence": ()},
@@ -1481,6 +1506,14 @@ def test_weights_that_only_follow_what_they_were_fitted_to_show_no_change(
     if not changed:
         assert told.evidence[0].kind == "not carried over"
         assert told.evidence[0].figures == pytest.approx({"given": 50.0, "refitted": 5.0, "left_out": 10.1})
+
+
+def test_parts_that_only_a_drift_keeps_apart_are_not_told_of(monkeypatch):
+    """Weights alone do not carry over, but with the fault that was found nothing more is left than noise."""
+    whole = SimpleNamespace(rms=0.01, terms=(), names=("offset-drift",), squares=0.0)
+    more = {"refitted": 0.5, "left_out": 1.01, "findings": (_finding("offset-drift", 90.0),)}
+    told = _given(monkeypatch, RAMP + 5.0, current=whole, verdict="offset-drift", **more)
+    assert (told.verdict, told.evidence[0].kind) == ("offset-drift", "static")
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from pulsetrainer.artefacts.diagnosis import Recorded
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
-from pulsetrainer.diagnosis import dependence
+from pulsetrainer.diagnosis import dependence, learned
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, STATES, Part, Unlisted
 from pulsetrainer.diagnosis.repeats import repeats
@@ -318,3 +319,20 @@ def test_an_input_that_never_rests_does_not_make_it_noise(turns):
     assert [one.tau_s for one in found.dependences] == [pytest.approx(0.3, rel=0.1)]
     assert model.fit.rms > 0.008 * SPAN
     assert found.left.percent < 0.15  # the noise is 0.1 % of the span
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ([0.0, 6.0, 16.0, 27.0, 32.0, 27.0, 15.0, 5.0], "higher by 29 mN when it is near 5"),
+        ([0.0, -6.0, -16.0, -27.0, -32.0, -27.0, -15.0, -5.0], "lower by 29 mN when it is near 5"),
+        ([0.0, 2.0, 9.0, 20.0, 28.0, 31.0, 32.0, 32.0], "higher by 32 mN when it goes from 1 to 1100"),
+    ],
+)
+def test_a_curve_is_told_by_its_bump_or_by_its_ends(value, said):
+    """A wide bump is one: it stands out from the line between its ends by more than they differ."""
+    at = np.asarray([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 1100.0])
+    kind = SimpleNamespace(unit="1", words="it", saturates=False)
+    curve = learned._Curve(SimpleNamespace(kind=kind), 1.0, at, np.asarray(value), np.zeros(8))
+    words = {"input": "current", "output": "force", "u": "A", "y": "mN"}
+    assert said in learned._text(curve, words)

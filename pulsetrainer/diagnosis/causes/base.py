@@ -21,6 +21,7 @@ from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
 if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.finding import Estimate
     from pulsetrainer.diagnosis.fitting import Fitted
 
 _NO_LAG = 1e-7  # of a time step: a shorter time constant is none
@@ -158,6 +159,10 @@ class Cause:
     def restored(self, values: Values) -> tuple[Cause, Values]:
         """Return the cause and its parameters, from the constants and parameters that a model kept."""
         return self, values
+
+    def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
+        """Return, of all parameters in their order, those that are all zero where the cause is nothing."""
+        return parameters[: self.strengths]
 
     def sign(self, name: str, polarity: int) -> int:
         """Return by what a parameter is multiplied when the output is, by its polarity; sizes stay."""

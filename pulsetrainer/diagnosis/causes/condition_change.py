@@ -33,7 +33,7 @@ class ConditionChange(Cause):
     """One gain and offset for the later records."""
 
     id = "condition-change"
-    title = "gain or offset differs from record to record"
+    title = "gain or offset of the later records differs from that of the first"
     formula = "y + b + g (y - y0) in all records but the first"
     signature = "records agree within themselves and differ between one another"
     excitation = "the same signal twice, in the two conditions"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import interpolate
@@ -19,6 +20,9 @@ from pulsetrainer.diagnosis.causes.base import (
     remember,
     remembered,
 )
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.finding import Estimate
 
 KNOTS = 8  # of each curve: even between the ends of the state; its first value is 0
 _STILL = 0.004  # of the range: an input that stays within it rests
@@ -217,6 +221,10 @@ class Unlisted(Cause):
                 ("high", part.high, part.kind.unit),
             )
         )
+
+    def strengths_of(self, parameters: Sequence[Estimate]) -> Sequence[Estimate]:
+        """Return the points of the curves."""
+        return [one for one in parameters if one.name != "tau"]
 
     def sign(self, name: str, polarity: int) -> int:
         """Return by what a parameter is multiplied when the output is: the curve is added to it."""

@@ -32,7 +32,7 @@ def stage(state: State) -> State:
         for finding in state.findings
         if finding.cause.id in state.background
     ]
-    if state.current is not state.baseline:
+    if state.current is not state.baseline and state.believed is state:
         said.append(Evidence("extended", figures={"left": percent * state.current.rms}))
         if not state.is_whole(state.current):
             rest = float(
@@ -78,6 +78,8 @@ def _largest(state: State) -> Iterator[Evidence]:
         rms = residual.rms_by(group, state.current.residual)
         most, least = float(np.nanmax(rms)), float(np.nanmin(rms))
         if most > LIMITS.largest_at * least:
-            at = state.scale.places(group.at, group.unit)
-            figures = {"at": float(at[int(np.nanargmax(rms))]), "times": most / least}
-            yield Evidence("largest", figures=figures, names=(group.name,))
+            k = int(np.nanargmax(rms))
+            at, name = float(state.scale.places(group.at, group.unit)[k]), group.name
+            if name == "rate":
+                at, name = at * state.scale.reach, "rest" if k == 0 else name
+            yield Evidence("largest", figures={"at": at, "times": most / least}, names=(name,))

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import best_experiment
 from pulsetrainer.diagnosis.state import State
@@ -64,8 +65,8 @@ def _after_verdict(state: State) -> Evidence:
         return Evidence("correct, extend" if device else "correct", names=tuple(state.correctable))
     if state.lacks:
         return Evidence("lacks", names=state.lacks)
-    if not library()[state.verdict].lasting:
-        return Evidence("repair")
+    if not library()[state.verdict].lasting and state.extended is None:
+        return Evidence("conditions" if state.verdict == ConditionChange.id else "repair")
     if state.extended is not None and state.correctable:
         return Evidence("extend, correct", names=tuple(state.correctable))
     return Evidence("extend" if state.extended is not None or state.question.quick else "again")
@@ -76,5 +77,5 @@ def _to_see_more(state: State) -> Evidence:
     worst = max(state.limits.get(name, np.inf) for name in state.blind)
     times = (worst / LIMITS.matters) ** 2
     kind = "inconclusive" if state.lacks else "too noisy" if times <= LIMITS.longer else "far too noisy"
-    figures = {"matters": PERCENT * LIMITS.matters, "times": times}
+    figures = {"matters": PERCENT * LIMITS.matters, "times": max(np.ceil(times), 2.0)}
     return Evidence(kind, figures=figures, names=(*state.blind, *state.lacks))

@@ -152,6 +152,8 @@ def _far_off(
     left_out = span * _left_out(state)
     if np.isnan(left_out) or follows(left_out, given):
         return _in_another_condition(state, changed, judged.polarity)
+    if state.correctable and state.is_whole(state.current):
+        return state, []  # what the measurement did is all that the parts differ by
     figures = {"given": given, "refitted": span * state.baseline.rms, "left_out": left_out}
     said = Evidence("not carried over", figures={name: percent * size for name, size in figures.items()})
     nothing = state.verdict in ("none", "inconclusive")

@@ -9,8 +9,8 @@ repeat: it is told with these words, and is not added to the model; nor is one t
 another reason (`rivals`). What equal loops show was tested by itself.
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
-been fitted beside it. One whose strength may be nothing, and that explains less than a tenth beside a cause
-without a doubt, was not found: it mends the formula of that cause.
+been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
+cent of the span, was not found: it mends the formula of another cause, or nothing.
 """
 
 from __future__ import annotations
@@ -40,14 +40,16 @@ def stage(state: State) -> State:
     findings = tuple(
         replace(one, doubts=(*one.doubts, DOUBT)) if one.cause.id in told else one for one in state.findings
     )
-    if any(one.found and not one.in_doubt for one in findings):
-        findings = tuple(replace(one, found=one.found and not _is_nothing(one)) for one in findings)
-    return replace(state, findings=findings, repeated=kept)
+    findings = tuple(replace(one, found=one.found and not _is_nothing(state, one)) for one in findings)
+    current = state.current if any(one.found for one in findings) else state.baseline
+    return replace(state, findings=findings, current=current, repeated=kept)
 
 
-def _is_nothing(finding: Finding) -> bool:
-    """Whether a finding may be nothing, and would matter little."""
-    return MAY_BE_NOTHING in finding.doubts and finding.explains_percent < PERCENT * LIMITS.mends
+def _is_nothing(state: State, finding: Finding) -> bool:
+    """Whether a finding may be nothing, and would matter little: beside the others, or at all."""
+    share = finding.explains_percent / PERCENT
+    little = share < LIMITS.mends or state.rms_of(share) < LIMITS.matters * state.floor.span
+    return MAY_BE_NOTHING in finding.doubts and little
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:

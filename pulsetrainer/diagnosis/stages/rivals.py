@@ -7,10 +7,11 @@ the rate are named together: there they are just a wider loop. Causes that equal
 here: equal loops differ by nothing else that is known.
 
 What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
-than the model without it, the interval of its strength spans zero, a parameter sits on its bound, it is
-slow and what is left still wanders from one tenth of the time to the next, it is slow, belongs to the record,
-and all causes together take away less than half of what can be lowered on blocks that were left out (which a
-device of another kind leaves), or only equal loops would show it and there are none.
+than the model without it, the interval of its strength (of a learned curve: of all its points) spans zero,
+a parameter sits on its bound, it is slow and what is left still wanders from one tenth of the time to the
+next, it is slow, belongs to the record, and all causes together take away less than half of what can be
+lowered on blocks that were left out (which a device of another kind leaves), or only equal loops would show
+it and there are none.
 """
 
 from __future__ import annotations
@@ -74,7 +75,7 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         of_all = state.held_out.gain(state.baseline, state.current, state.floor)
         if not cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
             yield LITTLE
-    strengths = known[: cause.strengths]
+    strengths = cause.strengths_of(known)
     if strengths and all(one.lower <= 0 <= one.upper for one in strengths):
         yield MAY_BE_NOTHING
     bounds = cause.quantities(state.problem.frames[0])

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.raw import Firing
@@ -29,17 +27,13 @@ def stage(state: State) -> State:
     fired = {one.cause.id for one in gated}
     silent = [Finding(c, False) for c in library().values() if c.stage == "record" and c.id not in fired]
     faint = state.background
-    share = sum(one.explains_percent for one in found) / PERCENT
-    most = np.sqrt(share * state.floor.reducible(state.baseline) / state.floor.count)
+    most = state.rms_of(sum(one.explains_percent for one in found) / PERCENT)
     seen = [*gated, *found] if most < LIMITS.matters * state.floor.span else [*found, *gated]
     sure = [one.cause.id for one in seen if not one.in_doubt]
     verdict = next((name for name in sure if name not in faint), "none")
     if verdict == "none" and state.blind and not state.question.quick:
         verdict = "inconclusive"
-    doubtful = {one.cause.id for one in seen if one.in_doubt}
-    in_doubt = bool(state.current.names) and doubtful.issuperset(state.current.names)
-    believed = replace(state, current=state.baseline) if in_doubt else state
-    if believed.unexplained and not state.question.quick:
+    if replace(state, findings=tuple(seen)).believed.unexplained and not state.question.quick:
         verdict = next((one.cause.id for one in gated if one.cause.jagged), "unknown")
     return replace(state, findings=(*seen, *rest, *silent), verdict=verdict)
 
