@@ -5,9 +5,9 @@ the next (Kuensch, Ann. Statist. 17 (1989) 1217-1241). The memory is followed on
 record: the sums of a block stay what they are however often it is drawn, so a resample is a
 weighted sum of them and one warm-started fit.
 
-Refits smoothed as the fit is share its bias: they are smoothed over a shorter length, so that the intervals are
-wider, and around a fit of less bias. They still are a little narrow, as bootstraps are, and what the levels
-cannot follow they do not see: decision 006 has the figures.
+Refits smoothed as the fit is share its bias: they are smoothed over a shorter length, so that the intervals
+are wider, and around a fit of less bias. They still are a little narrow, as bootstraps are, and what the
+levels cannot follow they do not see: decision 006 has the figures.
 """
 
 from __future__ import annotations
