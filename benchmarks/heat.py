@@ -11,6 +11,7 @@ that the last device told.
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 
 import numpy as np
 import scipy.signal
@@ -18,40 +19,43 @@ from matplotlib.figure import Figure
 
 import pulsetrainer as pt
 from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.errors import DeviceError
 from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.report.heat_figures import temperature
 from pulsetrainer.steps.programme import Programme
 from pulsetrainer.steps.session import InMemory, perform
+from pulsetrainer.steps.stopped import raise_if_stopped
 
 DRIFT_PER_A2, TAU_S = 0.006, 20.0  # of the as-built bench
 COPPER_PER_K = 0.0039
 NAMES = ("normal", "bifid")
-_PLAYS = 8
+_ATTEMPTS = 8
+
+
+def again(attempt):
+    """Return what an attempt gives; one that ends because the computer was busy for seconds is made again."""
+    for _ in range(_ATTEMPTS - 1):
+        with suppress(DeviceError):
+            return attempt()
+    return attempt()
+
+
+def captured(signal: str, port: str):
+    """Return what a cold device gives for a signal."""
+    with pt.open_device(port) as device:
+        return pt.capture(signal, device)
 
 
 def calibrated(port: str):
     """Return the extended model of a device, as it is at calibration."""
-    with pt.open_device(port) as device:
-        run = pt.capture("identification", device)
-    model = pt.identify(run)
-    with pt.open_device(port) as device:  # cold again
-        diagnostic = pt.capture("diagnostic", device)
-    found = pt.diagnose([diagnostic], model)
+    model = pt.identify(again(lambda: captured("identification", port)))
+    found = pt.diagnose([again(lambda: captured("diagnostic", port))], model)
     return pt.extend(model, found)
 
 
 def played(model, port: str, minutes: float, *, track: bool, ambient: float):
-    """Mean error in %, and where heat is tracked the temperature: time in s, told and true in K, each (w,).
-
-    A play that ends because this computer was busy with something else for seconds is played again.
-    """
-    for _ in range(_PLAYS):
-        sink = InMemory()
-        done = _once(model, port, minutes, sink, track=track)
-        if not done.fault:
-            break
-    else:
-        raise RuntimeError(done.fault)
+    """Mean error in %; where heat is tracked also the temperature: time in s, told and true in K, (w,)."""
+    done, sink = again(lambda: pressed(model, port, minutes, track=track))
     error = done.figures["mean_abs_error_percent"]
     if not track:
         return error, None
@@ -63,11 +67,11 @@ def played(model, port: str, minutes: float, *, track: bool, ambient: float):
     return error, (told_s, told, own + ambient)
 
 
-def _once(model, port: str, minutes: float, sink: InMemory, *, track: bool):
-    """Press the pulses of ``NAMES``, each for half of the time."""
-    programme = Programme(NAMES, rate=None, amplitude=100.0, seconds=60.0 * minutes)
+def pressed(model, port: str, minutes: float, *, track: bool):
+    """Press the pulses of ``NAMES``, each for half of the time; how it went, and what was measured."""
+    programme, sink = Programme(NAMES, minutes=minutes), InMemory()
     with pt.open_device(port) as device:
-        return perform(
+        done = perform(
             model,
             device,
             [read_pulse(name) for name in NAMES],
@@ -77,6 +81,8 @@ def _once(model, port: str, minutes: float, sink: InMemory, *, track: bool):
             rates=programme.rates,
             track_heat=track,
         )
+    raise_if_stopped(done.fault, done.remedy, "the session")
+    return done, sink
 
 
 def rooms(first: int, devices: int):

@@ -15,11 +15,12 @@ THERE = {"x.h5", "x.html", "x.png", "x.csv"}  # outputs that exist
 
 
 class Mistake(NamedTuple):
-    """A command line, the exit code that it must end with, and the option or argument to be named."""
+    """A command line, the exit code that it must end with, and pieces of what is said: where, what next."""
 
     words: tuple[str, ...]
     code: int
     where: str = ""
+    then: str = ""
 
 
 def lay_out(folder: Path) -> None:
@@ -30,6 +31,7 @@ def lay_out(folder: Path) -> None:
     (folder / "other").mkdir()
     (folder / "other" / "run.csv").write_text("t_s,current_A,force_N\n0,0,0\n")
     (folder / "wrong.toml").write_text("levles = 48\n")
+    (folder / "bare").mkdir()
 
 
 def at_once() -> dict[str, Mistake]:
@@ -118,10 +120,55 @@ def at_once() -> dict[str, Mistake]:
     }
     found["two files to draw"] = Mistake(("plot", "run.h5", "model.h5"), 2, "got model.h5")
     found["an argument to a command of none"] = Mistake(("tune", "now"), 2, "got now")
+    for name, (line, code, where, then) in _WORDS_OF_A_TIRED_HAND.items():
+        found[name] = Mistake(tuple(line.split()), code, where, then)
     bounds = ("evaluate", "played.h5", "--bounds", "absent.toml")
     found["no such file of bounds"] = Mistake(bounds, 2, "absent.toml")
     found["no such CSV signal"] = Mistake(("capture", "absent.csv", "-o", "out.h5"), 3, "(argument ")
     return found
+
+
+# said unclearly once, tried by hand: each now says what is wrong, and what to do about it
+_WORDS_OF_A_TIRED_HAND = {
+    "a decimal comma": (
+        *("capture identification -o out.h5 --current-max 1,2", 2),
+        *("--current-max must be a number, got '1,2'", "with a point and without a unit: 1.2"),
+    ),
+    "a number with its unit": (
+        *("capture identification -o out.h5 --current-max 1.2A", 2, "got '1.2A'", "without a unit: 1.2"),
+    ),
+    "an option of another command": (
+        "identify run.h5 --model model.h5 -o out.h5",
+        2,
+        "no option --model",
+        "--help",
+    ),
+    "an option that is nearly one": (
+        *(
+            "session --model model.h5 -o out.h5 --pulse normal",
+            2,
+            "no option --pulse",
+            "did you mean --pulses?",
+        ),
+    ),
+    "two pulses": (
+        *("invert normal bifid --model model.h5 -o out.h5", 2, "got bifid as well", "run it once for each"),
+    ),
+    "a file that a look at the device does not take": ("doctor run.h5", 2, "got run.h5", "pulsetrainer show"),
+    "a table that is absent": ("import absent.csv -o out.h5", 2, "absent.csv does not exist", "file here"),
+    "a folder of nothing": ("identify bare -o out.h5", 3, "bare is a folder", "name another"),
+    "a folder as a page": ("evaluate played.h5 --html bare", 2, "bare is a folder", "name a file in it"),
+    "one run twice": ("identify run.h5 run.h5 -o out.h5", 2, "run.h5 is named twice", "each file once"),
+    "a quiz of one pulse": (
+        *(
+            "session --model model.h5 -o out.h5 --quiz 4 --pulses normal",
+            2,
+            "two pulses",
+            "--pulses normal,bifid",
+        ),
+    ),
+    "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),
+}
 
 
 def _given_as(words: tuple[str, ...]) -> str:
@@ -143,7 +190,21 @@ PREPARATION = (
     ("invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--periods", "1"),
     ("play", "drive.h5", "-o", "played.h5", "--repeats", "1"),
 )
+TABLES = {
+    "empty.csv": "",
+    "wide.csv": "time;Spannung;Kraft;Bemerkung\n0,0;1,5;2,5;gut\n",
+    "bounds.toml": "normal.continuous.mean_err = [1, 2]\n",
+}
 INSIDE = {
+    "a run as a signal": Mistake(
+        ("capture", "run.h5", "-o", "out.h5"), 3, "run.h5 is not a text file", "pulsetrainer show run.h5"
+    ),
+    "a table whose columns are not named": Mistake(
+        ("import", "wide.csv", "-o", "out.h5"), 2, "--input is missing", "--input Spannung --output Kraft"
+    ),
+    "a table that is empty": Mistake(
+        ("import", "empty.csv", "-o", "out.h5"), 2, "empty.csv is empty", "export"
+    ),
     "a run without a model": Mistake(("evaluate", "run.h5"), 2),
     "a playback and a run": Mistake(("evaluate", "played.h5", "run.h5"), 2),
     "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),
@@ -151,6 +212,33 @@ INSIDE = {
         ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--method", "extended"), 2
     ),
     "nothing left to resume": Mistake(("capture", "identification", "-o", "run.h5", "--resume"), 2),
+    "a quiz where no key can be pressed": Mistake(
+        ("session", "--model", "model.h5", "-o", "out.h5", "--quiz", "4", "--pulses", "normal,bifid"),
+        2,
+        "there is no terminal",
+        "--answers answers.txt",
+    ),
+    "a force below the range": Mistake(
+        ("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--force-max", "-2"),
+        3,
+        "-2 N is asked for, but model.h5 reaches",
+        "--force-min",
+    ),
+    "bounds that are no text": Mistake(
+        ("evaluate", "played.h5", "--bounds", "run.h5"), 2, "not a text file", "write it as TOML"
+    ),
+    "a metric that is nearly one": Mistake(
+        ("evaluate", "played.h5", "--bounds", "bounds.toml"),
+        2,
+        "normal.continuous.mean_err",
+        "normal.continuous.mean_error_reduction_percent",
+    ),
+    "learnt from a drive that was not refined": Mistake(
+        ("invert", "bifid", "--model", "model.h5", "-o", "out.h5", "--learnt", "drive.h5"),
+        3,
+        "that --learnt names",
+        "pulsetrainer refine drive.h5",
+    ),
     "no such bench parameter": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench:?crep=1"), 2
     ),

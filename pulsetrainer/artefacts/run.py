@@ -75,6 +75,11 @@ class Run(Shown):
         return float(np.median(np.diff(self.time_s)))
 
     @property
+    def counts(self) -> BoolArray:
+        """Samples (n,) whose output is a measurement: all that are not masked."""
+        return np.ones(self.input.size, dtype=np.bool_) if self.masked is None else ~self.masked
+
+    @property
     def fingerprint(self) -> str:
         """Digest of what was measured: equal for runs of equal samples."""
         measured = [self.input, self.output, *([] if self.time_s is None else [self.time_s])]

@@ -65,7 +65,7 @@ def compare(
     rows = []
     for m in metrics:
         owner, named = names.split(m.name)
-        change = "-" if m.change is None else f"{round(m.change, 2) or 0.0:+.2f}"
+        change = "-" if m.change is None else f"{round(m.change, 2):+.2f}" if round(m.change, 2) else "0.00"
         verdict = [] if learners else [words[m.better]]
         rows.append(
             [f"{owner.removeprefix('session.')}: {named.words}", named.unit, *m.values, change, *verdict]

@@ -37,7 +37,7 @@ def correct(
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
     from pulsetrainer.artefacts.units import with_unit
 
-    masked = 0 if corrected.masked is None else int(corrected.masked.sum())
+    masked = int((~corrected.counts).sum())
     changed = abs(corrected.output - measured.output)
     most = float(changed[changed >= 0].max())  # lost samples are not numbers
     payload = {"output": out, "corrected": corrected.corrected, "masked_samples": masked}

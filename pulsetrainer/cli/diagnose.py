@@ -12,6 +12,7 @@ import typer
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.steps.asked import check_once
 
 
 def diagnose(
@@ -31,6 +32,7 @@ def diagnose(
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
+    check_once(runs)
     job = Job(context, inputs=(*runs, model), outputs=(out, html))
     from pulsetrainer.report.diagnosis_text import sections
     from pulsetrainer.report.results import diagnosed

@@ -53,7 +53,10 @@ class Hands:
         dark = "a result in JSON has no live view" if screen.as_json else why_not()
         if isinstance(chosen, Blind):
             if by_key and dark:
-                raise UsageError(f"a quiz is answered by key, and {dark}", hint="give the answers in a file")
+                raise UsageError(
+                    f"a quiz is answered by key, and {dark}",
+                    hint="run it on a terminal, or give the answers in a file: --answers answers.txt",
+                )
             return Steered(chosen) if dark else self._asked(chosen)
         if dark:
             if "small" in dark:

@@ -10,6 +10,7 @@ import typer
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting, word_or_number
+from pulsetrainer.steps.asked import check_once
 
 Reading = Literal["continuous", "relay"]
 _MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
@@ -66,6 +67,7 @@ def identify(
 
     Example: pulsetrainer identify run.h5 -o model.h5
     """
+    check_once(runs)
     job = Job(context, inputs=runs, outputs=(out,))
     length = word_or_number(smoothing, "auto", "--smoothing", "auto or a number from 0 to 1", least=0, most=1)
 

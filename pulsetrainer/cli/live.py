@@ -94,7 +94,7 @@ class Live:
 def why_not() -> str:
     """Return why there is no screen; empty if there can be one."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        return "no terminal"
+        return "there is no terminal"
     try:
         import termios  # noqa: F401
     except ImportError:

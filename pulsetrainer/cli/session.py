@@ -86,8 +86,8 @@ def session(
     from pulsetrainer.files.pulses import pulse_file
     from pulsetrainer.steps.asked import check_asked_for
 
-    check_asked_for(answers, quiz)
     names = [name for name in (part.strip() for part in pulses.split(",")) if name]
+    check_asked_for(answers, quiz, len(names))
     tables = [pulse_file(name) for name in names]
     job = Job(context, inputs=(model,), tables=(changes, answers), outputs=(out, html))
     for path, name in zip(tables, names, strict=True):
@@ -124,6 +124,8 @@ def session(
         else hands.answer,
         seed=seed,
     )
+    if amplitude < 1.0:
+        job.notes([f"an amplitude of {amplitude:g} % is hardly felt: 40 % is --amplitude 40"])
     beside = {"--minutes": minutes, "--beats": beats, "--changes": changes}
     if quiz and (unused := [name for name, value in beside.items() if value is not None]):
         job.notes(

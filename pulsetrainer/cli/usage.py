@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
+import difflib
 import re
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pulsetrainer.errors import PulsetrainerError, UsageError
+from pulsetrainer.errors import DataError, UsageError
 
 _EXAMPLE = re.compile(r"^\s*Example: (.+)$", re.MULTILINE)
 # of options that take a word or a number: what they look like
@@ -23,10 +22,15 @@ _INSTEAD = {
     "tune": "a drive is an option: pulsetrainer tune --drive {extra}",
     "ports": "to look at one: pulsetrainer doctor --port {extra}",
     "doctor": "a port is an option: pulsetrainer doctor --port {extra}",
+    "invert": "one pulse at a time: run it once for each, with an output of its own",
+    "capture": "one signal at a time: run it once for each, with an output of its own",
 }
+# of them, those that are no file's name
+_NO_FILE = {"ports", "doctor"}
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
+_NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*[^\d\s.,]*'$")
 
 
 def usage_of(error: Exception, named: str = "") -> UsageError | None:
@@ -42,13 +46,16 @@ def usage_of(error: Exception, named: str = "") -> UsageError | None:
     parameter: Any = getattr(error, "param", None)
     kind, help_ = type(error).__name__, f"{command} --help"
     if kind == "NoSuchOption":
-        near = getattr(error, "possibilities", None) or _beginning_alike(error, context)
+        near = _alike(str(getattr(error, "option_name", "")), context)
         said = f"{command} has no option {getattr(error, 'option_name', '')}"
         return UsageError(said, hint=f"did you mean {' or '.join(near)}?" if near else help_)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
-        return UsageError(f"{_named(parameter)} {_must(parameter, error)}", hint=_without(parameter, help_))
+        must = _must(parameter, error)
+        return UsageError(
+            f"{_named(parameter)} {must}", hint=_as_a_number(parameter, must) or _without(parameter, help_)
+        )
     option = getattr(error, "param_hint", None)  # of what a command finds out itself
     if kind == "BadParameter" and isinstance(option, str):
         said = f"{option} {str(getattr(error, 'message', error)).rstrip('.')}"
@@ -60,11 +67,15 @@ def usage_of(error: Exception, named: str = "") -> UsageError | None:
     )
 
 
-def _beginning_alike(error: Exception, context: Any) -> list[str]:
-    """Return the options that begin with the letter of a short one that there is not."""
-    given = str(getattr(error, "option_name", ""))
-    names = [name for one in getattr(getattr(context, "command", None), "params", ()) for name in one.opts]
-    return [name for name in names if len(given) == 2 and name.startswith(f"--{given[1:]}")]
+def _alike(given: str, context: Any) -> list[str]:
+    """Return the options that an unknown one may mean; of a letter, those that begin with it."""
+    params = getattr(getattr(context, "command", None), "params", ())
+    names = [name[2:] for one in params for name in one.opts if name.startswith("--")]
+    if len(given) == 2:
+        near = [name for name in names if name.startswith(given[1:])]
+    else:
+        near = difflib.get_close_matches(given.lstrip("-").lower(), names, n=2)
+    return [f"--{name}" for name in near]
 
 
 def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
@@ -72,32 +83,37 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     like = example[1] if example else help_
     said = f"{_named(parameter)} is missing: {_meaning(parameter)}"
     given: list[Path] = (context.params.get("files") or []) if context is not None else []
-    columns = _columns(given) if parameter.name in ("input_column", "output_column") else ()
-    if len(columns) > 1:
-        first, second = map(shlex.quote, columns[-2:])
-        said += f"; {given[0]} has {', '.join(columns)}"
-        like = f"name two of them, such as --input {first} --output {second}"
+    if given and parameter.name in ("input_column", "output_column"):
+        try:
+            columns = _columns(Path(given[0]))
+        except DataError as error:  # which weighs more than what is missing
+            return UsageError(f"{error.message}; and {said}", hint=error.hint)
+        if len(columns) > 1:
+            first, second = map(shlex.quote, (columns[1:3] if len(columns) > 2 else columns))
+            said += f"; {given[0]} has {', '.join(columns)}"
+            like = f"name two of them, such as --input {first} --output {second}"
     return UsageError(said, hint=like)
 
 
 def _with_or_without_value(error: Exception, command: str) -> UsageError:
     """A value where none goes, or none where one does; the parser does not tell of which command."""
-    takes = "takes no value" if "not take" in str(getattr(error, "message", "")) else "needs a value"
-    return UsageError(
-        f"{getattr(error, 'option_name', 'an option')} {takes}",
-        hint=" ".join(("pulsetrainer", *filter(None, [command]), "--help")),
-    )
+    option = getattr(error, "option_name", "an option")
+    help_ = " ".join(("pulsetrainer", *filter(None, [command]), "--help"))
+    if "not take" in str(getattr(error, "message", "")):
+        return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
+    return UsageError(f"{option} needs a value", hint=help_)
 
 
-def _columns(files: Sequence[Path]) -> tuple[str, ...]:
-    """Return the columns of the first table that is to be imported; none where it cannot be read."""
+def _columns(table: Path) -> tuple[str, ...]:
+    """Return the columns of a table that is to be imported; DataError where there is none to be read."""
+    from pulsetrainer.files.input_file import check_file
+
+    check_file(table)
+    if table.suffix.lower() in (".npz", ".npy", ".mat", ".wav"):  # told by what reads them
+        return ()
     from pulsetrainer.files.csv_dialect import detect
 
-    if not files or Path(files[0]).suffix.lower() not in (".csv", ".tsv", ".txt", ".dat"):
-        return ()
-    with contextlib.suppress(PulsetrainerError, OSError, ValueError):
-        return detect(Path(files[0])).names
-    return ()
+    return detect(table).names
 
 
 def _other(said: str, command: str, parsed: Any) -> UsageError:
@@ -119,10 +135,13 @@ def _other(said: str, command: str, parsed: Any) -> UsageError:
 def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     """What stands behind the arguments that a command takes."""
     taken = [p.human_readable_name for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
-    instead = _INSTEAD.get(command.rpartition(" ")[2], "{command} --help")
+    name = command.rpartition(" ")[2]
+    instead = _INSTEAD.get(name, "{command} --help")
+    if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
+        instead = "leave it out; to look into a file: pulsetrainer show {extra}"
     beside = "one file at a time; evaluations or sessions side by side: pulsetrainer compare a.h5 b.h5"
     return UsageError(
-        f"{command} takes {' and '.join(taken) or 'options only'}, got {extra} besides",
+        f"{command} takes {' and '.join(taken) or 'options'} only, got {extra} as well",
         hint=beside if taken == ["FILE.h5"] else instead.format(command=command, extra=extra),
     )
 
@@ -152,6 +171,12 @@ def _must(parameter: Any, error: Exception) -> str:
         f" from {low:g} to {high:g}" if high is not None else f", {low:g} or more" if low is not None else ""
     )
     return f"must be {kind}{within}, got {repr(got[1]) if 'valid' in got[0] else got[1].removesuffix('.0')}"
+
+
+def _as_a_number(parameter: Any, must: str) -> str:
+    """How the number is written that was given with a decimal comma, or with its unit; else empty."""
+    given = _NEARLY_A_NUMBER.search(must) if "float" in getattr(parameter.type, "name", "") else None
+    return f"write it with a point and without a unit: {given[1]}.{given[2] or 0}" if given else ""
 
 
 def _without(parameter: Any, help_: str) -> str:

@@ -44,10 +44,7 @@ class Beats:
     def single(self, number: int) -> Shape:
         """Return one beat, the first is 1.
 
-        Raises
-        ------
-        DataError
-            There is no such beat.
+        DataError where there is no such beat.
         """
         if not 1 <= number <= self.count:
             held = f"{self.count} whole beat{'s' if self.count != 1 else ''}"
@@ -89,10 +86,7 @@ def find_beats(record: Shape) -> Beats:
 
     Source: Savitzky and Golay, Analytical Chemistry 36 (1964), 1627, for the parabolas.
 
-    Raises
-    ------
-    DataError
-        There is no whole beat in it.
+    DataError where there is no whole beat in it.
     """
     t, p = record.time_s, record.value
     step = float(np.median(np.diff(t)))

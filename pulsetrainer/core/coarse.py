@@ -33,10 +33,7 @@ _LEAST_COUNT = 1e-3  # that a sample counts at least: keeps the fit regular
 def between_steps(record: Record, plane: Plane, step: float) -> FloatArray:
     """Return the expected output (n,) of a record whose output comes in steps.
 
-    Raises
-    ------
-    ConvergenceError
-        A fit does not settle.
+    ConvergenceError where a fit does not settle.
     """
     noise = _noise(record.output, step)
     if noise > _MOST_NOISE * step:

@@ -126,10 +126,7 @@ def _filter(dt_s: float) -> tuple[FloatArray, FloatArray]:
 def identify_coil(holds: Sequence[Hold], dt_s: float, start: Coil | None = None) -> Coil:
     """Find the coil that explains some responses to a known duty, by least squares.
 
-    Raises
-    ------
-    DataError
-        No current flows in them, or nothing of this kind explains them.
+    DataError where no current flows in them, or nothing of this kind explains them.
     """
     top = max(float(np.nanmax(hold.current_A)) for hold in holds)
     if not top > 0:

@@ -56,10 +56,7 @@ def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:
     Source: Mayergoyz, Mathematical Models of Hysteresis and Their Applications, 2003, section 1.3: what is
     never switched cannot be identified.
 
-    Raises
-    ------
-    ArgumentError
-        An input is no finite vector.
+    ArgumentError where an input is no finite vector.
     """
     done = np.zeros(plane.n_q, dtype=bool)
     i, j = plane.cell_indices
@@ -82,10 +79,7 @@ def minor_coverage(plane: Plane, inputs: Sequence[ArrayLike], noise: float = 0.0
     ``noise``, input unit, is how far noise moves a turn. One so near an edge is taken for one on it, with a
     minimum in the band above the edge and a maximum in that below. What lies beyond the plane is at its end.
 
-    Raises
-    ------
-    ArgumentError
-        An input is no finite vector.
+    ArgumentError where an input is no finite vector.
     """
     passed = np.zeros((plane.n_h, plane.n_h), dtype=bool)
     for values in inputs:
@@ -132,10 +126,7 @@ def largest_gap(plane: Plane, covered: NDArray[np.bool_]) -> Gap | None:
     Every rectangle of bands is tried whose cells below the diagonal are all uncovered; the one of the
     largest area, input unit squared, is named, and of equal ones the first. None when all cells are covered.
 
-    Raises
-    ------
-    ArgumentError
-        ``covered`` has not one entry for each cell.
+    ArgumentError where ``covered`` has not one entry for each cell.
     """
     if covered.shape != (plane.n_q,):
         raise ArgumentError(

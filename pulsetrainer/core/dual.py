@@ -58,10 +58,7 @@ class Dual:
     def __call__(self, values: ArrayLike, start: State | None = None) -> FloatArray:
         """Output (n,) for an input (n,) from its lower end, or from ``start``, remembered inputs.
 
-        Raises
-        ------
-        ArgumentError
-            The input is empty, not one-dimensional or not finite.
+        ArgumentError where the input is empty, not one-dimensional or not finite.
         """
         u = finite_vector("input", values)
         past = np.zeros(0) if start is None else np.asarray(start.extremes)
@@ -72,10 +69,7 @@ class Dual:
 
         Targets beyond the output's range are clipped to it and counted.
 
-        Raises
-        ------
-        ArgumentError
-            The target is empty, not one-dimensional or not finite.
+        ArgumentError where the target is empty, not one-dimensional or not finite.
         """
         wanted = finite_vector("target", target)
         plane = self.inner.plane

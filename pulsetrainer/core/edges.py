@@ -60,10 +60,7 @@ def steepness(records: Sequence[Record], low: float, high: float) -> float:
 def plane_for(records: Sequence[Record], low: float, high: float, n_h: int) -> Plane:
     """Return a plane of ``n_h`` levels over [low, high]: its edges even, or crowded where the loop is steep.
 
-    Raises
-    ------
-    ArgumentError
-        Fewer than 2 levels, or a range that is zero or not finite.
+    ArgumentError for fewer than 2 levels, or a range that is zero or not finite.
     """
     even = Plane.uniform(low, high, n_h)
     if steepness(records, low, high) >= STEEP:

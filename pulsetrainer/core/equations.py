@@ -181,10 +181,7 @@ def parted_sums(
     ``parts`` holds for each record the number of the part of each of its samples (n,), 0 .. count - 1.
     Samples with any other number are left out of the sums, but not out of the memory.
 
-    Raises
-    ------
-    ArgumentError
-        The reading is unknown.
+    ArgumentError where the reading is unknown.
     """
     sums = [NodeSums.nothing(plane) for _ in range(count)]
     for record, part in zip(records, parts, strict=True):
@@ -198,9 +195,6 @@ def parted_sums(
 def normal_equations(plane: Plane, records: Sequence[Record], reading: Reading) -> NormalEquations:
     """Sums over all samples of all records in the coordinates of the masses: ``node_sums``, carried there.
 
-    Raises
-    ------
-    ArgumentError
-        The reading is unknown.
+    ArgumentError where the reading is unknown.
     """
     return node_sums(plane, records, reading).dense()

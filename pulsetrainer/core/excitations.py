@@ -39,10 +39,7 @@ class Signal:
 def check_size(times: int, samples: float, most: int = MOST_SAMPLES) -> None:
     """Refuse so many ``samples`` so many ``times`` where that is more than ``most``.
 
-    Raises
-    ------
-    ArgumentError
-        It is more.
+    ArgumentError where it is more.
     """
     if times > most or not times * samples <= most:  # either may be beyond every float
         raise ArgumentError(
@@ -57,11 +54,8 @@ def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
 
     Each point lies on the nearest sample, each turn on one of its own, so that none is cut short.
 
-    Raises
-    ------
-    ArgumentError
-        No points, one that is not finite, a speed or rate that is not positive, or such that the path has
-        more than ``MOST_SAMPLES``.
+    ArgumentError for no points, one that is not finite, a speed or rate that is not positive, or such that
+    the path has more than ``MOST_SAMPLES``.
     """
     points = finite_vector("points", points)
     positive(speed=speed, rate=rate_Hz)
@@ -134,10 +128,7 @@ def conditioning(low: float, high: float, *, speed: float, rate_Hz: float, rest_
     At ``high`` every relay is up, back at ``low`` every relay is down, whatever came before (wiping out,
     Mayergoyz 2003, section 1.2). ``low``, ``high`` and the samples share a unit, ``speed`` is that a second.
 
-    Raises
-    ------
-    ArgumentError
-        An empty range, a speed or rate that is not positive, or a negative rest.
+    ArgumentError for an empty range, a speed or rate that is not positive, or a negative rest.
     """
     ascending(low, high)
     if not rest_s >= 0:

@@ -17,7 +17,7 @@ import numpy as np
 from pulsetrainer.core.dual import Dual, exchanged
 from pulsetrainer.core.dual_fit import in_output
 from pulsetrainer.core.edges import plane_for
-from pulsetrainer.core.forms import Form, Signals, Static, asked_form
+from pulsetrainer.core.forms import BETTER, Form, Signals, Static, asked_forms
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify, offsets_between
 from pulsetrainer.core.initial_state import record_of
 from pulsetrainer.core.metrics import root_mean_square
@@ -100,13 +100,13 @@ def fit(
     ArgumentError, ConvergenceError
         As ``identification.identify``; or relays, or the alternating method, with another form than direct.
     """
-    chosen = asked_form(form, signals, low, high, plain=reading == "continuous" and method == "joint")
-    if chosen == "dual":
-        return _dual(signals, low, high, n_h, smoothing, kept)
+    forms = asked_forms(form, signals, low, high, plain=reading == "continuous" and method == "joint")
+    if "direct" not in forms:
+        fits = [
+            (_dual if one == "dual" else _signed)(signals, low, high, n_h, smoothing, kept) for one in forms
+        ]
+        return fits[-1] if fits[-1].misfit < BETTER * fits[0].misfit else fits[0]
     records = _records(signals, low, high, kept)
-    if chosen == "signed":
-        found = identify(records, plane_for(records, low, high, n_h), smoothing=smoothing, signed=True)
-        return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
     even = Plane.uniform(low, high, n_h)
     plane = even if reading == "relay" else plane_for(records, low, high, n_h)
     offsets = offsets_between(records, plane, reading)
@@ -130,6 +130,20 @@ def _records(signals: Signals, low: float, high: float, kept: Sequence[BoolArray
     if kept is None:
         return records
     return [replace(r, sample_weight=r.sample_weight * k) for r, k in zip(records, kept, strict=True)]
+
+
+def _signed(
+    signals: Signals,
+    low: float,
+    high: float,
+    n_h: int,
+    smoothing: Smoothing,
+    kept: Sequence[BoolArray] | None,
+) -> Fitted:
+    """Fit weights of either sign."""
+    records = _records(signals, low, high, kept)
+    found = identify(records, plane_for(records, low, high, n_h), smoothing=smoothing, signed=True)
+    return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
 
 
 def _dual(

@@ -58,16 +58,20 @@ _SMOOTHINGS = (0.025, _FIRST, 0.1)
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """What each form left on held-out blocks, rms, output unit; and the form that is asked for."""
+    """What each form left on held-out blocks, rms, output unit; the best one; and those to fit in full."""
 
     left: dict[Form, float]
     form: Form
+    to_fit: tuple[Form, ...]
 
 
-def asked_form(
+def asked_forms(
     form: Form | Literal["auto"], signals: Signals, low: float, high: float, *, plain: bool
-) -> Form:
+) -> tuple[Form, ...]:
     """Return the form to fit: the one asked for, or with "auto" the one that the records ask for.
+
+    Two, the simpler one first, where a coarse plane does not tell: there weights of either sign follow sharp
+    corners of a loop that leads better than the dual form does. Both are then fitted in full, and compared.
 
     Parameters
     ----------
@@ -83,13 +87,13 @@ def asked_form(
         raise ArgumentError(f"form must be auto, {', '.join(FORMS)}, got {form!r}", hint="use auto")
     if form == "auto":
         enough = sum(u.size for u, _ in signals) >= _FEWEST and any(np.ptp(y) > 0 for _, y in signals)
-        return try_all(signals, low, high).form if plain and enough else "direct"
+        return try_all(signals, low, high).to_fit if plain and enough else ("direct",)
     if form != "direct" and not plain:
         raise ArgumentError(
             f"the {form} form is fitted jointly, in the continuous reading",
             hint="leave method and reading out, or ask for the direct form",
         )
-    return form
+    return (form,)
 
 
 def leaves_more_than_noise(residuals: Sequence[FloatArray], span: float) -> bool:
@@ -101,30 +105,28 @@ def leaves_more_than_noise(residuals: Sequence[FloatArray], span: float) -> bool
 def try_all(signals: Signals, low: float, high: float) -> Tried:
     """Fit every form to blocks of the records, pairs of input and output (n,), and judge it by the others.
 
-    Raises
-    ------
-    ConvergenceError
-        A fit did not settle.
+    ConvergenceError where a fit did not settle.
     """
     records = [record_of(u, y, low, high) for u, y in signals]
     folds = [np.where(r.sample_weight > 0, blocks(r.input, low, high) % FOLDS, -1) for r in records]
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
     if len({number for fold in folds for number in np.unique(fold).tolist()} - {-1}) < 2:
-        return Tried({}, "direct")  # nothing can be held out
+        return Tried({}, "direct", ("direct",))  # nothing can be held out
     direct, signed = (_HeldOut(records, folds, plane, signed=either) for either in (False, True))
     span = float(np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in records])))
     left: dict[Form, float] = {"direct": direct(_FIRST), "signed": signed(_FIRST)}
     # the dual form too is rarely much worse as a signed one than by itself
     if left["direct"] < SMALLEST * span or left["signed"] > LOOK * left["direct"]:
-        return Tried(left, "direct")
+        return Tried(left, "direct", ("direct",))
     if _is_late(records, folds, plane):
-        return Tried(left, "direct")
+        return Tried(left, "direct", ("direct",))
     left = {"direct": direct.best(), "signed": signed.best(), "dual": _held_out_dual(signals, folds)}
     form: Form = "direct"
     for other in ("dual", "signed"):
         if left[other] < min(BETTER * left[form], DESCRIBES * span):
             form = other
-    return Tried(left, form)
+    in_doubt = form == "signed" and left["dual"] < DESCRIBES * span
+    return Tried(left, form, ("dual", "signed") if in_doubt else (form,))
 
 
 def _is_late(records: Sequence[Record], folds: Sequence[IntArray], plane: Plane) -> bool:

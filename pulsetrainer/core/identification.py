@@ -78,10 +78,7 @@ def polarity_of(
     signs are fitted, and the one that leaves less is returned: the loop's direction then tells more than
     its trend.
 
-    Raises
-    ------
-    ConvergenceError
-        A fit did not settle.
+    ConvergenceError where a fit did not settle.
     """
     correlation = correlation_of(records)
     if plane is None or abs(correlation) >= CLEAR:
@@ -199,10 +196,7 @@ def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = 
     zero unless that makes the error smaller by ``SHIFTED``: records of one device in one state keep one
     offset.
 
-    Raises
-    ------
-    ConvergenceError
-        The fit did not settle.
+    ConvergenceError where the fit did not settle.
     """
     told = np.asarray([np.any(r.sample_weight > 0) for r in records])
     if not told.all():  # what has no sample that counts has no offset

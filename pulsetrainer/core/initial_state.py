@@ -161,10 +161,7 @@ def start_of(inputs: FloatArray, low: float, high: float) -> State | None:
 def record_of(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> Record:
     """Return measured input and output (n,) as a record to fit; it counts from where the memory is known.
 
-    Raises
-    ------
-    ArgumentError
-        There are too few samples, or NaN or infinity.
+    ArgumentError where there are too few samples, or NaN or infinity.
     """
     counts = np.ones(inputs.size)
     counts[: known_from(inputs, low, high, outputs)] = 0.0

@@ -51,10 +51,7 @@ def estimate(values: ArrayLike) -> float:
     it would ask for exceeds a tenth of the range: there the samples are too coarse to tell noise
     from motion.
 
-    Raises
-    ------
-    ArgumentError
-        The input is no finite vector.
+    ArgumentError where the input is no finite vector.
     """
     u = finite_vector("input", values)
     if u.size < 16:

@@ -203,10 +203,7 @@ def closest_match(operator: Preisach, target: ArrayLike, start: State | None = N
     the memory before the step; at the target, or at saturation, keep the nearer of the last two
     (Tan, Baras, Krishnaprasad 2005, section 4). Mirrored when the output is above the target.
 
-    Raises
-    ------
-    ArgumentError
-        The target is not a finite vector, or all weights are zero.
+    ArgumentError where the target is not a finite vector, or all weights are zero.
     """
     wanted = finite_vector("target", target)
     _check_not_empty(operator)
@@ -264,11 +261,8 @@ def smoothed(inputs: ArrayLike, time_s: ArrayLike, step: float, low: float, high
     residual is allowed the variance of a uniform error, sum (u_k - spline(t_k))^2 <= n step^2 / 12. Inputs,
     step and range are in the input unit, times in s.
 
-    Raises
-    ------
-    ArgumentError
-        Fewer than five samples, one that is not finite, times that do not increase, a step that is not
-        positive, or an empty range.
+    ArgumentError for fewer than five samples, one that is not finite, times that do not increase, a step
+    that is not positive, or an empty range.
 
     Source: Reinsch 1967, Smoothing by spline functions (the condition on the residual).
     """
@@ -293,10 +287,7 @@ def slew_limited(inputs: ArrayLike, rate_Hz: float, slew: float) -> FloatArray:
     path below the input and the lowest path above it, both with that slope (McShane 1934), starts a ramp as
     long before a jump as it ends after it, so nothing is delayed.
 
-    Raises
-    ------
-    ArgumentError
-        ``slew`` or ``rate_Hz`` is not positive, or an input is not finite.
+    ArgumentError where ``slew`` or ``rate_Hz`` is not positive, or an input is not finite.
     """
     positive(slew=slew, rate=rate_Hz)
     u = finite_vector("inputs", inputs)

@@ -52,12 +52,8 @@ class Large(NamedTuple):
 def solve(sums: NodeSums, smoothing: float = 0.0, *, max_iterations: int = 60) -> Large:
     """Return the non-negative minimiser for the sums of a record, smoothed over s = ``smoothing``.
 
-    Raises
-    ------
-    ArgumentError
-        ``smoothing`` is out of range.
-    ConvergenceError
-        The stopping rule was not met within ``max_iterations`` Newton steps.
+    ArgumentError where ``smoothing`` is out of range; ConvergenceError where the stopping rule was not met
+    within ``max_iterations`` Newton steps.
     """
     problem = _Problem(sums, smoothing)
     usable, count = problem.usable, int(problem.usable.sum())

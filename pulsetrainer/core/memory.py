@@ -50,10 +50,7 @@ class State:
 def negative_saturation(low: float) -> State:
     """Return the state in which every relay is down and the input is ``low``, input unit.
 
-    Raises
-    ------
-    ArgumentError
-        ``low`` is not finite.
+    ArgumentError where ``low`` is not finite.
     """
     return State((float(low),))
 
@@ -61,10 +58,7 @@ def negative_saturation(low: float) -> State:
 def positive_saturation(low: float, high: float) -> State:
     """Return the state in which every relay is up and the input is ``high``, input unit.
 
-    Raises
-    ------
-    ArgumentError
-        ``low`` is not below ``high``, or one of them is not finite.
+    ArgumentError where ``low`` is not below ``high``, or one of them is not finite.
     """
     return State((float(low), float(high)))
 
@@ -72,10 +66,7 @@ def positive_saturation(low: float, high: float) -> State:
 def demagnetised(low: float, high: float, swings: int = 200) -> State:
     """Return the state after ``swings`` ever smaller swings around the middle of [low, high].
 
-    Raises
-    ------
-    ArgumentError
-        An empty range or no swings.
+    ArgumentError for an empty range or no swings.
     """
     ascending(low, high)
     if swings < 1:

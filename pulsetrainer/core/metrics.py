@@ -22,10 +22,7 @@ class Tracking(NamedTuple):
 def tracking(target: ArrayLike, measured: ArrayLike, full: float) -> Tracking:
     """Errors of every finite sample of ``measured`` (..., n) against ``target`` (n,).
 
-    Raises
-    ------
-    ArgumentError
-        Nothing was measured, the shapes do not fit, or ``full`` is not positive.
+    ArgumentError where nothing was measured, the shapes do not fit, or ``full`` is not positive.
     """
     wanted, got = finite_vector("target", target), float_array("measured", measured)
     if got.shape[-1:] != wanted.shape:
@@ -52,10 +49,7 @@ def root_mean_square(values: FloatArray) -> float:
 def loop_area(x: ArrayLike, y: ArrayLike) -> float:
     """Area enclosed by the closed curve (x, y): |closed integral of y dx|, by the shoelace formula.
 
-    Raises
-    ------
-    ArgumentError
-        x and y are not finite vectors of one length.
+    ArgumentError where x and y are not finite vectors of one length.
     """
     a, b = _pair("x", x, "y", y)
     return abs(float(np.sum(a * np.roll(b, -1) - np.roll(a, -1) * b))) / 2.0
@@ -66,10 +60,7 @@ def repeat_spread(measured: ArrayLike) -> float:
 
     A sample that only one repeat has tells nothing; 0 where all are such.
 
-    Raises
-    ------
-    ArgumentError
-        There is no axis of repeats.
+    ArgumentError where there is no axis of repeats.
     """
     repeats = float_array("measured", measured)
     if repeats.ndim != 2:
@@ -107,11 +98,8 @@ class Prediction(NamedTuple):
 def prediction(measured: ArrayLike, predicted: ArrayLike) -> Prediction:
     """Errors of ``predicted`` (n,) against ``measured`` (n,).
 
-    Raises
-    ------
-    ArgumentError
-        They are not finite vectors of one length, or the measured output does not vary, so that no
-        percentage exists.
+    ArgumentError where they are not finite vectors of one length, or the measured output does not vary, so
+    that no percentage exists.
     """
     was, said = _pair("measured", measured, "predicted", predicted)
     span = float(np.ptp(was))

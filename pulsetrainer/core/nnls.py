@@ -63,12 +63,8 @@ def solve(
     Variables whose diagonal entry is zero never appear in the data and stay at zero. ``passive``
     is a first guess of the positive variables, from a neighbouring problem.
 
-    Raises
-    ------
-    ArgumentError
-        Shapes that do not fit, or numbers that are not finite.
-    ConvergenceError
-        No method settled: the matrix is not positive semidefinite.
+    ArgumentError for shapes that do not fit, or numbers that are not finite; ConvergenceError where no
+    method settled: the matrix is not positive semidefinite.
     """
     return Gram(gram).solve(rhs, passive=passive, max_iterations=max_iterations)
 

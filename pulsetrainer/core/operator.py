@@ -53,10 +53,7 @@ def steps(plane: Plane, to: FloatArray, origin: FloatArray) -> scipy.sparse.csr_
 def follow(plane: Plane, values: ArrayLike, start: State | None, reading: Reading) -> Trace:
     """Trace an input through the plane's memory under a reading.
 
-    Raises
-    ------
-    ArgumentError
-        The input is empty, not one-dimensional or not finite; the reading is unknown.
+    ArgumentError where the input is empty, not one-dimensional or not finite; the reading is unknown.
     """
     _check_reading(reading)
     u = finite_vector("input", values)
@@ -188,10 +185,7 @@ class Preisach:
     def run(self, values: ArrayLike, start: State | None = None) -> tuple[FloatArray, State]:
         """Output (n,) and the final state, with which the next piece of the input can go on.
 
-        Raises
-        ------
-        ArgumentError
-            The input is empty, not one-dimensional or not finite.
+        ArgumentError where the input is empty, not one-dimensional or not finite.
         """
         path = follow(self.plane, values, start, self.reading)
         return self.traced(path), path.final
@@ -227,11 +221,8 @@ def outputs(
 
     The memory is followed once; every weight vector then costs one sparse product.
 
-    Raises
-    ------
-    ArgumentError
-        The input is not a finite vector, the weights do not fit the plane or are negative, or weights or
-        offsets are not finite.
+    ArgumentError where the input is not a finite vector, the weights do not fit the plane or are negative, or
+    weights or offsets are not finite.
     """
     mu, y0 = float_array("weights", weights), float_array("offsets", offsets)
     if mu.ndim != 2 or mu.shape[1] != plane.n_q or y0.shape != mu.shape[:1]:

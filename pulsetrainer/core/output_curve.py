@@ -65,10 +65,7 @@ class Rivals:
 def rivals(records: Sequence[Record], low: float, high: float) -> Rivals | None:
     """Fit both forms to blocks of records over [low, high]; None where no block can be held out.
 
-    Raises
-    ------
-    ConvergenceError
-        A fit did not settle.
+    ConvergenceError where a fit did not settle.
     """
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
     counted = [np.flatnonzero(r.sample_weight > 0) for r in records]

@@ -31,10 +31,7 @@ Reading = Literal["continuous", "relay"]
 def float_array(name: str, values: ArrayLike) -> FloatArray:
     """Return ``values`` as an array of floats of any shape.
 
-    Raises
-    ------
-    ArgumentError
-        They are no numbers, or rows of unlike lengths.
+    ArgumentError where they are no numbers, or rows of unlike lengths.
     """
     try:
         return np.asarray(values, dtype=np.float64)
@@ -47,10 +44,7 @@ def float_array(name: str, values: ArrayLike) -> FloatArray:
 def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatArray:
     """Return ``values`` as a float array (n,), n no less than ``at_least``.
 
-    Raises
-    ------
-    ArgumentError
-        It is not one-dimensional, is shorter than ``at_least``, or holds NaN or infinity.
+    ArgumentError where it is not one-dimensional, is shorter than ``at_least``, or holds NaN or infinity.
     """
     array = float_array(name, values)
     if array.ndim != 1 or array.size < at_least:
@@ -72,10 +66,7 @@ def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatAr
 def positive(**named: float) -> None:
     """Let pass numbers that are positive and finite.
 
-    Raises
-    ------
-    ArgumentError
-        One of them is not; it is named.
+    ArgumentError where one of them is not, with its name.
     """
     for name, number in named.items():
         if not (number > 0 and np.isfinite(number)):
@@ -87,10 +78,7 @@ def positive(**named: float) -> None:
 def ascending(low: float, high: float, *, what: str = "the input range") -> None:
     """Let pass a range that is neither empty nor infinite.
 
-    Raises
-    ------
-    ArgumentError
-        ``low`` is not below ``high``, or their distance is not finite.
+    ArgumentError where ``low`` is not below ``high``, or their distance is not finite.
     """
     if not (low < high and np.isfinite(float(high) - float(low))):
         raise ArgumentError(
@@ -106,10 +94,7 @@ MOST_LEVELS = 10_000  # fifty million cells
 class Plane:
     """The edges of the cells of a discrete Preisach plane; everything else follows from them.
 
-    Raises
-    ------
-    ArgumentError
-        Fewer than 3 edges, one that is not finite, or edges that do not strictly increase.
+    ArgumentError for fewer than 3 edges, one that is not finite, or edges that do not strictly increase.
 
     Source: Preisach 1935; Mayergoyz, Mathematical Models of Hysteresis, 2003, chapter 1.
     """
@@ -135,10 +120,8 @@ class Plane:
     def uniform(cls, low: float, high: float, n_h: int) -> Plane:
         """Return the plane with ``n_h`` even levels over [low, high].
 
-        Raises
-        ------
-        ArgumentError
-            Fewer than 2 levels, more than ``MOST_LEVELS``, or a range that is zero or not finite.
+        ArgumentError for fewer than 2 levels, more than ``MOST_LEVELS``, or a range that is zero or not
+        finite.
         """
         if not 2 <= n_h <= MOST_LEVELS or n_h != int(n_h):
             raise ArgumentError(
@@ -194,10 +177,8 @@ class Plane:
 
         A weight is a density: output unit per input unit squared.
 
-        Raises
-        ------
-        ArgumentError
-            The length is not n_q, or a weight is not finite, or negative where it must not be.
+        ArgumentError where the length is not n_q, or a weight is not finite, or negative where it must not
+        be.
         """
         array = float_array("weights", weights)
         if array.shape != (self.n_q,):
@@ -218,10 +199,7 @@ class Plane:
     def unpack(self, packed: FloatArray) -> FloatArray:
         """Spread (..., n_q) cell values over the lower triangle of (..., n_h, n_h) squares of zeros.
 
-        Raises
-        ------
-        ArgumentError
-            There is not one value for each cell.
+        ArgumentError where there is not one value for each cell.
         """
         self._check_cells(packed)
         i, j = self.cell_indices
@@ -242,10 +220,7 @@ class Plane:
 
         E[i + 1, j] = sum of masses over p <= i, q >= j: two cumulative sums.
 
-        Raises
-        ------
-        ArgumentError
-            As ``unpack``.
+        ArgumentError as ``unpack``.
 
         Source: Everett 1955; Mayergoyz 2003, eq. 1.15.
         """
@@ -261,10 +236,7 @@ class Plane:
         Cell (p, q) collects the nodes (i + 1, j) with i >= p and j <= q, so that for all a and b
         a . everett_nodes(b) = adjoint(a) . b.
 
-        Raises
-        ------
-        ArgumentError
-            As ``unpack``.
+        ArgumentError as ``unpack``.
         """
         self._check_cells(node_values)
         i, j = self.cell_indices
@@ -280,10 +252,7 @@ class Plane:
     def everett_grid(self, nodes: FloatArray) -> FloatArray:
         """Everett values (n_q,) on the full (n_h + 1, n_h + 1) grid of nodes, zero on and above the diagonal.
 
-        Raises
-        ------
-        ArgumentError
-            As ``unpack``.
+        ArgumentError as ``unpack``.
         """
         return np.pad(self.unpack(nodes), ((1, 0), (0, 1)))  # node (i + 1, j) is numbered like cell (i, j)
 

@@ -73,11 +73,8 @@ def train(shape: Shape, *, periods: int, rate_Hz: float, low: float, high: float
 
     Source: Fritsch and Carlson, SIAM Journal on Numerical Analysis 17 (1980), 238.
 
-    Raises
-    ------
-    ArgumentError
-        No periods, an empty range, a rate that is not positive or leaves no sample, or more than
-        ``excitations.MOST_SAMPLES``.
+    ArgumentError for no periods, an empty range, a rate that is not positive or leaves no sample, or more
+    than ``excitations.MOST_SAMPLES``.
     """
     if periods < 1:
         raise ArgumentError(f"a pulse train needs at least 1 period, got {periods}", hint="12 suit a session")

@@ -16,11 +16,9 @@ from pulsetrainer.errors import ArgumentError
 class Record:
     """One measured record: what a fit or a diagnosis works on.
 
-    Raises
-    ------
-    ArgumentError
-        Input, output, sample weights or reference differ in length, there are fewer than 2 samples, an input
-        or an output that counts is not finite, a sample weight is negative, or the time step is not positive.
+    ArgumentError where input, output, sample weights or reference differ in length, there are fewer than 2
+    samples, an input or an output that counts is not finite, a sample weight is negative, or the time step is
+    not positive.
     """
 
     input: FloatArray  # (n,) input unit

@@ -160,10 +160,7 @@ def penalty(plane: Plane, diagonal: FloatArray, smoothing: float) -> scipy.spars
 def smoothed(equations: NormalEquations, smoothing: float) -> tuple[FloatArray, FloatArray]:
     """Centred Gram matrix (n_q, n_q) with s^8 g B added, and the right side (n_q,).
 
-    Raises
-    ------
-    ArgumentError
-        ``smoothing`` is out of range.
+    ArgumentError where ``smoothing`` is out of range.
     """
     gram, rhs = equations.centred()
     if smoothing != 0:
@@ -214,10 +211,7 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
     least by no more than a standard error of their difference from block to block (Breiman, Friedman, Olshen,
     Stone, Classification and Regression Trees, 1984, section 3.4.3).
 
-    Raises
-    ------
-    ArgumentError
-        All samples with weight lie in one block, so that none can be held out.
+    ArgumentError where all samples with weight lie in one block, so that none can be held out.
     """
     coarse = thinned(plane, CHOICE_LEVELS)
     memory = _memory_of_residual(records, coarse, reading, signed=signed)

@@ -64,12 +64,7 @@ def choose_stiffness(records: Sequence[Record], plane: Plane, reading: Reading) 
     Each t is fitted to the first halves, on at most 32 levels, and judged by its rms error on the second
     halves, both followed from the start of the record. The largest t within ``TOLERANCE`` of the best wins.
 
-    Raises
-    ------
-    ArgumentError
-        The reading is unknown.
-    ConvergenceError
-        A fit did not settle.
+    ArgumentError where the reading is unknown; ConvergenceError where a fit did not settle.
     """
     coarse = thinned(plane, _LEVELS)
     parts = []

@@ -336,14 +336,14 @@ class Device:
     ) -> Trace:
         """Let a player play in a thread of its own, and follow what it brings back."""
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)
+        follower = Follower(player, self.info.tick_rate_Hz, monotonic=self._monotonic, sleep=self._sleep)
+        interrupted = False
         with self._turn:
             if self._player is not None:
                 raise DeviceError(
                     "the device is playing already", hint="wait for the play to end, or stop() it"
                 )
-            self._player = player
-        follower = Follower(player, self.info.tick_rate_Hz, monotonic=self._monotonic, sleep=self._sleep)
-        interrupted = False
+            self._player = player  # from here on it is waited for: nothing lies between this and the thread
         try:
             thread.start()
             interrupted = follower.follow(on_block, should_stop, keep=keep, top_up=top_up)

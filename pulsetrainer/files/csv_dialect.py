@@ -166,7 +166,9 @@ def _encoding(path: Path) -> str:
         ours = start.startswith(b"\x89HDF")
         raise DataError(
             f"{path} is not a text file",
-            hint="it is an HDF5 file, perhaps a run already" if ours else "export the recording as CSV",
+            hint=f"it is an HDF5 file: see `pulsetrainer show {path}`, and give a table here"
+            if ours
+            else "export the recording as CSV",
         )
     return "utf-8-sig"
 

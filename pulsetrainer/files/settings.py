@@ -82,8 +82,9 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = "it is not a text file" if isinstance(error, UnicodeDecodeError) else error
         raise UsageError(
-            f"the {what} in {path} cannot be read: {error}",
+            f"the {what} in {path} cannot be read: {reason}",
             hint=f"write it as TOML, a line each, such as: {_TOML_LINES[what]}",
         ) from error
 

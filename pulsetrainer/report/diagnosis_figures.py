@@ -6,7 +6,6 @@ import textwrap
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from pulsetrainer.artefacts import Dependence, Diagnosis, FloatArray, Profile
@@ -44,7 +43,7 @@ def course(found: Diagnosis) -> Figure:
     panels.trace(above, found.time_s, found.before, **MODEL, label="model, fitted anew")
     above.set_ylabel(label(found.output_quantity or panels.quantity_of(found.output_unit), found.output_unit))
     causes = ", ".join(one.cause for one in found.found) or found.verdict
-    above.set_title(f"verdict: {causes}", wrap=True)
+    above.set_title(f"verdict: {causes}{' (quick screen)' if found.quick else ''}", wrap=True)
     panels.headroom(above)
     panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="left without causes")
     if found.extended_percent < found.static_percent:
@@ -52,7 +51,7 @@ def course(found: Diagnosis) -> Figure:
         panels.trace(below, found.time_s, left, **MODEL, label="with the causes found")
     below.axhline(0.0, **GUIDE)
     below.set_ylabel(label("measured − model", found.output_unit))
-    below.set_xlabel(label("time, recordings one after another", "s"))
+    below.set_xlabel(label("time" if len(found.records) == 1 else "time, recordings one after another", "s"))
     panels.headroom(below)
     return figure
 
@@ -152,8 +151,7 @@ def ranking(found: Diagnosis) -> Figure:
     axes.set_xticks(
         [tick for tick in axes.get_xticks() if tick <= min(1.2 * max(share, default=0.0), _WHOLE)]
     )
+    axes.set_title("Causes, and whether each was found")
     axes.set_xlabel("explains [% of the squared error beyond noise]")
     axes.grid(visible=False, axis="y")
-    keys = [Patch(color=colour, label=f"found: {words}") for words, colour in _SHADES.items()]
-    figure.legend(handles=keys, loc="outside lower center", ncols=len(keys))
     return figure

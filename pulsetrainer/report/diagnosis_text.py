@@ -45,12 +45,13 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
         ),
     )
     others = [one for one in found.causes if not one.found][: max(_SHOWN - len(found.found), 0)]
-    yield Table(
-        "causes, strongest first",
-        ("cause", "found", "explains, %", "held-out\nshare, %"),
-        tuple(_row(one, found) for one in (*found.found, *others)),
-    )
-    yield Facts("in this table", COLUMNS)
+    columns = ("cause", "found", "explains, %", "held-out\nshare, %")
+    rows = tuple(_row(one, found) for one in (*found.found, *others))
+    if tells_shares(found):
+        yield Table("causes, strongest first", columns, rows)
+        yield Facts("in this table", COLUMNS)
+    else:
+        yield Table("causes, strongest first", columns[:2], tuple(row[:2] for row in rows))
     yield Facts("evidence", {str(k): text for k, text in enumerate(found.evidence, start=1)})
     yield Facts("next", {"": found.next_experiment})
 
@@ -120,6 +121,11 @@ def explains(one: Cause, found: Diagnosis) -> float:
     beyond = not found.static_percent <= found.floor_percent
     untested = one.found and one.p_value is None  # of the model as given, or read off the raw data
     return one.explains_percent if beyond or untested else math.nan
+
+
+def tells_shares(found: Diagnosis) -> bool:
+    """Tell whether any cause has a share: not where nothing is beyond noise and nothing was fitted."""
+    return any(math.isfinite(explains(one, found)) for one in found.causes)
 
 
 def _row(one: Cause, found: Diagnosis) -> tuple[Any, ...]:

@@ -88,7 +88,7 @@ def room(axes: Axes, share: float = 0.16) -> None:
 def headroom(axes: Axes, share: float = 0.16) -> None:
     """Make room above the curves and put the legend there, in one row: it never covers a curve."""
     room(axes, share)
-    axes.legend(loc="upper left", ncols=4, columnspacing=1.2, borderaxespad=0.2)
+    axes.legend(loc="upper left", ncols=4, columnspacing=1.0, handlelength=1.8, borderaxespad=0.2)
 
 
 def quantity_of(unit: str, otherwise: str = "output") -> str:
@@ -293,7 +293,7 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
         drawn.append((one.inversion if several else "compensated", one, one.compensated, style))
     for name, one, drive, style in drawn:
         beat = slice(0, one.target.size // beats(one.target))
-        shown = f"{name}, loop area {digits(drive.hysteresis_percent)} %"
+        shown = f"{name}, loop area {digits(drive.hysteresis_percent)} % of full force²"
         orbit(axes, one.target[beat], drive.output[beat], **style, label=shown)
     axes.set_aspect("equal")
     axes.set_xlabel(label("target", first.output_unit))

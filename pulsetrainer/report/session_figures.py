@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 from pulsetrainer.artefacts import Quiz, Session
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import heat_figures, panels
-from pulsetrainer.report.style import BLUE, COLUMN_IN, COMPENSATED, INK, TARGET, VERMILION, label, styled
+from pulsetrainer.report.style import BLUE, COLUMN_IN, COMPENSATED, TARGET, VERMILION, label, styled
 
 SHOWN_S = 6.0
 _UPRIGHT = 30  # letters of all names that stand side by side
@@ -39,14 +39,15 @@ def course(session: Session) -> Figure:
     panels.trace(above, session.time_s[near], session.output[near], **COMPENSATED, label="measured")
     above.set_ylabel(label("force", session.output_unit))
     above.set_xlabel(label("time", "s"))
-    above.set_title(f"{SHOWN_S:g} seconds from the middle" + ("" if session.complete else ", stopped early"))
+    stopped = "" if session.complete else ", stopped early"
+    above.set_title(f"Session: {SHOWN_S:g} seconds from its middle{stopped}")
     panels.headroom(above)
     beats = session.beats
     percent = 100.0 / session.full_force
-    below.plot(beats.start_s, percent * beats.max_error, ".", markersize=3, color=INK, label="max error")
     below.plot(
-        beats.start_s, percent * beats.mean_error, ".", markersize=3, color=VERMILION, label="mean error"
+        beats.start_s, percent * beats.max_error, ".", markersize=3, color=VERMILION, label="max error"
     )
+    below.plot(beats.start_s, percent * beats.mean_error, ".", markersize=3, color=BLUE, label="mean error")
     below.set_ylabel("error [% of full force]")
     below.set_xlabel(label("start of the beat", "s"))
     below.set_ylim(bottom=0.0)

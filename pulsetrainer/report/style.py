@@ -12,6 +12,7 @@ from functools import wraps
 from typing import Any, Final, ParamSpec, TypeVar
 
 from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts.units import shown
 
@@ -87,7 +88,7 @@ SETTINGS: Final[Any] = {
     "xtick.labelsize": 9.0,
     "ytick.labelsize": 9.0,
     "legend.frameon": False,
-    "legend.fontsize": 9.0,
+    "legend.fontsize": 10.0,
     "legend.handlelength": 2.4,
     "lines.solid_capstyle": "round",
     "figure.constrained_layout.w_pad": 0.07,
@@ -105,7 +106,10 @@ def styled(drawing: Callable[P, R]) -> Callable[P, R]:
     @wraps(drawing)
     def in_style(*args: P.args, **kwargs: P.kwargs) -> R:
         with rc_context(SETTINGS):
-            return drawing(*args, **kwargs)
+            drawn = drawing(*args, **kwargs)
+            if isinstance(drawn, Figure):
+                drawn.align_ylabels()  # of panels one below the other
+            return drawn
 
     return in_style
 

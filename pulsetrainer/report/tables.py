@@ -95,7 +95,9 @@ def rendered(part: Facts | Table, width: int | None = None) -> str:
     if isinstance(part, Table):
         lines = drawn(part.title, part.columns, part.rows)
         if width is not None and max(map(len, ESCAPE.sub("", lines).splitlines())) > width:
-            lines = "\n".join(listed(part.title, part.columns, part.rows)) + "\n"
+            words = ((line, line.lstrip()) for line in listed(part.title, part.columns, part.rows))
+            indents = ((line[: -len(said)], said) for line, said in words)
+            lines = "\n".join(folded(lead, said, width, len(lead) + 2) for lead, said in indents) + "\n"
         return lines
     named = [(label(name), text(value)) for name, value in part.rows.items()]
     longest = max((len(name) for name, _ in named), default=0)

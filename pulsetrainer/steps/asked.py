@@ -27,13 +27,36 @@ def check_force_range(low: float | None, high: float | None) -> None:
         )
 
 
-def check_asked_for(answers: object, quiz: int) -> None:
-    """Raise UsageError for answers that no quiz asks for."""
-    if answers and not quiz:
+def check_asked_for(answers: object, quiz: int, pulses: int) -> None:
+    """Raise UsageError for answers that no quiz asks for, and for a quiz of so many pulses that is none."""
+    if quiz:
+        check_quiz(pulses, quiz)
+    elif answers:
         raise UsageError(
             "`answers` were given, but no quiz asks for them",
             hint="give `quiz` with the number of questions, or leave `answers` out",
         )
+
+
+def check_quiz(choices: int, questions: int) -> None:
+    """Raise UsageError for fewer than two pulses to choose from, or fewer questions than pulses."""
+    if choices < 2:
+        raise UsageError(
+            f"a quiz needs at least two pulses to choose from, got {choices}",
+            hint="name more, such as `pulses` normal,bifid",
+        )
+    if questions < choices:
+        raise UsageError(
+            f"a quiz of {questions} question{'s' * (questions != 1)} cannot ask each of {choices} pulses",
+            hint=f"ask at least {choices}",
+        )
+
+
+def check_once(files: Sequence[object]) -> None:
+    """Raise UsageError for a file that is named twice where each is to count once."""
+    for number, path in enumerate(files):
+        if path in files[:number]:
+            raise UsageError(f"{path} is named twice, and would count double", hint="name each file once")
 
 
 def check_several(evaluations: Sequence[object]) -> None:

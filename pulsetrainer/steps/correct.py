@@ -78,7 +78,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     if not faults and not delay_s:
         raise DataError(_nothing(diagnosis, diagnosis_name), hint=_instead(diagnosis))
     output = run.output.copy()
-    masked = np.zeros(output.size, dtype=bool) if run.masked is None else run.masked.copy()
+    masked = ~run.counts
     for where, part in parts:
         if part.fingerprint in known:
             restored = _restored(part, diagnosis, faults, known[part.fingerprint], delay_s)
@@ -142,4 +142,6 @@ def _nothing(diagnosis: Diagnosis, name: str) -> str:
 def _instead(diagnosis: Diagnosis) -> str:
     if diagnosis.extended is not None:
         return "extend the model: pulsetrainer extend DIAGNOSIS.h5 --model model.h5 -o extended.h5"
-    return "diagnose in full" if diagnosis.quick else "use the run as it is"
+    if diagnosis.quick:
+        return "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model model.h5 -o full.h5"
+    return "use the run as it is"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -242,7 +243,7 @@ def _second_half(measured: FloatArray, predicted: FloatArray) -> float:
 
 def _known(run: Run, low: float, high: float) -> BoolArray:
     """Tell which samples (n,) count: from where the memory is known, but those that are masked."""
-    kept = np.ones(run.input.size, dtype=bool) if run.masked is None else ~run.masked
+    kept = run.counts
     kept[: known_from(run.input, low, high, run.output)] = False
     return kept
 
@@ -269,9 +270,10 @@ def breaches(evaluation: Evaluation, bounds: Mapping[str, tuple[float, float]]) 
     figures = evaluation.figures()
     unknown = [name for name in bounds if name not in figures]
     if unknown:
+        near = difflib.get_close_matches(unknown[0], figures, n=3) or sorted(figures)[:3]
         raise UsageError(
             f"the bounds name {unknown[0]}, which this evaluation does not have",
-            hint=f"it has {', '.join(sorted(figures)[:4])}, ...",
+            hint=f"it has {', '.join(near)} and others: pulsetrainer evaluate --json lists them",
         )
     return tuple(
         Breach(name, value, low, high)

@@ -40,13 +40,13 @@ def thermal_of(model: Model) -> Thermal | None:
 
 
 def thermometer_of(model: Model | None, device: Device, *, asked: bool | None) -> Thermometer | None:
-    """Return the thermometer for a play; None where heat is not tracked.
+    """Return the thermometer for a play, with the temperature before it; None where heat is not tracked.
 
     ``asked`` None: it is where the model has a thermal term, was captured with the duty, and the device tells
     it.
 
     DataError where it is asked for and the model does not know the coil; DeviceError where it is asked for
-    and the device does not tell the duty.
+    and the device does not tell the duty, and as ``take_temperature``.
     """
     coil = coil_of(model, asked=asked)
     if coil is None or model is None:
@@ -55,7 +55,9 @@ def thermometer_of(model: Model | None, device: Device, *, asked: bool | None) -
         return None
     device.needs_duty("tracking heat")
     check_same_device(model, device)
-    return thermometer(coil, thermal_of(model))
+    meter = thermometer(coil, thermal_of(model))
+    take_temperature(device, meter, operator_of(model).high)
+    return meter
 
 
 def coil_of(model: Model | None, *, asked: bool | None) -> Coil | None:

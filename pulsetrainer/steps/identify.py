@@ -100,14 +100,15 @@ def identify(
     """
     whole = [runs] if isinstance(runs, Run) else list(runs)
     titles = list(names) or [f"run {number}" for number in range(1, len(whole) + 1)]
-    notes: list[str] = []
     _check_runs(titles, whole)
-    for title, run in zip(titles, whole, strict=True):
-        if not run.complete:
-            notes.append(f"{title} is incomplete; fitting the {run.input.size} samples it has")
+    notes = [
+        f"{title} is incomplete; fitting the {run.input.size} samples it has"
+        for title, run in zip(titles, whole, strict=True)
+        if not run.complete
+    ]
     titles, measured = _with_samples(titles, whole)
     raw = measured
-    masked = [np.zeros(p.input.size, dtype=bool) if p.masked is None else p.masked for p in measured]
+    masked = [~part.counts for part in measured]
     tamed = wild.tame([(p.input, wild.repaired(p.output, m)) for p, m in zip(measured, masked, strict=True)])
     measured = [
         replace(part, input=t.input, output=t.output) for part, t in zip(measured, tamed, strict=True)
@@ -134,20 +135,12 @@ def identify(
     notes += _of_first_strokes(titles, measured, operator.low, operator.high)
     notes += [] if fitted.evenly_spaced else [_CROWDED]
     progress(0.4 if bootstrap else 0.8)
-    ensemble = None
-    if bootstrap and fitted.form != "direct":
-        notes.append(f"the bootstrap is of the direct form; the {fitted.form} form has no intervals")
-    elif bootstrap:
-        ensemble = uncertainty.bootstrap(
-            fitted.records, fitted.identified, rng=np.random.default_rng(seed), draws=bootstrap
-        )
+    ensemble = _resampled(fitted, bootstrap, seed, notes)
     if operator.polarity < 0:
         notes.append("the output falls when the input rises: fitted as a falling loop")
-    dual = fitted.form == "dual"
-    remembered = [x for x, _ in (exchanged(_signals(measured)) if dual else _signals(measured))]
-    covered = coverage(plane, remembered)
-    notes += _of_gaps(plane, covered, measured[0].output_unit if dual else measured[0].input_unit)
-    minor_percent = 100.0 * minor_coverage(plane, remembered, _unsure(measured, cleaned, dual=dual))
+    covered, minor_percent = _switched(fitted, measured, cleaned)
+    unit = measured[0].output_unit if fitted.form == "dual" else measured[0].input_unit
+    notes += _of_gaps(plane, covered, unit)
     warning = fit_notes.warning(fitted, measured, form, minor_percent)
     little = fit_notes.of_no_minor_loops(fitted, measured[0], minor_percent)
     notes += little if warning else [*fit_notes.of_rest(fitted), *little]
@@ -210,8 +203,7 @@ def _without_wild(
 
 def to_their_tips(runs: list[Run]) -> list[Run]:
     """Return runs with turns of the input at their tips between samples, where that fits better."""
-    kept = [np.ones(run.input.size, dtype=bool) if run.masked is None else ~run.masked for run in runs]
-    tips = turns.at_their_tips(_signals(runs), [run.time_s for run in runs], kept)
+    tips = turns.at_their_tips(_signals(runs), [r.time_s for r in runs], [r.counts for r in runs])
     return [replace(run, input=tip) for run, tip in zip(runs, tips, strict=True)]
 
 
@@ -264,7 +256,7 @@ def _with_samples(titles: Sequence[str], runs: Sequence[Run]) -> tuple[list[str]
         (title, part)
         for title, run in zip(titles, runs, strict=True)
         for part in run.parts(SHORTEST_PART)
-        if part.masked is None or not part.masked.all()
+        if part.counts.any()
     ]
     if not cut:
         raise DataError(
@@ -288,10 +280,28 @@ def _reach(names: Sequence[str], runs: Sequence[Run]) -> tuple[float, float]:
     return low, high
 
 
-def _unsure(runs: Sequence[Run], cleaned: Sequence[input_noise.Cleaned], *, dual: bool) -> float:
-    """How far noise moves the turns of what the operator remembers: the inputs, or of a dual the outputs."""
+def _resampled(fitted: Fitted, draws: int, seed: int, notes: list[str]) -> uncertainty.Ensemble | None:
+    """Refit resampled blocks, where that is asked for and the form has intervals."""
+    if draws and fitted.form != "direct":
+        notes.append(f"the bootstrap is of the direct form; the {fitted.form} form has no intervals")
+    if not draws or fitted.form != "direct":
+        return None
+    rng = np.random.default_rng(seed)
+    return uncertainty.bootstrap(fitted.records, fitted.identified, rng=rng, draws=draws)
+
+
+def _switched(
+    fitted: Fitted, runs: Sequence[Run], cleaned: Sequence[input_noise.Cleaned]
+) -> tuple[BoolArray, float]:
+    """Cells (n_q,) that what the operator remembers has switched, and those that minor loops tell apart, %.
+
+    A dual operator remembers the outputs. Noise moves the turns of either.
+    """
+    plane, dual = fitted.identified.operator.plane, fitted.form == "dual"
+    remembered = [x for x, _ in (exchanged(_signals(runs)) if dual else _signals(runs))]
     turned = [input_noise.clean(run.output) for run in runs] if dual else cleaned
-    return max(one.dead_band for one in turned)
+    noise = max(one.dead_band for one in turned)
+    return coverage(plane, remembered), 100.0 * minor_coverage(plane, remembered, noise)
 
 
 def _of_noise(cleaned: Sequence[input_noise.Cleaned], unit: str) -> list[str]:

@@ -61,14 +61,9 @@ class Imported:
 
 
 def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | None = None) -> Imported:
-    """Join the parts of a record, and make its time steps even if ``resample`` says so.
+    """Join the parts of a record, in their order, and make its time steps even if ``resample`` says so.
 
-    Parameters
-    ----------
-    parts
-        One or more, in their order.
-    resample
-        Rate in Hz, ``"even"`` for that of the median step, None to leave the time stamps as they are.
+    It is a rate in Hz, ``"even"`` for that of the median step, None to leave the time stamps as they are.
 
     UsageError where the run has no time to resample, or the rate would make too many samples; DataError where
     the parts differ in units, or only some have a time or a reference.

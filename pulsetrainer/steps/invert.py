@@ -276,11 +276,12 @@ def _force_range(
     part: Invertible, model: Model, force_min: float | None, force_max: float | None, name: str
 ) -> tuple[float, float]:
     """Return the forces that the ends of the normalised pulse stand for."""
+    check_force_range(force_min, force_max)
     reach, unit = part.reach, model.output_unit
     low = reach[0] if force_min is None else force_min
     high = reach[1] if force_max is None else force_max
     slack = 1e-9 * (reach[1] - reach[0])
-    if low < reach[0] - slack or high > reach[1] + slack:
+    if low < reach[0] - slack or high > reach[1] + slack or not low < high:
         step = 10.0 ** (np.floor(np.log10(max(reach[1] - reach[0], np.finfo(float).tiny))) - 2.0)
         raise DataError(
             f"{model.output_quantity} from {low:g} to {with_unit(f'{high:g}', unit)} is asked for, but "
@@ -290,7 +291,6 @@ def _force_range(
             f"`force_min` {np.ceil(reach[0] / step) * step:g} "
             f"`force_max` {np.floor(reach[1] / step) * step:g}",
         )
-    check_force_range(low, high)
     return low, high
 
 

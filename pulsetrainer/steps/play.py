@@ -22,7 +22,7 @@ from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError
-from pulsetrainer.steps.heat import Correction, coil_of, take_temperature, thermometer_of
+from pulsetrainer.steps.heat import Correction, coil_of, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
 
@@ -177,7 +177,6 @@ class _Tracked:
         thermometer = thermometer_of(model, device, asked=asked)
         if thermometer is None or model is None:
             return None
-        take_temperature(device, thermometer, operator_of(model).high)
         return cls(drive, model, thermometer)
 
     def current(self) -> FloatArray:

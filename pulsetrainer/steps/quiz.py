@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from pulsetrainer.artefacts.session import Beats, Quiz, Score
-from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.errors import DataError
+from pulsetrainer.steps.asked import check_quiz
 from pulsetrainer.steps.conductor import Decision, Play, Rest
 
 QUESTION_S = 12.0  # every question lasts as long, whatever the pulse
@@ -26,13 +27,7 @@ def order(choices: int, questions: int, seed: int) -> list[int]:
 
     UsageError where there are fewer than two choices, or fewer questions than choices.
     """
-    if choices < 2:
-        raise UsageError("a quiz needs at least two pulses to choose from", hint="name more in `pulses`")
-    if questions < choices:
-        raise UsageError(
-            f"a quiz of {questions} question{'s' * (questions != 1)} cannot ask each of {choices} pulses",
-            hint=f"ask at least {choices}",
-        )
+    check_quiz(choices, questions)
     rng = np.random.default_rng((seed, questions, choices))
     often, more = divmod(questions, choices)
     asked = np.repeat(np.arange(choices), often)

@@ -19,7 +19,7 @@ from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError, UsageError
 from pulsetrainer.steps.asked import check_asked_for
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Pause, Play, Reach
-from pulsetrainer.steps.heat import coil_of, rest_force, take_temperature, thermometer_of
+from pulsetrainer.steps.heat import coil_of, rest_force, thermometer_of
 from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.own_device import check_units
@@ -135,7 +135,6 @@ def perform(
     reach = reach_of(model, beating, rates)
     meter = thermometer_of(model, device, asked=track_heat)
     if meter is not None:
-        take_temperature(device, meter, float(model.edges[-1]))
         meter.restart()
         rest, left = rest_force(model), 1.0 - max(meter.extra, 0.0)  # a warm coil does not reach as high
         reach = Reach(reach.low, rest + (reach.high - rest) * left)
@@ -323,7 +322,7 @@ def programme(
             "a session needs pulses, each named once, got " + (", ".join(names) or "none"),
             hint="name some of the library: normal,bifid",
         )
-    check_asked_for(None if callable(answers) else answers, quiz)
+    check_asked_for(None if callable(answers) else answers, quiz, len(names))
     programme = Programme(
         names, rate=rate, amplitude=amplitude, beats=beats, minutes=minutes, changes=changes
     )

@@ -100,8 +100,8 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
     model, of_refined = check(drive, passes=1), check(refined, passes=1)
     if not refined.passes:
         raise DataError(
-            f"the drive {refined.name} was not refined, so there is nothing to learn from",
-            hint="refine it first: pulsetrainer refine drive.h5 -o refined.h5",
+            f"the drive of {refined.name} that `learnt` names was not refined: nothing was learnt on it",
+            hint="refine it first: pulsetrainer refine REFINED.h5 -o refined.h5",
         )
     if model.fingerprint != of_refined.fingerprint:
         raise DataError(

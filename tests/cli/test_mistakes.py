@@ -10,7 +10,7 @@ import sys
 import typer
 
 from command_lines import READS_ONLY, WRITERS
-from mistakes import INSIDE, at_once, lay_out
+from mistakes import INSIDE, TABLES, at_once, lay_out
 from program import pulsetrainer
 from pulsetrainer.cli.app import app
 
@@ -55,7 +55,7 @@ def test_a_mistake_in_a_name_loads_nothing_heavy(tmp_path):
     wrong = {}
     for name, (code, said) in json.loads(done.stdout).items():
         told = said.startswith("error: ") and "\n  try: " in said and "Traceback" not in said
-        told = told and cases[name].where in said
+        told = told and cases[name].where in said and cases[name].then in said.partition("\n  try: ")[2]
         if code != cases[name].code or not told or not said.endswith("\n[]"):
             wrong[name] = (code, said)
     assert not wrong
@@ -72,10 +72,15 @@ def test_every_command_that_takes_a_file_is_among_them():
 def test_a_mistake_that_a_look_inside_tells_is_a_usage_error(small_chain, tmp_path):
     """The artefacts are opened, or the device is asked: exit 2 in words, nothing written."""
     shutil.copytree(small_chain, tmp_path, dirs_exist_ok=True)
+    for name, text in TABLES.items():
+        (tmp_path / name).write_text(text)
     before = sorted(path.name for path in tmp_path.iterdir())
-    for name, (words, code, _) in INSIDE.items():
+    for name, (words, code, where, then) in INSIDE.items():
         done = pulsetrainer(tmp_path, *words)
         assert done.code == code, (name, done)
         assert "error: " in done.err, (name, done)
-        assert "\n  try: " in done.err, (name, done)
+        said, _, tried = done.err.partition("\n  try: ")
+        assert tried, (name, done)
+        assert where in said, (name, done)
+        assert then in tried, (name, done)
     assert sorted(path.name for path in tmp_path.iterdir()) == before

@@ -190,3 +190,21 @@ def test_closing_from_another_thread_waits_until_the_play_is_stopped():
     closer.join(timeout=10)
     assert not closer.is_alive()
     assert trace.fault == "stopped"
+
+
+def test_a_ctrl_c_between_two_steps_of_a_start_leaves_nobody_waiting(monkeypatch):
+    """A play that has not begun is none: closing does not wait for its end."""
+    script = ScriptedDevice()
+    device = script.open()
+
+    def interrupted(*_given, **_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pulsetrainer.device.device.Follower", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        device.play([0.1, 0.1], 1000)
+    closing = threading.Thread(target=device.close, daemon=True)
+    closing.start()
+    closing.join(5)
+    assert not closing.is_alive()
+    assert script.when(m.Stop)

@@ -15,7 +15,7 @@ from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, DeviceError, Interrupted
 from pulsetrainer.steps.check import RATE_HZ, check_updatable, signal, updated
 from pulsetrainer.steps.heat import rest_force, take_temperature, thermometer
-from pulsetrainer.steps.session import Memory
+from pulsetrainer.steps.session import InMemory
 from wording import raises
 
 # What a diagnosis of the as-built bench finds.
@@ -238,7 +238,7 @@ def test_a_beat_starts_where_its_samples_are(model):
 
 def test_what_a_ctrl_c_took_from_a_session_is_counted(model, monkeypatch):
     """The samples that were just being written: they are missing in the file, and it says how many."""
-    append, calls = Memory.append, []
+    append, calls = InMemory.append, []
 
     def interrupted(self, *columns):
         calls.append(len(columns[0]))
@@ -246,7 +246,7 @@ def test_what_a_ctrl_c_took_from_a_session_is_counted(model, monkeypatch):
             raise KeyboardInterrupt
         append(self, *columns)
 
-    monkeypatch.setattr(Memory, "append", interrupted)
+    monkeypatch.setattr(InMemory, "append", interrupted)
     with pt.open_device("bench:?seed=1") as device, pytest.raises(Interrupted) as caught:
         pt.session(model, device, beats=8)
     kept = caught.value.kept

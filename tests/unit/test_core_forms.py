@@ -10,6 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 import pulsetrainer as pt
+from pulsetrainer.core.fit import fit
 from pulsetrainer.core.forms import try_all
 from pulsetrainer.core.identification import identify
 from pulsetrainer.core.input_noise import white
@@ -96,6 +97,17 @@ def test_the_form_is_named_right(draws, form, count):
     """Twelve devices of each kind: at most one of twenty may be named wrongly."""
     found = named(draws, range(5000, 5000 + count))
     assert found.count(form) / len(found) >= 0.95
+
+
+def test_a_loop_of_sharp_corners_that_leads_is_still_dual():
+    """A spring beside one sliding element: on a coarse plane weights of either sign leave half as much."""
+    rng = np.random.default_rng(0)
+    u = np.interp(np.linspace(0, 62, 1200), np.arange(63), [0.0, 1.0, 0.0, *rng.uniform(0, 1, 60)])
+    force = 0.82 * u - 0.68 * devices.play(u, np.array([0.23]))[:, 0]
+    force += rng.normal(0.0, 0.002 * np.ptp(force), u.size)
+    tried = try_all([(u, force)], 0.0, 1.0)
+    assert (tried.form, tried.to_fit) == ("signed", ("dual", "signed"))
+    assert fit([(u, force)], 0.0, 1.0, 20, form="auto").form == "dual"
 
 
 def test_records_of_unlike_ranges_are_judged_on_one_plane():

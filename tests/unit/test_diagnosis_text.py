@@ -41,6 +41,15 @@ def test_a_cause_that_was_not_found_says_why():
     assert answer(_cause(LIMITS.p_max), whole) == said[2]  # the limit itself is significant
 
 
+def test_columns_that_would_be_empty_are_left_out():
+    """Where nothing is beyond noise no cause has a share: a column of dashes says nothing."""
+    whole = replace(store_examples.diagnosis(), static_percent=2.0, floor_percent=1.0)
+    within = replace(whole, static_percent=1.0, causes=(_cause(0.5),))
+    shown = [{part.title: part for part in sections(one)} for one in (whole, within)]
+    assert [len(one["causes, strongest first"].columns) for one in shown] == [4, 2]
+    assert ["in this table" in one for one in shown] == [True, False]
+
+
 def test_a_parameter_is_told_with_unit_interval_and_meaning():
     """The interval says of which confidence it is; where none is known nothing is said of it."""
     known = Parameter("tau", 1.5, "s", 1.25, 1.75, "time constant of the lag")

@@ -47,9 +47,9 @@ def test_a_long_record_has_48_levels():
 
 
 @pytest.mark.parametrize("form", ["auto", "direct", "dual", "signed"])
-@pytest.mark.parametrize("points", [1, 2, 3])
+@pytest.mark.parametrize("points", [0, 1, 2, 3])
 def test_a_record_of_next_to_nothing_is_refused(points, form):
-    """One to three samples are no loop, of any form."""
+    """None to three samples are no loop, of any form."""
     u = np.arange(float(points))
     with pytest.raises((DataError, ArgumentError)):
         pt.identify(pt.Run(time_s=None, input=u, output=u), form=form)

@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pulsetrainer.errors import ArgumentError, DataError, ExistsError, UsageError
+from pulsetrainer.errors import AbsentError, ArgumentError, DataError, ExistsError, UsageError
 from pulsetrainer.files.csv_dialect import detect
 from pulsetrainer.files.csv_rows import PIECE, parse
+from pulsetrainer.files.input_file import check_file
 from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.table import read_table, write_table
 from wording import raises, tells
@@ -719,3 +720,15 @@ def test_a_column_is_found_with_its_unit_written_otherwise(tmp_path):
     with pytest.raises(DataError) as caught:
         table.index("force_mN")
     assert "force [N]" in caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"), [("zzzz.csv", "files in {}: a.csv"), ("zzzz", "no file in {} has a similar name")]
+)
+def test_an_absent_file_is_answered_with_those_of_its_ending(tmp_path, name, hint):
+    """Where no name is alike: of a table the tables, of a name without an ending the artefacts."""
+    for there in ("a.csv", "b.txt"):
+        (tmp_path / there).write_text("t,u\n")
+    with pytest.raises(AbsentError) as absent:
+        check_file(tmp_path / name)
+    assert absent.value.hint == hint.format(tmp_path)
