@@ -233,3 +233,14 @@ def test_a_model_goes_on_in_the_condition_of_the_first_record():
     plain, extended = pt.evaluate(clean, [model, pt.extend(model, found)]).models
     assert extended.rms_percent < 0.3 * plain.rms_percent
     assert extended.rms_percent < 1.5 * extended.shape_rms_percent
+
+
+@pytest.mark.slow
+def test_one_of_two_records_that_is_turned_over_is_told():
+    """A swapped lead in the second one: no other kind of device, whose force would follow the velocity."""
+    first, second = _runs_of_plays(lambda u, static, t, number: static.copy())
+    turned = replace(second, output=0.4 - 0.4 * second.output)
+    found = pt.diagnose([first, turned], pt.identify(first))
+    assert (found.verdict, [one.cause for one in found.found]) == ("condition-change", ["condition-change"])
+    assert "record 2: the force falls where the model rises" in found.evidence[0]
+    assert "different conditions" in found.next_experiment

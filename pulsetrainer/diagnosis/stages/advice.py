@@ -34,9 +34,10 @@ def stage(state: State) -> State:
 
 
 def _advice(state: State) -> Evidence:
-    another = [_ANOTHER_MODEL[one.kind] for one in state.evidence if one.kind in _ANOTHER_MODEL]
+    another = [one for one in state.evidence if one.kind in _ANOTHER_MODEL]
     if another:
-        return Evidence(another[0])
+        alone = another[0].record is not None  # only one of the records is not the model's
+        return Evidence("conditions" if alone else _ANOTHER_MODEL[another[0].kind])
     tied = next((one for one in state.findings if one.found and one.confounded_with), None)
     if tied is not None:
         names = (tied.cause.id, *tied.confounded_with)

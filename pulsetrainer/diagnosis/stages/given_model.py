@@ -3,8 +3,8 @@
 So far the weights were refitted; now the model is judged as it was given, by what it predicts for these
 records.
 
-- If the output falls where the model rises, the polarity is reversed: `condition-change`, and all else is
-  withdrawn.
+- If the output, of all records or of one, falls where the model rises, the polarity is reversed:
+  `condition-change`, and all else is withdrawn.
 - If a mere function of the velocity describes the output much better, the model is of the wrong kind: causes
   sought on top of it are withdrawn. If the speed matters and not only the direction, the force is `viscous`;
   else the cause is `unknown`.
@@ -21,7 +21,7 @@ What the raw data show stays, and so does what equal loops show, unless the mode
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,10 +73,11 @@ def stage(state: State) -> State:
     span = state.scale.span
     noise = span * state.floor_left.noise
     quick = span * state.floor.quick.noise  # what averages do not have: slow noise is in both
-    turned = condition_change.turned_over(judged.measured, judged.predicted, noise)
-    if turned is not None and turned.left < judged.speed.velocity:
-        state, more = _in_another_condition(withdrawn(state), turned, judged.polarity)
-        return replace(state, evidence=(*said, *more, *state.evidence))
+    for record, one in _whole_and_each(judged, state):
+        turned = condition_change.turned_over(one.measured, one.predicted, noise)
+        if turned is not None and turned.left < one.speed.velocity:
+            state, more = _in_another_condition(withdrawn(state), turned, judged.polarity, record)
+            return replace(state, evidence=(*said, *more, *state.evidence))
     if judged.speed.wrong:
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
@@ -126,6 +127,19 @@ def _judged(state: State, given: Given) -> _Judged:
         velocity.compare(core, steps, residuals),
         model.polarity,
     )
+
+
+def _whole_and_each(judged: _Judged, state: State) -> Iterator[tuple[int | None, _Judged]]:
+    """Yield all records, then each of several with its number: of two one may be turned over."""
+    yield None, judged
+    if len(judged.records) == 1:
+        return
+    steps = [r.dt_s for r in (state.scale.restored(record) for record in state.problem.records)]
+    for k, (record, left, step) in enumerate(zip(judged.records, judged.residuals, steps, strict=True)):
+        kept = record.sample_weight > 0
+        measured, speed = record.output[kept], velocity.compare([record], [step], [left])
+        predicted = measured - left[kept]
+        yield k, _Judged([record], [left], measured, predicted, speed, judged.polarity)
 
 
 def _brought_near(state: State, judged: _Judged, noise_rms: float) -> bool:
@@ -204,7 +218,9 @@ def _of_another_kind(state: State, judged: _Judged) -> State:
     )
 
 
-def _in_another_condition(state: State, changed: Change, polarity: int) -> tuple[State, list[Evidence]]:
+def _in_another_condition(
+    state: State, changed: Change, polarity: int, record: int | None = None
+) -> tuple[State, list[Evidence]]:
     """Put the change of condition first; withdraw what only repairs the rest of it."""
     said = []
     if changed.is_everything:
@@ -217,7 +233,7 @@ def _in_another_condition(state: State, changed: Change, polarity: int) -> tuple
             said.append(Evidence("overshadowed", figures=figures, names=gone))
             state = cleared
     if state.verdict != _CHANGED:
-        seen = _evidence(changed, polarity)
+        seen = replace(_evidence(changed, polarity), record=record)
         said.append(seen)
         state = _first(state, _finding(changed, polarity, seen))
     return state, said
