@@ -76,7 +76,9 @@ def _files_in(folder: Path) -> str:
     """Return a hint with the first few files of a folder that was given in place of a file."""
     files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
     sound = list(islice((str(path) for path in files if is_sound(path)), 5))
-    return f"name a file in it: {', '.join(sound)}" if sound else "name another: it holds no file that can be read"
+    if not sound:
+        return "name another: it holds no file that can be read"
+    return f"name a file in it: {', '.join(sound)}"
 
 
 def _names_in(folder: Path, path: Path) -> str:
