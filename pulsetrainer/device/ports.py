@@ -113,8 +113,8 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
         present = ", ".join(p.device for p in list_ports()) or "none"
         return DeviceError(
             f"there is no port {port} (ports here: {present})",
-            hint="check the cable, then `pulsetrainer ports`; without a device use --port bench:, over a network "
-            "socket://host:port",
+            hint="check the cable, then `pulsetrainer ports`; without a device use --port bench:, over a "
+            "network socket://host:port",
         )
     if number in {errno.ENOTTY, errno.EINVAL, errno.EISDIR}:
         return DeviceError(

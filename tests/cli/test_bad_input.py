@@ -318,7 +318,7 @@ def test_a_hint_names_the_files_that_were_given(ready):
     shutil.copy(KEPT / "diagnosis.h5", ready / "why not.h5")
     for words, hint in (
         (("invert", "normal", "--model", "mine.h5", "-o", "x.h5"), "identify run.h5 -o mine.h5"),
-        (("capture", "identification", "-o", "x.h5", "--live=yes"), "pulsetrainer capture --help"),
+        (("capture", "identification", "-o", "x.h5", "--levels=many"), "pulsetrainer capture --help"),
         (("correct", "absent.h5", "--diagnosis", "why not.h5", "-o", "x.h5"), "run.h5"),
     ):
         assert hint in pulsetrainer(ready, *words, "--json").json["error"]["hint"]
