@@ -24,11 +24,11 @@ TEXTS: Mapping[str, str] = {
     ),
     "tested": (
         "noise alone looks like it with a probability of {p:.3f}. It accounts for {explains:.1f} % of the "
-        "squared error beyond noise. What gives it away: {signature}."
+        "squared error beyond noise. {signature}."
     ),
     "tested, small": (
         "noise alone looks like it with a probability of {p:.3f}. How much of the error it is cannot be "
-        "told: all of it is no more than noise and levels may leave. What gives it away: {signature}."
+        "told: all of it is no more than noise and levels may leave. {signature}."
     ),
     "extended": "With these causes in the model, {left:.3f} % of the span remains (rms of short averages).",
     "would have shown": (
@@ -89,6 +89,11 @@ TEXTS: Mapping[str, str] = {
         "The change accounts for {share:.2f} % of the squared error. Adding {names} would only reduce the "
         "remainder, {left:.2g} % of the span: too little to be named."
     ),
+}
+# What a cause is known by; whether the records lack what shows it
+SIGNATURES: Mapping[bool, str] = {
+    False: "What gives it away: {mark}",
+    True: "What would give it away cannot all be seen here: {mark}",
 }
 # Where an error is largest, by the quantity that it was sorted by
 PLACES: Mapping[str, str] = {
@@ -159,8 +164,8 @@ ADVICE: Mapping[str, str] = {
         "diagnose the corrected recording with that model, and extend it."
     ),
     "conditions": (
-        "The recordings are of different conditions, such as load, zero or gain: see which of them the model "
-        "predicts (pulsetrainer evaluate), put the others right, or identify a model of each condition."
+        "The recordings are of different conditions, such as load, zero or gain: the evidence tells which of "
+        "them the model as given predicts. Put the others right, or identify a model of each condition."
     ),
     "repair": "No model can hold this: put right what was found, and record again.",
     "other model": (
@@ -174,6 +179,7 @@ ADVICE: Mapping[str, str] = {
 DOUBTS: Mapping[str, str] = {
     "predicts worse": "with it, parts of the recordings that were left out are predicted worse",
     "does not repeat": "it fits, but does not repeat: it is not added to the model",
+    "not added": "so it is not added to the model",
     "wanders": "what is left wanders still, so it may be a piece of that: it is neither added nor taken out",
     "predicts little": (
         "on parts of the recordings that were left out it takes away less than half of what could be, as "
@@ -181,7 +187,12 @@ DOUBTS: Mapping[str, str] = {
     ),
     "spans zero": "its strength may be nothing, as the interval spans zero",
     "no equal loops": "no minor loop was traced three times in equal time, which alone would show it",
-    "at bound": "a parameter is at the end of the range that was searched",
+    "at bound": "a parameter, or the interval of one, is at the end of the range that was searched",
+    "strength at bound": "its strength is at the end of the range that was searched, so it is another thing",
+    "own error": (
+        "with one rate and no rest it looks like what the model lacks of the device, and it explains little "
+        "more than that"
+    ),
 }
 OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o diagnostic.h5."
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``Bench.numbers``
@@ -300,7 +311,7 @@ def text(one: Evidence, words: Mapping[str, str] | None = None) -> str:
         **one.figures,
         "names": _listed(one.names, known),
         "limits": _joined([f"{name} {size:.2g}" for name, size in sorted(one.figures.items())]),
-        "signature": cause.signature if cause else "",
+        "signature": SIGNATURES[bool(one.names)].format(mark=cause.signature) if cause else "",
     }
     if one.kind == "largest":
         figures["way"] = WAYS.get(one.figures["at"], "")

@@ -230,6 +230,10 @@ def test_a_model_goes_on_in_the_condition_of_the_first_record():
     model = pt.identify(first)
     found = pt.diagnose([first, replace(clean, output=1.02 * clean.output + 1.0)], model)
     assert [one.cause for one in found.found] == ["output-lag", "condition-change"]
+    agrees, differs = (one for one in found.evidence if "the model as given is off" in one)
+    assert ("record 1: " in agrees, "record 2: " in differs) == (True, True)
+    assert "has 1.0" in agrees
+    assert "has 1.02" in differs
     plain, extended = pt.evaluate(clean, [model, pt.extend(model, found)]).models
     assert extended.rms_percent < 0.3 * plain.rms_percent
     assert extended.rms_percent < 1.5 * extended.shape_rms_percent

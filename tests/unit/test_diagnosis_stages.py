@@ -863,7 +863,8 @@ TAU = Estimate("tau", 0.02, "s", 0.01, 0.03)
         (0.9, (0.01, 0.03), 0.02, ()),
         (-0.27, (0.01, 0.03), 0.02, ("predicts worse",)),
         (0.9, (0.0, 0.03), 0.02, ("spans zero",)),
-        (0.9, (0.01, 0.5), 0.5, ("at bound",)),
+        (0.9, (0.01, 0.5), 0.5, ("strength at bound",)),
+        (0.9, (0.01, 0.5), 0.3, ("at bound",)),
         (-0.1, (0.0, 0.0), 0.0, ("predicts worse", "spans zero", "at bound")),
     ],
 )
@@ -881,6 +882,35 @@ def test_what_speaks_against_a_cause_is_written_beside_it(monkeypatch, gain, int
     (found,) = rivals.stage(state).findings
     assert found.doubts == doubts
     assert all(len(wording.DOUBTS[one]) > 10 for one in doubts)
+
+
+@pytest.mark.parametrize(
+    ("name", "lacks", "squares", "doubted"),
+    [
+        ("creep", (residual.RATES, residual.HOLDS), 974.0, True),  # 1.5 squared times the 300 that are left
+        ("creep", (residual.RATES, residual.HOLDS), 976.0, False),
+        ("creep", (residual.RATES,), 974.0, False),
+        ("creep", (residual.HOLDS,), 974.0, False),
+        ("clock-skew", (residual.RATES, residual.HOLDS), 974.0, False),
+    ],
+)
+def test_at_one_rate_without_rests_a_cause_must_be_larger_than_what_is_left(
+    monkeypatch, name, lacks, squares, doubted
+):
+    """There it looks like what a model lacks of the device; a fault of the measurement does not."""
+    monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
+    monkeypatch.setattr(residual, "wander", lambda *_: 0.0)
+    state = _state(
+        _fit(300.0, name),
+        lacks=lacks,
+        without={name: _fit(squares)},
+        p_values={name: 0.006},
+        estimates={name: (TAU,)},
+        held_out=HeldOut(0.9),
+    )
+    (found,) = (one for one in rivals.stage(state).findings if one.found)
+    assert (rivals.OWN_ERROR in found.doubts) is doubted
+    assert found.in_doubt is doubted
 
 
 @pytest.mark.parametrize(("one_point", "doubts"), [((-0.1, 0.3), ("spans zero",)), ((0.1, 0.3), ())])
@@ -1164,6 +1194,15 @@ def test_each_cause_found_brings_its_evidence(monkeypatch):
     ]  # fmt: skip
     assert found[1].figures == {"p": 0.005, "explains": 20.0}
     assert found[-1].names == ("rates",)
+    assert "cannot all be seen here: relaxation" in wording.sentence(found[1], {})
+
+
+def test_what_the_records_show_is_cited_as_seen(monkeypatch):
+    """A length that is lacking hides no mark, and a step has the same one at any rate."""
+    for name, lacks in (("creep", ()), ("creep", ("length",)), ("step", ("rates", "holds"))):
+        findings = (_finding(name, 20.0),)
+        found = _accounted(monkeypatch, verdict=name, findings=findings, lacks=lacks)
+        assert "What gives it away: " in wording.sentence(found[1], {})
 
 
 TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
@@ -1273,6 +1312,8 @@ def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, 
     after = repetition.stage(_state(_fit(500.0, "creep", "viscous"), findings=findings))
     assert [one.found for one in after.findings] == [True, found]
     assert after.repeated.names == (("creep",) if not beside else ())
+    # what is in doubt for another reason was never asked whether it repeats
+    assert after.findings[1].doubts == (rivals.MAY_BE_NOTHING, repetition.NOT_ADDED)
 
 
 @pytest.mark.parametrize(("larger", "found"), [(1.0, True), (1e4, False)])

@@ -66,6 +66,10 @@ class ConditionChange(Cause):
             "leave {left:.2g}{in_y} rms. The sensor or the coil is connected the other way round, or the "
             "model is of another device. Identify it again"
         ),
+        "each": (
+            "the model as given is off by {given:.2g} % of the span (rms); against it the {output} is "
+            "shifted by {shift:+.2g}{in_y} on average and has {times:.3f} times the gain"
+        ),
     }
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
@@ -143,7 +147,7 @@ def turned_over(measured: FloatArray, predicted: FloatArray, noise_rms: float) -
 
     Weights are not negative, so refitted ones cannot describe it: a negative gain stands in their place.
     """
-    gain, offset = _fit(measured, predicted)
+    gain, offset = carried(measured, predicted)
     left = left_by(measured, gain * predicted + offset, noise_rms)
     # of an output that is all noise nothing is left, and nothing can be told
     if gain >= 0.0 or left >= _REFITTED * left_by(measured, measured.mean(), noise_rms):
@@ -154,9 +158,9 @@ def turned_over(measured: FloatArray, predicted: FloatArray, noise_rms: float) -
 def _carried_over(
     measured: FloatArray, predicted: FloatArray, refitted_rms: float, given_rms: float
 ) -> Change:
-    gain, offset = _fit(measured, predicted)
+    gain, offset = carried(measured, predicted)
     parts = np.array_split(np.arange(measured.size), _BLOCKS)
-    without = np.stack([_fit(np.delete(measured, p), np.delete(predicted, p)) for p in parts])
+    without = np.stack([carried(np.delete(measured, p), np.delete(predicted, p)) for p in parts])
     spread = np.sqrt(_BLOCKS - 1) * without.std(axis=0)
     return Change(
         float(gain - 1.0),
@@ -170,7 +174,7 @@ def _carried_over(
     )
 
 
-def _fit(measured: FloatArray, predicted: FloatArray) -> FloatArray:
+def carried(measured: FloatArray, predicted: FloatArray) -> FloatArray:
     """Gain and offset (2,) that carry the prediction over to the measurement."""
     middle = float(predicted.mean())
     about = predicted - middle

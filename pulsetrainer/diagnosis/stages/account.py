@@ -16,6 +16,7 @@ import numpy as np
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.residual import LENGTH
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -26,7 +27,7 @@ def stage(state: State) -> State:
     levels = {"left": percent * state.baseline.rms, "floor": percent * state.floor_rms}
     said = [Evidence("static", figures=levels)]
     beyond = state.baseline.squares > state.floor.squares
-    said += [_of(finding, beyond=beyond) for finding in state.findings if finding.found]
+    said += [_of(state, finding, beyond=beyond) for finding in state.findings if finding.found]
     said += [
         Evidence("background", finding.cause.id, {one.name: one.value for one in finding.parameters})
         for finding in state.findings
@@ -55,13 +56,17 @@ def stage(state: State) -> State:
     return replace(state, evidence=(*state.evidence, *said))
 
 
-def _of(finding: Finding, *, beyond: bool) -> Evidence:
-    """What speaks for one cause; its share of the error only where there is one ``beyond`` noise."""
+def _of(state: State, finding: Finding, *, beyond: bool) -> Evidence:
+    """What speaks for one cause; its share of the error only where there is one ``beyond`` noise.
+
+    What tells a cause of the device from others is not cited of records without the rates or rests for it.
+    """
     if finding.seen is not None:
         return finding.seen
     assert finding.p_value is not None
     figures = {"p": finding.p_value, "explains": finding.explains_percent}
-    return Evidence("tested" if beyond else "tested, small", finding.cause.id, figures)
+    lacks = tuple(one for one in state.lacks if one != LENGTH) if finding.cause.lasting else ()
+    return Evidence("tested" if beyond else "tested, small", finding.cause.id, figures, lacks)
 
 
 def _not_accepted(state: State) -> Iterator[Evidence]:

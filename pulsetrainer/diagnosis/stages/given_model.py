@@ -90,7 +90,22 @@ def stage(state: State) -> State:
     if changed is not None and not _brought_near(state, judged, noise):
         state, more = _far_off(state, judged, changed, noise)
         said += more
+    if any(one.found and one.seen is None for one in state.findings if one.cause.id == _CHANGED):
+        said += _each_against(judged)
     return replace(state, evidence=(*said, *state.evidence))
+
+
+def _each_against(judged: _Judged) -> Iterator[Evidence]:
+    """Yield how far each record is from the model as given: which of them differ from it, and how."""
+    for k, (record, left) in enumerate(zip(judged.records, judged.residuals, strict=True)):
+        kept = record.sample_weight > 0
+        measured, error = record.output[kept], left[kept]
+        figures = {
+            "given": PERCENT * left_by(error, 0.0, 0.0) / float(np.ptp(measured)),
+            "shift": judged.polarity * float(np.mean(error)),
+            "times": condition_change.carried(measured, measured - error)[0],
+        }
+        yield Evidence("each", _CHANGED, figures, record=k)
 
 
 def _judged(state: State, given: Given) -> _Judged:

@@ -24,21 +24,22 @@ from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
-DOUBT = "does not repeat"
+DOUBT, NOT_ADDED = "does not repeat", "not added"
 
 
 def stage(state: State) -> State:
     """Return the state with the causes that do not repeat, and the model without them."""
     kept = state.current
     asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
-    told = {one.cause.id for one in asked if one.in_doubt}
-    once = told or _weakest(state, kept)
+    told: dict[str, str] = {one.cause.id: NOT_ADDED for one in asked if one.in_doubt}
+    once = set(told) or _weakest(state, kept)
     while once:
-        told |= once
+        told = {**dict.fromkeys(once, DOUBT), **told}
         kept = refit(state.problem, [t for t in kept.terms if t.cause.id not in once], kept)
         once = _weakest(state, kept)
     findings = tuple(
-        replace(one, doubts=(*one.doubts, DOUBT)) if one.cause.id in told else one for one in state.findings
+        replace(one, doubts=(*one.doubts, told[one.cause.id])) if one.cause.id in told else one
+        for one in state.findings
     )
     findings = tuple(replace(one, found=one.found and not _is_nothing(state, one)) for one in findings)
     current = state.current if any(one.found for one in findings) else state.baseline

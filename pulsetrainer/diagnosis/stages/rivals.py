@@ -8,29 +8,34 @@ here: equal loops differ by nothing else that is known.
 
 What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
 than the model without it, the interval of its strength (of a learned curve: of all its points) spans zero,
-a parameter sits on its bound, it is slow and what is left still wanders from one tenth of the time to the
-next, it is slow, belongs to the record, and all causes together take away less than half of what can be
-lowered on blocks that were left out (which a device of another kind leaves), or only equal loops would show
-it and there are none.
+a parameter or its interval ends where the search did, or its very strength sits there; it is slow and what is
+left still wanders from one tenth of the time to the next, it is slow, belongs to the record, and all causes
+together take away less than half of what can be lowered on blocks that were left out (which a device of
+another kind leaves), only equal loops would show it and there are none, or the record has one rate and no
+rest, where any cause looks like what a model lacks of the device, and it explains little more than that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
-from pulsetrainer.diagnosis.finding import Finding
+from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
+OWN_ERROR, STRONGEST, AT_BOUND = "own error", "strength at bound", "at bound"
 MAY_BE_NOTHING = "spans zero"
 
 
@@ -76,11 +81,35 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         if not cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
             yield LITTLE
     strengths = cause.strengths_of(known)
-    if strengths and all(one.lower <= 0 <= one.upper for one in strengths):
+    nothing = bool(strengths) and all(one.lower <= 0 <= one.upper for one in strengths)
+    if nothing:
         yield MAY_BE_NOTHING
+    if cause.lasting and not cause.by_contrast and _may_be_own_error(state, fall):
+        yield OWN_ERROR
     bounds = cause.quantities(state.problem.frames[0])
-    if any(value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)):
-        yield "at bound"
+    at_end = [value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)]
+    if any(at_end[: cause.strengths]) and not nothing:
+        yield STRONGEST
+    elif any(at_end) or _is_cut(state, known, bounds):
+        yield AT_BOUND
+
+
+def _may_be_own_error(state: State, fall: float) -> bool:
+    """Whether a fall of the squares is little more than what is left, on records of one rate without rests.
+
+    There all that takes time follows the input, as what a model lacks of a device does.
+    """
+    poor = {residual.RATES, residual.HOLDS} <= set(state.lacks)
+    return poor and fall < LIMITS.own_error**2 * state.current.squares
+
+
+def _is_cut(state: State, known: Sequence[Estimate], bounds: Sequence[Quantity]) -> bool:
+    """Whether an interval ends where the search did; an end of zero is the cause's own."""
+    return any(
+        end != 0 and np.isclose(one, end * state.scale.of_unit(bound.unit), rtol=1e-9, atol=0.0)
+        for own, bound in zip(known, bounds, strict=False)
+        for one, end in ((own.lower, bound.low), (own.upper, bound.high))
+    )
 
 
 def _equal_loops(state: State) -> bool:
