@@ -190,8 +190,8 @@ DOUBTS: Mapping[str, str] = {
     "at bound": "a parameter, or the interval of one, is at the end of the range that was searched",
     "strength at bound": "its strength is at the end of the range that was searched, so it is another thing",
     "own error": (
-        "with one rate and no rest it looks like what the model lacks of the device, and it explains little "
-        "more than that"
+        "with one rate and no rest it looks like what the model lacks of the device, and what is left is "
+        "nearly as large, or more than noise"
     ),
 }
 OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o diagnostic.h5."

@@ -855,6 +855,7 @@ def test_at_one_rate_all_that_widen_the_loop_are_one(monkeypatch):
 
 
 TAU = Estimate("tau", 0.02, "s", 0.01, 0.03)
+POOR = (residual.RATES, residual.HOLDS)
 
 
 @pytest.mark.parametrize(
@@ -885,23 +886,24 @@ def test_what_speaks_against_a_cause_is_written_beside_it(monkeypatch, gain, int
 
 
 @pytest.mark.parametrize(
-    ("name", "lacks", "squares", "doubted"),
+    ("name", "lacks", "left", "squares", "doubted"),
     [
-        ("creep", (residual.RATES, residual.HOLDS), 974.0, True),  # 1.5 squared times the 300 that are left
-        ("creep", (residual.RATES, residual.HOLDS), 976.0, False),
-        ("creep", (residual.RATES,), 974.0, False),
-        ("creep", (residual.HOLDS,), 974.0, False),
-        ("clock-skew", (residual.RATES, residual.HOLDS), 974.0, False),
+        ("creep", POOR, 120.0, 389.0, True),  # a fall of 1.5 squared times what is left
+        ("creep", POOR, 120.0, 391.0, False),
+        ("creep", POOR, 140.0, 9000.0, True),  # more than the floor of 100 and four times the relevant 9
+        ("creep", (residual.RATES,), 120.0, 389.0, False),
+        ("creep", (residual.HOLDS,), 120.0, 389.0, False),
+        ("clock-skew", POOR, 120.0, 389.0, False),
     ],
 )
 def test_at_one_rate_without_rests_a_cause_must_be_larger_than_what_is_left(
-    monkeypatch, name, lacks, squares, doubted
+    monkeypatch, name, lacks, left, squares, doubted
 ):
     """There it looks like what a model lacks of the device; a fault of the measurement does not."""
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
     monkeypatch.setattr(residual, "wander", lambda *_: 0.0)
     state = _state(
-        _fit(300.0, name),
+        _fit(left, name),
         lacks=lacks,
         without={name: _fit(squares)},
         p_values={name: 0.006},

@@ -12,7 +12,8 @@ a parameter or its interval ends where the search did, or its very strength sits
 left still wanders from one tenth of the time to the next, it is slow, belongs to the record, and all causes
 together take away less than half of what can be lowered on blocks that were left out (which a device of
 another kind leaves), only equal loops would show it and there are none, or the record has one rate and no
-rest, where any cause looks like what a model lacks of the device, and it explains little more than that.
+rest, where any cause looks like what a model lacks of the device, and it explains little more than what is
+left, or that is more than noise.
 """
 
 from __future__ import annotations
@@ -95,12 +96,14 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
 
 
 def _may_be_own_error(state: State, fall: float) -> bool:
-    """Whether a fall of the squares is little more than what is left, on records of one rate without rests.
+    """Whether a cause may be what the model lacks of the device, on records of one rate without rests.
 
-    There all that takes time follows the input, as what a model lacks of a device does.
+    There all that takes time follows the input, as that does: a fall of the squares must be much larger than
+    what is left, and what is left be noise.
     """
-    poor = {residual.RATES, residual.HOLDS} <= set(state.lacks)
-    return poor and fall < LIMITS.own_error**2 * state.current.squares
+    if not {residual.RATES, residual.HOLDS} <= set(state.lacks):
+        return False
+    return fall < LIMITS.own_error**2 * state.current.squares or not state.is_whole(state.current)
 
 
 def _is_cut(state: State, known: Sequence[Estimate], bounds: Sequence[Quantity]) -> bool:
