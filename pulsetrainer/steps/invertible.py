@@ -62,16 +62,25 @@ def major_loop(low: float, high: float, rate_Hz: float) -> FloatArray:
 def invertible(model: Model, rate_Hz: float) -> Invertible:
     """Return the part of a model that can be inverted; DataError where branches of a signed one never are."""
     whole = operator_of(model)
-    loop = major_loop(whole.low, whole.high, rate_Hz)
-    inverse: Callable[[FloatArray], inversion.Inverse]
     if isinstance(whole, Dual):
-        inverse = partial(whole.inverse, lead=loop)
-    elif whole.signed:
+        return _recorded(whole, model, rate_Hz)
+    loop = major_loop(whole.low, whole.high, rate_Hz)
+    if whole.signed:
         return _within(whole, model, loop, rate_Hz)
-    else:
-        inverse = partial(inversion.invert, whole)
     low, high = sorted(whole.saturation)
+    inverse = partial(inversion.invert, whole)
     return Invertible(whole, whole.low, whole.high, (low, high), whole.polarity, loop, np.zeros(0), inverse)
+
+
+def _recorded(whole: Dual, model: Model, rate_Hz: float) -> Invertible:
+    """Return a dual model within the inputs that it was fitted to: its own ends follow from the weights."""
+    seen = model.fit.input if model.fit is not None and model.fit.input.size else np.array([-np.inf, np.inf])
+    low, high = max(whole.low, float(np.min(seen))), min(whole.high, float(np.max(seen)))
+    loop = major_loop(low, high, rate_Hz)
+    outputs = whole(loop)
+    below, above = sorted((float(outputs[np.argmax(loop)]), float(outputs[-1])))
+    inverse = partial(whole.inverse, lead=loop)
+    return Invertible(whole, low, high, (below, above), whole.polarity, loop, np.zeros(0), inverse)
 
 
 def _within(whole: Preisach, model: Model, loop: FloatArray, rate_Hz: float) -> Invertible:
