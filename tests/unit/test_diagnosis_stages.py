@@ -894,6 +894,7 @@ def test_what_speaks_against_a_cause_is_written_beside_it(monkeypatch, gain, int
         ("creep", (residual.RATES,), 120.0, 389.0, False),
         ("creep", (residual.HOLDS,), 120.0, 389.0, False),
         ("clock-skew", POOR, 120.0, 389.0, False),
+        ("clock-skew", POOR, 140.0, 9000.0, False),
     ],
 )
 def test_at_one_rate_without_rests_a_cause_must_be_larger_than_what_is_left(

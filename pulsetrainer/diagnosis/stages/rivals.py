@@ -25,7 +25,7 @@ import numpy as np
 
 from pulsetrainer.diagnosis import residual
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Quantity
+from pulsetrainer.diagnosis.causes.base import Cause, Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
@@ -85,7 +85,7 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
     nothing = bool(strengths) and all(one.lower <= 0 <= one.upper for one in strengths)
     if nothing:
         yield MAY_BE_NOTHING
-    if cause.lasting and not cause.by_contrast and _may_be_own_error(state, fall):
+    if _may_be_own_error(state, cause, fall):
         yield OWN_ERROR
     bounds = cause.quantities(state.problem.frames[0])
     at_end = [value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)]
@@ -95,15 +95,17 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         yield AT_BOUND
 
 
-def _may_be_own_error(state: State, fall: float) -> bool:
+def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:
     """Whether a cause may be what the model lacks of the device, on records of one rate without rests.
 
     There all that takes time follows the input, as that does: a fall of the squares must be much larger than
     what is left, and what is left be noise.
     """
-    if not {residual.RATES, residual.HOLDS} <= set(state.lacks):
+    if cause.by_contrast or not {residual.RATES, residual.HOLDS} <= set(state.lacks):
         return False
-    return fall < LIMITS.own_error**2 * state.current.squares or not state.is_whole(state.current)
+    if not state.is_whole(state.current):
+        return cause.lasting or cause.drifts  # a drift or step may be a piece of it as well
+    return cause.lasting and fall < LIMITS.own_error**2 * state.current.squares
 
 
 def _is_cut(state: State, known: Sequence[Estimate], bounds: Sequence[Quantity]) -> bool:
