@@ -888,6 +888,7 @@ def test_what_speaks_against_a_cause_is_written_beside_it(monkeypatch, gain, int
 @pytest.mark.parametrize(
     ("name", "lacks", "left", "squares", "doubted"),
     [
+        ("creep", (*POOR, "quick noise"), 120.0, 389.0, False),
         ("creep", POOR, 120.0, 389.0, True),  # a fall of 1.5 squared times what is left
         ("creep", POOR, 120.0, 391.0, False),
         ("creep", POOR, 140.0, 9000.0, True),  # more than the floor of 100 and four times the relevant 9
@@ -903,9 +904,11 @@ def test_at_one_rate_without_rests_a_cause_must_be_larger_than_what_is_left(
     """There it looks like what a model lacks of the device; a fault of the measurement does not."""
     monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
     monkeypatch.setattr(residual, "wander", lambda *_: 0.0)
+    monkeypatch.setattr(State, "in_bursts", False)
     state = _state(
         _fit(left, name),
         lacks=lacks,
+        floor=replace(FLOOR, sampled=(FLOOR.white / (2.9 if "quick noise" in lacks else 3.1)) ** 2),
         without={name: _fit(squares)},
         p_values={name: 0.006},
         estimates={name: (TAU,)},

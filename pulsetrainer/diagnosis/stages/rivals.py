@@ -13,7 +13,7 @@ left still wanders from one tenth of the time to the next, it is slow, belongs t
 together take away less than half of what can be lowered on blocks that were left out (which a device of
 another kind leaves), only equal loops would show it and there are none, or the record has one rate and no
 rest, where any cause looks like what a model lacks of the device, and it explains little more than what is
-left, or that is more than noise.
+left and slow, or that is more than noise.
 """
 
 from __future__ import annotations
@@ -105,7 +105,8 @@ def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:
         return False
     if not state.is_whole(state.current):
         return cause.lasting or cause.drifts  # a drift or step may be a piece of it as well
-    return cause.lasting and fall < LIMITS.own_error**2 * state.current.squares
+    slow = state.floor.slow > LIMITS.slow_noise  # noise from sample to sample is no error of a model
+    return cause.lasting and slow and fall < LIMITS.own_error**2 * state.current.squares
 
 
 def _is_cut(state: State, known: Sequence[Estimate], bounds: Sequence[Quantity]) -> bool:
