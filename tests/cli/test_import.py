@@ -307,7 +307,7 @@ def test_a_large_file_is_streamed(tmp_path):
             "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024)\n"
         )
         command = [sys.executable, "-c", program, sys.executable, "-m", "pulsetrainer", *words]
-        # left alone, glibc takes arrays of up to 32 MB from a heap with holes: 15 MB more, by chance of addresses
+        # left alone, glibc takes arrays of up to 32 MB from a heap with holes, by chance 15 MB more
         env = {**os.environ, "MALLOC_MMAP_THRESHOLD_": str(2**18)}
         done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=True)
         return path.stat().st_size, int(done.stdout.splitlines()[-1])
