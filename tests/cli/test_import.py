@@ -61,6 +61,16 @@ def test_units_come_from_the_header_and_milliseconds_become_seconds(run, tmp_pat
         np.testing.assert_allclose(file["output"][:3], [0.0, 0.2, 0.4])
 
 
+def test_a_unit_that_is_not_that_of_the_heading_is_said(run, tmp_path):
+    """The unit that is given counts, and the numbers are not converted; one letter for micro is another."""
+    (tmp_path / "scope.csv").write_text("t [s];u [V];y [um]\n" + "".join(f"{k};{k};{k}\n" for k in range(9)))
+    words = ["--input", "u", "--output", "y", "--input-unit", "A", "--output-unit", "\N{MICRO SIGN}m"]
+    done = run("import", "scope.csv", *words, "-o", "run.h5")
+    assert done.code == 0, done
+    assert "note: the heading 'u [V]' of scope.csv says V, and --input-unit A" in " ".join(done.err.split())
+    assert "y [um]" not in done.err
+
+
 def test_a_rate_replaces_the_time_column(run, tmp_path):
     """Without time stamps --rate gives them."""
     (tmp_path / "bare.csv").write_text("\n".join(f"{k % 7},{k % 5}" for k in range(30)))

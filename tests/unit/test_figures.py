@@ -399,8 +399,8 @@ def test_a_comparison_shows_what_became_worse_than_nothing():
 def test_a_long_name_of_the_input_fits_below_its_figure():
     """The label of an axis has more lines, and none goes beyond the figure."""
     group = np.linspace(0.01, 10.0, 6)
-    one = Profile("rate", "1/s", group, group, group, output_unit="um")
-    for name in ("Drive voltage", "Drive voltage of the amplifier in the other room"):
+    one = Profile("rate", "1/s", group, group / 1000, group / 1000, output_unit="um")
+    for name in ("Spannung", "Drive voltage", "Drive voltage of the amplifier in the other room"):
         figure = diagnosis_figures.profile(one, name, extended=True)
         FigureCanvasAgg(figure).draw()
         box = figure.axes[0].xaxis.label.get_window_extent()
