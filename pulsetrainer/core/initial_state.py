@@ -188,7 +188,5 @@ def estimated_start(operator: Preisach | Dual, records: Sequence[Record]) -> tup
 
 
 def _squares(operator: Preisach | Dual, record: Record, state: State) -> float:
-    """Weighted sum of squared errors of the samples that count, from a state."""
-    counts = record.sample_weight > 0
-    left = operator(record.input, state)[counts] - record.output[counts]
-    return float(record.sample_weight[counts] @ left**2)
+    """Weighted sum of squared errors from a state."""
+    return float(record.sample_weight @ (operator(record.input, state) - record.fitted_output) ** 2)

@@ -68,7 +68,7 @@ def rivals(records: Sequence[Record], low: float, high: float) -> Rivals | None:
     ConvergenceError where a fit did not settle.
     """
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
-    counted = [np.flatnonzero(r.sample_weight > 0) for r in records]
+    counted = [np.flatnonzero(r.counts) for r in records]
     every = max(1, sum(at.size for at in counted) // _MOST)
     kept = [at[::every] for at in counted]
     rows = np.concatenate([_states(plane, r, at) for r, at in zip(records, kept, strict=True)])

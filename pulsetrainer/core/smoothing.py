@@ -225,7 +225,7 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
     if len(held_out) < 2:
         raise ArgumentError(
             "smoothing='auto' holds out blocks of a record, but the "
-            f"{sum(np.count_nonzero(r.sample_weight) for r in records)} samples that count lie in one block",
+            f"{sum(np.count_nonzero(r.counts) for r in records)} samples that count lie in one block",
             hint="give smoothing as a number",
         )
     error = _HeldOut(held_out, reading, signed=signed)
@@ -242,7 +242,7 @@ def _memory_of_residual(records: Sequence[Record], plane: Plane, reading: Readin
     gram, rhs = smoothed(equations, _PILOT)
     masses = nnls.solve_signed(gram, rhs) if signed else nnls.solve(gram, rhs).x
     operator = Preisach(plane, masses / plane.areas, equations.offset(masses), reading, signed=signed)
-    return correlation_time([(r.output - operator(r.input, r.start))[r.sample_weight > 0] for r in records])
+    return correlation_time([(r.output - operator(r.input, r.start))[r.counts] for r in records])
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,7 +264,7 @@ class _Cut:
         for fold, operator in operators.items():
             here = folds == fold
             left[here] = (operator.traced(self.path) - self.record.output)[here]
-        counted = np.where(self.record.sample_weight > 0, left, 0.0)
+        counted = np.where(self.record.counts, left, 0.0)
         return np.bincount(self.block, self.record.sample_weight * counted**2).astype(np.float64)
 
 
