@@ -12,6 +12,7 @@ import numpy as np
 
 from pulsetrainer.artefacts.data import BoolArray, Data, FloatArray, check_equal_length, check_time
 from pulsetrainer.artefacts.shown import Shown
+from pulsetrainer.artefacts.time_steps import behind_turns
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +87,36 @@ class Run(Shown):
         return hashlib.sha256(b"".join(np.asarray(one, "<f8").tobytes() for one in measured)).hexdigest()
 
     @property
+    def unseen_turns(self) -> list[int]:
+        """Samples before which the input may have turned, in a gap of the time stamps within a part."""
+        if self.time_s is None:
+            return []
+        parts = pairwise([0, *self._seams, self.input.size])
+        return [k + at for k, end in parts for at in behind_turns(self.time_s[k:end], self.input[k:end])]
+
+    @property
+    def _seams(self) -> list[int]:
+        return [] if self.seam is None else (np.flatnonzero(self.seam[1:]) + 1).tolist()
+
+    @property
+    def gap_words(self) -> str:
+        """Say in how many gaps the input may have turned, and what follows; empty: in none."""
+        number = len(self.unseen_turns)
+        if not number:
+            return ""
+        plural = "s" if number > 1 else ""
+        return (
+            f"the input may have turned unseen in {number} gap{plural} of the time stamps: "
+            "what is behind counts from where the input next reaches an end, which makes its memory known"
+        )
+
+    @property
     def slices(self) -> tuple[slice, ...]:
-        """The uninterrupted parts, as slices of the samples."""
-        if self.seam is None or not np.any(self.seam):
+        """The uninterrupted parts, as slices of the samples: a seam parts them, and an unseen turn."""
+        edges = sorted([*self._seams, *self.unseen_turns])
+        if not edges:
             return (slice(None),)
-        edges = [0, *np.flatnonzero(self.seam[1:]) + 1, self.seam.size]
-        return tuple(slice(start, stop) for start, stop in pairwise(edges))
+        return tuple(slice(start, stop) for start, stop in pairwise([0, *edges, self.input.size]))
 
     def cut(self, part: slice) -> Run:
         """Return one uninterrupted part as a run."""
@@ -102,11 +127,13 @@ class Run(Shown):
         """Return the uninterrupted parts of ``at_least`` so many samples; the run itself where there is none.
 
         After a seam the device had been off: what is slow in it (heat, creep) does not go on where it was.
-        Each part begins at the low end of the input, so that its memory is known.
+        Each such part begins at the low end of the input, so that its memory is known; behind an unseen turn
+        it is known from where the input next reaches an end.
         """
-        if len(self.slices) == 1:
+        slices = self.slices
+        if len(slices) == 1:
             return (self,)
-        parts = map(self.cut, self.slices)
+        parts = map(self.cut, slices)
         return tuple(one for one in parts if one.input.size >= at_least) or (self,)
 
 

@@ -57,6 +57,9 @@ _MICRO = re.compile(rf"(?<![A-Za-zΩµ])u(?=(?:{_OF_MICRO})(?![A-Za-zΩµ]))|\N{
 _EXPONENT = re.compile(r"(?:\^|\*\*)?(?P<exponent>[-+]?\d)$|(?P<raised>[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹])$")
 _SEPARATOR = re.compile(r"\s*[*·/×]\s*|\s+|(?<=[A-Za-zΩµ])\.(?=[A-Za-zΩµ])")
 _BRACKETED = re.compile(r"^(?P<name>.*?)\s*/?\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()\[\]]*)\))\s*$")
+# as circuit simulators write a voltage of a node or between two, and a current of an element or its pin
+_OF_A_PART = re.compile(r"(?P<what>[Vv]|i|I[bcdegsx]?)\((?!t\))(?P<part>[\w:.,]+)\)")
+_NO_PART = 4  # letters of a unit: ``counts`` is hardly the name of a node, ``in`` and ``g`` are
 _MARK = re.compile(r"\s*[/,]\s*|\s+in\s+")
 _SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,12})$")
 _POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -125,8 +128,10 @@ def split_unit(heading: str) -> tuple[str, str]:
     """Return name and unit of a column heading; no unit where it says none.
 
     What stands in brackets at its end is a unit, known or not. Behind a slash, a comma or the word "in" it
-    is one if it is known: ``B/T`` is, ``A/B`` and ``H/V ratio`` are names.
+    is one if it is known: ``B/T`` is, ``A/B`` and ``H/V ratio`` are names. ``V(in)`` is a voltage of a node.
     """
+    if unit := _unit_of_a_part(heading):
+        return heading, unit
     if (found := _BRACKETED.match(heading)) and found["name"]:
         return found["name"].strip(), (found["square"] or found["round"] or "").strip()
     found = _SUFFIXED.match(heading)
@@ -139,6 +144,15 @@ def split_unit(heading: str) -> tuple[str, str]:
         if name and name[-1] not in "/," and unit != "1" and is_unit(symbol_of(unit)):
             return name, unit
     return heading, ""
+
+
+def _unit_of_a_part(heading: str) -> str:
+    """Return V or A of ``V(in)``, ``I(L1)`` or ``Ic(Q1)``; empty of ``V(mV)`` and all else."""
+    found = _OF_A_PART.fullmatch(heading)
+    if found is None:
+        return ""
+    unit, inner = ("A" if found["what"][0] in "Ii" else "V"), symbol_of(found["part"])
+    return "" if is_unit(inner) and (inner.endswith(unit) or len(inner) >= _NO_PART) else unit
 
 
 def _stands_alone(text: str) -> bool:

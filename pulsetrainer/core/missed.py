@@ -68,9 +68,13 @@ def elsewhere(known: Path, missed: FloatArray, new: Path) -> tuple[FloatArray, F
 
 
 def told_by_the_rest(known: Path, missed: FloatArray, part: IntArray) -> float:
-    """Share of what is missed (m,), in squares, that each part (m,) of a path is told by the other parts."""
+    """Share of what is missed (m,), in squares, that each part (m,) of a path is told by the other parts.
+
+    Where nothing is missed all of it is told.
+    """
     expected = np.empty_like(missed)
     for number in np.unique(part):
         held = part == number
         expected[held], _ = elsewhere(known[~held], missed[~held], known[held])
-    return 1.0 - float(np.sum((missed - expected) ** 2) / np.sum(missed**2))
+    left, all_of_it = float(np.sum((missed - expected) ** 2)), float(np.sum(missed**2))
+    return 1.0 - left / all_of_it if all_of_it > 0 else 1.0

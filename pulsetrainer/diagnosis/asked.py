@@ -50,6 +50,8 @@ def question_of(
             corrected.append(run.corrected)
             words = first_stroke_words(record.input, record.output, low, high)
             notes += [f"{name}: {words}"] if words else []
+        if run.gap_words:
+            notes.append(f"{name}: {run.gap_words}")
         if not run.complete:
             notes.append(f"{name} is incomplete; diagnosing the {run.input.size} samples it has")
     ours = all(

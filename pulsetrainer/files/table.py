@@ -153,7 +153,7 @@ def numbered(names: Sequence[str]) -> tuple[str, ...]:
     for k, name in enumerate(names):
         if names.count(name) > 1:
             bare, unit = split_unit(name)
-            behind = f" [{unit}]" if bare == unit else name.removeprefix(bare)
+            behind = f" [{unit}]" if unit and bare == name else name.removeprefix(bare)
             found.append(f"{bare}#{names[: k + 1].count(name)}{behind}")
         else:
             found.append(name)

@@ -61,7 +61,7 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
         "samples": run.input.size,
         "seconds": float(run.time_s[-1] - run.time_s[0]) if run.time_s is not None and steps else None,
         "rate_Hz": 1.0 / steps.median if steps else None,
-        "gaps": gaps_of(parts).number if steps else None,
+        "gaps": gaps_of(run.time_s, run.seam).number if steps else None,
         **({"parts": len(parts)} if len(parts) > 1 else {}),
         f"input ({run.input_quantity})": _span(run.input, run.input_unit),
         f"output ({run.output_quantity})": _span(run.output, run.output_unit),

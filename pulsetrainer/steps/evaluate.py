@@ -162,7 +162,7 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
 
 def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[str]) -> Evaluation:
     found: list[ModelEvaluation] = []
-    notes: list[str] = []
+    notes = [f"{name}: {run.gap_words}"] if run.gap_words else []
     for title, model in zip(model_names, models, strict=True):
         if not same_units((model.input_unit, model.output_unit), (run.input_unit, run.output_unit)):
             raise DataError(

@@ -106,6 +106,7 @@ def identify(
         for title, run in zip(titles, whole, strict=True)
         if not run.complete
     ]
+    notes += [f"{title}: {run.gap_words}" for title, run in zip(titles, whole, strict=True) if run.gap_words]
     titles, measured = _with_samples(titles, whole)
     raw = measured
     masked = [~part.counts for part in measured]

@@ -22,6 +22,7 @@ from pulsetrainer.errors import DataError, UsageError
 
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range
 _LOOKED_AT = 1_000_000  # samples; of a longer record every so many are looked at
+_LEAST = 2  # samples between two gaps: of fewer there is no step to resample
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +71,14 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
     """
     run, notes = joined(parts)
     report = report_of(run, resampled=resample is not None)
+    if run.gap_words:
+        notes = (*notes, f"{run.signal}: {run.gap_words}")
     if resample is not None:
+        signal = run.signal
         del run
         rate_Hz = None if resample == "even" else float(resample)
-        run, _ = joined([resampled(part, rate_Hz) for part in parts])
+        run, _ = joined([resampled(one, rate_Hz) for part in parts for one in part.parts(_LEAST)])
+        run = replace(run, signal=signal)
     return Imported(run, report, (*notes, *_still(run.signal, report), *_notes_on_time(run.signal, report)))
 
 
@@ -81,7 +86,7 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
     """Return what a run holds, in numbers."""
     timed = whole.time_s is not None
     steps = steps_of(whole.time_s) if whole.time_s is not None else None
-    gaps = gaps_of(whole.parts())
+    gaps = gaps_of(whole.time_s, whole.seam)
     low, high = float(whole.input.min()), float(whole.input.max())
     every = -(-whole.input.size // _LOOKED_AT)
     u, y = whole.input[::every], whole.output[::every]
@@ -127,7 +132,7 @@ def _still(name: str, report: Report) -> list[str]:
 def _notes_on_time(name: str, report: Report) -> list[str]:
     notes = []
     if report.gaps:
-        filled = ", filled with straight lines" if report.resampled else ""
+        filled = ", filled with straight lines where the input went on" if report.resampled else ""
         plural = "s" if report.gaps > 1 else ""
         longest = with_seconds(report.longest_gap_s or 0.0)
         notes.append(

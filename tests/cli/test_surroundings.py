@@ -69,4 +69,5 @@ def test_a_terminal_of_twenty_columns(there):
     assert len(facts) > 15
     assert max(map(len, facts)) <= 20
     evaluated = on_terminal(there, "evaluate", "played.h5", COLUMNS="20", TERM="dumb").decode()
-    assert "mean error, compensated" in evaluated
+    assert max(len(line.rstrip("\r")) for line in evaluated.splitlines()) <= 20
+    assert "mean error, compensated" in " ".join(evaluated.split())

@@ -171,3 +171,13 @@ def test_a_time_that_makes_no_sense_is_refused(tmp_path, rows):
     assert done.code == 3
     assert done.json["error"]["hint"]
     assert not (tmp_path / "r.h5").exists()
+
+
+def test_a_record_of_a_circuit_simulator_is_in_volts_and_amperes(tmp_path):
+    """``V(in)`` is no length in inches; a column that is there twice keeps its unit."""
+    rows = [[k * 1e-3, u, u, u + k % 3] for k, u in enumerate(TRIANGLE)]
+    _written(tmp_path / "a.csv", rows, header="time,V(in),V(in),I(L1)")
+    words = ("--input", "V(in)#1", "--output", "I(L1)")
+    assert pulsetrainer(tmp_path, "import", "a.csv", *words, "-o", "a.h5").code == 0
+    run = store.read(tmp_path / "a.h5", Run)
+    assert (run.input_unit, run.output_unit, run.output_quantity) == ("V", "A", "I(L1)")

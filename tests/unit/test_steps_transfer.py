@@ -79,6 +79,7 @@ def test_what_one_path_says_of_another():
     rests = part == 4  # a part that moves nothing tells nothing, and takes nothing from what the others tell
     held = Path(np.where(rests, 0.0, wide.rate), np.where(rests[:, None], wide.relays[0], wide.relays))
     assert told_by_the_rest(held, 0.01 - 0.004 * held.rate + 0.02 * held.relays.mean(axis=1), part) > 0.95
+    assert told_by_the_rest(wide, 0.0 * missed, part) == 1.0  # nothing is missed: all of it is told
     _, less = elsewhere(narrow, missed, wide)
     assert less.mean() > 3 * variance.mean()
     assert np.all(variance <= same.variance)

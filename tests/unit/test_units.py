@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pint
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from pulsetrainer.artefacts.units import (
@@ -105,11 +105,26 @@ def test_pint_knows_them_too(text):
 )
 def test_a_heading_is_a_quantity_and_a_unit_however_they_are_parted(name, written, unit):
     """Only brackets make a unit of what is none: behind anything else the heading is a name."""
+    assume((name, written) != ("I", "{}({})"))  # a current of an element
     heading = written.format(name, unit)
     if (is_unit(symbol_of(unit)) and unit != "1") or written[-1] in ")]":
         assert split_unit(heading) == (name, unit)
     else:
         assert split_unit(heading) == (heading, "")
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [(one, one, "V") for one in ("V(in)", "V(n001)", "v(out)", "V(g)", "V(a,b)", "V(x1:m3)", "V(1)")]
+    + [(one, one, "A") for one in ("I(L1)", "I(V1)", "i(l1)", "Ic(Q1)", "Ix(u1:IN)", "I(min)")]
+    + [("V(mV)", "V", "mV"), ("V(V)", "V", "V"), ("I(A)", "I", "A"), ("I(kA)", "I", "kA"), ("T(K)", "T", "K")]
+    + [("v(mm/s)", "v", "mm/s"), ("V(counts)", "V", "counts"), ("V(volts)", "V", "volts"), ("v(t)", "v", "t")]
+    + [("u (V)", "u", "V"), ("V (in)", "V", "in"), ("V[in]", "V", "in"), ("force(N)", "force", "N")]
+    + [("Voltage (mV)", "Voltage", "mV"), ("in(N)", "in", "N"), ("U(in)", "U", "in"), ("I(%)", "I", "%")],
+)
+def test_a_circuit_simulator_writes_a_voltage_of_a_node(heading, name, unit):
+    """What stands in its brackets is a node or an element, unless it is a unit of voltage or current."""
+    assert split_unit(heading) == (name, unit)
 
 
 def test_units_of_time_are_as_long_as_pint_says():
