@@ -170,6 +170,24 @@ _WORDS_OF_A_TIRED_HAND = {
             "--pulses normal,bifid",
         ),
     ),
+    "one dash": (
+        *("session --model model.h5 -o out.h5 -rate 100", 2, "no option -rate", "did you mean --rate"),
+    ),
+    "one option twice": (
+        *("diagnose run.h5 --model model.h5 --model model.h5 -o out.h5", 2),
+        *("--model was given 2 times", "give it once"),
+    ),
+    "models with a comma": (
+        *("evaluate run.h5 --model model.h5,model.h5", 3, "(--model)", "--model model.h5 --model model.h5"),
+    ),
+    "runs with a comma": (
+        *("diagnose run.h5,run.h5 --model model.h5 -o out.h5", 3, "(argument ", "one by one: run.h5 run.h5"),
+    ),
+    "a file behind a switch": ("check model.h5 --update out.h5", 2, "got out.h5", "--update -o out.h5"),
+    "a drive for a session": (
+        *("session --model model.h5 drive.h5 -o out.h5", 2, "got drive.h5", "a model is an option"),
+    ),
+    "a drive refined over itself": ("refine drive.h5 -o drive.h5", 2, "drive.h5 (-o)", "--overwrite"),
     "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),
 }
 
@@ -209,6 +227,9 @@ INSIDE = {
         ("import", "empty.csv", "-o", "out.h5"), 2, "empty.csv is empty", "export"
     ),
     "a run without a model": Mistake(("evaluate", "run.h5"), 2),
+    "a model without its option": Mistake(
+        ("evaluate", "run.h5", "--model", "model.h5", "model.h5"), 3, "got a model", "a --model of its own"
+    ),
     "a playback and a run": Mistake(("evaluate", "played.h5", "run.h5"), 2),
     "a playback with a model": Mistake(("evaluate", "played.h5", "--model", "model.h5"), 2),
     "no extended inverse": Mistake(

@@ -5,14 +5,15 @@ from __future__ import annotations
 import contextlib
 import difflib
 import shlex
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperOption
 
 from pulsetrainer.cli.next_step import to_make, with_files
-from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError
+from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError
 from pulsetrainer.files.input_file import is_sound, near_names
 from pulsetrainer.files.pulses import library
 
@@ -42,11 +43,28 @@ _TABLES = {
     "waveform": "name a pulse of the library, such as normal, or give a table with a column of time "
     "and one of values",
 }
+_WHOLE = 200  # letters, more than any first sentence has
 _NEAR = 0.7  # how alike a name must be to be taken for the one that was meant
 
 
 class Command(TyperCommand):
     """A command that names the argument of a file, and says what there is after Ctrl-C."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse; UsageError where an option of one file was given twice: the first would be lost."""
+        _, _, order = self.make_parser(ctx).parse_args(list(args))
+        options = [one for one in order if isinstance(one, TyperOption) and not one.multiple]
+        for name, times in Counter(one.opts[-1] for one in options if one.type.name == "path").items():
+            if times > 1:
+                raise UsageError(
+                    f"{name} was given {times} times, and takes one file",
+                    hint="give it once, or run the command once for each",
+                )
+        return super().parse_args(ctx, args)
+
+    def get_short_help_str(self, limit: int = 45) -> str:
+        """Return the first sentence of the help, whole: a narrow terminal folds it."""
+        return super().get_short_help_str(max(limit, _WHOLE))
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command.
@@ -69,7 +87,7 @@ class Command(TyperCommand):
                 stopped.hint = "run the command again" + (" with --overwrite" if written else "")
             raise stopped from error
         except (AbsentError, ExistsError) as error:
-            given = _given_as(ctx, error.path)
+            given = _given_as(ctx, error.path, to_write=isinstance(error, ExistsError))
             if given is not None:
                 _name(error, given, ctx)
             error.hint = with_files(error.hint, ctx.params)
@@ -88,8 +106,9 @@ def _files(context: typer.Context) -> dict[Path, int]:
     return {}
 
 
-def _given_as(context: typer.Context, path: Path) -> Any:
-    for parameter in context.command.params:
+def _given_as(context: typer.Context, path: Path, *, to_write: bool) -> Any:
+    """Return the parameter that names a file; of a file named twice, the one it is read or written by."""
+    for parameter in context.command.params[:: -1 if to_write else 1]:
         value = context.params.get(parameter.name or "")
         given = value if isinstance(value, list | tuple) else (value,)
         if any(isinstance(one, str | Path) and Path(one) == path for one in given):
@@ -117,6 +136,9 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         return
     if isinstance(error, ExistsError) or kinds is None or not folder.is_dir():
         return
+    if hint := _several(error.path, given, option) or _cut_off(error.path):
+        error.hint = hint
+        return
     where = "here" if folder == Path() else f"in {folder}"
     near = [shlex.quote(str(error.path.with_name(name))) for name in near_names(error.path, kinds)]
     if near:
@@ -127,3 +149,19 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         error.hint = f"there is no {' or '.join(kinds)} file {where}; {instead}"
     else:
         error.hint = f"there is no .h5 file of pulsetrainer {where}: give the path of one"
+
+
+def _several(path: Path, given: Any, option: str) -> str:
+    """Say how several files are given where they were written as one, with commas between them."""
+    files = [Path(name) for name in str(path).split(",")]
+    if len(files) < 2 or not all(file.is_file() for file in files):
+        return ""
+    if not given.multiple and given.nargs != -1:
+        return "name one file"
+    return "name them one by one: " + " ".join(f"{option} {shlex.quote(str(file))}".strip() for file in files)
+
+
+def _cut_off(path: Path) -> str:
+    """Name what a recording left that was cut off before it had this name; empty where there is none."""
+    left = path.with_name(f"{path.name}.partial")
+    return f"it was cut off: {shlex.quote(str(left))} holds what there is" if left.is_file() else ""

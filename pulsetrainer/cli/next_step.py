@@ -123,9 +123,9 @@ def with_files(text: str, parameters: Mapping[str, Any]) -> str:
 
 
 def _after_wrong_kind(problem: WrongKindError) -> str:
-    if problem.expected == ("playback", "run") and problem.found == "model":
+    if problem.expected[:2] == ("playback", "run") and problem.found == "model":
         given = shlex.quote(str(problem.path))
-        return f"a model goes with the run: pulsetrainer evaluate run.h5 --model {given}"
+        return f"each model goes behind a --model of its own: pulsetrainer evaluate run.h5 --model {given}"
     for kind in problem.expected:
         if (kind, problem.found) in _NEXT:
             return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))

@@ -147,7 +147,7 @@ def session(
             )
         job.would("press a session", planned, to_be_pressed(planned, job.limits.force_N))
         return
-    said = "a session that was cut off: look with `pulsetrainer show {left}`, and delete it"
+    said = "a session that was cut off; its sheet: `pulsetrainer evaluate {left} --html sheet.html`"
     job.left_over(out, pt.Session, said)
     with job.open_device(loaded) as device, job.working("session") as progress, steered.screen:
 

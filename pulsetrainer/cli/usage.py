@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ _EXAMPLES = {
 }
 # what is often given as an argument to a command that has none of that kind
 _INSTEAD = {
-    "session": "several pulses are separated by commas: --pulses normal,bifid",
+    "session": "pulses are separated by commas, a model is an option: --pulses normal,bifid --model model.h5",
+    "check": "-o names the file that --update writes: pulsetrainer check model.h5 --update -o {extra}",
     "tune": "a drive is an option: pulsetrainer tune --drive {extra}",
     "ports": "to look at one: pulsetrainer doctor --port {extra}",
     "doctor": "a port is an option: pulsetrainer doctor --port {extra}",
@@ -33,10 +35,10 @@ _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 _NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*[^\d\s.,]*'$")
 
 
-def usage_of(error: Exception, named: str = "") -> UsageError | None:
+def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> UsageError | None:
     """Return what the parser objects to, or None when the error is not the parser's.
 
-    ``named`` is the command, which the parser does not always tell.
+    ``named`` is the command, which the parser does not always tell, and ``words`` is what was typed.
     """
     explain = getattr(error, "format_message", None)
     if explain is None:
@@ -46,8 +48,9 @@ def usage_of(error: Exception, named: str = "") -> UsageError | None:
     parameter: Any = getattr(error, "param", None)
     kind, help_ = type(error).__name__, f"{command} --help"
     if kind == "NoSuchOption":
-        near = _alike(str(getattr(error, "option_name", "")), context)
-        said = f"{command} has no option {getattr(error, 'option_name', '')}"
+        given = _as_typed(str(getattr(error, "option_name", "")), words)
+        near = _alike(given, context)
+        said = f"{command} has no option {given}"
         return UsageError(said, hint=f"did you mean {' or '.join(near)}?" if near else help_)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
@@ -65,6 +68,13 @@ def usage_of(error: Exception, named: str = "") -> UsageError | None:
         if kind == "BadOptionUsage"
         else _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
     )
+
+
+def _as_typed(option: str, words: Sequence[str]) -> str:
+    """Return an option as it was typed: of ``-rate`` the parser tells ``-r`` alone."""
+    if len(option) != 2:
+        return option
+    return next((word.partition("=")[0] for word in words if word.startswith(option)), option)
 
 
 def _alike(given: str, context: Any) -> list[str]:

@@ -96,11 +96,9 @@ def minor_coverage(plane: Plane, inputs: Sequence[ArrayLike], noise: float = 0.0
 def _mark_corners(plane: Plane, turns: FloatArray, noise: float, passed: NDArray[np.bool_]) -> None:
     """Mark the cells (n_h, n_h) that corners of the memory pass, rising first, from negative saturation."""
     inwards = min(noise, 0.5 * float(np.diff(plane.edges).min())) * np.where(np.arange(turns.size) % 2, 1, -1)
-    bands = np.searchsorted(plane.edges, turns + inwards, side="right") - 1
-    bands = np.clip(bands, 0, plane.n_h - 1).tolist()
-    last = plane.n_h - 1
+    bands = np.searchsorted(plane.edges[1:-1], turns + inwards, side="right").tolist()
     # remembered extremes and their bands; the outermost of both kinds are those of saturation
-    maxima, minima = [(np.inf, last)], [(-np.inf, 0)]
+    maxima, minima = [(np.inf, plane.n_h - 1)], [(-np.inf, 0)]
     at = 0  # band that has been reached
     for k, one in enumerate(zip(turns.tolist(), bands, strict=True)):
         if k % 2 == 0:

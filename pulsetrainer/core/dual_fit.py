@@ -57,9 +57,9 @@ def in_output(inner: Preisach, records: Sequence[Record], smoothing: float) -> P
     ConvergenceError
         A fit did not settle.
     """
-    counted = sum(int(np.count_nonzero(r.sample_weight)) for r in records)
+    counted = sum(int(np.count_nonzero(r.counts)) for r in records)
     every = max(1, counted // _MOST)
-    kept = [np.flatnonzero(r.sample_weight > 0)[::every] for r in records]
+    kept = [np.flatnonzero(r.counts)[::every] for r in records]
     measured = np.concatenate([r.output[at] for r, at in zip(records, kept, strict=True)])
     found, before = inner, np.inf
     for _ in range(_ROUNDS):

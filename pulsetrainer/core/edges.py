@@ -36,7 +36,7 @@ def variation(records: Sequence[Record], low: float, high: float, bins: int) -> 
     ends = np.linspace(low, high, bins + 1)
     total = np.zeros(bins)
     for record in records:
-        kept = record.sample_weight > 0
+        kept = record.counts
         u, y = record.input[kept], record.output[kept]
         if u.size < 2:
             continue

@@ -33,7 +33,7 @@ class Signal:
     @property
     def reversals(self) -> int:
         """Number of times the signal turns."""
-        return max(turning_points(self.value).size - 1, 0)
+        return turning_points(self.value)[:-1].size
 
 
 def check_size(times: int, samples: float, most: int = MOST_SAMPLES) -> None:

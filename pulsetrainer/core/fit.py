@@ -54,7 +54,7 @@ class Fitted:
 
     def counted(self, values: Sequence[FloatArray]) -> list[FloatArray]:
         """Those of the values (n,) of each record whose samples count in the fit."""
-        return [x[r.sample_weight > 0] for x, r in zip(values, self.records, strict=True)]
+        return [x[r.counts] for x, r in zip(values, self.records, strict=True)]
 
     @property
     def counted_output(self) -> FloatArray:

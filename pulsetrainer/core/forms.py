@@ -108,12 +108,12 @@ def try_all(signals: Signals, low: float, high: float) -> Tried:
     ConvergenceError where a fit did not settle.
     """
     records = [record_of(u, y, low, high) for u, y in signals]
-    folds = [np.where(r.sample_weight > 0, blocks(r.input, low, high) % FOLDS, -1) for r in records]
+    folds = [np.where(r.counts, blocks(r.input, low, high) % FOLDS, -1) for r in records]
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
     if len({number for fold in folds for number in np.unique(fold).tolist()} - {-1}) < 2:
         return Tried({}, "direct", ("direct",))  # nothing can be held out
     direct, signed = (_HeldOut(records, folds, plane, signed=either) for either in (False, True))
-    span = float(np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in records])))
+    span = float(np.ptp(np.concatenate([r.output[r.counts] for r in records])))
     left: dict[Form, float] = {"direct": direct(_FIRST), "signed": signed(_FIRST)}
     # the dual form too is rarely much worse as a signed one than by itself
     if left["direct"] < SMALLEST * span or left["signed"] > LOOK * left["direct"]:

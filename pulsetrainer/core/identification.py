@@ -59,8 +59,8 @@ class Identified:
 
 def correlation_of(records: Sequence[Record]) -> float:
     """Return the correlation of input and output, -1..1; 0 where one of them does not vary."""
-    u = np.concatenate([r.input[r.sample_weight > 0] for r in records])
-    y = np.concatenate([r.output[r.sample_weight > 0] for r in records])
+    u = np.concatenate([r.input[r.counts] for r in records])
+    y = np.concatenate([r.output[r.counts] for r in records])
     # both scaled to 1 first: the product of two small numbers must not underflow
     u, y = (
         x / max(float(np.abs(x).max(initial=0.0)), np.finfo(float).tiny) for x in (u - u.mean(), y - y.mean())
@@ -186,7 +186,7 @@ def _most_dense() -> int:
 
 def _span(records: Sequence[Record]) -> float:
     """Span of the output over all samples that count."""
-    return float(np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in records])))
+    return float(np.ptp(np.concatenate([r.output[r.counts] for r in records])))
 
 
 def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = "continuous") -> FloatArray:
@@ -198,7 +198,7 @@ def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = 
 
     ConvergenceError where the fit did not settle.
     """
-    told = np.asarray([np.any(r.sample_weight > 0) for r in records])
+    told = np.asarray([np.any(r.counts) for r in records])
     if not told.all():  # what has no sample that counts has no offset
         offsets = np.zeros(len(records))
         offsets[told] = offsets_between([records[k] for k in np.flatnonzero(told).tolist()], plane, reading)
@@ -227,7 +227,7 @@ def offsets_between(records: Sequence[Record], plane: Plane, reading: Reading = 
 
 def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: Smoothing) -> int:
     """Return the number of samples that count, or raise ArgumentError when they cannot be fitted."""
-    samples = sum(int(np.count_nonzero(r.sample_weight)) for r in records)
+    samples = sum(int(np.count_nonzero(r.counts)) for r in records)
     if samples == 0:
         raise ArgumentError(
             f"records must hold at least one sample that counts, got none in {len(records)} records",
@@ -240,7 +240,7 @@ def _check(records: Sequence[Record], plane: Plane, method: Method, smoothing: S
             f"smoothing must be 'auto' or a number in 0..1, got {smoothing!r}", hint="use 'auto'"
         )
     inputs = np.concatenate([np.clip(r.input, plane.low, plane.high) for r in records])
-    outputs = np.concatenate([r.output[r.sample_weight > 0] for r in records])
+    outputs = np.concatenate([r.output[r.counts] for r in records])
     for name, values in (("input", inputs), ("output", outputs)):
         if np.ptp(values) <= 1e-12 * np.abs(values).max():
             raise ArgumentError(

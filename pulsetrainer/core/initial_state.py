@@ -40,7 +40,7 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
     this is seen, and the memory is known from where it next reaches an end. The same goes for an end of the
     input's own range, where what lies beyond may be switched by the first stroke alone.
     """
-    ends = _near_ends(inputs, low, high)
+    ends = near_ends(inputs, low, high)
     begin = int(ends[0]) if ends.size else first_extreme(inputs)[0]
     if outputs is None or (ends.size and begin > 0):
         return begin
@@ -130,16 +130,16 @@ def _stroke(away: FloatArray, outputs: FloatArray, reach: float) -> tuple[FloatA
 def first_extreme(inputs: FloatArray) -> tuple[int, bool]:
     """First sample (n,) that is ``NEAR`` an end of the input's own range, and whether that is the top."""
     bottom, top = float(inputs.min()), float(inputs.max())
-    at = int(_near_ends(inputs, bottom, top)[0])
+    at = int(near_ends(inputs, bottom, top)[0])
     return at, bool(inputs[at] >= top - NEAR * (top - bottom))
 
 
 def reaches_an_end(inputs: FloatArray, low: float, high: float) -> bool:
     """Tell whether an input (n,) comes ``NEAR`` an end of [low, high], so that its memory becomes known."""
-    return _near_ends(inputs, low, high).size > 0
+    return near_ends(inputs, low, high).size > 0
 
 
-def _near_ends(inputs: FloatArray, low: float, high: float) -> IntArray:
+def near_ends(inputs: FloatArray, low: float, high: float) -> IntArray:
     """Samples (k,) at which an input (n,) is ``NEAR`` an end of [low, high]."""
     near = NEAR * (high - low)
     return np.flatnonzero((inputs <= low + near) | (inputs >= high - near))
@@ -188,7 +188,5 @@ def estimated_start(operator: Preisach | Dual, records: Sequence[Record]) -> tup
 
 
 def _squares(operator: Preisach | Dual, record: Record, state: State) -> float:
-    """Weighted sum of squared errors of the samples that count, from a state."""
-    counts = record.sample_weight > 0
-    left = operator(record.input, state)[counts] - record.output[counts]
-    return float(record.sample_weight[counts] @ left**2)
+    """Weighted sum of squared errors from a state."""
+    return float(record.sample_weight @ (operator(record.input, state) - record.fitted_output) ** 2)

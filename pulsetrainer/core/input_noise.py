@@ -116,7 +116,7 @@ def clean(values: ArrayLike, sigma: float | None = None) -> Cleaned:
     """
     u = finite_vector("input", values)
     noise = estimate(u) if sigma is None else sigma
-    reversals = max(turning_points(u).size - 1, 0)
+    reversals = turning_points(u)[:-1].size
     if not noise > 0:
         return Cleaned(u, noise, 0.0, 0, reversals)
     band = dead_band(noise, u.size)
@@ -124,7 +124,7 @@ def clean(values: ArrayLike, sigma: float | None = None) -> Cleaned:
     if turns.size >= reversals:  # every turn is a real one
         return Cleaned(u, noise, band, 0, reversals)
     smooth = monotone_between(u, turns, noise)
-    left = max(turning_points(smooth).size - 1, 0)  # monotone between real turns, so fewer than before
+    left = turning_points(smooth)[:-1].size  # monotone between real turns, so fewer than before
     return Cleaned(smooth, noise, band, reversals - left, left)
 
 

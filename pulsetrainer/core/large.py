@@ -107,7 +107,7 @@ def _newton(
 def _reach(x: FloatArray, dx: FloatArray) -> float:
     """Longest step in 0..1 along ``dx`` that keeps ``x`` from falling below zero."""
     falling = dx < 0
-    return float(min(1.0, (x[falling] / -dx[falling]).min(initial=1.0)))
+    return float((x[falling] / -dx[falling]).min(initial=1.0))
 
 
 class _Problem:

@@ -96,7 +96,7 @@ class Trace:
         """Sum ``steps`` (m, ...) from the root to each node, in log2(depth) vectorised passes."""
         total = steps.copy()
         jump = self.parent.copy()
-        while np.any(jump != 0):
+        while jump.any():
             total += total[jump]
             jump = jump[jump]
         return total

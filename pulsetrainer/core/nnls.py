@@ -105,12 +105,22 @@ class Gram:
         except ConvergenceError:
             pass
         try:
-            return _active_set(self.matrix, rhs, max_iterations)
+            return self._active_set(rhs, max_iterations)
         except RuntimeError:
             # a record of one branch only: no cell is better than its neighbours
-            ridge = _LAST_RIDGE * float(np.diagonal(self.matrix).max(initial=0.0))
-            raised = Gram(self.matrix + ridge * np.diag(np.diagonal(self.matrix) > 0))
+            ridge = _LAST_RIDGE * self.scale
+            raised = Gram(self.matrix + ridge * np.diag(self.usable))
             return _exchange(_Problem(raised, rhs), passive, max_iterations)
+
+    def _active_set(self, rhs: FloatArray, used: int) -> NonNegative:
+        """Minimise |A x - b|^2 / 2 with A'A = G and A'b = f, A from the eigenvectors of G (rank, q)."""
+        x = np.zeros(rhs.size)
+        value, vector = scipy.linalg.eigh(self.matrix[np.ix_(self.usable, self.usable)])
+        kept = value > _RELATIVE_RIDGE * value[-1]
+        root, vector = np.sqrt(value[kept]), vector[:, kept].T
+        b = (vector @ rhs[self.usable]) / root
+        x[self.usable], _ = scipy.optimize.nnls(root[:, None] * vector, b, maxiter=_ACTIVE_SETS * rhs.size)
+        return NonNegative(x, x > 0, used)
 
     def minimise(self, rhs: FloatArray, free: NDArray[np.bool_]) -> FloatArray:
         """Minimiser (q,) over the free variables (q,), of either sign, the others zero."""
@@ -155,16 +165,6 @@ def _exchange(problem: _Problem, passive: NDArray[np.bool_] | None, max_iteratio
             return _descend(problem, np.maximum(x, 0.0), iteration, max_iterations)
         free = free ^ wrong
     raise _unsettled(max_iterations)
-
-
-def _active_set(gram: FloatArray, rhs: FloatArray, used: int) -> NonNegative:
-    """Minimise |A x - b|^2 / 2 with A'A = G and A'b = f, A from the eigenvectors of G (rank, q)."""
-    value, vector = scipy.linalg.eigh(gram)
-    kept = value > _RELATIVE_RIDGE * value[-1]
-    root = np.sqrt(value[kept])
-    a = root[:, None] * vector[:, kept].T
-    x, _ = scipy.optimize.nnls(a, (vector[:, kept].T @ rhs) / root, maxiter=_ACTIVE_SETS * rhs.size)
-    return NonNegative(x, x > 0, used)
 
 
 class _Problem:

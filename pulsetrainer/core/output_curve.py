@@ -68,7 +68,7 @@ def rivals(records: Sequence[Record], low: float, high: float) -> Rivals | None:
     ConvergenceError where a fit did not settle.
     """
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
-    counted = [np.flatnonzero(r.sample_weight > 0) for r in records]
+    counted = [np.flatnonzero(r.counts) for r in records]
     every = max(1, sum(at.size for at in counted) // _MOST)
     kept = [at[::every] for at in counted]
     rows = np.concatenate([_states(plane, r, at) for r, at in zip(records, kept, strict=True)])
@@ -129,7 +129,7 @@ def _curve_over(masses: FloatArray, rows: FloatArray, y: FloatArray) -> _Curve:
     z = rows @ masses
     knots: FloatArray = np.linspace(float(z.min()), float(z.max()) + 1e-9, _KNOTS)
     share = (z - knots[0]) / (knots[1] - knots[0])
-    left = np.minimum(share.astype(np.int64), _KNOTS - 2)
+    left = share.astype(np.int64)  # the last knot lies beyond all
     hats = np.zeros((z.size, _KNOTS))
     sample = np.arange(z.size)
     hats[sample, left], hats[sample, left + 1] = 1.0 - (share - left), share - left

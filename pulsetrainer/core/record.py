@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pulsetrainer.core.memory import State
-from pulsetrainer.core.plane import FloatArray, finite_vector
+from pulsetrainer.core.plane import BoolArray, FloatArray, finite_vector
 from pulsetrainer.errors import ArgumentError
 
 
@@ -67,9 +67,14 @@ class Record:
         return 1.0 if self.dt_s is None else self.dt_s
 
     @property
+    def counts(self) -> BoolArray:
+        """Which samples (n,) count in a fit."""
+        return self.sample_weight > 0
+
+    @property
     def fitted_output(self) -> FloatArray:
         """The output (n,), zero where the sample weight is: what is left out may be anything, NaN too."""
-        return np.where(self.sample_weight > 0, self.output, 0.0)
+        return np.where(self.counts, self.output, 0.0)
 
 
 def levelled(records: Sequence[Record], sign: int = 1) -> tuple[list[Record], float]:
@@ -78,6 +83,6 @@ def levelled(records: Sequence[Record], sign: int = 1) -> tuple[list[Record], fl
     Sums of squares far from zero have no digits left for what the output does: a force of 1000 N that moves
     by 1 mN is fitted as well as one around zero only after its mean is taken off.
     """
-    counted = np.concatenate([r.output[r.sample_weight > 0] for r in records])
+    counted = np.concatenate([r.output[r.counts] for r in records])
     zero = sign * float(np.mean(counted)) if counted.size else 0.0
     return [replace(r, output=sign * r.output - zero) for r in records], zero

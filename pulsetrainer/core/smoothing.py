@@ -33,6 +33,7 @@ from pulsetrainer.core import nnls
 from pulsetrainer.core.correlation import correlation_time
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.equations import NodeSums, NormalEquations, normal_equations, parted_sums
+from pulsetrainer.core.initial_state import near_ends
 from pulsetrainer.core.memory import Trace
 from pulsetrainer.core.operator import Preisach, follow
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane, Reading
@@ -177,10 +178,9 @@ def blocks(inputs: FloatArray, low: float, high: float, count: int = BLOCKS) -> 
     n = inputs.size
     count = max(1, min(count, n // 2))
     cuts = np.arange(1, count) * n // count
-    near = 0.01 * (high - low)
-    ends = np.flatnonzero((inputs <= low + near) | (inputs >= high - near))
+    ends = near_ends(inputs, low, high)
     if ends.size:
-        right = np.clip(np.searchsorted(ends, cuts), 0, ends.size - 1)
+        right = np.minimum(np.searchsorted(ends, cuts), ends.size - 1)
         left = np.maximum(right - 1, 0)
         nearest = np.where(np.abs(ends[left] - cuts) < np.abs(ends[right] - cuts), ends[left], ends[right])
         cuts = np.where(np.abs(nearest - cuts) * 2 * count <= n, nearest, cuts)
@@ -225,7 +225,7 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
     if len(held_out) < 2:
         raise ArgumentError(
             "smoothing='auto' holds out blocks of a record, but the "
-            f"{sum(np.count_nonzero(r.sample_weight) for r in records)} samples that count lie in one block",
+            f"{sum(np.count_nonzero(r.counts) for r in records)} samples that count lie in one block",
             hint="give smoothing as a number",
         )
     error = _HeldOut(held_out, reading, signed=signed)
@@ -242,7 +242,7 @@ def _memory_of_residual(records: Sequence[Record], plane: Plane, reading: Readin
     gram, rhs = smoothed(equations, _PILOT)
     masses = nnls.solve_signed(gram, rhs) if signed else nnls.solve(gram, rhs).x
     operator = Preisach(plane, masses / plane.areas, equations.offset(masses), reading, signed=signed)
-    return correlation_time([(r.output - operator(r.input, r.start))[r.sample_weight > 0] for r in records])
+    return correlation_time([(r.output - operator(r.input, r.start))[r.counts] for r in records])
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,9 +263,8 @@ class _Cut:
         left, folds = np.zeros(self.block.size), self.fold
         for fold, operator in operators.items():
             here = folds == fold
-            left[here] = (operator.traced(self.path) - self.record.output)[here]
-        counted = np.where(self.record.sample_weight > 0, left, 0.0)
-        return np.bincount(self.block, self.record.sample_weight * counted**2).astype(np.float64)
+            left[here] = (operator.traced(self.path) - self.record.fitted_output)[here]
+        return np.bincount(self.block, self.record.sample_weight * left**2).astype(np.float64)
 
 
 class _HeldOut:

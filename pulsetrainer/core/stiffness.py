@@ -69,7 +69,7 @@ def choose_stiffness(records: Sequence[Record], plane: Plane, reading: Reading) 
     coarse = thinned(plane, _LEVELS)
     parts = []
     for record in records:
-        known = np.cumsum(record.sample_weight > 0)
+        known = np.cumsum(record.counts)
         parts.append((known > (1.0 - HELD_OUT) * known[-1]).astype(np.int64))
     fitted, held_out = (part.dense() for part in parted_sums(coarse, records, reading, parts, 2))
     if min(fitted.weight_sum, held_out.weight_sum) <= 0:

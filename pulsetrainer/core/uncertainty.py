@@ -130,7 +130,7 @@ def bootstrap(
             f"the bootstrap needs dense matrices, too large for {plane.n_h} levels", hint="use 48 levels"
         )
     turned, zero = levelled(records, sign)
-    left = [(r.fitted_output - operator(r.input, r.start))[r.sample_weight > 0] for r in records]
+    left = [(r.fitted_output - operator(r.input, r.start))[r.counts] for r in records]
     length = block or block_length(left)
     parts, count = _blocks(records, length)
     if count < 2:
@@ -154,7 +154,7 @@ def _blocks(records: Sequence[Record], length: int) -> tuple[list[IntArray], int
     """Numbers of the blocks of all samples, -1 where the weight is zero, and how many there are."""
     parts, count = [], 0
     for record in records:
-        fitted = record.sample_weight > 0
+        fitted = record.counts
         place = np.cumsum(fitted) - 1
         parts.append(np.where(fitted, count + place // length, -1).astype(np.int64))
         count += -(-int(fitted.sum()) // length)

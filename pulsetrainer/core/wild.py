@@ -74,7 +74,7 @@ def isolated(values: FloatArray) -> BoolArray:
 
 def _motion(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Steps (n,) of a signal (n,), and how large they are near by."""
-    step = np.abs(np.diff(values, prepend=values[0]))
+    step = np.abs(np.diff(values, prepend=values[:1]))
     return step, scipy.ndimage.percentile_filter(step, _FAST, size=_AROUND, mode="mirror")
 
 

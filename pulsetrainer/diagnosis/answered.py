@@ -46,9 +46,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     problem, model = state.problem, given.model
     scale = state.scale
     percent = PERCENT / float(np.ptp(problem.measured))
-    of_samples = PERCENT / float(
-        np.ptp(np.concatenate([r.output[r.sample_weight > 0] for r in problem.records]))
-    )
+    of_samples = PERCENT / float(np.ptp(np.concatenate([r.output[r.counts] for r in problem.records])))
     rms, extended = rms_of(state, model), state.current if state.extends else state.baseline
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
@@ -147,7 +145,7 @@ def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = ()) -> flo
         if stamps is not None:
             said = np.interp(stamps, np.arange(said.size) * even.step, said)
         fault = faults[k] if faults else 0.0
-        errors.append((said + fault - own.output)[masked.sample_weight > 0])
+        errors.append((said + fault - own.output)[masked.counts])
     return root_mean_square(np.concatenate(errors))
 
 

@@ -74,7 +74,7 @@ def loops_of(records: Sequence[Record], low: float, high: float) -> list[Loop]:
             inside = top < high - LIMITS.loop_same * reach and bottom > low + LIMITS.loop_same * reach
             if wide > LIMITS.loop_narrowest * reach and closed and inside:
                 whole = slice(int(at[j]), int(at[j + 2]) + 1)
-                if np.all(record.sample_weight[whole] > 0):
+                if np.all(record.sample_weight[whole]):
                     found.append((k, int(at[j]), int(at[j + 1]), int(at[j + 2]), float(bottom), float(top)))
     kinds: list[tuple[float, float, float]] = []
     loops = []

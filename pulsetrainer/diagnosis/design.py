@@ -154,7 +154,7 @@ def bins_of(records: Sequence[Record]) -> Bins:
     numbers, record, time, widths, count = [], [], [], [], 0
     for k, r in enumerate(records):
         per_bin = max(1, round(width / r.step))
-        raw = np.where(r.sample_weight > 0, np.arange(r.input.size) // per_bin, -1)
+        raw = np.where(r.counts, np.arange(r.input.size) // per_bin, -1)
         used, inverse = np.unique(raw, return_inverse=True)
         first = int(used[0] == -1)
         numbers.append(np.where(raw >= 0, inverse - first + count, -1).astype(np.int64))

@@ -68,6 +68,6 @@ def static_behind(found: Fitted, known: Sequence[Term], model: Model, scale: Sca
         passing = float(np.mean(shown - kept_by))
         y = model.polarity * scale.outputs(record.output - (shown - inner) + passing)
         signals.append((u, y))
-        kept.append(record.sample_weight > 0)
+        kept.append(record.counts)
     operator, form = operator_of(model), cast("Form", model.form)
     return fit(signals, operator.low, operator.high, model.levels, form=form, kept=kept)

@@ -74,7 +74,7 @@ def problem_for(
     """
     bins = bins_of(records)
     measured = bins.average([r.output for r in records])
-    moved = np.concatenate([np.clip(r.input[r.sample_weight > 0], low, high) for r in records])
+    moved = np.concatenate([np.clip(r.input[r.counts], low, high) for r in records])
     if np.ptp(measured) == 0 or np.ptp(moved) == 0:
         what = "output" if np.ptp(measured) == 0 else "input"
         raise DataError(
@@ -95,8 +95,8 @@ def problem_for(
 
 def _ends(records: Sequence[Record], low: float, high: float) -> tuple[float, float]:
     """Mean outputs near both ends of the input's range, or as near as the records come to them."""
-    u = np.concatenate([r.input[r.sample_weight > 0] for r in records])
-    y = np.concatenate([r.output[r.sample_weight > 0] for r in records])
+    u = np.concatenate([r.input[r.counts] for r in records])
+    y = np.concatenate([r.output[r.counts] for r in records])
     near = LIMITS.near_end * (high - low)
     bottom = y[u <= max(low, float(u.min())) + near]
     top = y[u >= min(high, float(u.max())) - near]

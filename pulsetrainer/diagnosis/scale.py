@@ -102,7 +102,7 @@ class Scale:
 
 def scale_of(records: Sequence[Record], low: float, high: float, second: float) -> Scale:
     """Return the scale of some records: gates have looked at them, and what they masked has no weight."""
-    y = np.concatenate([r.output[r.sample_weight > 0] for r in records])
+    y = np.concatenate([r.output[r.counts] for r in records])
     bottom, top = np.quantile(y, LIMITS.span_quantiles) if y.size else (0.0, 0.0)
     span = float(top - bottom) or (float(np.ptp(y)) if y.size else 0.0) or 1.0
     return Scale(low, high - low, float(np.mean(y)) if y.size else 0.0, span, second)

@@ -48,7 +48,7 @@ def compare(
         Time step of each record, s; None where only the order of the samples is known: the direction of
         motion then takes the place of the velocity.
     """
-    kept = [r.sample_weight > 0 for r in records]
+    kept = [r.counts for r in records]
     output = np.concatenate([r.output[k] for r, k in zip(records, kept, strict=True)])
     left = np.concatenate([e[k] for e, k in zip(residuals, kept, strict=True)])
     timed = all(step is not None for step in dt_s)

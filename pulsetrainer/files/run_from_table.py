@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import FloatArray, Run
-from pulsetrainer.artefacts.units import SECONDS, check_unit, claimed_unit, split_unit, symbol_of
+from pulsetrainer.artefacts.units import SECONDS, check_unit, claimed_unit, same_units, split_unit, symbol_of
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.csv_dialect import column_words
 from pulsetrainer.files.table import Table, read_table
@@ -102,6 +102,7 @@ def run_from_table(
         signal=table.path.name,
     )
     meanings = {"input": (input, run.input_unit), "output": (output, run.output_unit)}
+    notes = (*notes, *_other_units(table, meanings))
     if reference is not None:
         meanings["reference"] = (reference, run.input_unit)
     return TableRun(run, (*notes, *when.notes), _read_as(table, when.words, meanings))
@@ -231,6 +232,16 @@ def _unit(table: Table, column: str, given: str | None, what: str) -> str:
     if not own:
         return "1"
     return check_unit(own, what, f"the heading {table.names[table.index(column)]!r} of {table.path}")
+
+
+def _other_units(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[str]:
+    """Say which headings name another unit than the one that was given: the numbers are not converted."""
+    return [
+        f"the heading {table.names[table.index(column)]!r} of {table.path} says {own}, and `{meaning}_unit` "
+        f"{unit}: taken as {unit}, number by number"
+        for meaning, (column, unit) in meanings.items()
+        if (own := table.unit(column)) and not same_units([own], [unit])
+    ]
 
 
 def _needed(table: Table, wanted: Sequence[str], time_column: str | None, *, automatic: bool) -> set[int]:

@@ -30,7 +30,7 @@ SEEN = 0.05  # % that a cause explains: less reads 0.0
 _WHOLE = 100.0 + 1e-9  # %
 _SHADES = {"yes": BLUE, "in doubt": GREEN, "no": MUTED}
 _MANY = 1.5  # decades: over fewer, an even scale shows more
-_LABEL = 44  # letters that fit below such a figure
+_LABEL = 40  # letters that fit below such a figure
 _SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side
 
 

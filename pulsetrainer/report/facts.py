@@ -54,7 +54,7 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
     steps = steps_of(run.time_s) if run.time_s is not None and run.time_s.size > 1 else None
     if reversals is None:
         turns = turning_points(run.input if run.reference is None else run.reference)
-        reversals = max(turns.size - 1, 0)
+        reversals = turns[:-1].size
     parts = run.parts()
     return {
         "signal": run.signal,

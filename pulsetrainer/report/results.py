@@ -99,12 +99,13 @@ def inverted(out: Path, drive: Waveform) -> Said:
         "current_range": current,
         **picked(drive, "clipped_samples", "predicted_max_error_percent", "input_unit", "output_unit"),
     }
+    but = ", which lacks what was learnt" if drive.inversion == "transferred" else ""
     rows = {
         "length": f"{length}, {drive.time_s.size} samples",
         made: with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
         given: with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
         "out of reach": f"{drive.clipped_samples} samples",
-        "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model",
+        "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model{but}",
     }
     return payload, f"{out}: {drive_title(drive)}", rows
 

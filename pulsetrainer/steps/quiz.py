@@ -61,7 +61,7 @@ class Blind:
         self._choices, self._asked, self._answer, self._play = tuple(choices), tuple(asked), answer, play
         self._answers: list[tuple[str, float]] = []
         self._begun: list[float] = []
-        self._first = -1  # number of the first beat of the question
+        self._first: int  # number of the first beat of the question, once it has begun
 
     @property
     def question(self) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -35,6 +36,19 @@ def test_every_command_has_help_with_an_example(run, command):
     assert done.code == 0
     assert f"Example: pulsetrainer {command}" in " ".join(done.out.split())
     assert "--json" in done.out
+
+
+def test_a_narrow_terminal_folds_what_a_command_does():
+    """Nothing of it is cut."""
+    found = {}
+    for width in ("60", "200"):
+        words = [sys.executable, "-m", "pulsetrainer", "--help"]
+        done = subprocess.run(
+            words, capture_output=True, text=True, check=True, env={**os.environ, "COLUMNS": width}
+        )
+        assert "..." not in done.stdout.replace("[ARGS]...", "")
+        found[width] = done.stdout.split()
+    assert found["60"] == found["200"]
 
 
 def test_version(run):

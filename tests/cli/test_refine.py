@@ -114,6 +114,7 @@ def test_what_was_learnt_is_asked_for_in_another_pulse(tmp_path):
         played = pt.load(tmp_path / f"{name}-played.h5")
         errors.append(pt.evaluate(played).waveforms[0].compensated.mean_abs_error_percent)
     assert pt.load(tmp_path / "after.h5").inversion == "transferred"
+    assert "by the model, which lacks what was learnt" in " ".join(done.out.split())
     assert errors[1] < errors[0] / 1.5
 
 

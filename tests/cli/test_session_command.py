@@ -318,6 +318,8 @@ def _check_cut_off(tmp_path: Path, after: int) -> None:
     assert kept.beats.start_s.size >= (last_s - 3.0) // 0.8 - 1  # but for the way up, and the one under way
     shown = pulsetrainer(tmp_path, "show", "s.h5.partial", "--json")
     assert (shown.json["kind"], shown.json["facts"]["complete"]) == ("session", False)
+    absent = pulsetrainer(tmp_path, "evaluate", "s.h5")
+    assert "try: it was cut off: s.h5.partial holds" in absent.err
     done = pulsetrainer(tmp_path, "evaluate", "s.h5.partial", "--html", "s.html", "--json")
     if not kept.beats.start_s.size:
         refusal(done, 3, "no beat of a session", file="s.h5.partial")

@@ -30,7 +30,10 @@ def test_inverse_after_forward_is_the_identity(world, data):
     dual = Dual(world.operator)
     u = within(world.operator, data.draw)
     lead = np.array([dual.low, dual.high, dual.low])
-    y = dual(np.concatenate((lead, u)))[lead.size :]
+    led, y = np.split(dual(np.concatenate((lead, u))), [lead.size])
+    low, high = dual.saturation
+    reach = world.plane.high - world.plane.low
+    np.testing.assert_allclose(led, [low, high, low], atol=1e-6 * reach)
     found = dual.inverse(y, lead)
     np.testing.assert_allclose(found.input, u, atol=100 * world.slack)
     assert found.clipped == 0

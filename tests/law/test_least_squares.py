@@ -146,7 +146,9 @@ def test_masked_samples_do_not_count(drawn):
     nonsense = np.where(masked, np.nan, record.output)
     weight = record.sample_weight
     one = identify([Record(record.input, record.output, weight, record.start)], world.plane)
-    two = identify([Record(record.input, nonsense, weight, record.start)], world.plane)
+    spoilt = Record(record.input, nonsense, weight, record.start)
+    assert np.array_equal(spoilt.counts, ~masked)
+    two = identify([spoilt], world.plane)
     assert np.array_equal(one.operator.weights, two.operator.weights)
     assert one.operator.offset == two.operator.offset
 

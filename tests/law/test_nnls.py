@@ -20,6 +20,8 @@ def problems(draw):
     matrix[rng.random(matrix.shape) < draw(st.sampled_from([0.0, 0.5]))] = 0.0
     if draw(st.booleans()) and columns > 1:
         matrix[:, 0] = matrix[:, -1]  # cells that the data cannot tell apart
+    if draw(st.booleans()):
+        matrix[:, columns // 2] = 0.0  # a cell that they never touch
     matrix *= draw(st.sampled_from([1e-8, 1.0, 1e5]))
     return matrix, rng.normal(size=rows) * draw(st.sampled_from([1e-6, 1.0, 1e3]))
 
@@ -35,11 +37,15 @@ def test_same_objective_as_scipy(problem):
 
 @given(problems())
 def test_the_active_set_ends_what_exchanges_leave(problem):
-    """After a single system scipy goes on, on a root of the normal equations, to the same objective."""
+    """After a single system scipy goes on, on a root of the normal equations, to the same objective.
+
+    What the data never touch stays at zero.
+    """
     matrix, right = problem
     x = nnls.solve(matrix.T @ matrix, matrix.T @ right, max_iterations=1).x
     _, norm = optimize.nnls(matrix, right, maxiter=10_000)
     assert np.all(x >= 0)
+    assert np.all(x[~matrix.any(axis=0)] == 0)
     assert np.sum((matrix @ x - right) ** 2) == pytest.approx(norm**2, rel=1e-6, abs=1e-9 * (right @ right))
 
 
@@ -106,10 +112,11 @@ def test_kkt_violation_tells_right_from_wrong(problem):
 
 
 @pytest.mark.parametrize("seed", [10047, 10069, 10125, 10250, 10417, 10505, 10627])
-def test_cells_that_hardly_differ_settle(seed):
+def test_cells_that_hardly_differ_settle(monkeypatch, seed):
     """Twice cumulated columns, fewer samples than cells: descent that only puts to zero what falls stalls.
 
-    A ridge would settle it at another point: the conditions hold to rounding, after few systems.
+    A ridge would settle it at another point: the conditions hold to rounding, after few systems. No step of
+    the descent leaves the non-negative, or climbs.
     """
     rng = np.random.default_rng(seed)
     rows, columns = int(rng.integers(20, 60)), int(rng.integers(20, 60))
@@ -117,8 +124,45 @@ def test_cells_that_hardly_differ_settle(seed):
     matrix *= 10.0 ** rng.uniform(-3, 0, columns)
     right = matrix @ np.maximum(rng.normal(size=columns), 0.0) + 1e-3 * rng.normal(size=rows)
     gram, rhs = matrix.T @ matrix, matrix.T @ right
+    ways, is_lower = [], nnls._Problem.is_lower
+    monkeypatch.setattr(
+        nnls._Problem, "is_lower", lambda own, there, here: ways.append(here) or is_lower(own, there, here)
+    )
     found = nnls.solve(gram, rhs, max_iterations=columns)
+    way = np.array(ways)
+    heights = np.sum((0.5 * way @ gram - rhs) * way, axis=1)
+    assert np.all(way >= 0)
+    assert np.all(np.diff(heights) <= 1e-12 * np.abs(heights).max())
     assert nnls.kkt_violation(gram, rhs, found.x) < 1e-12
     _, norm = optimize.nnls(matrix, right, maxiter=10_000)
     left = np.sum((matrix @ found.x - right) ** 2)
     assert left <= norm**2 + 1e-12 * (right @ right)
+
+
+@pytest.mark.parametrize("rounding", [1e-15, 1e-12, 1e-9])
+def test_cells_that_cannot_be_told_apart_share_their_mass(rounding):
+    """Also where the rounding of large sums makes their matrix indefinite."""
+    gram = np.array([[4.0, 4.0, 0.0], [4.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
+    gram[[0, 1], [1, 0]] *= 1.0 + rounding
+    assert nnls.solve_signed(gram, np.array([2.0, 2.0, 0.0])) == pytest.approx([0.25, 0.25, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(("seed", "systems"), [(10250, 13), (10417, 9), (10505, 9)])
+def test_where_nothing_settles_a_ridge_ends_it(monkeypatch, seed, systems):
+    """The same kind of columns and an empty one: near the minimum, after fewer systems."""
+    rng = np.random.default_rng(seed)
+    rows, columns = int(rng.integers(20, 60)), int(rng.integers(20, 60))
+    matrix = np.cumsum(np.cumsum(rng.normal(size=(rows, columns)), axis=1), axis=0)
+    matrix *= 10.0 ** rng.uniform(-3, 0, columns)
+    matrix[:, 3] = 0.0
+    right = matrix @ np.maximum(rng.normal(size=columns), 0.0) + 1e-3 * rng.normal(size=rows)
+    gram, rhs = matrix.T @ matrix, matrix.T @ right
+    monkeypatch.setattr(optimize, "nnls", _out_of_iterations)
+    found = nnls.solve(gram, rhs, max_iterations=systems)
+    assert found.iterations <= systems
+    assert 1e-12 < nnls.kkt_violation(gram, rhs, found.x) < 1e-9
+    assert found.x[3] == 0.0
+
+
+def _out_of_iterations(*_, **__):
+    raise RuntimeError("Maximum number of iterations reached.")

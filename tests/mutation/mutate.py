@@ -50,8 +50,8 @@ PACKAGES = {  # the tests that answer for a package
         *(f"{UNIT}{one}*.py" for one in ("core_", "waveform")),
         *(f"{UNIT}{one}.py" for one in ("beats", "beside_hysteresis", "coil", "conductor", "first_stroke")),
         *(f"{UNIT}{one}.py" for one in ("minor_coverage", "rhythm", "scale", "short_records")),
-        *(f"{UNIT}{one}.py" for one in ("signal_table", "steps_correct", "steps_refine", "temperature")),
-        f"{UNIT}steps_transfer.py",
+        *(f"{UNIT}{one}.py" for one in ("signal_table", "steps_correct", "steps_evaluate", "steps_refine")),
+        *(f"{UNIT}{one}.py" for one in ("steps_transfer", "temperature")),
     ),
     "diagnosis": (
         *(f"{UNIT}{one}.py" for one in ("congruency", "conductor", "scale", "sticking", "unlisted")),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from core_jobs import curves, plant
 
+from pulsetrainer.core import output_curve
 from pulsetrainer.core.fit import CROWDED_MISFIT, fit
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
@@ -62,3 +63,14 @@ def test_records_shifted_against_each_other_have_offsets():
     alone = fit([(U, Y)], -1.0, 1.0, 12, smoothing=0.0)
     assert not np.any(alone.offsets)
     assert alone.misfit < 1e-6
+
+
+def test_a_curve_over_the_state_is_the_one_that_was_there():
+    """Bent once; what it leaves is what is left of its own output."""
+    plane, rng = Plane.uniform(0.0, 1.0, 6), np.random.default_rng(4)
+    masses, rows = plane.areas / plane.areas.sum(), rng.uniform(-1.0, 1.0, (400, plane.n_q))
+    y = (1.0 + rows @ masses) ** 2
+    found = output_curve._curve_over(masses, rows, y)
+    left = y - found(rows)
+    assert found.squares == pytest.approx(np.sum(left**2))
+    assert np.std(left) < 0.01 * np.ptp(y)

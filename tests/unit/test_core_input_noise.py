@@ -101,6 +101,15 @@ def test_no_lag_and_no_lost_amplitude():
     assert np.abs(error[tops]).max() < 0.03
 
 
+def test_a_record_backwards_is_cleaned_the_same():
+    """The filter of a piece of any length is of zero phase."""
+    rng = np.random.default_rng(8)
+    for n in range(2, 40):
+        u = np.linspace(0.0, 0.05, n) + rng.normal(0.0, 0.01, n)
+        there, back = (input_noise.monotone_between(x, np.zeros(0, int), 0.01) for x in (u, u[::-1]))
+        np.testing.assert_allclose(back[::-1], there, rtol=0, atol=1e-15)
+
+
 def test_real_turns_alternate_and_exceed_the_band():
     """Every kept swing exceeds the dead-band, from first extreme to first extreme, and holds no other."""
     u = np.round(np.cumsum(np.random.default_rng(6).normal(size=5000)), 1)

@@ -135,3 +135,16 @@ def test_as_many_steps_as_are_needed_are_enough():
     np.testing.assert_array_equal(again.masses, needed.masses)
     with pytest.raises(ConvergenceError):
         large.solve(sums, max_iterations=needed.iterations - 1)
+
+
+@pytest.mark.parametrize(("unit", "zero"), [(1e5, -3e5), (1e-6, 4e-6)])
+def test_units_do_not_matter(unit, zero):
+    """Nor where the output's zero is: as many steps to the same fit."""
+    u = signal("curves", np.random.default_rng(1))
+    y = plant(N_H)(u)
+    here, there = (
+        large.solve(node_sums(PLANE, [Record(u, output)], "continuous")) for output in (y, unit * y + zero)
+    )
+    assert there.iterations == here.iterations
+    np.testing.assert_allclose(there.masses, unit * here.masses, rtol=1e-5, atol=1e-8 * unit)
+    assert there.offset == pytest.approx(zero + unit * here.offset, abs=1e-6 * unit)

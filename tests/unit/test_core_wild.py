@@ -91,6 +91,15 @@ def test_coarse_steps_are_not_wild():
     assert not (found.wild_input | found.wild_output).any()
 
 
+def test_a_rare_flicker_of_a_coarse_converter_is_not_wild():
+    """Twenty steps of 500 samples; some samples read the next step. What reads the fourth is wild."""
+    held = np.repeat(np.arange(20.0), 500)
+    flicker = held + (np.arange(held.size) % 125 == 60)
+    assert not wild.isolated(flicker).any()
+    flicker[4321] += 4.0
+    assert np.flatnonzero(wild.isolated(flicker)).tolist() == [4321]
+
+
 @pytest.mark.parametrize("far", [0.0, 10.0])
 def test_a_reversal_curve_that_saturates_for_one_sample_is_real(far):
     """A short excursion of the input that the output's memory shows is kept, also beside wild outputs."""

@@ -1579,7 +1579,7 @@ def test_causes_that_bring_the_given_model_near_are_no_change_of_the_device(
             return [RAMP]
 
     current = SimpleNamespace(rms=0.01, terms=(_term("creep"),), simulator=Simulator())
-    record = SimpleNamespace(sample_weight=np.ones(RAMP.size))
+    record = SimpleNamespace(counts=np.ones(RAMP.size, dtype=bool))
     judged = given_model._Judged
     monkeypatch.setattr(given_model, "_Judged", lambda _, *rest: judged([record], *rest))
     findings = (replace(_finding("creep", 20.0), doubts=doubts),)
@@ -1593,7 +1593,7 @@ def test_a_learned_curve_is_known_but_for_a_constant(monkeypatch, name, changed)
     cause = Unlisted() if name == "unlisted" else CAUSE[name]
     simulator = SimpleNamespace(full=lambda terms: [RAMP], inner=lambda terms: [RAMP])
     current = SimpleNamespace(rms=0.01, terms=(SimpleNamespace(cause=cause),), simulator=simulator)
-    record = SimpleNamespace(sample_weight=np.ones(RAMP.size))
+    record = SimpleNamespace(counts=np.ones(RAMP.size, dtype=bool))
     judged = given_model._Judged
     monkeypatch.setattr(given_model, "_Judged", lambda _, *rest: judged([record], *rest))
     found = (Finding(cause, found=True),)

@@ -22,6 +22,7 @@ from pulsetrainer.artefacts import Evaluation, Profile, Run, units
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import comparison_figure, diagnosis_figures, figures
 from pulsetrainer.report.directions import directions, turns
+from pulsetrainer.report.facts import run_facts, warmth_words
 from pulsetrainer.report.fewer_points import MOST_POINTS, extremes, path
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
@@ -399,10 +400,17 @@ def test_a_comparison_shows_what_became_worse_than_nothing():
 def test_a_long_name_of_the_input_fits_below_its_figure():
     """The label of an axis has more lines, and none goes beyond the figure."""
     group = np.linspace(0.01, 10.0, 6)
-    one = Profile("rate", "1/s", group, group, group, output_unit="um")
-    for name in ("Drive voltage", "Drive voltage of the amplifier in the other room"):
+    one = Profile("rate", "1/s", group, group / 1000, group / 1000, output_unit="um")
+    for name in ("Spannung", "Drive voltage", "Drive voltage of the amplifier in the other room"):
         figure = diagnosis_figures.profile(one, name, extended=True)
         FigureCanvasAgg(figure).draw()
         box = figure.axes[0].xaxis.label.get_window_extent()
         assert figure.bbox.x0 <= box.x0
         assert box.x1 <= figure.bbox.x1
+
+
+def test_the_main_figures_of_a_run_and_its_heat():
+    """By hand: how long, how fast, how many reversals; the temperature from the first to the last."""
+    found = run_facts(Run(np.arange(6) / 2.0, np.array([0.0, 1.0, 2.0, 0.5, 1.0, 1.0]), np.zeros(6)))
+    assert (found["samples"], found["seconds"], found["rate_Hz"], found["reversals"]) == (6, 2.5, 2.0, 2)
+    assert warmth_words([-0.04, 3.0, 5.06]).startswith("+0.0 to +5.1 K")

@@ -159,3 +159,28 @@ def test_a_change_is_better_or_worse_or_none():
     assert (rms.better, rms.values[1] - rms.values[0]) == (True, pytest.approx(rms.change))
     assert {m.better for m in compare([after, after])} == {None}
     assert {m.name: m.better for m in compare([after, before])}["model.rms_percent"] is False
+
+
+@pytest.mark.parametrize("times", [0.9, 1.1])
+def test_a_change_within_the_spread_of_the_repeats_is_none(times):
+    """Errors of 4 and 1 of a full force: a spread of 0.1 is one of 2.5 % in the reduction."""
+    (one,) = evaluate(read(FOLDER / "played.h5", Playback)).waveforms
+    scaled, error = (replace(one.scaled, mean_abs_error_percent=size) for size in (4.0, 1.0))
+    before, after = (
+        Evaluation(
+            waveforms=(
+                replace(
+                    one,
+                    scaled=scaled,
+                    compensated=replace(error, mean_abs_error_percent=1.0 - less),
+                    mean_error_reduction_percent=75.0 + 25.0 * less,
+                    error_spread_percent=0.1,
+                ),
+            )
+        )
+        for less in (0.0, 0.1 * times)
+    )
+    better = {m.name.removeprefix("pulse."): m.better for m in compare([before, after])}
+    expected = True if times > 1.0 else None
+    assert better["mean_error_reduction_percent"] is expected
+    assert better["compensated.mean_abs_error_percent"] is expected

@@ -83,6 +83,7 @@ def test_what_one_path_says_of_another():
     _, less = elsewhere(narrow, missed, wide)
     assert less.mean() > 3 * variance.mean()
     assert np.all(variance <= same.variance)
+    np.testing.assert_allclose(same.variance, np.diagonal(same.along(same)))
 
 
 def test_a_device_that_is_its_model_has_nothing_to_carry_over():

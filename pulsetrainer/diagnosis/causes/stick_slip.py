@@ -188,7 +188,7 @@ def _strokes(fitted: Fitted) -> Strokes:
         left = record.output - said
         turns = input_noise.real_turns(record.input, _TURN * reach)
         for begin, end in pairwise(turns.tolist()):
-            if end - begin > _STROKE * _SAMPLES and np.all(record.sample_weight[begin:end] > 0):
+            if end - begin > _STROKE * _SAMPLES and np.all(record.sample_weight[begin:end]):
                 found.append((said[begin:end], left[begin:end] - left[begin:end].mean()))
     return found
 

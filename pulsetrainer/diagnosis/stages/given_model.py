@@ -133,7 +133,7 @@ def _judged(state: State, given: Given) -> _Judged:
         for one, step in zip(core, steps, strict=True)
     ]
     residuals = [one.output - p for one, p in zip(core, said, strict=True)]
-    kept = [one.sample_weight > 0 for one in core]
+    kept = [one.counts for one in core]
     return _Judged(
         core,
         residuals,
@@ -151,7 +151,7 @@ def _whole_and_each(judged: _Judged, state: State) -> Iterator[tuple[int | None,
         return
     steps = [r.dt_s for r in (state.scale.restored(record) for record in state.problem.records)]
     for k, (record, left, step) in enumerate(zip(judged.records, judged.residuals, steps, strict=True)):
-        kept = record.sample_weight > 0
+        kept = record.counts
         measured, speed = record.output[kept], velocity.compare([record], [step], [left])
         predicted = measured - left[kept]
         yield k, _Judged([record], [left], measured, predicted, speed, judged.polarity)
@@ -165,7 +165,7 @@ def _brought_near(state: State, judged: _Judged, noise_rms: float) -> bool:
         return False
     simulator = state.current.simulator
     pairs = zip(simulator.full(terms), simulator.inner(()), judged.records, strict=True)
-    added = np.concatenate([(full - plain)[record.sample_weight > 0] for full, plain, record in pairs])
+    added = np.concatenate([(full - plain)[record.counts] for full, plain, record in pairs])
     said = judged.predicted + state.scale.span * added
     if Unlisted.id in found:  # a learned curve is known but for a constant
         said = said + np.mean(judged.measured - said)

@@ -56,9 +56,7 @@ def stage(question: Question) -> Masked:
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
     even = [evenly(record, times) for record, times in zip(masked, stamps, strict=True)]
     times = [np.asarray(one.step * np.arange(one.input.size)) if one.timed else None for one in even]
-    inputs = at_their_tips(
-        [(one.input, one.output) for one in even], times, [one.sample_weight > 0 for one in even]
-    )
+    inputs = at_their_tips([(one.input, one.output) for one in even], times, [one.counts for one in even])
     even = [replace(one, input=u) for one, u in zip(even, inputs, strict=True)]
     scale = scale_of(even, low, high, second)
     firings = tuple((k, one) for k, fired in enumerate(found) for one in fired)
