@@ -28,6 +28,7 @@ import numpy as np
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.initial_state import estimated_start, reaches_an_end, start_of
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import velocity
@@ -101,7 +102,7 @@ def _each_against(judged: _Judged) -> Iterator[Evidence]:
         kept = record.sample_weight > 0
         measured, error = record.output[kept], left[kept]
         figures = {
-            "given": PERCENT * left_by(error, 0.0, 0.0) / float(np.ptp(measured)),
+            "given": PERCENT * root_mean_square(error) / float(np.ptp(measured)),
             "shift": judged.polarity * float(np.mean(error)),
             "times": condition_change.carried(measured, measured - error)[0],
         }
