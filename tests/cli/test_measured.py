@@ -99,7 +99,8 @@ def test_records_shifted_against_each_other_are_fitted_with_an_offset_each(folde
     assert done.json["fit_rms_percent"] <= 0.3
     assert np.ptp(done.json["offsets"]) == pytest.approx(0.6, abs=0.05)
     tells(done.err, "zeros differ")
-    words = ["davinci_f0p3_torque10.h5", "davinci_f0p3_torque10.h5"]
+    shutil.copy(folder / "davinci_f0p3_torque10.h5", folder / "once-more.h5")
+    words = ["davinci_f0p3_torque10.h5", "once-more.h5"]
     done = pulsetrainer(folder, "identify", *words, "-o", "twice.h5", "--overwrite", "--json")
     assert done.json["offsets"] == [0.0, 0.0]
 
