@@ -263,14 +263,14 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
     for one, style in zip(played, cycle(METHODS)):
         size = min(time.size, one.target.size)
         x, measured, target = time[:size], one.compensated.output[:size], one.target[:size]
-        shown = f"{one.inversion}, mean error {digits(one.compensated.mean_abs_error_percent)} %"
+        shown = f"{one.inversion}: mean {digits(one.compensated.mean_abs_error_percent)} %"
         trace(above, x, measured, **style, label=shown)
         trace(below, x, 100.0 * (measured - target) / one.full_force, **style)
     above.set_ylabel(label("force", first.output_unit))
     above.set_title(f"{first.name}, one beat")
     below.set_xlabel(label("time", "s"))
     below.set_ylabel("error\n[% of full force]")
-    panel.legend(loc="outside lower center", ncols=2)
+    panel.legend(loc="outside lower center", ncols=2, columnspacing=0.8, handlelength=1.5, handletextpad=0.5)
 
 
 def titled(one: Waveform | WaveformEvaluation) -> str:
