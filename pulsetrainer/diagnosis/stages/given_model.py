@@ -99,7 +99,7 @@ def stage(state: State) -> State:
 def _each_against(judged: _Judged) -> Iterator[Evidence]:
     """Yield how far each record is from the model as given: which of them differ from it, and how."""
     for k, (record, left) in enumerate(zip(judged.records, judged.residuals, strict=True)):
-        kept = record.sample_weight > 0
+        kept = record.counts
         measured, error = record.output[kept], left[kept]
         figures = {
             "given": PERCENT * root_mean_square(error) / float(np.ptp(measured)),
