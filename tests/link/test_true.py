@@ -250,8 +250,8 @@ def test_what_a_ctrl_c_took_from_a_session_is_counted(model, monkeypatch):
     with pt.open_device("bench:?seed=1") as device, pytest.raises(Interrupted) as caught:
         pt.session(model, device, beats=8)
     kept = caught.value.kept
-    played = round((kept.time_s[-1] - kept.time_s[0]) * 1000.0) + 1
-    assert kept.dropped_samples == played - kept.time_s.size == calls[2]
+    assert kept.dropped_samples == calls[2] > 0
+    assert kept.time_s.size == sum(calls) - calls[2]
 
 
 @pytest.mark.parametrize("verb", ["session", "capture"])
