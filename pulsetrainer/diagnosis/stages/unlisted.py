@@ -122,7 +122,11 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
     while len(parts) < LIMITS.most_states and _more_is_left(state):
         current = state.current
         best = best_dependence(current, state.held_out, Unlisted.order, state.question.rng)
-        if best is None or best.p_value > LIMITS.p_max or best.gain < LIMITS.linearised * state.floor.relevant:
+        if (
+            best is None
+            or best.p_value > LIMITS.p_max
+            or best.gain < LIMITS.linearised * state.floor.relevant
+        ):
             break
         begun = [*parts, best.part], [*values, *best.values]
         if _cancel(*begun):
