@@ -1328,6 +1328,18 @@ def test_where_all_repeat_the_model_is_that_of_the_search(monkeypatch):
     assert state.repeated is state.current
 
 
+@pytest.mark.parametrize(("rival", "added"), [("step", False), ("offset-drift", False), ("creep", True)])
+def test_what_may_be_a_fault_of_the_measurement_is_not_added(monkeypatch, rival, added):
+    """The next record does not have it: a gain that settled was called heat. The name stands."""
+    monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    findings = (replace(_finding("thermal-drift", 80.0), confounded_with=(rival,)),)
+    after = repetition.stage(_state(_fit(500.0, "thermal-drift"), findings=findings))
+    assert after.repeated.names == (("thermal-drift",) if added else ())
+    assert after.findings[0].doubts == (() if added else (repetition.A_FAULT,))
+    assert not after.findings[0].in_doubt
+
+
 @pytest.mark.parametrize(
     ("explains", "beside", "found"), [(9.9, (), False), (10.1, (), True), (9.9, (rivals.WORSE,), False)]
 )
