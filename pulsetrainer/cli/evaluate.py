@@ -11,6 +11,7 @@ import pulsetrainer as pt
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
+from pulsetrainer.steps.asked import check_once
 
 
 def evaluate(
@@ -33,6 +34,7 @@ def evaluate(
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
+    check_once(inputs)
     job = Job(context, inputs=(*inputs, *model), outputs=(out, html))
     from pulsetrainer.files.bounds import read_bounds
 
@@ -102,6 +104,8 @@ def show_tables(screen: Screen, evaluation: pt.Evaluation) -> None:
     from pulsetrainer.report.text import tables_of
 
     screen.parts(tables_of(evaluation, screen.width))
+    if any("#" in w.inversion for w in evaluation.told_apart().waveforms):
+        screen.line("#2: ", "the second playback of that pulse and inversion, in the order given")
     if len(evaluation.models) > 1:
         screen.line("improvement: ", "how much less rms error than by the first model")
     if any(w.name in PUBLISHED for w in evaluation.waveforms):

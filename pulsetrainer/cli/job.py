@@ -293,6 +293,8 @@ def check_ending(path: Path, context: typer.Context) -> None:
     else:
         what, right = f"{command} writes HDF5", ".h5"
         then = "; then `pulsetrainer export` makes a table of it, `pulsetrainer plot` a figure"
+        if ending == ".html" and "html" in context.params:
+            then = f", and the page with --html {path}"
     if ending in _FORMATS and not right.startswith(ending):  # .htm is a page too
         raise UsageError(f"{what}, but {path} ends in {ending!r}", hint=f"name it {path.stem}{right}{then}")
 
