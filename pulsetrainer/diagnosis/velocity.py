@@ -42,11 +42,8 @@ def compare(
 ) -> Comparison:
     """Compare the operator's residuals (n,) of each record with those of a function of the velocity.
 
-    Parameters
-    ----------
-    dt_s
-        Time step of each record, s; None where only the order of the samples is known: the direction of
-        motion then takes the place of the velocity.
+    ``dt_s`` is the time step of each record, s; None where only the order of the samples is known: the
+    direction of motion then takes the place of the velocity.
     """
     kept = [r.counts for r in records]
     output = np.concatenate([r.output[k] for r, k in zip(records, kept, strict=True)])

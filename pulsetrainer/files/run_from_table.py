@@ -133,12 +133,13 @@ def _time(table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float 
                 f"samples have an order only (if it is in seconds, give `time` {time!r})"
             )
             return _Time(None, "no time", (note,))
-    heading, unit = table.names[table.index(time)], _unit_of_time(table, time)
+    time = table.names[table.index(time)]  # the whole heading
+    unit = _unit_of_time(table, time)
     notes: tuple[str, ...] = ()
     if not unit and _unknown_unit(table, time):
-        said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
+        said = f"the heading {time!r} of {table.path} says no unit that is known: taken as seconds"
         notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
-    words = f"time from {split_unit(heading)[0]} [{unit or 's'}]"
+    words = f"time from {split_unit(time)[0]} [{unit or 's'}]"
     stamps, days = _past_midnight(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
     if days:
         table = replace(table, columns={**table.columns, time: stamps})
