@@ -23,13 +23,15 @@ def evaluate(
     model: Annotated[list[Path], typer.Option(help="Model to test on the run; may be given again.")] = [],  # noqa: B006
     out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write.")] = None,
     html: Annotated[Path | None, typer.Option(help="Report to write.")] = None,
-    bounds: Annotated[Path | None, typer.Option(help="TOML file of bounds; outside them exit 1.")] = None,
+    bounds: Annotated[
+        Path | None, typer.Option(help="TOML file of bounds; a figure outside them: exit 1.")
+    ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Report how large the errors are.
 
-    Force errors of playbacks, or prediction errors of models on a run that they were not fitted to. Of a
+    Force errors of playbacks, or prediction errors of models on a run that they were not fitted to. For a
     session it says what was pressed and answered, and --html writes its score sheet.
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html

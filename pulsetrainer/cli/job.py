@@ -119,7 +119,7 @@ class Job:
                 self.notes([f"{said}, which plays with those delivered; `pulsetrainer tune` measures it"])
         of = model.coil.serial if model is not None and model.coil is not None else ""
         if of not in ("", device.info.serial):
-            self.notes([f"the model is of {of}, and this is {device.info.serial}, whose force is another"])
+            self.notes([f"the model is of {of}, but this is {device.info.serial}, whose force is different"])
         return device
 
     def alike(self, files: Sequence[Path]) -> None:

@@ -188,7 +188,7 @@ DOUBTS: Mapping[str, str] = {
     "spans zero": "its strength may be nothing, as the interval spans zero",
     "no equal loops": "no minor loop was traced three times in equal time, which alone would show it",
     "at bound": "a parameter, or the interval of one, is at the end of the range that was searched",
-    "strength at bound": "its strength is at the end of the range that was searched, so it is another thing",
+    "strength at bound": "its strength is at the end of the range that was searched, so it is something else",
     "own error": (
         "with one rate and no rest it looks like what the model lacks of the device, and what is left is "
         "nearly as large, or more than noise"
