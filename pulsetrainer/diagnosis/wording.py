@@ -5,6 +5,7 @@ The one place where a diagnosis is put into English, but for the texts that a ca
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -274,7 +275,9 @@ class Bench:
     def _number(self, share: float) -> str:
         step = LIMITS.told_to * self.scale.reach
         value = round((self.scale.low + share * self.scale.reach) / step) * step
-        return figure(value, LIMITS.told_digits + 1)
+        # a small swing about a large value needs more digits than most
+        more = max(0, math.ceil(math.log10(max(abs(value), self.scale.reach) / self.scale.reach)))
+        return figure(value, LIMITS.told_digits + 1 + more)
 
     def _rate(self, ranges: float) -> str:
         if not self.timed:
@@ -291,7 +294,7 @@ class Bench:
 
 def figure(value: float, digits: int = LIMITS.told_digits) -> str:
     """Return a number with some significant digits, and without an exponent where it needs none."""
-    return f"{float(f'{value:.{digits}g}') + 0.0:g}"  # no negative zero
+    return f"{float(f'{value:.{digits}g}') + 0.0:.{max(digits, 6)}g}"  # no negative zero
 
 
 def sentence(one: Evidence, words: Mapping[str, str]) -> str:

@@ -223,6 +223,7 @@ def test_noise_and_steps_of_a_record():
     assert noise_of(noise[:8]) > 0.0
     assert spacing_of(np.asarray([0.0, 0.5, 0.5, 1.0])) == 0.5
     assert spacing_of(np.ones(9)) == 0.0
+    assert spacing_of(np.append(np.arange(50.0), [9.9e37, 9.9e37])) == 1.0  # an overload is no step
     assert coarse_step(np.repeat(np.arange(50.0), 9)) == 1.0
     assert coarse_step(np.round(noise)) == 0.0
 

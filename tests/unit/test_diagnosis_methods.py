@@ -675,6 +675,14 @@ def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
     assert "e+" not in said
 
 
+def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
+    """Between 99.95 A and 100.05 A: three digits would make all stops the same."""
+    bench = wording.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
+    said = wording.advice(Evidence("lacks", names=("holds",)), bench)
+    assert "between 99.95 A and 100.05 A" in said
+    assert "at each of 100.04, 99.98, 100.02 and 99.96 A" in said
+
+
 def test_what_a_record_lacks_is_asked_for_in_numbers():
     """Rates, stops and length, for a slow bench in millimetres."""
     bench = wording.Bench(Scale(low=0.0, reach=2.0, second=100.0), "mm")
