@@ -78,7 +78,8 @@ class Device:
             "dip of mean output": lambda: dip(mean(y), self.place, 0.1),
             "heat": lambda: rise(mean(u**2), 0.8, 0.15),
             "mean square output": lambda: 3.0 * np.minimum(mean(y**2), 0.35),
-            "speed": lambda: np.sqrt(mean(np.abs(np.gradient(u)) / h) + 0.05),
+            # it rests before a record begins
+            "speed": lambda: np.sqrt(mean(np.abs(np.diff(u, prepend=u[0])) / h) + 0.05),
             "rest": lambda: np.log1p(_rested(u) * h / tau),
             "last turn": lambda: -dip(mean(_turns(u)), 0.4 + 0.7 * self.place, 0.2),
             "two": lambda: dip(mean(u), HIGH * self.place, 0.12) + rise(mean(u**2, 12.0), 0.8, 0.2),
@@ -87,7 +88,8 @@ class Device:
 
 
 def _turns(u: np.ndarray, band: float = 0.03) -> np.ndarray:
-    turn, extreme, way, found = u[0], u[0], 1.0, []
+    # before a record it came down from the top, as after the stroke that conditions it
+    turn, extreme, way, found = HIGH, u[0], -1.0, []
     for value in u.tolist():
         if (extreme - value) * way > band:
             turn, extreme, way = extreme, value, -way

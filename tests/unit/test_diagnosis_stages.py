@@ -644,9 +644,31 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
 )
 def test_two_of_one_state_that_are_nearly_the_same_are_one(state, tau, there):
     """Within a factor of one and a half of the time constant."""
-    known = [unlisted.Part(2, 0.0, 1.0), unlisted.Part(0, 0.0, 1.0)]
-    values = [5.0, *[0.0] * 7, 1.0, *[0.0] * 7]
-    assert unlisted._is_there(unlisted.Part(state, 0.0, 1.0), tau, known, values) is there
+    parts = [unlisted.Part(one, 0.0, 1.0) for one in (2, 0, state)]
+    values = [5.0, *[0.0] * 7, 1.0, *[0.0] * 7, tau, *[0.0] * 7]
+    assert unlisted._cancel(parts, values) is there
+
+
+@pytest.mark.parametrize(("moved", "curves"), [(1.45, 1), (1.55, 2)])
+def test_a_second_curve_that_the_refit_moves_onto_the_first_is_left_out(monkeypatch, moved, curves):
+    """Together they would cancel: each may be nothing then, and neither would be added to the model."""
+    found = [
+        SimpleNamespace(p_value=0.009, gain=40.0, part=unlisted.Part(0, 0.0, 1.0), values=(tau, *[0.1] * 7))
+        for tau in (3.0, 1.0)
+    ]
+
+    def refitted(_, terms, current, **__):
+        cause = terms[-1].cause
+        values = [one for tau in (1.0, moved)[: len(cause.parts)] for one in (tau, *[0.1] * 7)]
+        return Fit(current.squares - 150.0, (Term(cause, tuple(values)),))
+
+    monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
+    monkeypatch.setattr(unlisted, "refit", refitted)
+    monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+    after = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0)))
+    assert [len(term.cause.parts) for term in after.current.terms] == [curves]
 
 
 @pytest.mark.parametrize(("sampled", "sought"), [(0.65, False), (0.55, True), (0.0, True)])

@@ -20,6 +20,7 @@ dependence of its own. So is one of several in whose place the listed causes fit
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
 from pulsetrainer.diagnosis.dependence import best_dependence
@@ -125,25 +126,33 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
             best is None
             or best.p_value > LIMITS.p_max
             or best.gain < LIMITS.linearised * state.floor.relevant
-            or _is_there(best.part, best.values[0], parts, values)
         ):
             break
-        trial = _refitted(state, current, [*parts, best.part], [*values, *best.values])
+        begun = [*parts, best.part], [*values, *best.values]
+        if _cancel(*begun):
+            break
+        trial = _refitted(state, current, *begun)
+        refitted = list(next(term.values for term in trial.terms if term.cause.id == _ID))
+        if _cancel(begun[0], refitted):
+            break
         falls = current.squares - trial.squares > max(state.floor.relevant, listed)
         if not falls or not repeats(state.held_out, current, trial):
             doubtful = falls and not parts
             break
         parts.append(best.part)
-        values = list(next(term.values for term in trial.terms if term.cause.id == _ID))
+        values = refitted
         largest = max(largest, best.p_value)
         state = _heard_again(replace(state, current=trial))
     return (state.current if parts else None), largest, doubtful
 
 
-def _is_there(part: Part, tau: float, parts: list[Part], values: list[float]) -> bool:
-    """Whether a dependence on the same state over nearly the same time is in the model: they would cancel."""
-    known = [values[k * KNOTS] for k, one in enumerate(parts) if one.state == part.state]
-    return any(max(tau / one, one / tau) < LIMITS.other_tau for one in known)
+def _cancel(parts: list[Part], values: list[float]) -> bool:
+    """Whether two dependences are on the same state over nearly the same time: their curves cancel."""
+    taus = [(part.state, values[k * KNOTS]) for k, part in enumerate(parts)]
+    return any(
+        one == other and max(tau / near, near / tau) < LIMITS.other_tau
+        for (one, tau), (other, near) in combinations(taus, 2)
+    )
 
 
 def _heard_again(state: State) -> State:
