@@ -71,6 +71,12 @@ TEXTS: Mapping[str, str] = {
         "wrong model here. It leaves {preisach:.1f} % of the span (rms), a plain function of the velocity "
         "leaves {velocity:.1f} %. Use the velocity as the input, or a damper model"
     ),
+    "wrong kind, both": (
+        "{output} follows the velocity of {input} beside {input} itself: a Preisach model in {input} is the "
+        "wrong model here. It leaves {preisach:.1f} % of the span (rms), a plain function of the velocity "
+        "{velocity:.1f} %, and one with a part in proportion to {input} {beside:.1f} %. Use a model of a "
+        "damper and a spring"
+    ),
     "given better": (
         "The model as given predicts these recordings better than any extension that was tried, so none is "
         "proposed."
@@ -172,6 +178,7 @@ ADVICE: Mapping[str, str] = {
     "other model": (
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
     ),
+    "other model, both": "A Preisach model does not suit this device: use a model of a damper and a spring.",
     "identify anew": (
         "Identify the device again in this condition (a new run, then pulsetrainer identify), and "
         "diagnose with the new model."

@@ -420,6 +420,18 @@ def test_a_function_of_the_velocity_is_found():
     assert untimed.velocity == pytest.approx(np.std(np.abs(record.output)), rel=0.02)
 
 
+@pytest.mark.parametrize(("spring", "kind"), [(0.0, "wrong kind"), (1.0, "wrong kind, both")])
+def test_a_spring_beside_a_damper_is_told(spring, kind):
+    """Of y = x + 2 dx/dt a function of the velocity leaves what follows x: it does not follow that alone."""
+    t = np.arange(4000) * 1e-2
+    u = np.sin(2 * np.pi * 0.2 * t) * (1 + 0.5 * np.sin(0.3 * t))
+    record = Record(u, spring * u + 2.0 * np.gradient(u, 1e-2), dt_s=1e-2)
+    found = velocity.compare([record], [1e-2], [record.output])
+    assert found.wrong
+    assert velocity.evidence(found).kind == kind
+    assert ("damper and a spring" in velocity.warning(found, "x", "F")) is bool(spring)
+
+
 # --- from runs to records
 def _run(t, **more) -> Run:
     return Run(
@@ -597,6 +609,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
     figures = dict.fromkeys(
         [
             "left",
+            "beside",
             "white",
             "floor",
             "p",
