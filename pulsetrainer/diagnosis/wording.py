@@ -5,6 +5,7 @@ The one place where a diagnosis is put into English, but for the texts that a ca
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -69,6 +70,12 @@ TEXTS: Mapping[str, str] = {
         "{output} follows the velocity of {input}, not {input} itself: a Preisach model in {input} is the "
         "wrong model here. It leaves {preisach:.1f} % of the span (rms), a plain function of the velocity "
         "leaves {velocity:.1f} %. Use the velocity as the input, or a damper model"
+    ),
+    "wrong kind, both": (
+        "{output} follows the velocity of {input} beside {input} itself: a Preisach model in {input} is the "
+        "wrong model here. It leaves {preisach:.1f} % of the span (rms), a plain function of the velocity "
+        "{velocity:.1f} %, and one with a part in proportion to {input} {beside:.1f} %. Use a model of a "
+        "damper and a spring"
     ),
     "given better": (
         "The model as given predicts these recordings better than any extension that was tried, so none is "
@@ -171,6 +178,7 @@ ADVICE: Mapping[str, str] = {
     "other model": (
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
     ),
+    "other model, both": "A Preisach model does not suit this device: use a model of a damper and a spring.",
     "identify anew": (
         "Identify the device again in this condition (a new run, then pulsetrainer identify), and "
         "diagnose with the new model."
@@ -274,7 +282,9 @@ class Bench:
     def _number(self, share: float) -> str:
         step = LIMITS.told_to * self.scale.reach
         value = round((self.scale.low + share * self.scale.reach) / step) * step
-        return figure(value, LIMITS.told_digits + 1)
+        # a small swing about a large value needs more digits than most
+        more = max(0, math.ceil(math.log10(max(abs(value), self.scale.reach) / self.scale.reach)))
+        return figure(value, LIMITS.told_digits + 1 + more)
 
     def _rate(self, ranges: float) -> str:
         if not self.timed:
@@ -291,7 +301,7 @@ class Bench:
 
 def figure(value: float, digits: int = LIMITS.told_digits) -> str:
     """Return a number with some significant digits, and without an exponent where it needs none."""
-    return f"{float(f'{value:.{digits}g}') + 0.0:g}"  # no negative zero
+    return f"{float(f'{value:.{digits}g}') + 0.0:.{max(digits, 6)}g}"  # no negative zero
 
 
 def sentence(one: Evidence, words: Mapping[str, str]) -> str:

@@ -7,11 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.units import with_seconds, with_unit
-from pulsetrainer.report.facts import loop_words, minor_words, warmth_words
+from pulsetrainer.report.facts import loop_words, minor_words, span_words, warmth_words
 from pulsetrainer.report.tables import picked
+
+_SMALL = 0.1  # of a unit: three decimals would not tell a range of less
 
 Said = tuple[dict[str, Any], str, dict[str, Any]]
 
@@ -83,6 +87,13 @@ def drive_title(drive: Waveform) -> str:
     return f"{drive.name} by {drive.inversion} inversion"
 
 
+def _range_words(ends: tuple[float, float], unit: str) -> str:
+    """Return a range with three decimals, or with more digits where these would not tell its ends apart."""
+    if ends[1] - ends[0] < _SMALL:
+        return span_words(np.asarray(ends), unit)
+    return with_unit(f"{ends[0]:.3f} .. {ends[1]:.3f}", unit)
+
+
 def inverted(out: Path, drive: Waveform) -> Said:
     """Say what drive was found for a pulse."""
     force = float(drive.target[drive.scored].min()), float(drive.target[drive.scored].max())
@@ -103,8 +114,8 @@ def inverted(out: Path, drive: Waveform) -> Said:
     but = ", which lacks what was learnt" if drive.inversion == "transferred" else ""
     rows = {
         "length": f"{length}, {drive.time_s.size} samples",
-        made: with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
-        given: with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
+        made: _range_words(force, drive.output_unit),
+        given: _range_words(current, drive.input_unit),
         "out of reach": f"{drive.clipped_samples} samples",
         "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model{but}",
     }

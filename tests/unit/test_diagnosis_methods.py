@@ -441,6 +441,18 @@ def test_a_function_of_the_velocity_is_found():
     assert untimed.velocity == pytest.approx(np.std(np.abs(record.output)), rel=0.02)
 
 
+@pytest.mark.parametrize(("spring", "kind"), [(0.0, "wrong kind"), (1.0, "wrong kind, both")])
+def test_a_spring_beside_a_damper_is_told(spring, kind):
+    """Of y = x + 2 dx/dt a function of the velocity leaves what follows x: it does not follow that alone."""
+    t = np.arange(4000) * 1e-2
+    u = np.sin(2 * np.pi * 0.2 * t) * (1 + 0.5 * np.sin(0.3 * t))
+    record = Record(u, spring * u + 2.0 * np.gradient(u, 1e-2), dt_s=1e-2)
+    found = velocity.compare([record], [1e-2], [record.output])
+    assert found.wrong
+    assert velocity.evidence(found).kind == kind
+    assert ("damper and a spring" in velocity.warning(found, "x", "F")) is bool(spring)
+
+
 # --- from runs to records
 def _run(t, **more) -> Run:
     return Run(
@@ -618,6 +630,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
     figures = dict.fromkeys(
         [
             "left",
+            "beside",
             "white",
             "floor",
             "p",
@@ -694,6 +707,14 @@ def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
     )
     assert "between 0 A and 1.2 A" in said
     assert "e+" not in said
+
+
+def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
+    """Between 99.95 A and 100.05 A: three digits would make all stops the same."""
+    bench = wording.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
+    said = wording.advice(Evidence("lacks", names=("holds",)), bench)
+    assert "between 99.95 A and 100.05 A" in said
+    assert "at each of 100.04, 99.98, 100.02 and 99.96 A" in said
 
 
 def test_what_a_record_lacks_is_asked_for_in_numbers():
