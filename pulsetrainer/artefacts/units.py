@@ -89,17 +89,8 @@ def _is_symbol(text: str) -> bool:
 def check_unit(text: str, what: str, where: str = "") -> str:
     """Return a unit as it is written; the two letters that look like a micro are one.
 
-    Parameters
-    ----------
-    what
-        Which unit this is: "input unit".
-    where
-        What it was read from, if anything: "the heading 'Force (measured)' of scope.csv".
-
-    Raises
-    ------
-    DataError
-        It is not a unit.
+    DataError where it is none; ``what`` names it there ("input unit"), ``where`` what it was read from, if
+    anything ("the heading 'Force (measured)' of scope.csv").
     """
     if is_unit(text):
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same

@@ -67,10 +67,7 @@ def problem_for(
 ) -> Problem:
     """The records with masks applied, ready to be fitted.
 
-    Raises
-    ------
-    DataError
-        Input or output does not vary, or too few samples are left.
+    DataError where input or output does not vary, or too few samples are left.
     """
     bins = bins_of(records)
     measured = bins.average([r.output for r in records])

@@ -79,10 +79,7 @@ class Firing:
 def evenly(record: Record, stamps: FloatArray | None) -> Record:
     """Return a record at even time steps, straight between samples; what fills a gap has no weight.
 
-    Raises
-    ------
-    DataError
-        More of the record is gaps than samples.
+    DataError where more of the record is gaps than samples.
     """
     if stamps is None or record.dt_s is None:
         return record

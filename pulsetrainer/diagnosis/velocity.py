@@ -45,11 +45,8 @@ def compare(
 
     A part in proportion to the input, beside that function, is a spring beside a damper.
 
-    Parameters
-    ----------
-    dt_s
-        Time step of each record, s; None where only the order of the samples is known: the direction of
-        motion then takes the place of the velocity.
+    ``dt_s`` is the time step of each record, s; None where only the order of the samples is known: the
+    direction of motion then takes the place of the velocity.
     """
     kept = [r.counts for r in records]
     output = np.concatenate([r.output[k] for r, k in zip(records, kept, strict=True)])

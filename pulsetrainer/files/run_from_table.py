@@ -143,13 +143,14 @@ def _time(
         if _just_counts(table.columns[time]):
             lack = f"the column {time} of {table.path} just counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=whole)
-    heading, unit = table.names[table.index(time)], _unit_of_time(table, time)
+    heading = table.names[table.index(time)]
+    unit = _unit_of_time(table, heading)
     notes: tuple[str, ...] = ()
     if not unit and (unit := unit_of_count(float(table.columns[heading][0]), heading)):
         told = "days of a spreadsheet" if unit == "d" else f"{unit} since 1970"
         notes = (f"the column {heading} of {table.path} is taken as {told}, by its size",)
         table = replace(table, units={**table.units, heading: unit})
-    elif not unit and _unknown_unit(table, time):
+    elif not unit and _unknown_unit(table, heading):
         said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
         notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
     words = f"time from {split_unit(heading)[0]} [{unit or 's'}]"

@@ -51,16 +51,11 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
             within = f"{low} to {high} {unit}".removesuffix(" 1")
             most = sys.float_info.max
             amiss = "is not a number from" if math.isnan(number_in(value, -most, most)) else "is outside"
+            hint = f"give {name} ({meaning}) a value in that range"
             if re.search(r"[,;]\w+=", value):
-                return UsageError(
-                    f"`port`: the bench parameter {name}={value} {amiss} {within}",
-                    hint="put & between parameters, and quotes around them: "
-                    f"`port` 'bench:?{name}={re.sub('[,;]', '&', value)}'",
-                )
-            return UsageError(
-                f"`port`: the bench parameter {name}={value} {amiss} {within}",
-                hint=f"give {name} ({meaning}) a value in that range",
-            )
+                several = f"bench:?{name}={re.sub('[,;]', '&', value)}"
+                hint = f"put & between parameters, and quotes around them: `port` '{several}'"
+            return UsageError(f"`port`: the bench parameter {name}={value} {amiss} {within}", hint=hint)
     for what in options.breaks:
         if what.partition("@")[0] not in breaks or what in complaint:
             return UsageError(

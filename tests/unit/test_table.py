@@ -400,6 +400,8 @@ def test_times_of_day_go_on_after_midnight(table):
     read = run_from_table(table("when;u;y\n" + "".join(lines)).path, **COLUMNS)
     np.testing.assert_array_equal(np.diff(read.run.time_s), np.ones(29))
     assert any("midnight" in note for note in read.notes)
+    named = run_from_table(table("When [s];u;y\n" + "".join(lines)).path, **COLUMNS, time="when")
+    np.testing.assert_array_equal(named.run.time_s, read.run.time_s)
     later = "".join([*lines[:5], *lines[2:]])
     with pytest.raises(DataError):
         read_run(table("when;u;y\n" + later).path, **COLUMNS)

@@ -37,13 +37,11 @@ class OffsetDrift(Cause):
     corrects = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         length = frames[0].time_s[-1] + frames[0].dt_s
         size = _TRIED * frames[0].span
         return [[(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         return y + _drift(values, frame.time_s)
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:

@@ -63,7 +63,6 @@ class Step(Cause):
         return (*values[:2], one.begin_s + split * one.dt_s)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         after = np.clip((frame.begin_s + frame.time_s - values[2]) / (_SHARED * frame.dt_s) + 0.5, 0.0, 1.0)
         return y + after * (values[0] + values[1] * (y - frame.zero))
 
