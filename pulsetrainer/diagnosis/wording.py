@@ -111,10 +111,8 @@ PLACES: Mapping[str, str] = {
     "time": "about {at:.3g} {seconds} after the start",
 }
 WAYS = {-1.0: "falls", 0.0: "rests", 1.0: "rises"}
-PLAIN = {  # where nothing better is known
-    **{"input": "input", "output": "output", "in_y": "", "in_u": ""},
-    **{"second": "second", "seconds": "s"},
-}
+# where nothing better is known
+PLAIN = {"input": "input", "output": "output", "in_y": "", "in_u": "", "second": "second", "seconds": "s"}
 AGAIN = (
     "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
     "recording.{command}"
