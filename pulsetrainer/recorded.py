@@ -57,14 +57,9 @@ def capture_into(
 ) -> Captured:
     """Play a course from sample ``at`` on and record it into a file, or go on with one that was cut off.
 
-    Raises
-    ------
-    ArgumentError
-        The device cannot play the course.
-    UsageError, DataError
-        The file is there already, or the disk is full or failed.
-    DeviceError, Interrupted
-        The device or the user stopped it; the message says where the samples are.
+    ArgumentError where the device cannot play the course; UsageError or DataError where the file is there
+    already, or the disk is full or failed; DeviceError, Interrupted where the device or the user stopped it;
+    the message says where the samples are.
     """
     signal = course.signal
     decimation_for(device.info.tick_rate_Hz, signal.rate_Hz)  # before anything is written
@@ -122,12 +117,9 @@ def session_into(
     The file has the header ``begun`` until the session is over, and then ``header``; of a quiz, ``blind``,
     it tells what was asked when that is answered.
 
-    Raises
-    ------
-    UsageError, DataError
-        The file is there already, the disk is full or failed, or the model cannot be used.
-    DeviceError, Interrupted
-        It was stopped before a beat was over; after that the result says why it ended.
+    UsageError, DataError where the file is there already, the disk is full or failed, or the model cannot be
+    used; DeviceError, Interrupted where it was stopped before a beat was over; after that the result says why
+    it ended.
     """
     with SessionRecorder(out, begun, overwrite=overwrite, signal="session") as recorder:
         done = perform(model, device, pulses, decide, _Sink(recorder, blind, out.stem), **options)

@@ -16,16 +16,17 @@ from pulsetrainer.errors import DataError
 
 _PREFIXES = ("da", *"YZEPTGMkhdcmunpfazyµμ")
 _PREFIXED_SYMBOLS = """
-    A V N T m g s Pa Hz W J K C F H S rad bar ohm Ohm Ω Wb L l eV Oe G emu gf cd mol Nm Nmm Vs Ah Wh VA
+    A V N T m g s Pa Hz W J K C F H S rad bar ohm Ohm Ω Wb L l eV Oe G emu gf cd mol Nm Nmm Vs Ah Wh VA Am
 """
 _BARE_SYMBOLS = """
-    1 % percent ppm ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev atm
-    counts count ct LSB digit digits steps step px a.u. arb au norm dB
+    1 % ‰ percent ppm ppb ppt ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev atm
+    counts count ct LSB digit digits steps step samples sample px a.u. arb au norm dB
 """
 # what may stand behind the last underscore of a heading, where most letters and short words are a name's, or,
 # of two letters and more, may be all of it
 _SUFFIXES = """
-    s ms us µs min h A mA uA kA V mV kV N mN kN Nm mNm T mT m mm um µm nm Pa kPa MPa bar mbar mmHg
+    s ms us µs ns min h A mA uA nA pA kA V mV uV kV N mN uN nN cN kN Nm mNm T mT m cm mm um µm nm Pa kPa MPa
+    GPa bar mbar mmHg Oe kOe emu uC nC ohm Ohm kOhm
     deg rad C °C degC K Hz kHz W g kg % percent
     A/m kA/m m/s mm/s cm/s km/h rad/s deg/s N/A N/m N/mm kN/mm V/s A/s N/s mV/V
 """
@@ -36,8 +37,8 @@ _SPELLED = {
     word: unit
     for unit, words in {
         "s": "second seconds sec secs sekunde sekunden",
-        "ms": "millisecond milliseconds msec",
-        "us": "microsecond microseconds usec",
+        "ms": "millisecond milliseconds msec millis",
+        "us": "microsecond microseconds usec micros",
         "min": "min mins minute minutes minuten",
         "h": "hour hours hr hrs stunde stunden",
         "V": "volt volts",
@@ -88,17 +89,8 @@ def _is_symbol(text: str) -> bool:
 def check_unit(text: str, what: str, where: str = "") -> str:
     """Return a unit as it is written; the two letters that look like a micro are one.
 
-    Parameters
-    ----------
-    what
-        Which unit this is: "input unit".
-    where
-        What it was read from, if anything: "the heading 'Force (measured)' of scope.csv".
-
-    Raises
-    ------
-    DataError
-        It is not a unit.
+    DataError where it is none; ``what`` names it there ("input unit"), ``where`` what it was read from, if
+    anything ("the heading 'Force (measured)' of scope.csv").
     """
     if is_unit(text):
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same

@@ -118,9 +118,9 @@ class Screen:
         """
         self.parts([tables.Table(title, columns, rows)])
 
-    def line(self, lead: str, text: str, *, indent: int | None = None) -> None:
+    def line(self, lead: str, text: str) -> None:
         """Print a line; on a terminal that is too narrow, on several, broken between words below ``lead``."""
-        self.whole(tables.folded(lead, text, self.width if self.is_terminal else None, indent))
+        self.whole(tables.folded(lead, text, self.width if self.is_terminal else None))
 
     def whole(self, text: str) -> None:
         """Print a line that is never folded, since a path or a command in it is copied in one piece."""

@@ -5,20 +5,17 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from pulsetrainer.cli.console import Screen
 from pulsetrainer.cli.live import LETTERS, Live, why_not
 from pulsetrainer.core.heartbeat import Pulse
+from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import UsageError
+from pulsetrainer.steps.conductor import Decide
+from pulsetrainer.steps.performance import Now
+from pulsetrainer.steps.programme import Programme
 from pulsetrainer.steps.quiz import Blind
 from pulsetrainer.steps.steering import Steering
-
-if TYPE_CHECKING:
-    from pulsetrainer.cli.console import Screen
-    from pulsetrainer.core.pulses import Shape
-    from pulsetrainer.steps.conductor import Decide
-    from pulsetrainer.steps.performance import Now
-    from pulsetrainer.steps.programme import Programme
 
 
 @dataclass(frozen=True, slots=True)

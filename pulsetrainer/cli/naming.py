@@ -69,12 +69,8 @@ class Command(TyperCommand):
     def invoke(self, ctx: Any) -> Any:
         """Run the command.
 
-        Raises
-        ------
-        PulsetrainerError
-            As the command; a file that is absent, or in the way, is named with its argument.
-        Interrupted
-            Also where Ctrl-C came while nothing was played.
+        PulsetrainerError as the command; a file that is absent, or in the way, is named with its argument;
+        Interrupted also where Ctrl-C came while nothing was played.
         """
         before = _files(ctx)
         try:

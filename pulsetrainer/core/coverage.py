@@ -30,16 +30,14 @@ class Gap:
 
     def words(self, plane: Plane, unit: str) -> str:
         """Name the region in one line: "never switched: relays with ... (18 % of the plane)"."""
-        parts = []
-        if self.alpha_low > plane.low:
-            parts.append(f"alpha above {self.alpha_low:.3g} {unit}")
-        if self.alpha_high < plane.high:
-            parts.append(f"alpha below {self.alpha_high:.3g} {unit}")
-        # beta never exceeds alpha, so a limit at alpha's own end says nothing new
-        if self.beta_low > plane.low:
-            parts.append(f"beta above {self.beta_low:.3g} {unit}")
-        if self.beta_high < self.alpha_high:
-            parts.append(f"beta below {self.beta_high:.3g} {unit}")
+        limits = (
+            ("alpha above", self.alpha_low, self.alpha_low > plane.low),
+            ("alpha below", self.alpha_high, self.alpha_high < plane.high),
+            # beta never exceeds alpha, so a limit at alpha's own end says nothing new
+            ("beta above", self.beta_low, self.beta_low > plane.low),
+            ("beta below", self.beta_high, self.beta_high < self.alpha_high),
+        )
+        parts = [f"{which} {at:.3g} {unit}".rstrip() for which, at, told in limits if told]
         which = f"relays with {' and '.join(parts)}" if parts else "all relays"
         rest = self.uncovered - self.share
         more = f"; {100 * rest:.0f} % more lies elsewhere" if rest >= 0.005 else ""

@@ -19,7 +19,7 @@ from pulsetrainer.device.exchange import Exchange
 from pulsetrainer.device.feed import Feed
 from pulsetrainer.device.follower import STOPPED, Follower
 from pulsetrainer.device.gains import DELIVERED, Gains
-from pulsetrainer.device.heat import HeatMemory, peak
+from pulsetrainer.device.heat import HeatMemory, course
 from pulsetrainer.device.identity import DeviceInfo
 from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire
 from pulsetrainer.device.player import Player, tells_duty
@@ -107,7 +107,8 @@ class Device:
         heat = status.heat * codes.HEAT_UNIT
         check_cool(heat, reference_A, rate_Hz, assumed=bool(status.flags & codes.STATUS_HEAT_ASSUMED))
         # Should nobody be left to ask afterwards, as if it had been played to its end.
-        self._remember_heat(peak(heat, reference_A, rate_Hz), reference_A.size / rate_Hz)
+        most = float(course(heat, reference_A, rate_Hz).max())
+        self._remember_heat(most, reference_A.size / rate_Hz)
 
     def __enter__(self) -> Self:
         return self

@@ -40,9 +40,9 @@ def added(reference_A: NDArray[np.float64], rate_Hz: float) -> NDArray[np.float6
     return heat
 
 
-def peak(heat: float, reference_A: NDArray[np.float64], rate_Hz: float) -> float:
-    """Return the highest heat that a coil of this heat gets by a reference (n,) in A."""
-    return float(np.max(heat * _left(reference_A.size, rate_Hz) + added(reference_A, rate_Hz)))
+def course(heat: float, reference_A: NDArray[np.float64], rate_Hz: float) -> NDArray[np.float64]:
+    """Return the heat (n,) that a coil of this heat has at each sample of a reference (n,) in A."""
+    return heat * _left(reference_A.size, rate_Hz) + added(reference_A, rate_Hz)
 
 
 def _left(samples: int, rate_Hz: float) -> NDArray[np.float64]:

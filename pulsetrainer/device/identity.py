@@ -21,7 +21,6 @@ class DeviceInfo:
     force_limit_N: float
     on_time_limit_s: float
     heartbeat_s: float
-    wave_buffer_samples: int
     reset_cause: str
     latched_fault: str  # what an earlier play ended with; the next play clears it
 
@@ -38,7 +37,6 @@ class DeviceInfo:
             force_limit_N=hello.force_trip / 1_000,
             on_time_limit_s=float(hello.on_time_s),
             heartbeat_s=hello.heartbeat_ms / 1_000,
-            wave_buffer_samples=hello.wave_buffer,
             reset_cause=reset_text(hello.reset_cause),
             latched_fault=latched_fault,
         )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.device import codes
-from pulsetrainer.device.heat import added, in_words, wait_s
+from pulsetrainer.device.heat import course, in_words, wait_s
 from pulsetrainer.device.plausibility import least_force
 from pulsetrainer.device.reference import ticks_per_sample, to_wire
 from pulsetrainer.device.trace import FloatArray
@@ -116,15 +116,12 @@ class Rehearsal:
                 hint="play fewer repeats, or at a lower current",
             )
         self._warm(current, rate_Hz)
-        foretold = expected_N is not None
-        if expected_N is None:
-            expected_N = least_force(current, rate_Hz)
-        self._press(current, expected_N, foretold=foretold)
+        self._press(current, rate_Hz, expected_N)
 
     def stream(self, reference_A: FloatArray, rate_Hz: float, expected_N: FloatArray) -> None:
         """Take the next piece (n,) of a reference without a known end as played; otherwise as ``play``."""
         current = codes.CURRENT_UNIT_A * to_wire(reference_A, limit_A=self.current_A).astype(float)
-        self._press(current, expected_N)
+        self._press(current, rate_Hz, expected_N)
         if self._warm(current, rate_Hz) > 1.0:
             raise DeviceError(
                 "the device would stop: the coil becomes too hot in the middle of a beat",
@@ -133,18 +130,19 @@ class Rehearsal:
 
     def _warm(self, current_A: FloatArray, rate_Hz: float) -> float:
         """Add the heat of a current (n,), and return the most that there is meanwhile."""
-        left = self._heat * np.exp(-np.arange(1, current_A.size + 1) / (rate_Hz * codes.HEAT_TAU_S))
-        heat = left + added(current_A, rate_Hz)
+        heat = course(self._heat, current_A, rate_Hz)
         self._heat, most = float(heat[-1]), float(heat.max())
         self.most_heat = max(self.most_heat, most)
         return most
 
-    def _press(self, current_A: FloatArray, expected_N: FloatArray, *, foretold: bool = True) -> None:
+    def _press(self, current_A: FloatArray, rate_Hz: float, foretold_N: FloatArray | None) -> None:
+        expected_N = least_force(current_A, rate_Hz) if foretold_N is None else foretold_N
         most = float(np.nanmax(expected_N))
         if most > self.force_N:
             # a slower stroke creeps higher, and sensors have noise: a tenth of the limit is left to them
             told_A = math.floor(100 * current_A[int(np.argmax(expected_N > 0.9 * self.force_N))]) / 100
-            lower = f"`current_max_A` at most {told_A:g}" if foretold else "a lower `current_max_A`"
+            at_most = f"`current_max_A` at most {told_A:g}"
+            lower = "a lower `current_max_A`" if foretold_N is None else at_most
             raise DeviceError(
                 f"the device would stop: {most:.3g} N are foretold, and its force limit is "
                 f"{self.force_N:g} N",
@@ -164,7 +162,8 @@ def too_hot_ever() -> ArgumentError:
     """Return the refusal of what heats even a cold coil beyond its limit."""
     return ArgumentError(
         "this reference heats the coil beyond its limit, however cold it is at the start",
-        hint="play less of it at a time, or at a lower current",
+        hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher `speed`), "
+        "or at a lower current",
     )
 
 

@@ -27,14 +27,8 @@ def open_device(
 ) -> Device:
     """Open a device and greet it; without a port the environment's ``PULSETRAINER_PORT``, else the bench.
 
-    Raises
-    ------
-    UsageError
-        if the port's text makes no sense.
-    ArgumentError
-        if a limit is beyond the device's own.
-    DeviceError
-        if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
+    UsageError if the port's text makes no sense; ArgumentError if a limit is beyond the device's own;
+    DeviceError if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
     """
     opened = _open_port(port or os.environ.get(PORT_VARIABLE) or DEFAULT_PORT, monotonic)
     try:

@@ -29,11 +29,8 @@ def question_of(
 ) -> Question:
     """Return the question that runs ask of a model; ``names`` of the runs and of the model are for messages.
 
-    Raises
-    ------
-    DataError
-        Runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is too
-        short, or has too few samples with a number.
+    DataError where runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is
+    too short, or has too few samples with a number.
     """
     low, high = input_range(model)
     *called, model_name = names or (*(f"run {k}" for k in range(1, len(runs) + 1)), "the model")
@@ -100,10 +97,7 @@ def measured_of(
 ) -> tuple[Record, FloatArray | None]:
     """Return the samples of a run that are numbers, and their times; None where the steps are even.
 
-    Raises
-    ------
-    DataError
-        The run is too short.
+    DataError where the run is too short.
     """
     good = np.isfinite(run.input) & np.isfinite(run.output)
     if run.reference is not None:

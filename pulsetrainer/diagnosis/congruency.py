@@ -124,10 +124,7 @@ def fitted_contrast(
 ) -> Contrast | None:
     """Fit the strength of ``cause`` to the contrasts; None where the records hold no equal loops.
 
-    Parameters
-    ----------
-    fitted
-        A joint fit without the cause; its other causes stay in.
+    ``fitted`` is a joint fit without the cause; its other causes stay in.
     """
     low, high = problem.plane.low, problem.plane.high
     loops = [

@@ -144,10 +144,7 @@ class Bins:
 def bins_of(records: Sequence[Record]) -> Bins:
     """Bins over the samples with weight.
 
-    Raises
-    ------
-    DataError
-        Hardly any sample has weight.
+    DataError where hardly any sample has weight.
     """
     duration = sum(r.input.size * r.step for r in records)
     width = max(min(LIMITS.bin_s, duration / LIMITS.enough_rows), duration / LIMITS.most_rows)
@@ -220,14 +217,6 @@ class Design:
         if isinstance(self.nodes, np.ndarray):
             return np.asarray(self.nodes @ masses)
         return np.asarray(self.nodes @ self.plane.everett_nodes(masses.T).T)
-
-    def columns(self, cells: IntArray) -> FloatArray:
-        """Columns (count, k) of D: what a mass of one in each of these cells gives."""
-        if isinstance(self.nodes, np.ndarray):
-            return self.bins.settled(self.nodes[:, cells])
-        masses = np.zeros((self.plane.n_q, cells.size))
-        masses[cells, np.arange(cells.size)] = 1.0
-        return self.bins.settled(self.output(masses))
 
     def across(self, columns: FloatArray) -> FloatArray:
         """Products D'c (n_q, m) with columns (count, m)."""
@@ -336,7 +325,8 @@ class Projector:
             free = np.asarray([int(np.argmax(np.diagonal(design.gram)))], dtype=np.int64)
         self.design, self.cells = design, free
         # filtered nodes are not sparse: then the columns of the few positive cells are faster than all
-        self._columns = None if sparse.issparse(design.nodes) else design.columns(free)
+        nodes = design.nodes
+        self._columns = design.bins.settled(nodes[:, free]) if isinstance(nodes, np.ndarray) else None
         block = design.gram[np.ix_(free, free)]
         # where no cell is seen at all, any ridge does
         block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max()) or 1.0
@@ -354,8 +344,3 @@ class Projector:
             self.factor, design.across(settled)[self.cells], check_finite=False
         )
         return settled - bins.settled(design.output(masses))
-
-    @property
-    def columns(self) -> FloatArray:
-        """Columns (count, k) of its cells."""
-        return self.design.columns(self.cells) if self._columns is None else self._columns

@@ -104,10 +104,7 @@ class Extended:
     def of(cls, static: Preisach | Dual, extensions: Sequence[tuple[str, Values]]) -> Extended:
         """Build from stored names and values.
 
-        Raises
-        ------
-        DataError
-            A cause is unknown.
+        DataError where a cause is unknown.
         """
         terms = in_order([Term(*cause_named(name).restored(values)) for name, values in extensions])
         return cls(_upright(static), terms, static.polarity)
@@ -135,18 +132,11 @@ class Extended:
         """Input (n,) whose output is ``target`` (n,), after the input ``lead`` (m,) has been played.
 
         The best iterate is kept; where none is better than the static inverse, that one is. What a delay
-        makes late is asked for, and compared, earlier by as much.
+        makes late is asked for, and compared, earlier by as much. ``inverse`` is that of the static part,
+        after the lead, for outputs as they are measured; None: over all its range, which signed weights do
+        not have.
 
-        Parameters
-        ----------
-        inverse
-            Of the static part, after the lead, for outputs as they are measured; None: over all its range,
-            which signed weights do not have.
-
-        Raises
-        ------
-        ArgumentError
-            The target is not a finite vector, or the static part cannot be inverted.
+        ArgumentError where the target is not a finite vector, or the static part cannot be inverted.
         """
         upright = Extended(self.static, self.terms)
         target = self.polarity * np.asarray(target)

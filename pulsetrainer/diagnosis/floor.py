@@ -99,12 +99,8 @@ def floor_of(
 ) -> Floor:
     """Return the floor of a problem from its raw noise and steps, discretisation left out.
 
-    Parameters
-    ----------
-    measured
-        The records as they were measured: time steps made even would hide the steps of the output.
-    span
-        What one is in the problem, output unit.
+    The records are as they were ``measured``: time steps made even would hide the steps of the output.
+    ``span`` is what one is in the problem, output unit.
     """
     records = problem.records
     noise = float(np.sqrt(np.mean([noise_beside_hum(r.output, r.sample_weight) ** 2 for r in records])))

@@ -13,7 +13,7 @@ would have given.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 
@@ -21,15 +21,13 @@ from pulsetrainer.artefacts import Model
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.fit import Fitted as StaticFit
 from pulsetrainer.core.fit import fit
+from pulsetrainer.core.forms import Form
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.diagnosis.problem import Static
 from pulsetrainer.diagnosis.scale import Scale
-
-if TYPE_CHECKING:
-    from pulsetrainer.core.forms import Form
 
 
 def base_of(model: Model, scale: Scale) -> Static | None:

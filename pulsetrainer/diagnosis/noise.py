@@ -69,16 +69,9 @@ def noise_in(
     level: FloatArray,
     rng: np.random.Generator,
 ) -> Noise:
-    """Return the noise of a residual.
+    """Return the noise of a residual (count,) at averaged outputs ``level`` (count,).
 
-    Parameters
-    ----------
-    residual
-        (count,) what is left.
-    free
-        Takes from columns (count, k) all that was taken from the residual.
-    level
-        (count,) averaged output.
+    ``free`` takes from columns (count, k) all that was taken from the residual.
     """
     left = free(residual[:, None])
     scale = _scale(left[:, 0], bins, level)
@@ -156,12 +149,7 @@ class Heard(NamedTuple):
 def quiet_square(residual: FloatArray, bins: Bins, level: FloatArray, speed: FloatArray) -> Heard:
     """Mean square of the noise in a residual (count,), whatever else is in it.
 
-    Parameters
-    ----------
-    level
-        (count,) averaged output.
-    speed
-        (count,) absolute rate of the input.
+    ``level`` is the averaged output, ``speed`` the absolute rate of the input, (count,) each.
     """
     quiet, trimmed = speed <= LIMITS.rate_edges[0], LIMITS.trimmed
     if np.count_nonzero(quiet) < LIMITS.least_quiet:

@@ -40,19 +40,10 @@ class Piece:
 
 
 class Piecewise:
-    """Inverts a model piece by piece, from the negative saturation and rest.
+    """Inverts a model, with or without terms, piece by piece, from the negative saturation and rest.
 
-    Parameters
-    ----------
-    extended
-        The model, with or without terms.
-    dt_s
-        Time step.
-    slew_per_s
-        Fastest that the input may move, input unit a second. A piece needs that much look-ahead, at least, as
-        the whole range takes at that speed.
-    band_Hz
-        Band of the correction.
+    ``slew_per_s`` is the fastest that the input may move, input unit a second: a piece needs that much
+    look-ahead, at least, as the whole range takes at that speed. ``band_Hz`` is the band of the correction.
     """
 
     def __init__(
@@ -86,10 +77,7 @@ class Piecewise:
     def next(self, target: FloatArray, ahead: FloatArray) -> Piece:
         """Return the input whose output is ``target`` (n,), if ``ahead`` (m,) shall follow it.
 
-        Raises
-        ------
-        ArgumentError
-            A target is not finite, or the static part cannot be inverted.
+        ArgumentError where a target is not finite, or the static part cannot be inverted.
         """
         n, wanted = target.size, self._polarity * np.concatenate((target, ahead))
         lift = np.zeros(wanted.size)

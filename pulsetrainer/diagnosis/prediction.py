@@ -18,12 +18,8 @@ if TYPE_CHECKING:
 def operator_of(model: Model) -> Preisach | Dual:
     """Return the static operator of a model, without its extensions.
 
-    Raises
-    ------
-    ArgumentError
-        Edges or weights are not those of a Preisach plane.
-    DataError
-        The model's reading is unknown.
+    ArgumentError where edges or weights are not those of a Preisach plane; DataError where the model's
+    reading is unknown.
     """
     if model.reading not in ("continuous", "relay"):
         raise DataError(
@@ -44,12 +40,8 @@ def operator_of(model: Model) -> Preisach | Dual:
 def extended_of(model: Model) -> Extended:
     """Return a model with its extensions, ready to predict and to be inverted.
 
-    Raises
-    ------
-    ArgumentError
-        Edges or weights are not those of a Preisach plane.
-    DataError
-        The model was extended by causes that this version does not know.
+    ArgumentError where edges or weights are not those of a Preisach plane; DataError where the model was
+    extended by causes that this version does not know.
     """
     # scipy.signal and scipy.stats come with it: a static model need not wait for them
     from pulsetrainer.diagnosis.causes import upright_values  # noqa: PLC0415
@@ -67,10 +59,7 @@ def predict(model: Model, inputs: FloatArray, dt_s: float | None, start: State |
 
         y_t = y0 + sum_k mu_k A_k r_k(u_0 .. u_t)    (Carneiro 2018, eq. 2), then the extensions in order
 
-    Raises
-    ------
-    DataError
-        The model has extensions, but the time step is unknown; or as ``extended_of``.
+    DataError where the model has extensions, but the time step is unknown; or as ``extended_of``.
     """
     if not model.extensions:
         return operator_of(model)(inputs, start)

@@ -1,4 +1,4 @@
-"""The question: some records, the plane on which weights live, and how samples are averaged."""
+"""The problem that is fitted: records, the plane on which weights live, and how samples are averaged."""
 
 from __future__ import annotations
 
@@ -67,10 +67,7 @@ def problem_for(
 ) -> Problem:
     """The records with masks applied, ready to be fitted.
 
-    Raises
-    ------
-    DataError
-        Input or output does not vary, or too few samples are left.
+    DataError where input or output does not vary, or too few samples are left.
     """
     bins = bins_of(records)
     measured = bins.average([r.output for r in records])

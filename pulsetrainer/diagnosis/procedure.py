@@ -63,10 +63,7 @@ QUICK: tuple[tuple[Callable[[State], State], float], ...] = (
 def diagnose(question: Question) -> State:
     """Diagnose records of one device: gates and baseline, then every stage.
 
-    Raises
-    ------
-    DataError
-        The data do not suffice for any statement.
+    DataError where the data do not suffice for any statement.
     """
     state = baseline.stage(raw_data.stage(question))
     for stage, done in QUICK if question.quick else FULL:

@@ -79,10 +79,7 @@ class Firing:
 def evenly(record: Record, stamps: FloatArray | None) -> Record:
     """Return a record at even time steps, straight between samples; what fills a gap has no weight.
 
-    Raises
-    ------
-    DataError
-        More of the record is gaps than samples.
+    DataError where more of the record is gaps than samples.
     """
     if stamps is None or record.dt_s is None:
         return record
@@ -157,7 +154,9 @@ def values_of(y: FloatArray) -> FloatArray:
     values = np.unique(y)
     if values.size == 0:
         return values
-    apart = LIMITS.same_value * (values[-1] - values[0])
+    # what an instrument writes for an overload may be 1e38 times the span
+    low, high = np.quantile(values, LIMITS.bulk_of_values)
+    apart = LIMITS.same_value * (high - low)
     return np.asarray(values[np.append(True, np.diff(values) > apart)])
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import wording
 from pulsetrainer.diagnosis.evidence import Evidence
@@ -30,6 +30,7 @@ class Comparison(NamedTuple):
     preisach: float
     velocity: float  # a static function of the velocity, or of its sign where there is no time
     span: float
+    beside: float = float("inf")  # that function, with a part in proportion to the input beside it
 
     @property
     def wrong(self) -> bool:
@@ -42,11 +43,10 @@ def compare(
 ) -> Comparison:
     """Compare the operator's residuals (n,) of each record with those of a function of the velocity.
 
-    Parameters
-    ----------
-    dt_s
-        Time step of each record, s; None where only the order of the samples is known: the direction of
-        motion then takes the place of the velocity.
+    A part in proportion to the input, beside that function, is a spring beside a damper.
+
+    ``dt_s`` is the time step of each record, s; None where only the order of the samples is known: the
+    direction of motion then takes the place of the velocity.
     """
     kept = [r.counts for r in records]
     output = np.concatenate([r.output[k] for r, k in zip(records, kept, strict=True)])
@@ -60,10 +60,19 @@ def compare(
     )
     edges = np.unique(np.quantile(speed, np.linspace(0.0, 1.0, LIMITS.speed_groups + 1)[1:-1]))
     group = np.searchsorted(edges, speed, side="right")
-    count = np.bincount(group)
-    mean = np.bincount(group, weights=output) / np.maximum(count, 1)
-    rest = output - mean[group]
-    return Comparison(root_mean_square(left), root_mean_square(rest), float(np.ptp(output)))
+    place = np.concatenate([r.input[k] for r, k in zip(records, kept, strict=True)])
+    rest, apart = (_within(group, values) for values in (output, place))
+    square = float(apart @ apart)
+    beside = rest - apart * (float(rest @ apart) / square) if square > 0 else rest
+    return Comparison(
+        root_mean_square(left), root_mean_square(rest), float(np.ptp(output)), root_mean_square(beside)
+    )
+
+
+def _within(group: IntArray, values: FloatArray) -> FloatArray:
+    """Values (n,) less the mean of their group."""
+    mean = np.bincount(group, weights=values) / np.maximum(np.bincount(group), 1)
+    return np.asarray(values - mean[group])
 
 
 def _velocity(u: FloatArray, dt_s: float | None) -> FloatArray:
@@ -78,6 +87,8 @@ def evidence(found: Comparison) -> Evidence:
     """Return the comparison as evidence against the kind of model."""
     percent = PERCENT / found.span
     figures = {"preisach": found.preisach * percent, "velocity": found.velocity * percent}
+    if found.beside < LIMITS.better * found.velocity:
+        return Evidence("wrong kind, both", figures=figures | {"beside": found.beside * percent})
     return Evidence("wrong kind", figures=figures)
 
 

@@ -24,6 +24,7 @@ _DELIMITERS = ("\t", ";", ",", "|", None)  # None: blanks
 _REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
 _SAMPLE_LINES = 200
 _LAST_BYTES = 4096
+_HEADS = 3  # lines: names, units, and words below them
 _TABLE = 10  # rows of one kind make a table of what stands below a text
 _REMARK_HEADINGS = frozenset(["comment", "comments", "remark", "remarks", "kommentar", "bemerkung"])
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
@@ -31,6 +32,7 @@ _FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
 _COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,' \u00a0\u202f])\d{3}(\1\d{3})*([.,]\d+)?")
 MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
+_MINUS = "\N{MINUS SIGN}"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
 
@@ -60,9 +62,9 @@ class Dialect:
         return f"{columns}, decimal {'commas' if self.decimal_comma else 'points'}"
 
     def split(self, line: str) -> list[str]:
-        """Return the cells of a line, without one that only a delimiter at the end makes."""
+        """Return the cells of a line, without those that only delimiters at the end make."""
         cells = split(line, self.delimiter)
-        if len(cells) == len(self.names) + 1 and not cells[-1]:
+        while len(cells) > len(self.names) and not cells[-1]:
             cells.pop()
         return cells
 
@@ -91,6 +93,8 @@ def number(cell: str, *, day_first: bool | None = None) -> float | None:
             return float(cell.replace(",", "."))
         if cell.lower() in MISSING:
             return np.nan
+        if cell.startswith(_MINUS):  # of a word processor
+            return number("-" + cell[1:])
         if _FORTRAN.fullmatch(cell):
             return float(re.sub("[dD]", "e", cell))
         return stamps.seconds(cell, day_first=day_first)
@@ -146,6 +150,9 @@ def detect(path: Path) -> Dialect:
     lines = [(count, line) for count, line in lines if not line.startswith(remarks)]
     if not lines:
         raise DataError(f"{path} is empty", hint="export the recording again")
+    aside = _below_the_units([split(line, delimiter) for _, line in lines])
+    comments += [(lines[k][0], lines[k][1].strip()) for k in aside]
+    lines = [line for k, line in enumerate(lines) if k not in aside]
     parted = [count - 1 in remarked for count, _ in lines]
     above = _above([split(line, delimiter) for _, line in lines], parted)
     comments += [(count, line.strip()) for count, line in lines[:above]]
@@ -202,6 +209,30 @@ def _delimiter(lines: list[str]) -> str | None:
     return "," if max(shares) < 0 else _DELIMITERS[int(np.argmax(shares))]
 
 
+def _below_the_units(rows: list[list[str]]) -> list[int]:
+    """Return the line of words between units and numbers, if there is one: Origin's comments, or types."""
+    start = _first_row(rows)
+    if start < _HEADS or len(rows) - start < _TABLE:
+        return []
+    names, units, words = rows[start - _HEADS : start]
+    told = [cell for cell in units if cell]
+    if not (len(names) == len(units) == len(words) and told and all(map(_says_a_unit, told))):
+        return []
+    return [] if any(map(_is_number, names + words)) or all(map(_says_a_unit, words)) else [start - 1]
+
+
+def _says_a_unit(cell: str) -> bool:
+    return is_unit(symbol_of(cell.strip("()[] "))) and not _is_number(cell)
+
+
+def _first_row(rows: list[list[str]]) -> int:
+    """Return where the rows at the end of the sample begin that are of one kind."""
+    start = len(rows)
+    while start and _is_row(rows[start - 1], rows[-1]):
+        start -= 1
+    return start
+
+
 def _above(rows: list[list[str]], parted: list[bool]) -> int:
     """Return how many lines stand above the table and its headings: what an instrument says about itself.
 
@@ -210,14 +241,11 @@ def _above(rows: list[list[str]], parted: list[bool]) -> int:
     ``parted`` says above which lines there is a remark.
     """
     kinds = [[_is_text(cell) for cell in row] for row in rows]
-    width = len(rows[-1])
-    start = len(rows)
-    while start and _is_row(rows[start - 1], rows[-1]):
-        start -= 1
+    start = _first_row(rows)
     words = (any(kind) or not any(row) for kind, row in zip(kinds[:start], rows, strict=False))
     if len(rows) - start < _TABLE or not all(words):
         return 0
-    named = width - (not rows[-1][-1])  # a delimiter at the end makes no column
+    named = _filled_width(rows[-1])
     head = start
     while head > max(start - 2, 0) and len(kinds[head - 1]) >= named:
         line = rows[head - 1]
@@ -238,7 +266,8 @@ def _is_row(row: list[str], last: list[str]) -> bool:
     text = [_is_text(cell) for cell in row]
     if len(row) != len(last):
         return len(row) > len(last) and not any(text[: len(last)]) and all(text[len(last) :])
-    return not text[0] or not any(here and _is_number(below) for here, below in zip(text, last, strict=True))
+    told = not text[0] and any(map(_is_number, row))
+    return told or not any(here and _is_number(below) for here, below in zip(text, last, strict=True))
 
 
 def _is_heading(row: list[str]) -> bool:
@@ -279,6 +308,7 @@ def _with_header(
             hint="correct the header; decimal commas need another delimiter, such as a semicolon",
         )
     columns = [_filled(k, body) for k in range(len(names))]
+    stated = None if columns[0] else stamps.stated_rate(comments)  # where the time would be there is nothing
     of_text = frozenset(k for k, cells in enumerate(columns) if _mostly_text(cells))
     if unremarked:
         of_text |= {len(first)}
@@ -298,7 +328,7 @@ def _with_header(
         lines[heads][0],
         of_text,
         frozenset(k for k, cells in enumerate(columns) if _is_stamped(cells)),
-        rate_Hz=rate,
+        rate_Hz=stated[0] if stated else rate,
         day_first=stamps.day_first(_columns(rows[heads:], delimiter, _last_lines(path, encoding))),
     )
 
@@ -350,7 +380,7 @@ def _cut_settings(rows: list[list[str]]) -> float | None:
     if len(rows) < 3:
         return None
     names, units, first = rows[:3]
-    width = len(first) - (not first[-1])
+    width = _filled_width(first)
     beside = [number(cell) for cell in units[width:] if cell]
     if not beside or None in beside or not all(number(cell) is None for cell in units[:width]):
         return None
@@ -359,6 +389,11 @@ def _cut_settings(rows: list[list[str]]) -> float | None:
     )
     rows[:2] = [names[:width], units[:width]]
     return 1.0 / step if step else None
+
+
+def _filled_width(row: list[str]) -> int:
+    """Return how many columns a row has, without those that delimiters at its end make."""
+    return max((k + 1 for k, cell in enumerate(row) if cell), default=0)
 
 
 def _heading_lines(text: list[list[bool]], rows: list[list[str]]) -> int:
@@ -372,10 +407,10 @@ def _heading_lines(text: list[list[bool]], rows: list[list[str]]) -> int:
 
 
 def _without_end(names: list[str], first: list[str]) -> tuple[list[str], list[str]]:
-    """Return header and first row without the column that only a delimiter at the end of a line makes."""
+    """Return header and first row without the columns that only delimiters at the end of a line make."""
     if not names[-1] and (not first[-1] or len(names) == len(first) + 1):
         names = names[:-1]
-    if not first[-1] and len(first) == len(names) + 1:
+    while len(first) > len(names) and not first[-1]:
         first = first[:-1]
     return names, first
 

@@ -19,6 +19,7 @@ from pulsetrainer.files.csv_dialect import MISSING, Dialect, column_words, has_t
 PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
 _SPARE = 1.02  # of the room that the first piece lets expect; what is never written to takes no memory
 _GROWTH = 1.125
+_NO_READING = (9.9e37, 9.91e37)  # IEEE 488.2: an instrument's overload, and its NaN
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +111,7 @@ class _Reader:
             values = self._at_once(rows, places)
             if values is None:
                 values = self._cell_by_cell(rows, places)
+        values[np.isin(np.abs(values), _NO_READING)] = np.nan
         self.line += len(found)
         self.row += len(values)
         return values
@@ -119,7 +121,7 @@ class _Reader:
         dialect = self.dialect
         rows = lines
         if dialect.delimiter and all(line.endswith(dialect.delimiter) for line in lines):
-            rows = [line[:-1] for line in lines]
+            rows = [line.rstrip(dialect.delimiter) for line in lines]
         if dialect.text_columns or not any(line.strip() for line in rows):
             return None
         if dialect.decimal_comma and dialect.delimiter == ",":  # in quotes

@@ -18,6 +18,7 @@ from pulsetrainer.artefacts.units import SECONDS, check_unit, claimed_unit, same
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.csv_dialect import column_words
 from pulsetrainer.files.table import Table, read_table
+from pulsetrainer.files.time_stamps import stated_rate, unit_of_count
 from pulsetrainer.files.timing import check_timing
 
 _TIME_NAMES = frozenset(
@@ -26,6 +27,9 @@ _TIME_NAMES = frozenset(
 _LEAVE_OUT = "leave bad rows out with `skip_bad_rows`"
 _ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the first: it has no name
 _DAY_S = 86_400.0
+_COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
+_EXACT = 0.02  # of a step: what rounding of large stamps may be off by
+_SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
 _BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
@@ -81,6 +85,7 @@ def run_from_table(
     )
     _check_distinct(table, input=input, output=output, reference=reference)
     notes: tuple[str, ...] = ()
+    whole = table.rows
     if skip_bad_rows:
         table, notes = _without_bad_rows(table, counted=rate_Hz is not None)
     columns = {name: np.ascontiguousarray(table.check_finite(name, remedy=_LEAVE_OUT)) for name in wanted}
@@ -88,7 +93,9 @@ def run_from_table(
         raise DataError(
             f"{table.path} has {table.rows} row, a run needs two or more", hint="export the record again"
         )
-    when = _Time(None, "no time") if no_time else _time(table, wanted, time, rate_Hz)
+    when = (
+        _Time(None, "no time") if no_time else _time(table, wanted, time, rate_Hz, whole=table.rows == whole)
+    )
     _check_distinct(table, input=input, output=output, reference=reference, time=time)
     run = Run(
         time_s=when.s,
@@ -116,49 +123,75 @@ class _Time(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def _time(table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float | None) -> _Time:
-    """Return the time by a rate, in a column, or, where neither is given, what the file has by itself."""
+def _time(
+    table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float | None, *, whole: bool
+) -> _Time:
+    """Return the time by a rate, in a column, or, where neither is given, what the file has by itself.
+
+    ``whole``: all rows are there, so that they may be counted.
+    """
     rate_Hz = table.rate_Hz if rate_Hz is None and time is None else rate_Hz
     if rate_Hz is not None:
         return _Time(np.arange(table.rows) / rate_Hz, f"time by the rate of {rate_Hz:g} Hz")
     if time is None:
         place = _own_column(table, {table.index(name) for name in wanted})
         if place is None:
-            lack = f"{table.path} has no time column: its samples have an order only"
-            return _Time(None, "no time", (f"{lack} (give `time` or `rate_Hz`)",))
+            return _counted(
+                table, f"{table.path} has no time column", "give `time` or `rate_Hz`", whole=whole
+            )
         time = table.names[place]
         if _just_counts(table.columns[time]):
-            note = (
-                f"the column {time} of {table.path} just counts the rows, so it is not used as time: the "
-                f"samples have an order only (if it is in seconds, give `time` {time!r})"
-            )
-            return _Time(None, "no time", (note,))
-    heading, unit = table.names[table.index(time)], _unit_of_time(table, time)
+            lack = f"the column {time} of {table.path} just counts the rows, so it is not used as time"
+            return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=whole)
+    heading = table.names[table.index(time)]
+    unit = _unit_of_time(table, heading)
     notes: tuple[str, ...] = ()
-    if not unit and _unknown_unit(table, time):
+    if not unit and (unit := unit_of_count(float(table.columns[heading][0]), heading)):
+        told = "days of a spreadsheet" if unit == "d" else f"{unit} since 1970"
+        notes = (f"the column {heading} of {table.path} is taken as {told}, by its size",)
+        table = replace(table, units={**table.units, heading: unit})
+    elif not unit and _unknown_unit(table, heading):
         said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
         notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
     words = f"time from {split_unit(heading)[0]} [{unit or 's'}]"
-    stamps, days = _past_midnight(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
-    if days:
-        table = replace(table, columns={**table.columns, time: stamps})
-        notes = (*notes, f"the time of {table.path} goes past midnight: a day is added from there on")
-    return _Time(seconds(table, time, of_record=True), words, notes)
+    stamps, again = _begun_again(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
+    if again:
+        table = replace(table, columns={**table.columns, heading: stamps})
+        notes = (*notes, f"the time of {table.path} {again}")
+    time_s = seconds(table, time, of_record=True)
+    if np.spacing(np.abs(time_s[0])) > _EXACT * float(np.median(np.diff(time_s))):
+        notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
+    return _Time(time_s, words, notes)
 
 
-def _past_midnight(stamps: FloatArray, unit: str) -> tuple[FloatArray, bool]:
-    """Return times of day (n,) that go on after midnight, and whether they do.
+def _counted(table: Table, lack: str, remedy: str, *, whole: bool) -> _Time:
+    """Return the time of counted rows at the rate that the comments state, else none."""
+    stated = stated_rate(table.comments) if whole else None
+    if stated is None:
+        return _Time(None, "no time", (f"{lack}: the samples have an order only ({remedy})",))
+    rate_Hz, said = stated
+    note = f"{lack}: the rate is that of its comment {said!r}"
+    return _Time(np.arange(table.rows) / rate_Hz, f"time by the rate of {rate_Hz:g} Hz", (note,))
+
+
+def _begun_again(stamps: FloatArray, unit: str) -> tuple[FloatArray, str]:
+    """Return times (n,) that go on where a day or a counter began again, and what was done; empty: nothing.
 
     A step back is midnight where with a day more it is a usual step of the record.
     """
     step = np.diff(stamps)
     back = np.flatnonzero(step < 0)
-    if unit != "s" or not back.size or stamps.min() < 0 or stamps.max() >= _DAY_S:
-        return stamps, False
+    whole, said = (_DAY_S, "goes past midnight: a day is added from there on")
+    if unit in _COUNTERS:
+        whole, said = _COUNTER, "begins again, as a counter of 32 bits does: 2^32 is added from there on"
+    elif unit != "s":
+        return stamps, ""
+    if not back.size or stamps.min() < 0 or stamps.max() >= whole:
+        return stamps, ""
     usual = float(np.median(step[step > 0])) if np.any(step > 0) else 0.0
-    if np.any(np.abs(step[back] + _DAY_S - usual) > _USUAL_STEP * usual):
-        return stamps, False
-    return stamps + _DAY_S * np.cumsum(np.concatenate(([0.0], step < 0))), True
+    if np.any(np.abs(step[back] + whole - usual) > _USUAL_STEP * usual):
+        return stamps, ""
+    return stamps + whole * np.cumsum(np.concatenate(([0.0], step < 0))), said
 
 
 def _read_as(table: Table, time: str, meanings: Mapping[str, tuple[str, str]]) -> dict[str, str]:

@@ -102,7 +102,7 @@ class Table:
                 hint=f"name another column; it has {', '.join(self.names)}",
             )
         if bad.size:
-            missing = "a blank cell or NaN" if self.shifts else "NaN"
+            missing = "an overload (9.9e37), a blank cell or NaN" if self.shifts else "NaN"
             value = missing if np.isnan(values[bad[0]]) else values[bad[0]]
             raise DataError(
                 f"{self.path} has {value} in {column_words(name)}, {self.place(int(bad[0]))} "
@@ -118,11 +118,13 @@ class Table:
 
         DataError where there is no such column (similar names are offered), or it holds text.
         """
-        bare = [split_unit(own)[0].lower() for own in self.names]
+        exact = [split_unit(own)[0] for own in self.names]
+        bare = [own.lower() for own in exact]
         wanted, unit = split_unit(name)
         units = [self.units.get(own) for own in self.names]
         alike = (
             [own == name for own in self.names],
+            [own == name for own in exact],
             [own == name.lower() for own in bare],
             [bool(unit) and pair == (wanted.lower(), unit) for pair in zip(bare, units, strict=True)],
         )

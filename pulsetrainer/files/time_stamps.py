@@ -17,6 +17,19 @@ _MINUTES = re.compile(r"(\b)(\d+):([0-5]\d[.,]\d+)(\b)")
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 _YEAR_FIRST = re.compile(rf"(\d{{4}})[/-](\d{{1,2}})[/-](\d{{1,2}}),?[T ]{_TIME}")
 _POINTS = re.compile(rf"(\d{{1,2}})\.(\d{{1,2}})\.(\d{{4}}),? {_TIME}")
+_UNIX = (("ms", 1e12), ("us", 1e15), ("ns", 1e18))  # counts since 1970, in 2001
+_DECADES = 4.0  # times those: in 2096
+_SPREADSHEET_DAYS = (30_000.0, 60_000.0)  # since 1900, in 1982 and 2064
+_RATE = re.compile(
+    r"(?i:\b(?:(?P<rate>sampl\w*[ _-]?(?:rate|frequency))|(?:sampl\w*[ _-]?(?:interval|period)|delta_x)))"
+    r"\W*(?:\((?P<above>[^()]+)\)\W*)?(?P<number>\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?)\s*(?P<unit>[A-Za-z\u00b5/]*)"
+)
+_OF_RATE = {"": 1.0} | {
+    f"{prefix}{unit}": factor
+    for prefix, factor in (("", 1.0), ("k", 1e3), ("M", 1e6))
+    for unit in ("Hz", "S/s", "Sa/s")
+}
+_OF_STEP = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "\u00b5s": 1e-6, "ns": 1e-9}
 _SLASHES = re.compile(rf"(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}),? {_TIME}")
 
 
@@ -58,6 +71,28 @@ def day_first(columns: Iterable[tuple[str, ...]]) -> bool | None:
         if len(spans) == len(set(spans.values())) > 0:
             return min(spans, key=spans.__getitem__)
     return None
+
+
+def unit_of_count(value: float, heading: str) -> str:
+    """Return in what a count is, told by its size: since 1970, or a spreadsheet's days; empty: in neither.
+
+    The latter stand below a heading of a date.
+    """
+    low, high = _SPREADSHEET_DAYS
+    if low < value < high and re.search("date|datum", heading, re.IGNORECASE):
+        return "d"
+    return next((unit for unit, least in _UNIX if least <= value <= _DECADES * least), "")
+
+
+def stated_rate(comments: Iterable[str]) -> tuple[float, str] | None:
+    """Return the rate in Hz that comments state, or state as a step, and their words; None: they do not."""
+    told = {}
+    for found in filter(None, map(_RATE.search, comments)):
+        size = float(found["number"].replace(",", "."))
+        factor = (_OF_RATE if found["rate"] else _OF_STEP).get(found["unit"] or found["above"] or "")
+        if factor is not None and size > 0:
+            told[size * factor if found["rate"] else 1.0 / (size * factor)] = found[0].strip()
+    return next(iter(told.items())) if len(told) == 1 else None
 
 
 def _of_day(time: tuple[str | Any, ...]) -> float:

@@ -38,7 +38,8 @@ def _playback(played: Playback) -> dict[str, Any]:
     }
 
 
-def _span(values: FloatArray, unit: str) -> str:
+def span_words(values: FloatArray, unit: str) -> str:
+    """Return the least and the greatest of values (n,) with as many digits as tell them apart."""
     values = values[np.isfinite(values)]  # a lost sample is none
     if values.size == 0:
         return "no samples"
@@ -63,8 +64,8 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
         "rate_Hz": 1.0 / steps.median if steps else None,
         "gaps": gaps_of(run.time_s, run.seam).number if steps else None,
         **({"parts": len(parts)} if len(parts) > 1 else {}),
-        f"input ({run.input_quantity})": _span(run.input, run.input_unit),
-        f"output ({run.output_quantity})": _span(run.output, run.output_unit),
+        f"input ({run.input_quantity})": span_words(run.input, run.input_unit),
+        f"output ({run.output_quantity})": span_words(run.output, run.output_unit),
         "reversals": reversals,
         "complete": run.complete,
         "dropped_samples": run.dropped_samples,
@@ -111,7 +112,7 @@ def _model(model: Model) -> dict[str, Any]:
         "polarity": model.polarity,
         "form": model.form,
         "loop": fit.loop or None if fit else None,
-        f"{'output' if model.form == 'dual' else 'input'} ({model.edges_quantity})": _span(
+        f"{'output' if model.form == 'dual' else 'input'} ({model.edges_quantity})": span_words(
             model.edges, model.edges_unit
         ),
         "offset": with_unit(f"{model.offset:.4g}", model.offset_unit),
@@ -129,8 +130,8 @@ def _waveform(waveform: Waveform) -> dict[str, Any]:
         "inversion": waveform.inversion,
         "samples": waveform.time_s.size,
         "seconds": float(waveform.time_s[-1]),
-        "target": _span(waveform.target[waveform.scored], waveform.output_unit),
-        "compensated drive": _span(waveform.compensated, waveform.input_unit),
+        "target": span_words(waveform.target[waveform.scored], waveform.output_unit),
+        "compensated drive": span_words(waveform.compensated, waveform.input_unit),
         "clipped_samples": waveform.clipped_samples,
         "source": waveform.source,
         **(_refined(waveform) if waveform.passes else {}),

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING, Final
+from typing import Final
 from xml.etree import ElementTree as ET
 
 from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from pulsetrainer.report.style import SETTINGS, THEME
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _DPI: Final = 200
 # keys that each format would otherwise fill with the time of writing

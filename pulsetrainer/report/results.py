@@ -7,11 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.units import with_seconds, with_unit
-from pulsetrainer.report.facts import loop_words, minor_words, warmth_words
+from pulsetrainer.report.facts import loop_words, minor_words, span_words, warmth_words
 from pulsetrainer.report.tables import picked
+
+_SMALL = 0.1  # of a unit: three decimals would not tell a range of less
 
 Said = tuple[dict[str, Any], str, dict[str, Any]]
 
@@ -53,7 +57,8 @@ def identified(out: Path, model: Model, seconds: float) -> Said:
         "fit rms": with_unit(f"{fit.rms:.4g}", unit),
         "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
         "cells switched": f"{fit.coverage_percent:.1f} %",
-        "told apart by minor loops": minor_words(fit.minor_percent),
+        "told apart by minor loops": minor_words(fit.minor_percent)
+        + f", on the plane of the {model.edges_quantity}" * (model.form == "dual"),
         "smoothing": f"{share:.3g} of the range of the {model.input_quantity}" if share else "none",
         "loop": loop_words(model),
         "form": model.form,
@@ -82,6 +87,13 @@ def drive_title(drive: Waveform) -> str:
     return f"{drive.name} by {drive.inversion} inversion"
 
 
+def _range_words(ends: tuple[float, float], unit: str) -> str:
+    """Return a range with three decimals, or with more digits where these would not tell its ends apart."""
+    if ends[1] - ends[0] < _SMALL:
+        return span_words(np.asarray(ends), unit)
+    return with_unit(f"{ends[0]:.3f} .. {ends[1]:.3f}", unit)
+
+
 def inverted(out: Path, drive: Waveform) -> Said:
     """Say what drive was found for a pulse."""
     force = float(drive.target[drive.scored].min()), float(drive.target[drive.scored].max())
@@ -102,8 +114,8 @@ def inverted(out: Path, drive: Waveform) -> Said:
     but = ", which lacks what was learnt" if drive.inversion == "transferred" else ""
     rows = {
         "length": f"{length}, {drive.time_s.size} samples",
-        made: with_unit(f"{force[0]:.3f} .. {force[1]:.3f}", drive.output_unit),
-        given: with_unit(f"{current[0]:.3f} .. {current[1]:.3f}", drive.input_unit),
+        made: _range_words(force, drive.output_unit),
+        given: _range_words(current, drive.input_unit),
         "out of reach": f"{drive.clipped_samples} samples",
         "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model{but}",
     }

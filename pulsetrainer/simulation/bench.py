@@ -16,12 +16,14 @@ from pathlib import Path
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.resources import firmware_dir
 from pulsetrainer.simulation.bad_wire import through
 from pulsetrainer.simulation.build import firmware_executable
 from pulsetrainer.simulation.options import BenchOptions, number_in, parse_bench
 
 BENCH_PORT = "bench:"
 _OWN = ("ideal", "speed", "break", "wire", "wire-seed", "serial")
+_LIST = "plant/solenoid_params.c"  # each with its range and what it does
 _START_S = 10.0
 _LEAVE_S = 2.0
 
@@ -39,28 +41,25 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
     parameters, breaks = _known(executable)
     for name, value in options.settings:
         if name not in parameters:
-            near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.6)
+            near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.6) or [
+                known for known, row in parameters.items() if name and name in f"{known} {row[-1]}"
+            ]
             return UsageError(
                 f"`port`: the bench has no parameter {name!r}",
                 hint=f"did you mean {' or '.join(near)}?"
                 if near
-                else f"there are: {', '.join([*_OWN, *parameters])}",
+                else f"it takes {', '.join(_OWN)}, and what {firmware_dir() / _LIST} lists, such as noise",
             )
         unit, low, high, meaning = parameters[name]
         if f"{name}={value}" in complaint:
             within = f"{low} to {high} {unit}".removesuffix(" 1")
             most = sys.float_info.max
             amiss = "is not a number from" if math.isnan(number_in(value, -most, most)) else "is outside"
+            hint = f"give {name} ({meaning}) a value in that range"
             if re.search(r"[,;]\w+=", value):
-                return UsageError(
-                    f"`port`: the bench parameter {name}={value} {amiss} {within}",
-                    hint="put & between parameters, and quotes around them: "
-                    f"`port` 'bench:?{name}={re.sub('[,;]', '&', value)}'",
-                )
-            return UsageError(
-                f"`port`: the bench parameter {name}={value} {amiss} {within}",
-                hint=f"give {name} ({meaning}) a value in that range",
-            )
+                several = f"bench:?{name}={re.sub('[,;]', '&', value)}"
+                hint = f"put & between parameters, and quotes around them: `port` '{several}'"
+            return UsageError(f"`port`: the bench parameter {name}={value} {amiss} {within}", hint=hint)
     for what in options.breaks:
         if what.partition("@")[0] not in breaks or what in complaint:
             return UsageError(

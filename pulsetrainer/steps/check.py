@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +13,9 @@ from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.edges import thinned
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.temperature import COPPER_PER_K
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import check_peak
+from pulsetrainer.device.trace import Trace
 from pulsetrainer.diagnosis.causes.base import low_pass
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError
@@ -23,10 +24,6 @@ from pulsetrainer.steps.own_device import check_same_device, check_units
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import condition
 from pulsetrainer.steps.stopped import raise_if_lost, raise_if_stopped
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
-    from pulsetrainer.device.trace import Trace
 
 RATE_HZ = 1000.0
 SPEED_A_PER_S = 1.5  # slow, as an identification: lags and creep are not the static model's

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from pulsetrainer.core import inversion
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.temperature import WINDOW_S, CoilRecord, Thermal, Thermometer
+from pulsetrainer.device.device import Device
 from pulsetrainer.diagnosis.prediction import extended_of, operator_of
 from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.invert import DEVICE_SLEW_A_PER_S
@@ -21,9 +21,6 @@ from pulsetrainer.steps.invertible import invertible
 from pulsetrainer.steps.own_device import check_same_device
 from pulsetrainer.steps.recording import conditioning_loop
 from pulsetrainer.steps.stopped import raise_if_stopped
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
 
 _RATE_HZ = 1000.0
 _COLDEST_K, _HOTTEST_K = -80.0, 150.0  # against calibration: beyond, it is another coil or another supply
@@ -108,8 +105,8 @@ def _check_plausible(kelvin: float) -> None:
     if not _COLDEST_K <= kelvin <= _HOTTEST_K:
         raise DeviceError(
             f"the duty says that the coil is {kelvin:+.0f} K against calibration, expected "
-            f"{_COLDEST_K:+.0f} to {_HOTTEST_K:+.0f} K: the coil or the supply is another",
-            hint="connect those of the calibration, or capture and identify again; `no_track_heat` leaves "
+            f"{_COLDEST_K:+.0f} to {_HOTTEST_K:+.0f} K: this is another coil or supply",
+            hint="connect those used at calibration, or capture and identify again; `no_track_heat` leaves "
             "heat out",
         )
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
-from pulsetrainer.artefacts.units import same_units, with_unit
+from pulsetrainer.artefacts.units import same_units, shown, with_unit
 from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
 from pulsetrainer.core.dual import exchanged
@@ -179,14 +179,14 @@ def _without_wild(
     masks = [one | other for one, other in zip(sure, doubtful, strict=True)]
     fitted = on(_signals(runs), *reach, kept=[~m for m in masks] if any(map(np.any, masks)) else None)
     span = float(np.ptp(np.concatenate([run.output for run in runs])))
-    shown = list(sure)  # those that are wild by themselves, or beside a fit
+    masked = list(sure)  # those that are wild by themselves, or beside a fit
     for number in range(_ROUNDS):
         off = wild.off(raw, fitted.predicted, span, masks)
-        shown = [before | now for before, now in zip(shown, off, strict=True)]
+        masked = [before | now for before, now in zip(masked, off, strict=True)]
         remembered = number == 0 and fitted.form == "dual" and any(map(np.any, masks))
-        if not remembered and all(map(np.array_equal, shown, masks)):
+        if not remembered and all(map(np.array_equal, masked, masks)):
             break
-        masks = list(shown)
+        masks = list(masked)
         predicted = fitted.predicted if fitted.form == "dual" else [None] * len(runs)
         runs = [
             replace(
@@ -338,7 +338,7 @@ def _of_first_strokes(names: Sequence[str], runs: Sequence[Run], low: float, hig
 def _of_gaps(plane: Plane, covered: BoolArray, unit: str) -> list[str]:
     """Name the largest part of the plane that the runs never reached."""
     gap = largest_gap(plane, covered)
-    return [] if gap is None or float(np.mean(covered)) >= WELL_COVERED else [gap.words(plane, unit)]
+    return [] if gap is None or float(np.mean(covered)) >= WELL_COVERED else [gap.words(plane, shown(unit))]
 
 
 def _only_way(runs: Sequence[Run]) -> str:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from pulsetrainer.artefacts import Model
+from pulsetrainer.device.device import Device
 from pulsetrainer.errors import DataError
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
 
 
 def check_units(model: Model, does: str) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Model, RefinePass, Waveform
 from pulsetrainer.core import inversion, learning, metrics
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.errors import ArgumentError, DataError, Interrupted
 from pulsetrainer.steps.invert import slew_limit
@@ -18,9 +18,6 @@ from pulsetrainer.steps.invertible import Invertible, invertible
 from pulsetrainer.steps.play import Plan, check_current, play_once
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
 
 _LOG = logging.getLogger(__name__)
 FEWEST, MOST = 2, 5  # repeats of a pass: two tell noise from error

@@ -122,12 +122,8 @@ def perform(
     watch
         Called with each piece of telemetry.
 
-    Raises
-    ------
-    DataError
-        The model cannot be used.
-    DeviceError
-        The device cannot be talked to, or its firmware knows no open-ended waves.
+    DataError where the model cannot be used; DeviceError where the device cannot be talked to, or its
+    firmware knows no open-ended waves.
     """
     check_model(model)
     check_peak(model.edges, device.info.current_limit_A)

@@ -6,7 +6,6 @@ import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from pulsetrainer.core.coil import Coil, Margins
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray, positive
 from pulsetrainer.core.pulses import Shape, train
+from pulsetrainer.device.device import Device
 from pulsetrainer.device.gains import Gains
 from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
@@ -23,9 +23,6 @@ from pulsetrainer.steps.loop_gains import MOST_PROPORTIONAL, OPEN_LOOP, from_wir
 from pulsetrainer.steps.measure_coil import MEAN_S, RATE_HZ, Measurement, Step, check_range, planned, rest_of
 from pulsetrainer.steps.play import check_current
 from pulsetrainer.steps.progress import Progress, silent
-
-if TYPE_CHECKING:
-    from pulsetrainer.device.device import Device
 
 _DIODE_V = (0.15, 2.0)  # what any diode drops
 _SUPPLY_OFF = 0.05  # share of the supply: what the diode's drop tells is hardly better

@@ -10,7 +10,10 @@ import pytest
 
 import pulsetrainer as pt
 from program import pulsetrainer
+from pulsetrainer.cli.console import plain
 from pulsetrainer.diagnosis.causes.base import low_pass
+from pulsetrainer.errors import DataError
+from pulsetrainer.steps.check import updated
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 KEPT = DATA / "files-0.1"
@@ -66,6 +69,31 @@ def test_records_of_other_laboratories(tmp_path, name):
     pt.save(model, tmp_path / "model.h5")
     errors = pt.evaluate(run, model, names=["run.h5"], model_names=["model.h5"])
     same(by_command(tmp_path, "evaluate", "run.h5", "--model", "model.h5"), stored(errors, tmp_path))
+    found = pt.diagnose(run, model, quick=True, names=["run.h5", "model.h5"])
+    words = ("diagnose", "run.h5", "--model", "model.h5", "--quick")
+    same(by_command(tmp_path, *words), stored(found, tmp_path))
+    drive = pt.invert("normal", model, periods=2)
+    words = ("invert", "normal", "--model", "model.h5", "--periods", 2)
+    same(by_command(tmp_path, *words), stored(drive, tmp_path))
+
+
+@pytest.mark.slow
+def test_causes_of_other_laboratories(tmp_path):
+    """A tendon diagnosed whole, the delay of its recorder taken out, and nothing to extend its model by."""
+    run = pt.read_table(DATA / MEASURED[1], input="u", output="y")
+    pt.save(run, tmp_path / "run.h5")
+    model = pt.identify(run, levels=16)
+    pt.save(model, tmp_path / "model.h5")
+    found = pt.diagnose(run, model, names=["run.h5", "model.h5"])
+    same(by_command(tmp_path, "diagnose", "run.h5", "--model", "model.h5"), stored(found, tmp_path))
+    pt.save(found, tmp_path / "diagnosis.h5")
+    corrected = pt.correct(run, found, delay_s=0.01)
+    words = ("correct", "run.h5", "--diagnosis", "diagnosis.h5", "--delay", 0.01)
+    same(by_command(tmp_path, *words), stored(corrected, tmp_path))
+    with pytest.raises(DataError) as refused:
+        pt.extend(model, found, names=["model.h5", "diagnosis.h5"])
+    done = pulsetrainer(tmp_path, "extend", "diagnosis.h5", "--model", "model.h5", "-o", "x.h5", "--json")
+    assert done.json["error"]["message"] == refused.value.message
 
 
 @pytest.mark.parametrize("pulse", ["normal", "bifid"])
@@ -141,6 +169,32 @@ def test_correct(tmp_path):
     corrected = pt.correct(humming, found)
     words = ("correct", "humming.h5", "--diagnosis", "diagnosis.h5")
     same(by_command(tmp_path, *words), stored(corrected, tmp_path))
+
+
+def test_check(tmp_path):
+    """A verdict, and the model that it updates, on two benches that are alike in every bit."""
+    port = "bench:?seed=5"
+    with pt.open_device(port) as device:
+        run = pt.capture("identification", device, levels=8, speed_A_per_s=3.0)
+    model = pt.identify(run, levels=8)
+    pt.save(model, tmp_path / "model.h5")
+    with pt.open_device(port) as device:
+        checked = pt.check(model, device)
+    done = pulsetrainer(tmp_path, "check", "model.h5", "--port", port, "--json")
+    assert {name: done.json[name] for name in ("verdict", "offset", "gain", "shape_percent")} == {
+        name: plain(getattr(checked, name)) for name in ("verdict", "offset", "gain", "shape_percent")
+    }
+    words = ("check", "model.h5", "--port", port, "--update")
+    same(by_command(tmp_path, *words), stored(updated(model, checked), tmp_path))
+
+
+def test_tune(tmp_path):
+    """The coil and the gains, on two benches that are alike in every bit."""
+    with pt.open_device("bench:?seed=5") as device:
+        tuned = pt.tune(device)
+    done = pulsetrainer(tmp_path, "tune", "--port", "bench:?seed=5", "--json")
+    assert done.code == 0, done.err
+    assert {name: done.json[name] for name in plain(tuned)} == plain(tuned)
 
 
 def test_compare(tmp_path):

@@ -59,6 +59,16 @@ def test_a_model_in_other_units_is_inverted(tmp_path, bench):
     assert -0.02 * reach <= low < high <= 1.02 * reach
 
 
+def test_a_small_output_is_told_in_digits_that_it_has(tmp_path):
+    """A stroke of 13 um in metres was 0.000 to 0.000."""
+    u = np.concatenate([a * np.sin(np.linspace(0, 2 * np.pi, 400)) for a in (100.0, 60.0, 30.0)])
+    (tmp_path / "small.csv").write_text("u_V,x_m\n" + "".join(f"{a},{1.3e-7 * a}\n" for a in u))
+    inverted(tmp_path, "small.csv", ("--input", "u", "--output", "x", "--no-time"))
+    done = pulsetrainer(tmp_path, "invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--overwrite")
+    assert "-1.3e-05 .. 1.3e-05 m" in done.out
+    assert "-99.999 .. 99.999 V" in done.out
+
+
 def test_a_measured_magnet_is_inverted(tmp_path):
     """A licensed record, in its own units."""
     columns = ("--input", "u", "--output", "y", "--input-unit", "T", "--output-unit", "nA m^2")

@@ -17,9 +17,11 @@ import pytest
 from program import PROGRAM, pulsetrainer
 from pulsetrainer.artefacts import Run
 from pulsetrainer.core import excitations
+from pulsetrainer.core.course import Course
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.recorder import RunRecorder
 from pulsetrainer.files.store import read, read_header
+from pulsetrainer.steps.recording import samples_played
 
 SEED = 20260103
 IDENTIFICATION = ("capture", "identification", "--levels", "16", "--speed", "3", "--repeats", "40")
@@ -122,8 +124,11 @@ def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
     assert np.array_equal(run.output[: cut.size], cut)
     assert len(run.parts()) == 2
     last = run.parts()[1].reference
-    one = excitations.identification(0.0, 1.5, n_h=12, speed=3.0, rate_Hz=1000.0).value
-    np.testing.assert_allclose(last[-500:], one[-500:], atol=STEP_A)
+    one = excitations.identification(0.0, 1.5, n_h=12, speed=3.0, rate_Hz=1000.0)
+    np.testing.assert_allclose(last[-500:], one.value[-500:], atol=STEP_A)
+    for samples in (1, 1000):  # of a recording that stopped with no way down
+        cut_off = run.parts()[0].cut(slice(samples))
+        assert samples_played(cut_off, Course(one, 1)) == samples
 
 
 @pytest.mark.realtime

@@ -81,7 +81,7 @@ PACKAGES = {  # the tests that answer for a package
         "tests/api",
     ),
     "steps": (
-        *(f"{UNIT}{one}*.py" for one in ("coil", "conductor", "quiz", "short_records", "steps")),
+        *(f"{UNIT}{one}*.py" for one in ("coil", "conductor", "core_wild", "quiz", "short_records", "steps")),
         *(f"tests/link/test_{one}.py" for one in ("dry_run", "heat", "plausibility", "true", "tune")),
         "tests/api",
         "tests/cli",

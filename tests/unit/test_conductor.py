@@ -17,6 +17,7 @@ from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import COOL, HOT, RATE_HZ, SLEW_A_PER_S, Conductor, Play, Rest
+from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.session import check_model, reach_of
 from pulsetrainer.steps.steering import AMPLITUDE_STEP, RATE_STEP_BPM, Steering
@@ -70,6 +71,15 @@ def _random(seed, minutes):
     )
 
 
+def _beats_over_the_range(model, pulse):
+    """Force (beats, n) of five minutes of a pulse that is the input itself, over the whole range."""
+    low, high = model.edges[[0, -1]]
+    record = low + (high - low) * pulse.record(pulse.own_bpm / 75.0, RATE_HZ)
+    current = np.tile(record, round(300 * RATE_HZ / record.size))
+    lead = major_loop(low, high, RATE_HZ)
+    return model.predict(np.append(lead, current), 1 / RATE_HZ)[lead.size :].reshape(-1, record.size)
+
+
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
 def test_no_change_is_a_step(model, seed):
     """Changes of rate, amplitude and pulse, at any time, move the current no faster than the slew limit."""
@@ -81,7 +91,14 @@ def test_no_change_is_a_step(model, seed):
     assert current.min() >= model.edges[0]
     assert current.max() <= model.edges[-1]
     target = np.concatenate([g.target for g in given if g.beat])
-    low, high = reach_of(model, PULSES, (75.0,)).low, reach_of(model, PULSES, (75.0,)).high
+    reach = reach_of(model, PULSES, (75.0,))
+    low, high = reach.low, reach.high
+    each = [reach_of(model, [pulse], (75.0,)) for pulse in PULSES]
+    assert (low, high) == (max(one.low for one in each), min(one.high for one in each))
+    for pulse, own in zip(PULSES, each, strict=True):  # cold, and once its slowest cause has settled
+        beats = _beats_over_the_range(model, pulse)[[1, -1]]
+        assert own.low == pytest.approx(beats.min(axis=1).max(), abs=1e-3)
+        assert own.high == pytest.approx(beats.max(axis=1).min(), abs=1e-3)
     assert low - 1e-9 <= target.min() <= target.max() <= high + 1e-9
 
 

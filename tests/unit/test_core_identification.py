@@ -287,6 +287,7 @@ def test_the_gap_is_named_in_the_input_unit():
     assert "% of the plane" in words
     assert "more lies elsewhere" in words
     assert gap.uncovered == pytest.approx(1.0 - (0.9 / 1.5) ** 2, abs=0.02)
+    assert "beta below 0.3 (" in gap.words(plane, "")
 
 
 def test_full_coverage_has_no_gap():

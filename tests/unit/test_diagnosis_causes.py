@@ -226,6 +226,7 @@ def test_noise_and_steps_of_a_record():
     assert noise_of(noise[:8]) > 0.0
     assert spacing_of(np.asarray([0.0, 0.5, 0.5, 1.0])) == 0.5
     assert spacing_of(np.ones(9)) == 0.0
+    assert spacing_of(np.append(np.arange(50.0), [9.9e37, 9.9e37])) == 1.0  # an overload is no step
     assert coarse_step(np.repeat(np.arange(50.0), 9)) == 1.0
     assert coarse_step(np.round(noise)) == 0.0
 
@@ -327,6 +328,18 @@ def test_where_the_input_turns_within_a_few_samples_none_is_wild(samples):
     wild = [200, 1200, 2200, 5000]
     y[wild] += 0.7
     np.testing.assert_array_equal(np.flatnonzero(CAUSE["outliers"].gate(_raw(y, u)).mask), wild)
+
+
+def test_where_three_in_a_hundred_are_wild_those_beside_turns_are_too():
+    """What one is left over would be what no cause explains."""
+    rng = np.random.default_rng(8)
+    u = np.interp(np.arange(4000), np.linspace(0, 3999, 54), [0.5, *rng.uniform(0.0, 1.0, 53)])
+    y = np.tanh(2.0 * u) + 1e-3 * rng.standard_normal(u.size)
+    wild = rng.random(u.size) < 0.03
+    y[wild] += rng.choice([-1.0, 1.0], wild.sum()) * rng.uniform(0.3, 3.0, wild.sum())
+    found = CAUSE["outliers"].gate(_raw(y, u)).mask
+    assert not np.any(found & ~wild)
+    assert np.count_nonzero(wild & ~found) <= 1
 
 
 def test_the_first_and_the_last_stroke_are_no_step():

@@ -94,6 +94,14 @@ def test_the_smallest_effect_that_shows_is_tested_and_matters(relevant, least):
     assert sight.least(relevant, there=9.0) == pytest.approx((least + 3.0) / 0.5)  # it may be undone by that
 
 
+def test_what_shows_of_a_cause_is_told_by_the_block_in_the_middle():
+    """Of its own blocks, by the effect that shows: noise times what the test asks for, over what is left."""
+    shares = (0.5, 0.1, 1.0)  # noises of 1, 2 and 3: effects of 2, 20 and 3 times what the test asks for
+    blocks = [replace(_block("creep", ((1.0,),), np.ones((4, 1)), [[1.0]]), share=one) for one in shares]
+    sight = screening._sights(blocks, np.diag([1.0, 4.0, 9.0]), -5.0)["creep"]
+    assert (sight.share, sight.noise) == (1.0, 3.0)
+
+
 @pytest.mark.parametrize("surprise", [-3.0, -9.0])
 def test_the_critical_size_has_the_surprise_that_is_asked_for(surprise):
     """For one column, a one-sided one, two, a whole one and a line that was sought."""
@@ -335,7 +343,7 @@ def test_the_jackknife_leaves_out_a_tenth_at_a_time():
     assert _told({10: [(None, changes[0])] * 9}).jackknife("a fit") is None
 
 
-@pytest.mark.parametrize(("jackknife", "variance"), [(None, 0.04), (0.09, 0.09), (0.01, 0.04)])
+@pytest.mark.parametrize(("jackknife", "variance"), [(None, 4e-4), (9e-4, 9e-4), (1e-4, 4e-4)])
 def test_intervals_hold_noise_levels_moment_and_formula(monkeypatch, jackknife, variance):
     """2.26 standard deviations, the larger of the two, and the systematic parts beside them."""
     term = Term(CAUSE["output-lag"], (0.3,))
@@ -345,14 +353,12 @@ def test_intervals_hold_noise_levels_moment_and_formula(monkeypatch, jackknife, 
     )
     monkeypatch.setattr(intervals, "_late", lambda fitted: np.asarray([0.02, 0.0]))
     monkeypatch.setattr(intervals, "_otherwise", lambda fitted: [np.asarray([-0.04, 5.0])])
-    told = SimpleNamespace(covariance=lambda columns: 0.4**2 * columns.T @ columns)  # 0.2 of the parameter
+    told = SimpleNamespace(covariance=lambda columns: 0.04**2 * columns.T @ columns)  # 0.02 of the parameter
     noise = SimpleNamespace(noise=told)
     told = SimpleNamespace(jackknife=lambda fitted: None if jackknife is None else np.asarray([jackknife]))
     (one,) = intervals.estimates_of(fitted, noise, told, Floor(4, 1.0, 1.0, 1.0, 0.05))["output-lag"]
     half = np.sqrt(2.26**2 * variance + (0.2 * 0.05 * 2.0 / 2.0) ** 2 + 0.01**2 + 0.02**2)
-    assert (one.value, one.lower, one.upper) == pytest.approx(
-        (0.3, max(0.3 - half, 0.0), min(0.3 + half, 0.5))
-    )
+    assert (one.value, one.lower, one.upper) == pytest.approx((0.3, 0.3 - half, 0.3 + half))
 
 
 # --- where the residual is, and what the records lack
@@ -382,6 +388,20 @@ def test_residuals_are_grouped():
     np.testing.assert_allclose(
         residual.rms_by(group, np.asarray([3.0, 4.0, -2.0])), [np.sqrt(12.5), np.nan, 2.0]
     )
+
+
+def test_every_average_is_in_a_group_and_all_power_in_a_band():
+    """No group beyond the last one that is used; bands of a third of an octave up to half the rate."""
+    u = np.tile(_loops(), 4)
+    problem = problem_for([Record(u, 3.0 * u, dt_s=0.01)], 0.0, 1.5)
+    left = np.random.default_rng(1).standard_normal(problem.bins.count)
+    for one in residual.groups(problem):
+        assert 0 <= one.number.min() <= one.number.max() < one.at.size
+        if one.name == "rate":
+            assert one.number.max() == one.at.size - 1
+    frequency, rms = residual.spectrum(problem, left)
+    np.testing.assert_allclose(np.diff(np.log2(frequency))[-6:], 1.0 / 3.0)
+    assert np.sum(rms**2) == pytest.approx(np.mean(left**2), rel=0.05)
 
 
 def test_averages_of_short_bins():
@@ -430,6 +450,18 @@ def test_a_function_of_the_velocity_is_found():
     assert timed.velocity < 0.05 * timed.span
     untimed = velocity.compare([record], [None], [record.output])
     assert untimed.velocity == pytest.approx(np.std(np.abs(record.output)), rel=0.02)
+
+
+@pytest.mark.parametrize(("spring", "kind"), [(0.0, "wrong kind"), (1.0, "wrong kind, both")])
+def test_a_spring_beside_a_damper_is_told(spring, kind):
+    """Of y = x + 2 dx/dt a function of the velocity leaves what follows x: it does not follow that alone."""
+    t = np.arange(4000) * 1e-2
+    u = np.sin(2 * np.pi * 0.2 * t) * (1 + 0.5 * np.sin(0.3 * t))
+    record = Record(u, spring * u + 2.0 * np.gradient(u, 1e-2), dt_s=1e-2)
+    found = velocity.compare([record], [1e-2], [record.output])
+    assert found.wrong
+    assert velocity.evidence(found).kind == kind
+    assert ("damper and a spring" in velocity.warning(found, "x", "F")) is bool(spring)
 
 
 # --- from runs to records
@@ -609,6 +641,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
     figures = dict.fromkeys(
         [
             "left",
+            "beside",
             "white",
             "floor",
             "p",
@@ -685,6 +718,14 @@ def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
     )
     assert "between 0 A and 1.2 A" in said
     assert "e+" not in said
+
+
+def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
+    """Between 99.95 A and 100.05 A: three digits would make all stops the same."""
+    bench = wording.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
+    said = wording.advice(Evidence("lacks", names=("holds",)), bench)
+    assert "between 99.95 A and 100.05 A" in said
+    assert "at each of 100.04, 99.98, 100.02 and 99.96 A" in said
 
 
 def test_what_a_record_lacks_is_asked_for_in_numbers():

@@ -63,7 +63,8 @@ def test_every_dialect_reads_to_the_same_numbers(data, tmp_path_factory):
     delimiter = data.draw(st.sampled_from([",", ";", "\t", " ", "  ", " ; "]))
     comma = delimiter.strip() != "," and data.draw(st.booleans())
     width = data.draw(st.integers(2, 4))
-    number = st.floats(allow_nan=False, allow_infinity=False)
+    overloads = (9.9e37, 9.91e37)  # read as missing
+    number = st.floats(allow_nan=False, allow_infinity=False).filter(lambda x: abs(x) not in overloads)
     rows = data.draw(st.lists(st.lists(number, min_size=width, max_size=width), min_size=1, max_size=8))
     names = data.draw(st.sampled_from([None, ["t_s", "current_A", "Kraft(N)", "B[T]"][:width]]))
     filler = st.lists(st.sampled_from(["", "   ", "# pause"]), max_size=2)
@@ -136,6 +137,11 @@ def test_write_and_read(tmp_path):
         ("A / B", "A / B", ""),
         ("N", "N", ""),
         ("min", "min", ""),
+        ("force_uN", "force", "uN"),
+        ("R_kOhm", "R", "kOhm"),
+        ("timestamp_ns", "timestamp", "ns"),
+        ("Moment (Am2)", "Moment", "Am2"),
+        ("Strain (ppt)", "Strain", "ppt"),
         ("(N)", "(N)", ""),
         ("x", "x", ""),
         ("Temperatur °C (°C)", "Temperatur °C", "°C"),
@@ -294,6 +300,49 @@ def test_an_oscilloscope_that_writes_its_step_beside_the_names(table, end):
     np.testing.assert_allclose(run.time_s, 2e-3 * np.arange(20), rtol=1e-12)
 
 
+def test_an_oscilloscope_that_leaves_two_cells_blank_in_every_row(table):
+    """Its settings have columns of their own, in which no row has anything."""
+    rows = "".join(f"{k},{k % 7},{k % 5},,\n" for k in range(20))
+    read = table(f"X,CH1,CH2,Start,Increment,\nSequence,Volt,Volt,-1.0,2.0e-3\n{rows}")
+    assert (read.names, read.rows, read.rate_Hz) == (("X", "CH1", "CH2"), 20, 500.0)
+
+
+@pytest.mark.parametrize("words", ["run 7\tHall probe\tVSM", "float\tfloat\tfloat", "\tHall probe\t"])
+def test_a_line_of_words_below_the_units(table, words):
+    """Origin writes comments there, and others the kind of number: neither is a name or a unit."""
+    read = table(f"Time\tField\tMoment\ns\tOe\temu\n{words}\n" + 2 * _TABS)
+    assert read.names == ("Time", "Field", "Moment")
+    assert read.units == {"Time": "s", "Field": "Oe", "Moment": "emu"}
+    assert read.comments == (words.strip(),)
+
+
+def test_the_minus_of_a_word_processor(table):
+    """It is another letter than that of the keyboard."""
+    read = table("u,y\n" + 12 * "\N{MINUS SIGN}0.5,\N{MINUS SIGN}2e-3\n")
+    assert (read.column("u")[0], read.column("y")[11]) == (-0.5, -2e-3)
+
+
+@pytest.mark.parametrize("cell", ["9.91E+37", "9.9E+37", "-9.900000e37"])
+@pytest.mark.parametrize("remark", ["", "ok"])
+def test_what_an_instrument_writes_for_no_reading_is_none(table, cell, remark):
+    """An overload is not 1e38 volts: such a row is left out, or named."""
+    path = table(f"t_s,u,y,Remark\n{_times(5, remark)}5,5,{cell},{remark}\n{_times(5, remark, 6)}").path
+    with pytest.raises(DataError, match=r"an overload \(9.9e37\).* in column y, line 7 \(1 of 11 rows"):
+        read_run(path, **COLUMNS)
+    assert read_run(path, **COLUMNS, skip_bad_rows=True).output.max() == 10.0
+
+
+def _times(count, remark, first=0):
+    """Return rows of a time, an input and an output that go on."""
+    return "".join(f"{k},{k},{k},{remark}\n" for k in range(first, first + count))
+
+
+def test_a_column_whose_name_differs_in_case_from_the_time(table):
+    """``t`` and ``T`` are time and temperature."""
+    read = table("t/s,T/\N{DEGREE SIGN}C,strain/%\n" + 2 * _POINT)
+    assert (read.index("T"), read.index("t"), read.index("Strain")) == (1, 0, 2)
+
+
 def test_a_line_of_text_above_numbers_is_a_comment(table):
     """One cell is no heading of two columns: they are numbered."""
     read = table("my instrument\n" + "".join(f"{k};{k / 8}\n" for k in range(14)))
@@ -351,9 +400,73 @@ def test_times_of_day_go_on_after_midnight(table):
     read = run_from_table(table("when;u;y\n" + "".join(lines)).path, **COLUMNS)
     np.testing.assert_array_equal(np.diff(read.run.time_s), np.ones(29))
     assert any("midnight" in note for note in read.notes)
+    named = run_from_table(table("When [s];u;y\n" + "".join(lines)).path, **COLUMNS, time="when")
+    np.testing.assert_array_equal(named.run.time_s, read.run.time_s)
     later = "".join([*lines[:5], *lines[2:]])
     with pytest.raises(DataError):
         read_run(table("when;u;y\n" + later).path, **COLUMNS)
+
+
+def test_a_counter_of_32_bits_that_begins_again(table):
+    """Microseconds of a microcontroller do so after 72 minutes."""
+    rows = "".join(f"{(2**32 - 5000 + 1000 * k) % 2**32},{k % 3},{k}\n" for k in range(20))
+    read = run_from_table(table("micros,u,y\n" + rows).path, **COLUMNS)
+    np.testing.assert_allclose(np.diff(read.run.time_s), 1e-3, rtol=1e-9)
+    assert any("begins again, as a counter of 32 bits does" in note for note in read.notes)
+
+
+@pytest.mark.parametrize(
+    ("heading", "first", "step", "step_s", "told"),
+    [
+        ("timestamp", 1_772_366_400_000, 10, 0.01, "ms since 1970"),
+        ("time", 1_772_366_400_000_000, 1000, 1e-3, "us since 1970"),
+        ("time_utc", 1_772_366_400_000_000_000, 1_000_000, 1e-3, "ns since 1970"),
+        ("Date/Time", 46_082.5, 0.25, 21_600.0, "days of a spreadsheet"),
+    ],
+)
+def test_counts_since_a_date_are_told_by_their_size(table, heading, first, step, step_s, told):
+    """As seconds they would be thousands of years, or a second for a day; it is said."""
+    rows = "".join(f"{first + k * step},{k % 3},{k}\n" for k in range(20))
+    read = run_from_table(table(f"{heading},u,y\n" + rows).path, **COLUMNS)
+    np.testing.assert_allclose(np.diff(read.run.time_s), step_s, rtol=1e-3)
+    assert any(f"taken as {told}, by its size" in note for note in read.notes)
+
+
+def test_stamps_of_more_digits_than_a_number_holds_are_told(table):
+    """In 1 us of 1.8e18 ns a quarter is lost: the steps are uneven by so much."""
+    rows = "".join(f"{1_772_366_400_000_000_000 + 1000 * k},{k % 3},{k}\n" for k in range(20))
+    read = run_from_table(table("timestamp_ns,u,y\n" + rows).path, **COLUMNS)
+    assert any("have more digits than a number holds" in note for note in read.notes)
+
+
+@pytest.mark.parametrize(
+    ("comment", "rate_Hz"),
+    [
+        ("Sample rate: 500 Hz", 500.0),
+        ("Sampling Rate (kHz) = 2,5", 2500.0),
+        ("sample interval, 4e-3 s", 250.0),
+        ("Sampling period: 5 min", None),
+        ("resampled by 3", None),
+    ],
+)
+def test_a_rate_in_the_comments_is_that_of_a_table_without_time(table, comment, rate_Hz):
+    """It is said; a table that has a time keeps it, and rows that were left out cannot be counted."""
+    rows = "".join(f"{k % 3},{k}\n" for k in range(20))
+    read = run_from_table(table(f"# {comment}\nu,y\n" + rows).path, **COLUMNS)
+    if rate_Hz is None:
+        assert read.run.time_s is None
+    else:
+        np.testing.assert_allclose(read.run.time_s, np.arange(20) / rate_Hz, rtol=1e-12)
+        assert comment in read.notes[0]
+    gap = table(f"# {comment}\nu,y\n" + rows + "nan,1\n").path
+    assert run_from_table(gap, **COLUMNS, skip_bad_rows=True).run.time_s is None
+
+
+def test_labview_without_a_column_of_time(table):
+    """The column is there, and nothing in it; the header has the step."""
+    head = "LabVIEW\t\nDelta_X\t0.005000\t0.005000\n***End_of_Header***\t\t\nX_Value\tu\ty\tComment\n"
+    run = read_run(table(head + "".join(f"\t{k % 3}\t{k}\n" for k in range(20))).path, **COLUMNS)
+    np.testing.assert_allclose(run.time_s, 0.005 * np.arange(20), rtol=1e-12)
 
 
 def test_numbers_of_the_rows_before_the_time_are_no_time(table):

@@ -29,10 +29,7 @@ def library() -> dict[str, Cause]:
 def cause_named(name: str) -> Cause:
     """Return a cause.
 
-    Raises
-    ------
-    DataError
-        This version knows no cause of that name.
+    DataError where this version knows no cause of that name.
     """
     if name not in library():
         raise DataError(
@@ -51,10 +48,7 @@ def taken_out(corrected: Iterable[str]) -> set[str]:
 def upright_values(one: Found | Extension, polarity: int) -> Values:
     """Return the values that were kept of a cause, for the output times the polarity.
 
-    Raises
-    ------
-    DataError
-        As ``cause_named``.
+    DataError as ``cause_named``.
     """
     cause = cause_named(one.cause)
     return tuple(cause.sign(p.name, polarity) * p.value for p in one.parameters)

@@ -33,11 +33,9 @@ class Accommodation(Cause):
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         return [[(_TRIED, path * frames[0].reach)] for path in _TRIED_PATHS]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         done = frame.path / values[1]
         share = np.diff(done, prepend=0.0)
         # LP(y) = exp(-s) (y0 + integral of y exp(s') ds'), with exp kept small by an origin per stretch

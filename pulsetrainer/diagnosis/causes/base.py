@@ -229,7 +229,6 @@ class Late(Cause):
     _tried_s: ClassVar[tuple[float, ...]] = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        """Return the parameters with the bounds that a record sets."""
         return sampled(self.parameters, frame)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
@@ -252,7 +251,6 @@ class OfKinds(Cause):
         return (self, *(type(self)(one) for one in self.tried[1:])) if plain else (self,)
 
     def kinds(self) -> tuple[Cause, ...]:
-        """Return the causes of this id to be tried."""
         return self._kinds
 
     def constants(self) -> tuple[tuple[str, float, str], ...]:

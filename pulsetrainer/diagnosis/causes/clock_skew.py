@@ -30,7 +30,6 @@ class ClockSkew(Cause):
     corrects = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         return [[(one,)] for one in _TRIED]
 
     def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
@@ -38,7 +37,6 @@ class ClockSkew(Cause):
         return any(abs(values[0]) * f.input.size >= _SLIP for f in frames)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         t = frame.time_s
         return np.interp(t * (1.0 + values[0]), t, y)
 

@@ -73,11 +73,9 @@ class ConditionChange(Cause):
     }
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         return [[(_TRIED * frames[0].span, 0.0), (0.0, _TRIED)]] if len(frames) > 1 else []
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         return y if frame.record == 0 else y + values[0] + values[1] * (y - frame.zero)
 
 
@@ -127,14 +125,9 @@ def against_model(
 ) -> Change | None:
     """Return how the condition changed, or None where it did not.
 
-    Parameters
-    ----------
-    measured, predicted
-        Output (n,) and what the model as given says.
-    refitted_rms
-        What the model leaves when its weights are fitted to these very records, output unit.
-    noise_rms
-        White noise of single samples, output unit: nobody's fault.
+    ``predicted`` (n,) is what the model as given says, ``refitted_rms`` what it leaves when its weights are
+    fitted to these very records, and ``noise_rms`` the white noise of single samples, nobody's fault; both in
+    the output unit.
     """
     given = left_by(measured, predicted, noise_rms)
     if is_near(measured, predicted, noise_rms) or not follows(refitted_rms, given):

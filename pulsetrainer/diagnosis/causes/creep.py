@@ -51,18 +51,15 @@ class Creep(OfKinds):
     )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        """Return the parameters with the bounds that a record sets."""
         strength, tau = self.parameters
         return strength, replace(tau, high=max(_BOUND * frame.length_s, 2.0 * tau.low))
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         length = frames[0].length_s
         slowest = max(_SLOWEST * length, min(_SHORT[0], _SHORT[1] * length))
         return [[(_TRIED, tau)] for tau in spread(_FASTEST_S, slowest, _RATIO)]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         return self._crept(y, values, frame, self.kind)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:

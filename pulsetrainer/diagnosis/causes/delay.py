@@ -30,7 +30,6 @@ class Delay(Late):
     parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005, "by which the {output} is late"),)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         before = remembered(frame.past, self.id, y[:0])
         whole = np.concatenate((before, y))
         t = frame.dt_s * (np.arange(whole.size) - before.size)

@@ -20,5 +20,4 @@ class FieldLag(Late):
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the lag"),)
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Input (n,) that the hysteresis sees."""
         return low_pass(u, values[0], frame.dt_s, frame.past, self.id)

@@ -35,11 +35,9 @@ class LoadDependence(Cause):
     by_contrast = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         return [[(_TRIED * frames[0].reach / frames[0].span,)]]
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Input (n,) that the hysteresis sees."""
         k, (bottom, top) = values[0], frame.ends
         wider = max(1.0 + k * (top - bottom) / frame.reach, _LEAST)
         return frame.low + (u - frame.low + k * (y - bottom)) / wider

@@ -42,14 +42,12 @@ class OffsetDrift(Cause):
     corrects = True
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         length = frames[0].time_s[-1] + frames[0].dt_s
         size = _TRIED * frames[0].span
         sizes = (size / length, _MIDDLE * size / length**2, _TWISTED * size / length**2)
         return [[tuple(one if j == k else 0.0 for j, one in enumerate(sizes)) for k in range(len(sizes))]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         return y + _drift(values, frame.time_s)
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.wild import isolated
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
 from pulsetrainer.diagnosis.thresholds import TINY
@@ -69,7 +70,8 @@ class Outliers(Cause):
         least = _beyond_the_tail(np.sort(beyond[beyond > 0.5]))
         if least is None:
             return None
-        wild = beyond > least
+        # beside a turn of the input the rules above tell nothing; what is wild elsewhere may be so there too
+        wild = (beyond > least) | (isolated(y) & (apart > noise) & ~raw.beside_breaks(_AROUND))
         figures = {"count": float(np.count_nonzero(wild)), "limit": least * float(limit[wild].min())}
         return Firing(self.id, "gate", float(apart[wild].max()), "{y}", figures, wild)
 

@@ -22,5 +22,4 @@ class OutputLag(Late):
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the smoothing"),)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         return low_pass(y, values[0], frame.dt_s, frame.past, self.id)

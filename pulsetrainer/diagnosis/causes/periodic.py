@@ -56,7 +56,6 @@ class Periodic(Cause):
         return (*own, *more, frequency)
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         k = int(np.argmax([one.size for one in residual]))  # a long record has the sharpest lines
         frame, one = frames[k], residual[k]
         power = np.abs(fft.rfft(one * np.hanning(one.size))) ** 2
@@ -86,7 +85,6 @@ class Periodic(Cause):
         return _INDEPENDENT * max(frame.input.size for frame in frames)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         return y + _sine(values, frame.record, frame.time_s)
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:

@@ -32,11 +32,9 @@ class RateWidening(Cause):
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         return [[(one * frames[0].reach ** 0.5,)] for one in _TRIED]
 
     def on_input(self, u: FloatArray, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Input (n,) that the hysteresis sees."""
         k = values[0]
         if k <= _NONE * (frame.reach * frame.dt_s) ** 0.5:
             return u

@@ -40,7 +40,6 @@ class Resonance(Cause):
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         fastest = _FASTEST / frames[0].dt_s
         grid = np.geomspace(*_TRIED_Hz).tolist()
         return [[(f, zeta)] for f in grid if f < fastest for zeta in _TRIED_DAMPING]
@@ -50,7 +49,6 @@ class Resonance(Cause):
         return any(values[0] * _longest_stroke_s(frame) >= _PERIODS for frame in frames)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         b, a = _filter(*values, frame.dt_s)
         at_first = np.multiply.outer(signal.lfilter_zi(b, a), y[0])
         state = remembered(frame.past, self.id, at_first)

@@ -58,7 +58,6 @@ class Step(Cause):
         return [self.at(t, frames) for t in np.linspace(first, last, _MOMENTS[2]).tolist()]
 
     def at(self, moment: float, frames: Sequence[Frame]) -> list[Values]:
-        """Return a block with an offset and a gain at one moment."""
         return [(_TRIED * frames[0].span, 0.0, moment), (0.0, _TRIED, moment)]
 
     def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:
@@ -75,7 +74,6 @@ class Step(Cause):
         return (*values[:2], one.begin_s + split * one.dt_s)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         after = np.clip(
             (frame.begin_s + frame.time_s - values[2]) / (self._shared * frame.dt_s) + 0.5, 0.0, 1.0
         )

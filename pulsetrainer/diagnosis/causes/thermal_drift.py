@@ -51,7 +51,6 @@ class ThermalDrift(OfKinds):
     )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        """Return the parameters with the bounds that a record sets."""
         strength, tau = self.parameters
         hottest = (1.0 - self.kind) ** 2  # heat of the largest input, squared ranges
         low, high = (share * frame.length_s for share in _BOUNDS)
@@ -61,14 +60,12 @@ class ThermalDrift(OfKinds):
         )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         slowest = _SLOWEST * frames[0].length_s
         # heat of an input that uses all of its range is of the size of that range squared
         strength = _TRIED / frames[0].reach ** 2
         return [[(strength, tau)] for tau in spread(_FASTEST_S, slowest, _RATIO)]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         return self._weakened(y, values, frame, 0.0)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:

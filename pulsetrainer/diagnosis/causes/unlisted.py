@@ -211,7 +211,6 @@ class Unlisted(Cause):
         return (tau, *curve) * len(self.parts)
 
     def constants(self) -> tuple[tuple[str, float, str], ...]:
-        """Return what is kept besides the parameters: name, value and unit."""
         return tuple(
             one
             for part in self.parts
@@ -242,7 +241,6 @@ class Unlisted(Cause):
         return []
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         found = y
         for k, part in enumerate(self.parts):
             tau, *curve = values[k * KNOTS : (k + 1) * KNOTS]

@@ -43,7 +43,6 @@ class Viscous(Cause):
     )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        """Return the parameters with the bounds that a record sets."""
         coefficient, trailing = self.parameters
         return coefficient, *sampled((trailing,), frame)
 
@@ -52,13 +51,11 @@ class Viscous(Cause):
         return self, (values[0], *(values[1:] or (0.0,)))
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
-        """Blocks of parameter values to try."""
         speed = max(float(np.std(np.gradient(f.input, f.dt_s))) for f in frames)
         force = _TRIED * frames[0].span / max(speed, _NO_SPEED)
         return [[(force, steps * frames[0].dt_s)] for steps in _FILTERS]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) after this cause."""
         # the rate before the sample, not around it: at a turn the output jumps after the turn
         before = remembered(frame.past, self.id, frame.input[:1])
         remember(frame.past, self.id, frame.input[-1:])
@@ -66,6 +63,5 @@ class Viscous(Cause):
         return y + values[0] * low_pass(speed, values[1], frame.dt_s, frame.past, self.id)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
-        """Outputs (n,) of an output cause under formulas that are as plausible as its own: for intervals."""
         around = np.gradient(frame.input, frame.dt_s)
         return [y + values[0] * low_pass(around, values[1], frame.dt_s)]

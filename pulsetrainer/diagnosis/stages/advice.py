@@ -22,6 +22,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 # What the evidence says of the model as given, and the advice
 _ANOTHER_MODEL = {
     "wrong kind": "other model",
+    "wrong kind, both": "other model, both",
     "shifted": "identify anew",
     "changed": "identify anew",
     "reversed": "identify anew",

@@ -24,10 +24,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 def stage(masked: Masked) -> State:
     """Return the state in which the search begins: no cause in the model.
 
-    Raises
-    ------
-    DataError
-        The data do not suffice for any statement.
+    DataError where the data do not suffice for any statement.
     """
     records, firings = masked.records, masked.firings
     given = masked.question.given

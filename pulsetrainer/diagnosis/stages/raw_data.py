@@ -39,10 +39,7 @@ class Masked:
 def stage(question: Question) -> Masked:
     """Return the records with bad samples masked, and the gates that fired.
 
-    Raises
-    ------
-    DataError
-        A record has more gaps than samples.
+    DataError where a record has more gaps than samples.
     """
     low, high = question.low, question.high
     stamps = question.stamps or [None] * len(question.records)
