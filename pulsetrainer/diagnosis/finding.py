@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.evidence import Evidence
 
+TOLD_BESIDE = ("at bound", "may be a fault")  # the name stands
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -36,4 +38,4 @@ class Finding:
     @property
     def in_doubt(self) -> bool:
         """Whether it predicts worse, does not repeat or may be nothing."""
-        return any(one != "at bound" for one in self.doubts)
+        return any(one not in TOLD_BESIDE for one in self.doubts)

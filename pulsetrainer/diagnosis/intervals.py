@@ -5,10 +5,13 @@ and of the jackknife over blocks, which also sees what the fitted model misses. 
 errors, the discretisation error, as if a fifth of it were aligned; the moment of sampling, since input and
 output belong together to a fifth of a sample step only (each has its filter, and converters are read in
 turn); and what the estimates would be under formulas as plausible as those of the library
-(``Cause.variants``).
+(``Cause.variants``). The moment of a sudden change has none of it, but all moments that fit as well
+(``moments``).
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +21,7 @@ from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.moments import profile
 from pulsetrainer.diagnosis.screening import Screen
 from pulsetrainer.diagnosis.thresholds import LIMITS, TINY
 
@@ -48,6 +52,11 @@ def estimates_of(
             low, high = max(value - half[at], quantity.low), min(value + half[at], quantity.high)
             rows.append(Estimate(quantity.name, value, quantity.unit, float(low), float(high)))
             at += 1
+        if term.cause.sudden:
+            low, high = profile(fitted, term).interval(noise.noise, floor)
+            low, high = min(low, term.values[-1]), max(high, term.values[-1])
+            wide = frame.dt_s  # it lies anywhere between two samples
+            rows[-1] = replace(rows[-1], lower=low - wide, upper=high + wide)
         found[term.cause.id] = tuple(rows)
     return found
 

@@ -191,6 +191,10 @@ class Thresholds:
     normal: float = 1.96  # 95 % of the normal distribution
     aligned: float = 0.2  # of the discretisation error: how far it may be in line with a parameter
     moment: float = 0.2  # sample steps: how far input and output may be apart (decision 043)
+    of_a_moment: float = 7.35  # -2 log(1 - sqrt(0.95)), for a moment that was searched for
+    farther: float = 1.35  # times as far from the best moment is the next one tried
+    moments_from: float = 0.02  # of the records, at each end: what happens there has one side only
+    moments_moved: int = 3  # times a moment is moved to a better one
 
     # Verdict
     unexplained: float = 0.5  # of the reducible part: with more left the cause is unknown

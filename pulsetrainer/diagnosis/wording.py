@@ -189,6 +189,9 @@ DOUBTS: Mapping[str, str] = {
     "predicts worse": "with it, parts of the recordings that were left out are predicted worse",
     "does not repeat": "it fits, but does not repeat: it is not added to the model",
     "not added": "so it is not added to the model",
+    "may be a fault": (
+        "a fault of the measurement in this recording alone would look like it: it is not added to the model"
+    ),
     "wanders": "what is left wanders still, so it may be a piece of that: it is neither added nor taken out",
     "predicts little": (
         "on parts of the recordings that were left out it takes away less than half of what could be, as "

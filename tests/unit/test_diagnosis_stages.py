@@ -381,14 +381,16 @@ def test_the_accepted_one_is_refitted_and_the_floor_estimated_anew(monkeypatch, 
 
 def test_the_next_candidate_is_taken_where_the_best_does_not_predict(monkeypatch):
     """Best fit first; the one that only fits is passed over."""
-    _refitting(monkeypatch, acceptance, squares={frozenset({"step"}): 300.0})
-    best, next_ = _fit(200.0, "creep"), _fit(300.0, "step")
+    _refitting(monkeypatch, acceptance, squares={frozenset({"offset-drift"}): 300.0})
+    best, next_ = _fit(200.0, "creep"), _fit(300.0, "offset-drift")
     held_out = HeldOut()
     held_out.gain = lambda before, after, floor: 0.0 if after is best else 1.0
     state = _state(
-        _fit(500.0), held_out=held_out, trials=((best, _score("creep", 1.0)), (next_, _score("step", 1.0)))
+        _fit(500.0),
+        held_out=held_out,
+        trials=((best, _score("creep", 1.0)), (next_, _score("offset-drift", 1.0))),
     )
-    assert acceptance.stage(state).current.names == ("step",)
+    assert acceptance.stage(state).current.names == ("offset-drift",)
 
 
 def test_the_search_goes_on_until_nothing_is_accepted_or_there_are_five(monkeypatch):
@@ -1324,6 +1326,18 @@ def test_where_all_repeat_the_model_is_that_of_the_search(monkeypatch):
     shares = {all_four: {"creep": 0.5, "thermal-drift": 0.7, "output-lag": 0.9}}
     state = _asked_again(monkeypatch, shares)
     assert state.repeated is state.current
+
+
+@pytest.mark.parametrize(("rival", "added"), [("step", False), ("offset-drift", False), ("creep", True)])
+def test_what_may_be_a_fault_of_the_measurement_is_not_added(monkeypatch, rival, added):
+    """The next record does not have it: a gain that settled was called heat. The name stands."""
+    monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    findings = (replace(_finding("thermal-drift", 80.0), confounded_with=(rival,)),)
+    after = repetition.stage(_state(_fit(500.0, "thermal-drift"), findings=findings))
+    assert after.repeated.names == (("thermal-drift",) if added else ())
+    assert after.findings[0].doubts == (() if added else (repetition.A_FAULT,))
+    assert not after.findings[0].in_doubt
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,8 @@ def _diagnosis(
 def _added(name, y, t):
     """Output with a fault, and the parameters that say it."""
     if name == "offset-drift":
-        return y + 0.02 * t + 0.003 * t * (t - t[-1]), {"rate": 0.02, "bend": 0.003}
+        bent = 0.02 * t + (0.003 + 0.001 * (t / t[-1] - 0.5)) * t * (t - t[-1])
+        return y + bent, {"rate": 0.02, "bend": 0.003, "twist": 0.001}
     if name == "step":
         return np.where(t > 12, 0.4 + 1.03 * y, y), {"offset": 0.4, "gain": 0.03, "time": 12.0}
     if name == "periodic":

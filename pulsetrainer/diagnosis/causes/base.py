@@ -135,6 +135,7 @@ class Cause:
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
     drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
+    sudden: ClassVar[bool] = False  # a change at a moment, its last parameter
 
     def gate(self, raw: Raw) -> Firing | None:
         """Return what the raw data of a record show of a cause of stage ``record``."""
@@ -174,6 +175,15 @@ class Cause:
 
         ``residual`` holds that of each record (n,) at its own rate, zero where samples have no weight.
         """
+        raise NotImplementedError
+
+    @property
+    def sharp(self) -> Cause:
+        """The same, as sudden as the samples can show it."""
+        return self
+
+    def at(self, moment: float, frames: Sequence[Frame]) -> list[Values]:
+        """Return a block with each strength of a sudden cause at one moment."""
         raise NotImplementedError
 
     def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:

@@ -1,18 +1,22 @@
-"""the zero drifts slowly with time: y + b t, and a bend of it.
+"""the zero drifts slowly with time: y + b t, with a bend and a twist.
 
-Drifts slow down as a device warms up, or grow. What the bend adds is zero at both ends of a record (0 to T),
-so that the rate is that from end to end.
+Drifts slow down as a device warms up, or grow, and most of that happens near one end. What bend and twist add
+is zero at both ends of a record (0 to T), so that the rate is that from end to end.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
+from pulsetrainer.diagnosis.thresholds import TINY
 
 _TRIED = 0.01  # of the span over the record
 _MIDDLE = 4.0  # the bend is largest in the middle: a quarter of c T^2
+_TWISTED = 20.8  # the twist at a fifth from the ends: 1/20.8 of d T^2
 
 
 class OffsetDrift(Cause):
@@ -20,7 +24,7 @@ class OffsetDrift(Cause):
 
     id = "offset-drift"
     title = "the zero of the {output} drifts slowly with time"
-    formula = "y + b t + c t (t - T)"
+    formula = "y + b t + (c + d (t/T - 1/2)) t (t - T)"
     signature = "equal states give different outputs, and the difference grows with time"
     excitation = "the same loop at the beginning, in the middle and at the end"
     source = "Ljung, System Identification, 1999, section 14.1"
@@ -28,10 +32,11 @@ class OffsetDrift(Cause):
     order = 140
     family = "drift"
     drifts = True
-    strengths = 2
+    strengths = 3
     parameters = (
         Quantity("rate", "{y}/s", -1e6, 1e6, 1e-5, "drift of the zero of the {output}, from end to end"),
         Quantity("bend", "{y}/s^2", -1e6, 1e6, 1e-7, "half of the change of that rate, a second"),
+        Quantity("twist", "{y}/s^2", -1e6, 1e6, 1e-7, "change of the bend, from end to end"),
     )
     lasting = False
     corrects = True
@@ -39,7 +44,8 @@ class OffsetDrift(Cause):
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         length = frames[0].time_s[-1] + frames[0].dt_s
         size = _TRIED * frames[0].span
-        return [[(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]]
+        sizes = (size / length, _MIDDLE * size / length**2, _TWISTED * size / length**2)
+        return [[tuple(one if j == k else 0.0 for j, one in enumerate(sizes)) for k in range(len(sizes))]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         return y + _drift(values, frame.time_s)
@@ -50,5 +56,7 @@ class OffsetDrift(Cause):
 
 
 def _drift(values: Values, time_s: FloatArray) -> FloatArray:
-    rate, bend = (*values, 0.0)[:2]  # a diagnosis was once kept without the bend
-    return time_s * (rate + bend * (time_s - time_s[-1]))
+    rate, *more = values
+    bend, twist = (*more, 0.0, 0.0)[:2]  # a diagnosis was once kept without them
+    last = max(float(time_s[-1]), TINY)
+    return np.asarray(time_s * (rate + (bend + twist * (time_s / last - 0.5)) * (time_s - last)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -39,15 +40,26 @@ class Step(Cause):
         Quantity("gain", "1", -0.9, 0.9, 1e-4, "change of the gain, as a share of it"),
         Quantity("time", "s", 0.0, 1e6, 0.01, "of the change, since the first sample"),
     )
+    sudden = True
     lasting = False
     corrects = True
 
+    def __init__(self, shared: float = _SHARED) -> None:
+        self._shared = shared
+
+    @cached_property
+    def sharp(self) -> Cause:
+        """The same at one sample."""
+        return Step(1.0)
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try: the same moments, whatever the residual."""
-        size = _TRIED * frames[0].span
         first, last = _sides(frames)
-        times = np.linspace(first, last, _MOMENTS[2]).tolist()
-        return [[(size, 0.0, t), (0.0, _TRIED, t)] for t in times]
+        return [self.at(t, frames) for t in np.linspace(first, last, _MOMENTS[2]).tolist()]
+
+    def at(self, moment: float, frames: Sequence[Frame]) -> list[Values]:
+        """Return a block with an offset and a gain at one moment."""
+        return [(_TRIED * frames[0].span, 0.0, moment), (0.0, _TRIED, moment)]
 
     def sharpened(self, values: Values, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> Values:
         """Return the moment around that of ``values`` where the residual on both sides differs most."""
@@ -63,7 +75,9 @@ class Step(Cause):
         return (*values[:2], one.begin_s + split * one.dt_s)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        after = np.clip((frame.begin_s + frame.time_s - values[2]) / (_SHARED * frame.dt_s) + 0.5, 0.0, 1.0)
+        after = np.clip(
+            (frame.begin_s + frame.time_s - values[2]) / (self._shared * frame.dt_s) + 0.5, 0.0, 1.0
+        )
         return y + after * (values[0] + values[1] * (y - frame.zero))
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
@@ -71,7 +85,7 @@ class Step(Cause):
         offset, gain, moment = values
         since = taken.begin_s + taken.time_s - moment
         before = (y - offset + gain * taken.empty) / (1.0 + gain)
-        unsure = np.abs(since) < 0.5 * _SHARED * taken.step_s
+        unsure = np.abs(since) < 0.5 * self._shared * taken.step_s
         return np.where(unsure, np.nan, np.where(since > 0, before, y))
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.moments import profile
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -63,6 +64,26 @@ def _fall(state: State, trial: Fitted) -> float:
 
 
 def settled(problem: Problem, trial: Fitted) -> Fitted:
-    """Refit a model to the end; a cause of the input gets rows of its own."""
+    """Refit a model to the end; a cause of the input gets rows of its own, a sudden one its best moment."""
     changes_input = any(term.cause.stage == "input" for term in trial.terms)
-    return refit(problem, trial.terms, trial, rebuild=changes_input)
+    fitted = refit(problem, trial.terms, trial, rebuild=changes_input)
+    for _ in range(LIMITS.moments_moved):
+        moved = _moved(problem, fitted)
+        if moved is fitted:
+            break
+        fitted = moved
+    return fitted
+
+
+def _moved(problem: Problem, fitted: Fitted) -> Fitted:
+    """Return a fit with its sudden causes at moments that leave less, or as it is where there are none."""
+    for term in fitted.terms:
+        if term.cause.sudden:
+            known = profile(fitted, term)
+            if known.gain < LIMITS.enough * fitted.squares:
+                continue
+            others = [one for one in fitted.terms if one is not term]
+            moved = refit(problem, (*others, known.terms[known.best]), fitted)
+            if fitted.squares - moved.squares > LIMITS.enough * fitted.squares:
+                fitted = moved
+    return fitted

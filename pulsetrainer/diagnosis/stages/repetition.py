@@ -6,7 +6,8 @@ with the cause the errors must fall by at least half of what they fall by in the
 rise. Nor may they on any quarter of the blocks, sorted by their rate and predicted from the others: a formula
 that only fits the rates of one record misleads at others. A cause that does not do that fits, but does not
 repeat: it is told with these words, and is not added to the model; nor is one that is in doubt for
-another reason (`rivals`). What equal loops show was tested by itself.
+another reason (`rivals`), nor one in whose place a fault of the measurement fits as well: that happened in
+this record, and not in the next. What equal loops show was tested by itself.
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
@@ -24,14 +26,15 @@ from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
-DOUBT, NOT_ADDED = "does not repeat", "not added"
+DOUBT, NOT_ADDED, A_FAULT = "does not repeat", "not added", "may be a fault"
 
 
 def stage(state: State) -> State:
     """Return the state with the causes that do not repeat, and the model without them."""
     kept = state.current
     asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
-    told: dict[str, str] = {one.cause.id: NOT_ADDED for one in asked if one.in_doubt}
+    told: dict[str, str] = {one.cause.id: A_FAULT for one in asked if _may_be_a_fault(one)}
+    told |= {one.cause.id: NOT_ADDED for one in asked if one.in_doubt}
     once = set(told) or _weakest(state, kept)
     while once:
         told = {**dict.fromkeys(once, DOUBT), **told}
@@ -44,6 +47,11 @@ def stage(state: State) -> State:
     findings = tuple(replace(one, found=one.found and not _is_nothing(state, one)) for one in findings)
     current = state.current if any(one.found for one in findings) else state.baseline
     return replace(state, findings=findings, current=current, repeated=kept)
+
+
+def _may_be_a_fault(finding: Finding) -> bool:
+    """Whether a fault of the measurement fits as well as a cause of the device."""
+    return any(library()[name].corrects for name in finding.confounded_with)
 
 
 def _is_nothing(state: State, finding: Finding) -> bool:
