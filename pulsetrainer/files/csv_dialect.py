@@ -225,6 +225,11 @@ def _says_a_unit(cell: str) -> bool:
     return is_unit(symbol_of(cell.strip("()[] "))) and not _is_number(cell)
 
 
+def _begins_with_text(row: list[str], last: list[str]) -> bool:
+    """Whether a line would be a row but for text in its first cell."""
+    return len(row) == len(last) > 1 and _is_text(row[0]) and all(map(_is_number, row[1:]))
+
+
 def _first_row(rows: list[list[str]]) -> int:
     """Return where the rows at the end of the sample begin that are of one kind."""
     start = len(rows)
@@ -242,6 +247,8 @@ def _above(rows: list[list[str]], parted: list[bool]) -> int:
     """
     kinds = [[_is_text(cell) for cell in row] for row in rows]
     start = _first_row(rows)
+    if start > 1 and _begins_with_text(rows[start - 1], rows[-1]) and all(kinds[start - 2]):
+        start -= 1  # a bad row below its heading, and no remark above it
     words = (any(kind) or not any(row) for kind, row in zip(kinds[:start], rows, strict=False))
     if len(rows) - start < _TABLE or not all(words):
         return 0

@@ -343,6 +343,12 @@ def test_a_column_whose_name_differs_in_case_from_the_time(table):
     assert (read.index("T"), read.index("t"), read.index("Strain")) == (1, 0, 2)
 
 
+def test_text_in_the_first_cell_of_the_first_row_hides_no_heading(table):
+    """It is a bad row, named with its line, and can be left out; the names above it are names."""
+    text = "t,u,y\nbegin,0.0,0.0\n" + 2 * _POINT
+    _refused(table, text, "'begin' in column t, line 2")
+
+
 def test_a_line_of_text_above_numbers_is_a_comment(table):
     """One cell is no heading of two columns: they are numbered."""
     read = table("my instrument\n" + "".join(f"{k};{k / 8}\n" for k in range(14)))
