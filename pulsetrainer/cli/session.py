@@ -25,7 +25,10 @@ def session(
     model: Annotated[Path, typer.Option(help="Model of the device, best an extended one.")],
     out: Out,
     pulses: Annotated[
-        str, typer.Option(help="Names of the library or CSV files, by commas; in turn, an equal share each.")
+        str,
+        typer.Option(
+            help="Names of the library or CSV files, separated by commas; each gets an equal share."
+        ),
     ] = "normal",
     rate: Annotated[
         float | None,
@@ -77,7 +80,7 @@ def session(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Press pulses for as long as wanted.
+    """Press pulses for as long as you like.
 
     On a terminal keys change rate, amplitude and pulse, pause and stop. With --quiz the pulses come blind.
 
@@ -94,7 +97,7 @@ def session(
         if str(path) == name:
             job.uses(path)
     from pulsetrainer.cli.hands import Hands
-    from pulsetrainer.cli.score import tell
+    from pulsetrainer.cli.score import say_pressed
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes
     from pulsetrainer.files.pulses import read_pulse
@@ -164,4 +167,4 @@ def session(
             blind=chosen if isinstance(chosen, Blind) else None, overwrite=overwrite,
             lead_s=LIVE_LEAD_S if steered.by_key else LEAD_S, watch=watch, **asked,
         )  # fmt: skip
-    tell(job, out, html, done, questions, device.info)
+    say_pressed(job, out, html, done, questions, device.info)
