@@ -169,6 +169,9 @@ def _encoding(path: Path) -> str:
         start = stream.read(4096)
     if start.startswith(_UTF16_MARKS):
         return "utf-16"
+    low, high = start[: 2 * _TABLE : 2], start[1 : 2 * _TABLE : 2]
+    if high and not any(high) and all(low):  # without its mark
+        return "utf-16-le"
     if b"\0" in start:
         ours = start.startswith(b"\x89HDF")
         raise DataError(
@@ -375,7 +378,7 @@ def _last_lines(path: Path, encoding: str) -> list[str]:
     with path.open("rb") as stream:
         start = max(path.stat().st_size - _LAST_BYTES, 0)
         stream.seek(start)
-        text = stream.read().decode("utf-16-le" if encoding == "utf-16" else "utf-8", "replace")
+        text = stream.read().decode("utf-16-le" if encoding.startswith("utf-16") else "utf-8", "replace")
     return [line for line in text.splitlines()[1 if start else 0 :] if line.strip()]
 
 

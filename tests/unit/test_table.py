@@ -77,7 +77,7 @@ def test_every_dialect_reads_to_the_same_numbers(data, tmp_path_factory):
     lines += data.draw(filler)
     text = data.draw(st.sampled_from(["\n", "\r\n"])).join(lines) + data.draw(st.sampled_from(["", "\n"]))
     path = tmp_path_factory.mktemp("dialect") / "t.csv"
-    path.write_bytes(text.encode(data.draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))))
+    path.write_bytes(text.encode(data.draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "utf-16-le"]))))
     read = read_table(path)
     np.testing.assert_array_equal(_numbers(read), rows)
     pieces = parse(path, detect(path), piece=data.draw(st.integers(1, 60)))
