@@ -183,7 +183,9 @@ def _device(port: str | None, tuned: Path | None, *, capture: bool) -> Iterator[
     try:
         with open_device(port, tuned=tuned) as device:
             yield from _identity(device, redact(port or DEFAULT_PORT))
-            own = f"those of `tune`, from {tuned}" if device.gains != DELIVERED else "as delivered"
+            own = (
+                f"those of `pulsetrainer tune`, from {tuned}" if device.gains != DELIVERED else "as delivered"
+            )
             yield _finding("gains", own)
             if capture:
                 yield from _short_capture(device)

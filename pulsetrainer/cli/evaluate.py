@@ -84,7 +84,7 @@ def evaluate(
 
 
 def _of_session(job: Job, path: Path, session: pt.Session, html: Path | None, *, alone: bool) -> None:
-    from pulsetrainer.cli.score import say
+    from pulsetrainer.cli.score import say_stored
     from pulsetrainer.errors import DataError, UsageError
 
     if not alone:
@@ -97,7 +97,7 @@ def _of_session(job: Job, path: Path, session: pt.Session, html: Path | None, *,
             f"{path} has no whole beat: {session.fault or 'it ended before the first was over'}",
             hint="press it again: pulsetrainer session",
         )
-    say(job, path, html, session)
+    say_stored(job, path, html, session)
 
 
 def show_tables(screen: Screen, evaluation: pt.Evaluation) -> None:

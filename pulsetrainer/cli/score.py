@@ -29,7 +29,7 @@ def sheet(job: Job, html: Path, session: pt.Session, header: Header) -> None:
     job.page(html, partial(render_session, score=result, asked=asked), session, header)
 
 
-def say(job: Job, path: Path, html: Path | None, session: pt.Session) -> None:
+def say_stored(job: Job, path: Path, html: Path | None, session: pt.Session) -> None:
     """Say what a session in a file amounts to, whole or cut off, and write its sheet."""
     from pulsetrainer.files import store
     from pulsetrainer.report.facts import facts
@@ -43,7 +43,7 @@ def say(job: Job, path: Path, html: Path | None, session: pt.Session) -> None:
     job.wrote(html)
 
 
-def tell(
+def say_pressed(
     job: Job, out: Path, html: Path | None, done: Performed, quiz: Quiz | None, info: DeviceInfo
 ) -> None:
     """Write the sheet and say what came out, also where the session was stopped."""

@@ -97,7 +97,7 @@ def session(
         if str(path) == name:
             job.uses(path)
     from pulsetrainer.cli.hands import Hands
-    from pulsetrainer.cli.score import tell
+    from pulsetrainer.cli.score import say_pressed
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes
     from pulsetrainer.files.pulses import read_pulse
@@ -167,4 +167,4 @@ def session(
             blind=chosen if isinstance(chosen, Blind) else None, overwrite=overwrite,
             lead_s=LIVE_LEAD_S if steered.by_key else LEAD_S, watch=watch, **asked,
         )  # fmt: skip
-    tell(job, out, html, done, questions, device.info)
+    say_pressed(job, out, html, done, questions, device.info)

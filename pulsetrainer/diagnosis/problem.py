@@ -1,4 +1,4 @@
-"""The question: some records, the plane on which weights live, and how samples are averaged."""
+"""The problem that is fitted: records, the plane on which weights live, and how samples are averaged."""
 
 from __future__ import annotations
 

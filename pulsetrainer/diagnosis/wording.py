@@ -105,13 +105,14 @@ SIGNATURES: Mapping[bool, str] = {
 # Where an error is largest, by the quantity that it was sorted by
 PLACES: Mapping[str, str] = {
     "rest": "while the {input} rests",
-    "rate": "where the {input} moves at {at:.3g}{in_u} per second",
+    "rate": "where the {input} moves at {at:.3g}{in_u} per {second}",
     "level": "where the {input} is about {at:.3g}{in_u}",
     "direction": "while the {input} {way}",
-    "time": "about {at:.3g} s after the start",
+    "time": "about {at:.3g} {seconds} after the start",
 }
 WAYS = {-1.0: "falls", 0.0: "rests", 1.0: "rises"}
-PLAIN = {"input": "input", "output": "output", "in_y": "", "in_u": ""}  # where nothing better is known
+# where nothing better is known
+PLAIN = {"input": "input", "output": "output", "in_y": "", "in_u": "", "second": "second", "seconds": "s"}
 AGAIN = (
     "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
     "recording.{command}"
@@ -261,6 +262,8 @@ class Bench:
         return {
             "input": self.input,
             "output": self.output,
+            "second": "second" if self.timed else "sample",
+            "seconds": "s" if self.timed else "samples",
             **{name: self._level(share) for name, share in shares.items()},
             "levels": self._levels(experiment.LEVELS[1:-1]),
             "biases": self._levels(experiment.BIASES),

@@ -1,4 +1,4 @@
-"""A script of changes for a session: a table with the column t_s and any of rate, amplitude and pulse."""
+"""Texts for a session: a table of changes (t_s and any of rate, amplitude, pulse), and answers to a quiz."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def _time(
         if _just_counts(table.columns[time]):
             lack = f"the column {time} of {table.path} just counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=whole)
-    heading = table.names[table.index(time)]  # the whole one
+    heading = table.names[table.index(time)]
     unit = _unit_of_time(table, heading)
     notes: tuple[str, ...] = ()
     if not unit and (unit := unit_of_count(float(table.columns[heading][0]), heading)):
@@ -154,11 +154,11 @@ def _time(
         said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
         notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
     words = f"time from {split_unit(heading)[0]} [{unit or 's'}]"
-    stamps, again = _begun_again(table.check_finite(heading, remedy=_LEAVE_OUT), unit or "s")
+    stamps, again = _begun_again(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
     if again:
         table = replace(table, columns={**table.columns, heading: stamps})
         notes = (*notes, f"the time of {table.path} {again}")
-    time_s = seconds(table, heading, of_record=True)
+    time_s = seconds(table, time, of_record=True)
     if np.spacing(np.abs(time_s[0])) > _EXACT * float(np.median(np.diff(time_s))):
         notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
     return _Time(time_s, words, notes)
@@ -335,7 +335,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
         raise DataError(
             f"the time {column_words(name)} of {table.path} is in {unit!r}, expected s, ms, us, ns, min, h "
             "or d",
-            hint="convert it to seconds" + ", choose another `time` column, or give a `rate_Hz`" * of_record,
+            hint="convert it to seconds, choose another `time` column, or give a `rate_Hz`",
         )
     stamps = table.check_finite(name, remedy=_LEAVE_OUT) if of_record else table.check_finite(name)
     time_s = stamps if SECONDS[unit] == 1.0 else stamps * SECONDS[unit]
@@ -344,16 +344,15 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
         row = int(back[0]) + 1
         this, before = (f"{stamps[k]:.15g} {unit or 's'}" for k in (row, row - 1))
         if this != before:
-            hint = "sort the rows"
-            other = ", choose another `time` column, give a `rate_Hz`, or cut the file into parts"
+            hint = "sort the rows, choose another `time` column, give a `rate_Hz`, or cut the file into parts"
         elif all(column[row] == column[row - 1] for column in table.columns.values()):
-            hint, other = "drop the repeated rows", ", or give a `rate_Hz` instead of the time"
+            hint = "drop the repeated rows, or give a `rate_Hz` instead of the time"
         else:
-            hint = "its stamps are rounded too coarsely, or repeated: write them with more digits"
-            other = ", or give a `rate_Hz` instead of the time"
+            hint = "its stamps are rounded too coarsely, or repeated: write them with more digits, or give a "
+            hint += "`rate_Hz` instead of the time"
         raise DataError(
             f"the time in {table.path}, {column_words(name)}, does not increase at {table.place(row)}: "
             f"{this} after {before} ({back.size} such rows)",
-            hint=hint + other * of_record,
+            hint=hint,
         )
     return time_s

@@ -314,7 +314,8 @@ def samples_played(run: Run, course: Course) -> int:
     """
     if run.time_s is None or run.reference is None:
         raise DataError(
-            "the earlier recording has no time or no reference", hint="resume what `capture` recorded"
+            "the earlier recording has no time or no reference",
+            hint="resume what `pulsetrainer capture` recorded",
         )
     at, begun_s, rate_Hz = 0, 0.0, course.signal.rate_Hz
     for number, part in enumerate(run.parts()):

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+import typer
+
+import pulsetrainer
+from pulsetrainer.cli.app import app as program
+from pulsetrainer.cli.next_step import as_options
 
 COMMANDS = (
     *("capture", "import", "identify", "invert", "play", "evaluate", "diagnose", "extend", "correct"),
@@ -36,6 +44,26 @@ def test_every_command_has_help_with_an_example(run, command):
     assert done.code == 0
     assert f"Example: pulsetrainer {command}" in " ".join(done.out.split())
     assert "--json" in done.out
+
+
+def test_what_is_told_as_an_option_is_one():
+    """A name alone between backticks becomes an option; a command is told in two words."""
+    commands = typer.main.get_command(program).commands.values()
+    options = {
+        name.lstrip("-") for one in commands for p in one.params for name in (*p.opts, *p.secondary_opts)
+    }
+    told = {}
+    for path in sorted(Path(pulsetrainer.__file__).parent.rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        docs = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+                for name in re.findall("--([a-z-]+)", as_options(node.value)):
+                    if f"--{name}" not in node.value:
+                        told[name] = f"{path.name}:{node.lineno}"
+    assert len(told) > 30
+    # `doctor --capture` is the one option that has the name of a command: no message is about it
+    assert {name: where for name, where in told.items() if name not in options - {"capture"}} == {}
 
 
 def test_a_narrow_terminal_folds_what_a_command_does():
