@@ -86,10 +86,6 @@ def _is_symbol(text: str) -> bool:
     return any(text.startswith(p) and text[len(p) :] in _PREFIXED for p in _PREFIXES)
 
 
-# how words for units begin, so that the unit can be proposed
-_SPELLED = {"volt": "V", "amp": "A", "newton": "N", "tesla": "T", "met": "m", "micro": "µm", "sec": "s"}
-
-
 def check_unit(text: str, what: str, where: str = "") -> str:
     """Return a unit as it is written; the two letters that look like a micro are one.
 
@@ -98,8 +94,8 @@ def check_unit(text: str, what: str, where: str = "") -> str:
     """
     if is_unit(text):
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same
-    spelled = [unit for word, unit in _SPELLED.items() if text.lower().startswith(word)]
-    near = spelled or difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
+    spelled = _SPELLED.get(text.lower())
+    near = [spelled] if spelled else difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
     meant = f"did you mean {' or '.join(repr(n) for n in near)}? " if near else ""
     raise DataError(
         f"the {what} {text!r}{where and ' in '}{where} is not a known unit",
