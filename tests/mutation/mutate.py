@@ -86,7 +86,7 @@ PACKAGES = {  # the tests that answer for a package
         "tests/api",
         "tests/cli",
     ),
-    "cli": ("tests/cli",),
+    "cli": ("tests/cli", "tests/api"),
 }
 MEMORY = 6_000_000_000  # a fault must not take the machine with it
 
