@@ -32,6 +32,8 @@ def lay_out(folder: Path) -> None:
     (folder / "other" / "run.csv").write_text("t_s,current_A,force_N\n0,0,0\n")
     (folder / "wrong.toml").write_text("levles = 48\n")
     (folder / "bare").mkdir()
+    (folder / "bare.toml").write_text("")
+    (folder / "one.toml").write_text('"normal.continuous.mean_error_reduction_percent" = 90\n')
 
 
 def at_once() -> dict[str, Mistake]:
@@ -188,6 +190,38 @@ _WORDS_OF_A_TIRED_HAND = {
         *("session --model model.h5 drive.h5 -o out.h5", 2, "got drive.h5", "a model is an option"),
     ),
     "a drive refined over itself": ("refine drive.h5 -o drive.h5", 2, "drive.h5 (-o)", "--overwrite"),
+    "an option of many letters behind one dash": (
+        *("identify run.h5 -output out.h5", 2, "there is no option -output", "-o FILE"),
+    ),
+    "an output behind an equals sign": (
+        *("identify run.h5 -o=out.h5", 2, "there is no option -o=out.h5", "-o out.h5"),
+    ),
+    "a column behind one dash": (
+        *("import x.csv -output force -o out.h5", 2, "no option -output", "--output names a column"),
+    ),
+    "help behind one dash": ("identify -help", 2, "no option -help", "pulsetrainer identify --help"),
+    "a version that is a command": (
+        *("version", 2, "there is no command 'version'", "pulsetrainer --version"),
+    ),
+    "the settings behind the command": (
+        *("capture identification -o out.h5 --settings wrong.toml", 2, "has no option --settings"),
+        "pulsetrainer --settings FILE capture",
+    ),
+    "a number in thousandths": (
+        *("correct run.h5 --diagnosis diagnosis.h5 -o out.h5 --delay 1ms", 2, "got '1ms'"),
+        "write the number alone, with a point: delay of the recorder of the output, s",
+    ),
+    "a page behind -o": (
+        *("diagnose run.h5 --model model.h5 -o out.html", 2, "out.html ends in '.html'", "--html out.html"),
+    ),
+    "one playback twice": ("evaluate played.h5 played.h5", 2, "played.h5 is named twice", "each file once"),
+    "one table twice": (
+        *("import x.csv x.csv --input u --output y -o out.h5", 2, "x.csv is named twice", "each file once"),
+    ),
+    "bounds of nothing": ("evaluate played.h5 --bounds bare.toml", 2, "holds no bound", "= [90, 100]"),
+    "a bound of one number": (
+        *("evaluate played.h5 --bounds one.toml", 2, "a pair [low, high], got 90", "lowest and the highest"),
+    ),
     "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),
 }
 
@@ -214,6 +248,7 @@ PREPARATION = (
 TABLES = {
     "empty.csv": "",
     "wide.csv": "time;Spannung;Kraft;Bemerkung\n0,0;1,5;2,5;gut\n",
+    "still.csv": "t,F\n0,0\n1,1\n1,2\n2,3\n",
     "bounds.toml": "normal.continuous.mean_err = [1, 2]\n",
 }
 INSIDE = {
@@ -265,5 +300,24 @@ INSIDE = {
     ),
     "no such bench parameter": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench:?crep=1"), 2
+    ),
+    "a bench without its colon": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--port", "bench"), 4, "no port bench", "--port bench:?"
+    ),
+    "too many levels for the coil": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--levels", "2000"),
+        *(3, "heats the coil", "fewer --levels"),
+    ),
+    "a pulse whose time stands still": Mistake(
+        ("invert", "still.csv", "--model", "model.h5", "-o", "out.h5"), 3, "line 4", "with more digits\n"
+    ),
+    "answers that are no text": Mistake(
+        (
+            *("session", "--model", "model.h5", "-o", "out.h5", "--pulses", "normal,bifid"),
+            *("--quiz", "4", "--answers", "run.h5"),
+        ),
+        3,
+        "run.h5 cannot be read: it is not a text file",
+        "one name a line",
     ),
 }

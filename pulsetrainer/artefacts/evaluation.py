@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 from typing import Annotated, ClassVar
 
@@ -152,3 +152,10 @@ class Evaluation(Shown):
         names = [*(f"{w.name}.{w.inversion}" for w in self.waveforms), *(m.short_name for m in self.models)]
         before = [names[:k].count(name) for k, name in enumerate(names)]
         return tuple(f"{name}#{n + 1}" if n else name for name, n in zip(names, before, strict=True))
+
+    def told_apart(self) -> Evaluation:
+        """Return the evaluation with a number in each repeated inversion of a pulse, as in ``stems``."""
+        pairs = zip(self.waveforms, self.stems, strict=False)
+        return replace(
+            self, waveforms=tuple(replace(w, inversion=stem.removeprefix(f"{w.name}.")) for w, stem in pairs)
+        )

@@ -20,7 +20,7 @@ _PREFIXED_SYMBOLS = """
 """
 _BARE_SYMBOLS = """
     1 % ‰ percent ppm ppb ppt ° °C degC degF deg mmHg cmH2O psi lbf lb in inch ft kgf min h d rpm rev atm
-    counts count ct LSB digit digits steps step px a.u. arb au norm dB
+    counts count ct LSB digit digits steps step samples sample px a.u. arb au norm dB
 """
 # what may stand behind the last underscore of a heading, where most letters and short words are a name's, or,
 # of two letters and more, may be all of it

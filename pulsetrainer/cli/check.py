@@ -28,7 +28,7 @@ def check(
     model: Annotated[Path, typer.Argument(help="Model of the device.", metavar="MODEL.h5")],
     port: Port = None,
     update: Annotated[
-        bool, typer.Option("--update", help="Write a model with the offset and the gain of now.")
+        bool, typer.Option("--update", help="Write a model with the present offset and gain.")
     ] = False,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write, with --update.")] = None,
     limit_current_A: LimitCurrent = None,
@@ -38,7 +38,7 @@ def check(
 ) -> None:
     """Tell in ten seconds whether a model is still true.
 
-    It measures on the device that the model is of, with the force sensor in place.
+    It measures on the model's own device, with the force sensor in place.
 
     The verdict is true, shifted (offset, gain, temperature) or changed (the shape: identify again).
 
@@ -80,7 +80,7 @@ def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, 
         rows["next"] = (
             f"use {out} in the place of {model}, and invert drives again with it"
             if found.verdict == "shifted"
-            else f"go on with {model}: nothing moved that a device would not by itself, {out} is no better"
+            else f"go on with {model}: nothing moved more than on a device left alone, {out} is no better"
         )
     elif found.verdict == "shifted" and updatable:
         rows["next"] = f"pulsetrainer check {shlex.quote(str(model))} --update -o updated.h5"

@@ -74,6 +74,7 @@ def compare(
     job.screen.table(f"{len(labels)} {loaded[0].kind}s side by side", head, rows)
     if not learners:
         job.screen.line(
-            "change: ", "from the first to the last; within the spread between repeats no verdict"
+            "change: ",
+            "from the first to the last; one within the spread between repeats gets no verdict",
         )
     job.wrote(out)

@@ -21,7 +21,9 @@ def diagnose(
     model: Annotated[Path, typer.Option(help="Model to be diagnosed.")],
     out: Out,
     html: Annotated[Path | None, typer.Option(help="Report to write.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Screen only: seconds, but no refit.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Only screen: takes seconds, refits nothing.")
+    ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated null distribution.")] = 0,
     overwrite: Overwrite = False,
     json: AsJson = False,

@@ -40,7 +40,8 @@ def doctor(
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
     with screen.bar("looking") as progress:
         result = examine(port, capture=capture, settings=words, tuned=file, progress=progress)
-    problem = f"{result.problems} of {len(result.findings)} findings stand in the way"
+    stand = "stands" if result.problems == 1 else "stand"
+    problem = f"{result.problems} of {len(result.findings)} findings {stand} in the way"
     failed = QualityError(problem, hint="follow the fixes, from the top") if result.problems else None
     screen.result(plain(result) | {"problems": result.problems}, failed)
     if not json:

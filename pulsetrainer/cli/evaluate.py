@@ -11,6 +11,7 @@ import pulsetrainer as pt
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
+from pulsetrainer.steps.asked import check_once
 
 
 def evaluate(
@@ -22,17 +23,20 @@ def evaluate(
     model: Annotated[list[Path], typer.Option(help="Model to test on the run; may be given again.")] = [],  # noqa: B006
     out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write.")] = None,
     html: Annotated[Path | None, typer.Option(help="Report to write.")] = None,
-    bounds: Annotated[Path | None, typer.Option(help="TOML file of bounds; outside them exit 1.")] = None,
+    bounds: Annotated[
+        Path | None, typer.Option(help="TOML file of bounds; a figure outside them: exit 1.")
+    ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Report how large the errors are.
 
-    Force errors of playbacks, or prediction errors of models on a run that they were not fitted to. Of a
+    Force errors of playbacks, or prediction errors of models on a run that they were not fitted to. For a
     session it says what was pressed and answered, and --html writes its score sheet.
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
+    check_once(inputs)
     job = Job(context, inputs=(*inputs, *model), outputs=(out, html))
     from pulsetrainer.files.bounds import read_bounds
 
@@ -102,6 +106,8 @@ def show_tables(screen: Screen, evaluation: pt.Evaluation) -> None:
     from pulsetrainer.report.text import tables_of
 
     screen.parts(tables_of(evaluation, screen.width))
+    if any("#" in w.inversion for w in evaluation.told_apart().waveforms):
+        screen.line("#2: ", "the second playback of that pulse and inversion, in the order given")
     if len(evaluation.models) > 1:
         screen.line("improvement: ", "how much less rms error than by the first model")
     if any(w.name in PUBLISHED for w in evaluation.waveforms):

@@ -23,8 +23,8 @@ def export(
 ) -> None:
     """Write the series of a file as a table.
 
-    Its header has the units. A run, a waveform and a diagnosis have a row a sample, a model a row a cell
-    of its density, a playback its repeats and an evaluation its waveforms or models one below another.
+    The header has the units. A run, a waveform or a diagnosis gives one row for each sample, a model one for
+    each cell of its density, a playback its repeats and an evaluation its waveforms or models in turn.
 
     Example: pulsetrainer export run.h5 -o run.csv
     """

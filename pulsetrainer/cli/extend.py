@@ -25,7 +25,7 @@ def extend(
 ) -> None:
     """Write the model with the causes found.
 
-    Its static part is identified again beside them.
+    Its static part is identified again together with them.
 
     Example: pulsetrainer extend diagnosis.h5 --model model.h5 -o extended.h5
     """

@@ -18,7 +18,7 @@ from typing import Any
 from pulsetrainer.cli.console import say
 from pulsetrainer.cli.next_step import as_options, next_step
 from pulsetrainer.cli.starting import loaded
-from pulsetrainer.cli.usage import usage_of
+from pulsetrainer.cli.usage import check_apart, usage_of
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
 
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -36,6 +36,7 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
     problem: PulsetrainerError
     try:
         loaded()
+        check_apart(words)
         code = _run(program, words)
         sys.stdout.flush()  # here, not at the end of the process, where a full disk has no words
     except PulsetrainerError as error:

@@ -12,6 +12,7 @@ import typer
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite, word_or_number
+from pulsetrainer.steps.asked import check_once
 
 if TYPE_CHECKING:
     from pulsetrainer.steps.import_ import Imported
@@ -76,6 +77,7 @@ def import_(
     from pulsetrainer.files.input_file import outputs_of
     from pulsetrainer.files.timing import check_timing
 
+    check_once(files)
     groups = outputs_of(files, out)
     must = "the word even or a rate above 0 in Hz"
     even = word_or_number(resample, "even", "--resample", must, **_RATES_HZ)

@@ -62,7 +62,7 @@ def invert(
 ) -> None:
     """Find the drive that presses a pulse.
 
-    Both the compensated one and, to compare, the merely scaled one with the same extremes.
+    Writes the compensated drive and, for comparison, the merely scaled one with the same extremes.
 
     With --learnt it begins from what refining found missing on another pulse.
 

@@ -119,7 +119,7 @@ class Job:
                 self.notes([f"{said}, which plays with those delivered; `pulsetrainer tune` measures it"])
         of = model.coil.serial if model is not None and model.coil is not None else ""
         if of not in ("", device.info.serial):
-            self.notes([f"the model is of {of}, and this is {device.info.serial}, whose force is another"])
+            self.notes([f"the model is of {of}, but this is {device.info.serial}, whose force is different"])
         return device
 
     def alike(self, files: Sequence[Path]) -> None:
@@ -293,6 +293,8 @@ def check_ending(path: Path, context: typer.Context) -> None:
     else:
         what, right = f"{command} writes HDF5", ".h5"
         then = "; then `pulsetrainer export` makes a table of it, `pulsetrainer plot` a figure"
+        if ending == ".html" and "html" in context.params:
+            then = f", and the page with --html {path}"
     if ending in _FORMATS and not right.startswith(ending):  # .htm is a page too
         raise UsageError(f"{what}, but {path} ends in {ending!r}", hint=f"name it {path.stem}{right}{then}")
 

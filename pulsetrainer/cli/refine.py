@@ -19,7 +19,7 @@ def refine(
     out: Out,
     port: Port = None,
     passes: Annotated[
-        int, typer.Option(min=1, help="Most passes; the first one plays the drive as it is.")
+        int, typer.Option(min=1, help="Passes at most; the first one plays the drive as it is.")
     ] = 5,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,

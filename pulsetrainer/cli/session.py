@@ -25,7 +25,10 @@ def session(
     model: Annotated[Path, typer.Option(help="Model of the device, best an extended one.")],
     out: Out,
     pulses: Annotated[
-        str, typer.Option(help="Names of the library or CSV files, by commas; in turn, an equal share each.")
+        str,
+        typer.Option(
+            help="Names of the library or CSV files, separated by commas; each gets an equal share."
+        ),
     ] = "normal",
     rate: Annotated[
         float | None,
@@ -77,7 +80,7 @@ def session(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Press pulses for as long as wanted.
+    """Press pulses for as long as you like.
 
     On a terminal keys change rate, amplitude and pulse, pause and stop. With --quiz the pulses come blind.
 

@@ -51,9 +51,9 @@ def tune(
 ) -> None:
     """Measure the coil and set the gains of its current loop.
 
-    Nobody's finger should be on the device meanwhile. The other commands take the gains from the file of
-    settings for the device whose serial number they stand under. --overwrite replaces what an earlier tuning
-    of the device wrote there; the rest of the file stays.
+    Nobody's finger should be on the device meanwhile. The gains go into the file of settings, under the
+    device's serial number; the other commands read them there. --overwrite replaces what an earlier tuning of
+    that device wrote; the rest of the file stays.
 
     Example: pulsetrainer tune -o pulsetrainer.toml
     """

@@ -32,7 +32,7 @@ _NO_FILE = {"ports", "doctor"}
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
-_NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*[^\d\s.,]*'$")
+_NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*([^\d\s.,]*)'$")
 
 
 def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> UsageError | None:
@@ -50,8 +50,11 @@ def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> Us
     if kind == "NoSuchOption":
         given = _as_typed(str(getattr(error, "option_name", "")), words)
         near = _alike(given, context)
-        said = f"{command} has no option {given}"
-        return UsageError(said, hint=f"did you mean {' or '.join(near)}?" if near else help_)
+        hint = f"did you mean {' or '.join(near)}?" if near else help_
+        if given == "--settings":
+            behind = command.removeprefix("pulsetrainer")
+            hint = f"it stands before the command: pulsetrainer --settings FILE{behind}"
+        return UsageError(f"{command} has no option {given}", hint=hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
@@ -70,11 +73,23 @@ def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> Us
     )
 
 
+def check_apart(words: Sequence[str]) -> None:
+    """UsageError for ``-output x.h5`` and ``-o=x.h5``: to the parser they name the files utput and =x.h5."""
+    for word in words[: words.index("--") if "--" in words else None]:
+        if word.startswith(("-ou", "-o=")):
+            name = word.partition("=")[2] or "FILE"
+            raise UsageError(
+                f"there is no option {word}: the file to write stands behind -o and a blank",
+                hint=f"-o {shlex.quote(name)}" + "; --output names a column" * ("import" in words),
+            )
+
+
 def _as_typed(option: str, words: Sequence[str]) -> str:
-    """Return an option as it was typed: of ``-rate`` the parser tells ``-r`` alone."""
+    """Return an option as it was typed: of ``-rate`` the parser tells ``-r`` alone, of ``-help`` ``-e``."""
     if len(option) != 2:
         return option
-    return next((word.partition("=")[0] for word in words if word.startswith(option)), option)
+    typed = [word.partition("=")[0] for word in words if re.match("-[^-]", word) and option[1] in word]
+    return next((word for word in typed if word.startswith(option)), (*typed, option)[0])
 
 
 def _alike(given: str, context: Any) -> list[str]:
@@ -134,6 +149,8 @@ def _other(said: str, command: str, parsed: Any) -> UsageError:
     unknown = _UNKNOWN.match(said)
     if unknown is None:
         return UsageError(said, hint=help_)
+    if unknown[1] == "version":
+        return UsageError("there is no command 'version'", hint="pulsetrainer --version")
     if unknown[1] == "help":
         return UsageError(
             "there is no command 'help'", hint="pulsetrainer --help, or pulsetrainer identify --help"
@@ -186,7 +203,12 @@ def _must(parameter: Any, error: Exception) -> str:
 def _as_a_number(parameter: Any, must: str) -> str:
     """How the number is written that was given with a decimal comma, or with its unit; else empty."""
     given = _NEARLY_A_NUMBER.search(must) if "float" in getattr(parameter.type, "name", "") else None
-    return f"write it with a point and without a unit: {given[1]}.{given[2] or 0}" if given else ""
+    if given is None:
+        return ""
+    told = re.sub(r".*, (\S+?)[.;,].*", r"\1", _meaning(parameter) + ".")  # "Top of the range, A."
+    if given[3] and given[3] != told:  # what is typed in ms must not be taken for s
+        return f"write the number alone, with a point: {_meaning(parameter)}"
+    return f"write it with a point and without a unit: {given[1]}.{given[2] or 0}"
 
 
 def _without(parameter: Any, help_: str) -> str:

@@ -52,6 +52,8 @@ _PILOT = 0.0177  # s of the fit whose residual is looked at
 # From far below a cell of any plane that fits in memory to a fifth of the range.
 _STEP = 2.0**0.5
 _GRID = 0.0125 * _STEP ** np.arange(-1, 9)
+_BIAS = _STEP**8  # by which a step multiplies the square of what is smoothed away
+_ALONE = 0.9  # of all likelihood: more leaves nothing to a mean over the grid
 _MIDDLE = 4  # of the grid, where the search begins
 _HOPELESS = 1.5  # times the least error so far: smoother ones are not tried
 # The choice is made on at most this many levels: s does not depend on them, the time does, as n_h^6.
@@ -206,7 +208,10 @@ def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed:
 
         exp(-(n / tau) (e(s)^2 / e_min^2 - 1) / 2)
 
-    as likelihoods of n samples whose errors remember themselves for tau. They are too sure where few blocks
+    as likelihoods of n samples whose errors remember themselves for tau. Where one length has nearly all of
+    that, the least lies between it and its neighbours: there e^2 = a - b k + c 16^k at k steps of the grid,
+    since noise falls with the logarithm of s, and what is smoothed away, a square, rises as s^8. The
+    likelihoods are too sure where few blocks
     decide. So s is no smaller than a step of the grid below the largest whose squared error is above the
     least by no more than a standard error of their difference from block to block (Breiman, Friedman, Olshen,
     Stone, Classification and Regression Trees, 1984, section 3.4.3).
@@ -328,7 +333,23 @@ def _mean_length(tried: Sequence[tuple[float, float]], samples: float) -> float:
     if least <= 0:
         return float(length[np.argmin(error)])
     weight = np.exp(-0.5 * samples * ((error / least) ** 2 - 1.0))
-    return float(np.exp(weight @ _logarithm(length) / weight.sum()))
+    mean = float(np.exp(weight @ _logarithm(length) / weight.sum()))
+    best = int(np.argmin(error))
+    if 0 < best < error.size - 1 and weight[best] > _ALONE * weight.sum():
+        return min(mean, _between(length[best - 1 : best + 2], error[best - 1 : best + 2] ** 2))
+    return mean
+
+
+def _between(length: FloatArray, squares: FloatArray) -> float:
+    """Length of the least of a - b k + c 16^k through three squared errors, of which the middle is least.
+
+    16 is the eighth power of a step of the grid.
+    """
+    before, least, after = squares.tolist()
+    c = (after - 2.0 * least + before) / (_BIAS - 1.0) ** 2
+    b = (_BIAS - 1.0) * c + before - least
+    steps = float(np.clip(np.log(b / (c * np.log(_BIAS))) / np.log(_BIAS), 0.0, 2.0)) if c > 0 else 1.0
+    return float(length[1] * _STEP ** (steps - 1.0))
 
 
 def _longest_alike(tried: Sequence[tuple[float, float]], squares: Callable[[float], FloatArray]) -> float:

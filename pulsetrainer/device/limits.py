@@ -162,7 +162,8 @@ def too_hot_ever() -> ArgumentError:
     """Return the refusal of what heats even a cold coil beyond its limit."""
     return ArgumentError(
         "this reference heats the coil beyond its limit, however cold it is at the start",
-        hint="play less of it at a time, or at a lower current",
+        hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher `speed`), "
+        "or at a lower current",
     )
 
 

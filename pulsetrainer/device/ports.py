@@ -111,9 +111,12 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
         )
     if number in {errno.ENOENT, errno.ENODEV, errno.ENXIO} or "FileNotFoundError" in text:
         present = ", ".join(p.device for p in list_ports()) or "none"
+        scheme = port.rstrip(":").lower()
         return DeviceError(
             f"there is no port {port} (ports here: {present})",
-            hint="check the cable, then `pulsetrainer ports`; without a device use --port bench:, over a "
+            hint=f"did you mean --port {scheme}:?"
+            if scheme in ("bench", "qemu")
+            else "check the cable, then `pulsetrainer ports`; without a device use --port bench:, over a "
             "network socket://host:port",
         )
     if number in {errno.ENOTTY, errno.EINVAL, errno.EISDIR}:

@@ -14,8 +14,8 @@ FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it 
 _REMEDY: dict[int, str] = {
     codes.Fault.OVER_FORCE: "raise `limit_force_N` where it was lowered, or "
     + less_current("`current_max_A` well below the current told here"),
-    codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where supply or "
-    "coil are others than before, set the gains for them: pulsetrainer tune -o pulsetrainer.toml",
+    codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where the supply "
+    "or the coil has been changed, set the gains again: pulsetrainer tune -o pulsetrainer.toml",
     codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
     codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
     codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",

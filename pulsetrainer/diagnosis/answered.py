@@ -188,7 +188,8 @@ def _parameters(
     meanings = {q.name: q.meaning for q in cause.quantities(state.problem.frames[0])} | {"size": cause.size}
 
     def told(e: Estimate) -> Parameter:
-        unit, meaning = unit_of(e.unit, words["u"], words["y"]), meanings.get(e.name, "").format(**words)
+        own = words.get("seconds", "s") if e.unit == "s" else e.unit
+        unit, meaning = unit_of(own, words["u"], words["y"]), meanings.get(e.name, "").format(**words)
         sign = cause.sign(e.name, polarity)
         low, high = (e.lower, e.upper) if sign > 0 else (-e.upper, -e.lower)
         return Parameter(e.name, sign * e.value, unit, low, high, meaning)

@@ -44,6 +44,7 @@ def compare(
     """Compare the operator's residuals (n,) of each record with those of a function of the velocity.
 
     A part in proportion to the input, beside that function, is a spring beside a damper.
+
     ``dt_s`` is the time step of each record, s; None where only the order of the samples is known: the
     direction of motion then takes the place of the velocity.
     """

@@ -24,11 +24,11 @@ TEXTS: Mapping[str, str] = {
         "of short averages). Noise and the number of levels alone would leave {floor:.3f} %."
     ),
     "tested": (
-        "noise alone looks like it with a probability of {p:.3f}. It accounts for {explains:.1f} % of the "
-        "squared error beyond noise. {signature}."
+        "noise alone would look like it with a probability of {p:.3f}. It accounts for {explains:.1f} % of "
+        "the squared error beyond noise. {signature}."
     ),
     "tested, small": (
-        "noise alone looks like it with a probability of {p:.3f}. How much of the error it is cannot be "
+        "noise alone would look like it with a probability of {p:.3f}. How much of the error it is cannot be "
         "told: all of it is no more than noise and levels may leave. {signature}."
     ),
     "extended": "With these causes in the model, {left:.3f} % of the span remains (rms of short averages).",
@@ -51,9 +51,9 @@ TEXTS: Mapping[str, str] = {
         "the device or the sensor that was not recorded, or the model cannot follow a device of this kind"
     ),
     "not accepted": (
-        "Noise alone hardly looks like {names} (p = {p:.3f}). But once the model is fitted together with it, "
-        "it is too small to matter, or does not predict the parts of the recordings that were left out. So "
-        "it is not named."
+        "Noise alone would hardly look like {names} (p = {p:.3f}). But once the model is fitted together "
+        "with it, it is too small to matter, or does not predict the parts of the recordings that were left "
+        "out. So it is not named."
     ),
     "not repeated": (
         "What is left can be fitted by a learned dependence, but that did not repeat when whole pieces of "
@@ -105,13 +105,14 @@ SIGNATURES: Mapping[bool, str] = {
 # Where an error is largest, by the quantity that it was sorted by
 PLACES: Mapping[str, str] = {
     "rest": "while the {input} rests",
-    "rate": "where the {input} moves at {at:.3g}{in_u} per second",
+    "rate": "where the {input} moves at {at:.3g}{in_u} per {second}",
     "level": "where the {input} is about {at:.3g}{in_u}",
     "direction": "while the {input} {way}",
-    "time": "about {at:.3g} s after the start",
+    "time": "about {at:.3g} {seconds} after the start",
 }
 WAYS = {-1.0: "falls", 0.0: "rests", 1.0: "rises"}
-PLAIN = {"input": "input", "output": "output", "in_y": "", "in_u": ""}  # where nothing better is known
+# where nothing better is known
+PLAIN = {"input": "input", "output": "output", "in_y": "", "in_u": "", "second": "second", "seconds": "s"}
 AGAIN = (
     "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
     "recording.{command}"
@@ -196,7 +197,7 @@ DOUBTS: Mapping[str, str] = {
     "spans zero": "its strength may be nothing, as the interval spans zero",
     "no equal loops": "no minor loop was traced three times in equal time, which alone would show it",
     "at bound": "a parameter, or the interval of one, is at the end of the range that was searched",
-    "strength at bound": "its strength is at the end of the range that was searched, so it is another thing",
+    "strength at bound": "its strength is at the end of the range that was searched, so it is something else",
     "own error": (
         "with one rate and no rest it looks like what the model lacks of the device, and what is left is "
         "nearly as large, or more than noise"
@@ -260,6 +261,8 @@ class Bench:
         return {
             "input": self.input,
             "output": self.output,
+            "second": "second" if self.timed else "sample",
+            "seconds": "s" if self.timed else "samples",
             **{name: self._level(share) for name, share in shares.items()},
             "levels": self._levels(experiment.LEVELS[1:-1]),
             "biases": self._levels(experiment.BIASES),

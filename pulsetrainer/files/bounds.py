@@ -7,17 +7,18 @@ from pathlib import Path
 from pulsetrainer.errors import UsageError
 from pulsetrainer.files.settings import leaves, read_toml
 
+_HOW = "write it, a line for each figure: normal.continuous.mean_error_reduction_percent = [90, 100]"
+
 
 def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
     """Return the two-sided bounds of a TOML file by metric name.
 
-    UsageError where the file cannot be read, is no TOML, or a bound is not a pair low <= high.
+    UsageError where the file cannot be read, is no TOML or is empty, or a bound is not a pair low <= high.
     """
     if not path.exists():
         raise UsageError(
             f"the file of bounds {path} does not exist",
-            hint="check its name, or write it, a line for each figure: "
-            "normal.continuous.mean_error_reduction_percent = [90, 100]",
+            hint=f"check its name, or {_HOW}",
         )
     bounds = {}
     for name, pair in leaves(read_toml(path, "bounds")):
@@ -27,6 +28,8 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
             case _:
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=f"write {name.rpartition('.')[2]} = [0.0, 1.0]",
+                    hint=f"write the lowest and the highest: {name.rpartition('.')[2]} = [0.5, 1.5]",
                 )
+    if not bounds:
+        raise UsageError(f"{path} holds no bound, so nothing would be checked", hint=_HOW)
     return bounds

@@ -43,7 +43,9 @@ def read_changes(
                     )
             return found
     except (OSError, UnicodeError, csv.Error) as error:
-        raise DataError(f"{path} cannot be read: {error}", hint="give a table of text") from error
+        why = "it is not a text file" if isinstance(error, UnicodeError) else error
+        hint = "write a table with a header such as: t_s,rate,amplitude,pulse"
+        raise DataError(f"{path} cannot be read: {why}", hint=hint) from error
 
 
 def _columns(names: Sequence[str] | None) -> str:
@@ -97,9 +99,8 @@ def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeError) as error:
-        raise DataError(
-            f"{path} cannot be read: {error}", hint="give a text file, one name a line"
-        ) from error
+        why = "it is not a text file" if isinstance(error, UnicodeError) else error
+        raise DataError(f"{path} cannot be read: {why}", hint="give a text file, one name a line") from error
     answers = [(number, line.strip()) for number, line in enumerate(lines, 1) if line.strip()]
     for number, said in answers:
         if said not in choices:

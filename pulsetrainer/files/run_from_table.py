@@ -143,7 +143,7 @@ def _time(
         if _just_counts(table.columns[time]):
             lack = f"the column {time} of {table.path} just counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=whole)
-    heading = table.names[table.index(time)]  # the whole one
+    heading = table.names[table.index(time)]
     unit = _unit_of_time(table, heading)
     notes: tuple[str, ...] = ()
     if not unit and (unit := unit_of_count(float(table.columns[heading][0]), heading)):
@@ -154,11 +154,11 @@ def _time(
         said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
         notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
     words = f"time from {split_unit(heading)[0]} [{unit or 's'}]"
-    stamps, again = _begun_again(table.check_finite(heading, remedy=_LEAVE_OUT), unit or "s")
+    stamps, again = _begun_again(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
     if again:
         table = replace(table, columns={**table.columns, heading: stamps})
         notes = (*notes, f"the time of {table.path} {again}")
-    time_s = seconds(table, heading, of_record=True)
+    time_s = seconds(table, time, of_record=True)
     if np.spacing(np.abs(time_s[0])) > _EXACT * float(np.median(np.diff(time_s))):
         notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
     return _Time(time_s, words, notes)

@@ -15,7 +15,8 @@ from pulsetrainer.report.style import BLUE, COLUMN_IN, GREEN, INK, VERMILION, st
 
 _PANEL_IN = 2.3
 _SHOWN = tuple(one for one in HEADLINES if one not in ("right_from_percent", "right_to_percent"))
-_LINES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
+# one more than there are colours: twenty lines before two look alike
+_LINES = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"), ((0, (8, 2)), "v"))
 
 
 @styled

@@ -18,13 +18,13 @@ _OF_A_CURVE = ("state", "low", "high")
 # what is left by each model: in words, then the fields of single samples and of short averages
 ERRORS = (
     ("the model as given", "rms_percent", ""),
-    ("fitted anew to these recordings", "", "static_percent"),
-    ("with the causes found", "extended_rms_percent", "extended_percent"),
-    ("noise alone (averages: and levels)", "noise_percent", "floor_percent"),
+    ("a model fitted anew to these recordings", "", "static_percent"),
+    ("that model with the causes found", "extended_rms_percent", "extended_percent"),
+    ("noise alone (of averages: and the levels)", "noise_percent", "floor_percent"),
 )
 COLUMNS = {
     "explains": "share of the squared error beyond noise that goes with this cause in the model; shares of "
-    "causes that look alike overlap",
+    "causes that look alike overlap; of one that was not found, a first estimate without a refit",
     "held-out share": "the same share, on parts of the recordings that were left out of the fit",
 }
 
@@ -77,7 +77,7 @@ def answer(one: Cause, found: Diagnosis) -> str:
         return "no"
     if one.p_value > LIMITS.p_max:
         return "no: noise does as much"
-    return "no: another explains more" if found.quick else "no: too small or no better"
+    return "no: another explains more" if found.quick else "no: not confirmed by the refit"
 
 
 def parameters(several: Sequence[Parameter]) -> dict[str, str]:

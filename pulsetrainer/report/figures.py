@@ -159,7 +159,8 @@ def evaluation(errors: Evaluation) -> Figure:
 
     DataError where the evaluation holds neither.
     """
-    pairs = -(-len(errors.models) // 2)
+    errors = errors.told_apart()
+    pairs, among = -(-len(errors.models) // 2), panels.inversions(errors.waveforms)
     pulses: dict[str, list[WaveformEvaluation]] = {}
     for one in errors.waveforms:
         pulses.setdefault(one.name, []).append(one)
@@ -173,10 +174,10 @@ def evaluation(errors: Evaluation) -> Figure:
     cells = figure.subfigures(rows, 2, squeeze=False)
     for row, played in zip(cells, pulses.values(), strict=False):
         if len(played) > 1:
-            panels.methods(row[0], played)
+            panels.methods(row[0], played, among)
         else:
             panels.tracking(row[0], played[0])
-        panels.loops(row[1], played)
+        panels.loops(row[1], played, among)
     reach = panels.largest_residual(errors.models)
     for cell, predicted in zip(cells[len(pulses) :].flat, errors.models, strict=False):
         panels.prediction(cell, predicted, reach)

@@ -128,6 +128,7 @@ def render_evaluation(
     Beside its figures stand those of a ``published`` device by waveform: ``mean_error_reduction_percent``,
     ``scaled.max_abs_error_percent`` and so on.
     """
+    evaluation = evaluation.told_apart()
     played = evaluation.waveforms
     # whose model the evaluation holds: that of the last
     last = f" of {panels.titled(played[-1])}" if len(set(map(panels.titled, played))) > 1 else ""
@@ -140,6 +141,7 @@ def render_evaluation(
             (f"waveform-{k}", one, stem)
             for k, (one, stem) in enumerate(zip(played, evaluation.stems, strict=False), start=1)
         ],
+        inversions=panels.inversions(played),
         published=published,
         model=evaluation.model,
         model_title=f"Model{last}",

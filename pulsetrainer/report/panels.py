@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle
 from pathlib import PurePath
 from typing import Any, Literal
 
@@ -251,8 +250,20 @@ def tracking(panel: FigureBase, played: WaveformEvaluation) -> None:
     below.set_ylabel("error\n[% of full force]")
 
 
-def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
-    """Draw one beat by every method that played a pulse: before and after above, what is left below."""
+def inversions(played: Sequence[WaveformEvaluation]) -> list[str]:
+    """Return the inversions in their order: each keeps its line in the figures of all pulses."""
+    return list(dict.fromkeys(one.inversion for one in played))
+
+
+def _line_of(inversion: str, among: Sequence[str]) -> dict[str, Any]:
+    return METHODS[among.index(inversion) % len(METHODS)]
+
+
+def methods(panel: FigureBase, played: Sequence[WaveformEvaluation], among: Sequence[str] = ()) -> None:
+    """Draw one beat by every method that played a pulse: before and after above, what is left below.
+
+    ``among``: the inversions of all pulses, where there are others.
+    """
     above, below = panel.subplots(2, 1, sharex=True, height_ratios=(1.5, 1.0))
     first = played[0]
     beat = slice(0, first.target.size // beats(first.target))
@@ -260,7 +271,8 @@ def methods(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
     trace(above, time, first.target[beat], **TARGET, label="target")
     trace(above, time, first.scaled.output[beat], **SCALED, label="scaled")
     below.axhline(0.0, **GUIDE)
-    for one, style in zip(played, cycle(METHODS)):
+    for one in played:
+        style = _line_of(one.inversion, among or inversions(played))
         size = min(time.size, one.target.size)
         x, measured, target = time[:size], one.compensated.output[:size], one.target[:size]
         shown = f"{one.inversion}: mean {digits(one.compensated.mean_abs_error_percent)} %"
@@ -278,10 +290,10 @@ def titled(one: Waveform | WaveformEvaluation) -> str:
     return f"{one.name}, {one.inversion} inversion"
 
 
-def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
+def loops(panel: FigureBase, played: Sequence[WaveformEvaluation], among: Sequence[str] = ()) -> None:
     """Draw force against target over one beat: hysteresis opens a loop, the perfect drive is a line.
 
-    The scaled drive, and the compensated one by each method that played the pulse.
+    The scaled drive, and the compensated one by each method that played the pulse, ``among`` those of all.
     """
     axes = panel.add_subplot()
     first = played[0]
@@ -289,7 +301,8 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation]) -> None:
     axes.plot(ends, ends, **TARGET, label="target")
     several = len(played) > 1
     drawn = [("scaled", first, first.scaled, SCALED)]
-    for one, style in zip(played, cycle(METHODS)):
+    for one in played:
+        style = _line_of(one.inversion, among or inversions(played)) if several else COMPENSATED
         drawn.append((one.inversion if several else "compensated", one, one.compensated, style))
     for name, one, drive, style in drawn:
         beat = slice(0, one.target.size // beats(one.target))

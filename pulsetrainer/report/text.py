@@ -31,6 +31,7 @@ _FIGURES = (*OVERVIEW, "compensated.current_tracking_max_percent")
 def title(artefact: Any) -> str:
     """Return one line: the kind, and what tells this one from others."""
     if isinstance(artefact, Evaluation):
+        artefact = artefact.told_apart()
         names = [*(f"{w.name} {w.inversion}" for w in artefact.waveforms), *(m.name for m in artefact.models)]
         return f"<evaluation of {', '.join(names) or 'nothing'}>"
     said = facts(artefact).get(_TITLED[artefact.kind])
@@ -84,7 +85,7 @@ def _predictions(evaluation: Evaluation) -> Table:
 def _pulses(evaluation: Evaluation, width: int) -> Iterator[Table]:
     """One table of all pulses where it fits the width, else one for each pulse."""
     columns: dict[str, list[tuple[str, dict[str, float]]]] = {}  # by pulse: heading and figures
-    for w in evaluation.waveforms:
+    for w in evaluation.told_apart().waveforms:
         published = [("published", PUBLISHED[w.name])] if w.name in PUBLISHED else []
         columns.setdefault(w.name, published).append((w.inversion, w.figures()))
     needed = _LABEL_WIDTH + _COLUMN_WIDTH * sum(len(group) for group in columns.values())

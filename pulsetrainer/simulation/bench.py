@@ -16,12 +16,14 @@ from pathlib import Path
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.transport import SerialTransport
 from pulsetrainer.errors import DeviceError, UsageError
+from pulsetrainer.resources import firmware_dir
 from pulsetrainer.simulation.bad_wire import through
 from pulsetrainer.simulation.build import firmware_executable
 from pulsetrainer.simulation.options import BenchOptions, number_in, parse_bench
 
 BENCH_PORT = "bench:"
 _OWN = ("ideal", "speed", "break", "wire", "wire-seed", "serial")
+_LIST = "plant/solenoid_params.c"  # each with its range and what it does
 _START_S = 10.0
 _LEAVE_S = 2.0
 
@@ -39,12 +41,14 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
     parameters, breaks = _known(executable)
     for name, value in options.settings:
         if name not in parameters:
-            near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.6)
+            near = difflib.get_close_matches(name, [*parameters, *_OWN], n=3, cutoff=0.6) or [
+                known for known, row in parameters.items() if name and name in f"{known} {row[-1]}"
+            ]
             return UsageError(
                 f"`port`: the bench has no parameter {name!r}",
                 hint=f"did you mean {' or '.join(near)}?"
                 if near
-                else f"there are: {', '.join([*_OWN, *parameters])}",
+                else f"it takes {', '.join(_OWN)}, and what {firmware_dir() / _LIST} lists, such as noise",
             )
         unit, low, high, meaning = parameters[name]
         if f"{name}={value}" in complaint:

@@ -70,7 +70,8 @@ def extend(
     if diagnosis.model not in ("", model.fingerprint):  # files of 0.1 do not name theirs
         raise DataError(
             f"{model_name} is not the model that {diagnosis_name} is of",
-            hint="give the model that was diagnosed, or diagnose this one: pulsetrainer diagnose",
+            hint="give the model that was diagnosed, which pulsetrainer show DIAGNOSIS.h5 tells, or diagnose "
+            f"this one: pulsetrainer diagnose RUN.h5 --model {model_name} -o new-diagnosis.h5",
         )
     # the levels of a dual model lie on the output, and a refit moves them
     ends = model.edges[[0, -1]]

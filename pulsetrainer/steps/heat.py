@@ -105,8 +105,8 @@ def _check_plausible(kelvin: float) -> None:
     if not _COLDEST_K <= kelvin <= _HOTTEST_K:
         raise DeviceError(
             f"the duty says that the coil is {kelvin:+.0f} K against calibration, expected "
-            f"{_COLDEST_K:+.0f} to {_HOTTEST_K:+.0f} K: the coil or the supply is another",
-            hint="connect those of the calibration, or capture and identify again; `no_track_heat` leaves "
+            f"{_COLDEST_K:+.0f} to {_HOTTEST_K:+.0f} K: this is another coil or supply",
+            hint="connect those used at calibration, or capture and identify again; `no_track_heat` leaves "
             "heat out",
         )
 

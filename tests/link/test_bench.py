@@ -67,8 +67,10 @@ def test_ports_that_do_not(port):
         (
             "bench:?zzzz=1",
             "no parameter 'zzzz'",
-            "there are: ideal, speed, break, wire, wire-seed, serial, seed",
+            "plant/solenoid_params.c lists, such as noise",
         ),
+        ("bench:?friction=1", "no parameter 'friction'", "did you mean coulomb?"),
+        ("bench:?drift=1", "no parameter 'drift'", "did you mean thermal-drift or offset-drift?"),
         ("bench:?creep=7", "creep=7 is outside 0 to 0.5", "give creep ("),
         ("bench:?creep=lots", "creep=lots is not a number from 0 to 0.5", ""),
         ("bench:?creep=", "creep= is not a number from 0 to 0.5", ""),

@@ -1,8 +1,8 @@
 """What a dry run promises, the device does: drawn command lines end the same with it and without.
 
-DRY_RUNS=60 python -m pytest tests/link/test_dry_run.py draws so many of each command, 300 in all. What no dry
-run can know is left out: a device that is broken or another than was delivered, and a force that is within a
-few tenths of its limit.
+DRY_RUNS=60 python -m pytest tests/link/test_dry_run.py draws so many of each command, 300 in all;
+DRY_RUNS_FIRST=1000 draws others. What no dry run can know is left out: a device that is broken or another
+than was delivered, and a force that is within a few tenths of its limit.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import pulsetrainer as pt
 from program import Ran, pulsetrainer
 
 QUICK, COUNT = 4, int(os.environ.get("DRY_RUNS", "60"))
+FIRST = int(os.environ.get("DRY_RUNS_FIRST", "0"))
 KEPT = Path(__file__).parents[1] / "data/files-0.1"
 GAINS = "pid_kp = {}\npid_ki = 3680\nfeed_resistance = 20423\nfeed_inductance = 3191\nfeed_offset = 374\n"
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the bench needs a pty")
@@ -250,7 +251,7 @@ def seeds() -> list[object]:
     return [
         pytest.param(command, seed, id=f"{command.__name__}-{seed}", marks=[slow] * (seed >= QUICK))
         for command in COMMANDS
-        for seed in range(COUNT)
+        for seed in range(FIRST, FIRST + COUNT)
     ]
 
 

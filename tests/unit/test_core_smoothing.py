@@ -144,6 +144,15 @@ def test_a_flat_error_has_its_smoothing_in_the_middle():
     assert smoothing._mean_length([(0.0, 1.0), (0.1, 1.0)], 10.0) == pytest.approx(np.sqrt(0.00625 * 0.1))
 
 
+@pytest.mark.parametrize("steps", [0.65, 0.9, 1.2])
+def test_the_least_between_two_lengths_is_found(steps):
+    """Of errors whose square falls with the logarithm of s and rises as s^8, tried at steps of 2^(1/2)."""
+    least = 0.05 * np.sqrt(2.0) ** (steps - 1.0)
+    bias = 1e-4 / (np.log(16.0) * 16.0**steps)  # so that the slope is zero there
+    tried = [(0.05 * np.sqrt(2.0) ** (k - 1), np.sqrt(1.0 - 1e-4 * k + bias * 16.0**k)) for k in range(3)]
+    assert smoothing._mean_length(tried, 1e7) == pytest.approx(min(least, 0.05), rel=1e-6)
+
+
 class Error:
     """Stands for the error on held-out blocks: 1 up to ``best``, then growing with s."""
 

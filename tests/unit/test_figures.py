@@ -26,6 +26,7 @@ from pulsetrainer.report.facts import run_facts, warmth_words
 from pulsetrainer.report.fewer_points import MOST_POINTS, extremes, path
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.style import THEME, VERMILION, label
+from pulsetrainer.report.text import tables_of
 from wording import raises
 
 
@@ -395,6 +396,35 @@ def test_a_comparison_shows_what_became_worse_than_nothing():
     low, high = first.get_ylim()
     assert low < -30.0 < 20.0 < high
     assert second.get_ylim() == (0.0, 1.0)
+
+
+def test_each_line_of_a_comparison_looks_unlike_the_others():
+    """The fifth pulse was drawn like the first."""
+    rows = {f"pulse{k}.continuous.mean_error_reduction_percent": [90.0, 91.0] for k in range(20)}
+    (axes,) = comparison_figure.draw(["before", "after"], rows).axes
+    looks = {(line.get_color(), line.get_marker()) for line in axes.lines}
+    assert len(looks) == 20
+
+
+def test_an_inversion_keeps_its_line_from_pulse_to_pulse_and_a_repeated_one_has_a_number():
+    """Two playbacks of one drive had one name; extended was black for one pulse and green for the next."""
+    played = [("normal", "continuous"), ("normal", "continuous"), ("normal", "extended")]
+    played += [("bifid", "continuous"), ("bifid", "extended")]
+    errors = Evaluation(tuple(examples.waveform_evaluation(*one) for one in played))
+    figure = figures.evaluation(errors)
+    colours = {}
+    for axes in figure.axes:
+        for line in axes.lines:
+            name = str(line.get_label()).partition(",")[0].partition(":")[0]
+            if name in ("continuous", "continuous#2", "extended"):
+                colours.setdefault(name, set()).add(line.get_color())
+    assert {name: len(several) for name, several in colours.items()} == {
+        "continuous": 1,
+        "continuous#2": 1,
+        "extended": 1,
+    }
+    assert len(set.union(*colours.values())) == 3
+    assert "normal\ncontinuous#2" in next(tables_of(errors, 200)).columns
 
 
 def test_a_long_name_of_the_input_fits_below_its_figure():

@@ -118,3 +118,16 @@ def test_a_record_of_a_device_at_rest_gets_an_answer(swing, seed):
     rest = 0.5 + swing * np.sin(3.0 * time_s) ** 2
     run = pt.Run(time_s, rest, model.predict(rest, None) + noise)
     assert pt.diagnose(run, model, quick=True).verdict != "condition-change"
+
+
+@pytest.mark.parametrize(("timed", "unit"), [(True, "s"), (False, "samples")])
+def test_a_moment_of_a_record_without_time_is_a_number_of_samples(timed, unit):
+    """Only their order is known: a change is so many samples after the first, not so many seconds."""
+    rng = np.random.default_rng(3)
+    turns = np.concatenate(([0.0, 1.0, -1.0], rng.uniform(-1.0, 1.0, 30), [1.0, -1.0, 1.0]))
+    u = np.interp(np.linspace(0.0, turns.size - 1.0, 1500), np.arange(turns.size), turns)
+    y = np.tanh(2.0 * u) + 0.003 * rng.standard_normal(u.size) + 0.1 * (np.arange(u.size) > 900)
+    run = pt.Run(0.01 * np.arange(u.size) if timed else None, u, y)
+    found = pt.diagnose(run, pt.identify(run, levels=12), quick=True)
+    step = next(one for one in found.causes if one.cause == "step")
+    assert {one.name: one.unit for one in step.parameters} == {"offset": "N", "gain": "1", "time": unit}
