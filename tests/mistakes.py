@@ -247,7 +247,7 @@ PREPARATION = (
 )
 TABLES = {
     "empty.csv": "",
-    "wide.csv": "time;Spannung;Kraft;Bemerkung\n0,0;1,5;2,5;gut\n",
+    "wide.csv": "time;Spannung;Kraft;Bemerkung\n0,0;1,5;2,5;gut\n0,1;2,5;3,5;gut\n",
     "still.csv": "t,F\n0,0\n1,1\n1,2\n2,3\n",
     "bounds.toml": "normal.continuous.mean_err = [1, 2]\n",
 }
@@ -297,6 +297,13 @@ INSIDE = {
         3,
         "that --learnt names",
         "pulsetrainer refine drive.h5",
+    ),
+    "a unit in words": Mistake(
+        (
+            *("import", "wide.csv", "--input", "Spannung", "--output", "Kraft", "--input-unit", "Volts"),
+            *("-o", "out.h5"),
+        ),
+        *(3, "'Volts' is not a known unit", "did you mean 'V'?"),
     ),
     "no such bench parameter": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench:?crep=1"), 2

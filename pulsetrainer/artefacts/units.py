@@ -94,7 +94,8 @@ def check_unit(text: str, what: str, where: str = "") -> str:
     """
     if is_unit(text):
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same
-    near = difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
+    spelled = _SPELLED.get(text.lower())
+    near = [spelled] if spelled else difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
     meant = f"did you mean {' or '.join(repr(n) for n in near)}? " if near else ""
     raise DataError(
         f"the {what} {text!r}{where and ' in '}{where} is not a known unit",

@@ -82,6 +82,13 @@ def capture(
     )
     if table is not None:
         job.uses(table)
+    for option, name, counts in (
+        ("--speed", "speed_A_per_s", signal == "identification"),
+        ("--current-max", "current_max_A", table is None),
+    ):
+        source = context.get_parameter_source(name)
+        if not counts and source is not None and source.name == "COMMANDLINE":
+            job.notes([f"{option} does not count here: the signal {played.name} has its own"])
     course, earlier, at = Course(played, repeats), None, 0
     if resume:
         earlier = earlier_of(out, {name: context.params[name] for name in _SAME}, overwrite=overwrite)

@@ -107,6 +107,7 @@ def as_options(text: str) -> str:
 _PLACEHOLDERS = {
     "RUN.h5": ("run", "runs"),
     "DIAGNOSIS.h5": ("diagnosis",),
+    "MODEL.h5": ("model",),
     "REFINED.h5": ("learnt",),
 }
 

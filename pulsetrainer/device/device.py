@@ -142,7 +142,7 @@ class Device:
         if not self.tells_duty:
             raise DeviceError(
                 f"{what} needs the duty of the coil's voltage; the device's firmware {self.info.firmware} "
-                f"speaks protocol {self.info.protocol}, which does not tell it: it came with "
+                f"speaks protocol {self.info.protocol}, which does not report it: that came with "
                 f"{codes.PROTOCOL_MAJOR}.{codes.DUTY_SINCE_MINOR}",
                 hint="flash the firmware that came with this program (make -C firmware)",
             )

@@ -144,7 +144,7 @@ class Rehearsal:
             at_most = f"`current_max_A` at most {told_A:g}"
             lower = "a lower `current_max_A`" if foretold_N is None else at_most
             raise DeviceError(
-                f"the device would stop: {most:.3g} N are foretold, and its force limit is "
+                f"the device would stop: a force of {most:.3g} N is predicted, and its limit is "
                 f"{self.force_N:g} N",
                 hint=f"raise `limit_force_N`, or {less_current(lower)}",
             )

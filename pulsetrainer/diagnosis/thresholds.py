@@ -37,10 +37,7 @@ class Thresholds:
     least_rows: int = 100  # averages: fewer tell no causes apart
     start_tau_s: tuple[float, ...] = (0.2, 0.8, 3.2)  # decays fitted from a record's start (decision 040)
     start_share: float = 6.0  # time constants of such a decay that a record must hold: else it is an offset
-    bulk_of_values: tuple[float, float] = (
-        0.1,
-        0.9,
-    )  # quantiles of the distinct values: no wild one is between
+    bulk_of_values: tuple[float, float] = (0.1, 0.9)  # quantiles of distinct values: no wild one is between
     same_value: float = 1e-9  # of the span: outputs nearer than this are one value, rounded
     jump_of_input: float = 0.1  # of its range from one sample to the next: there the output jumps as well
     noise_least: int = 8  # third differences: fewer tell no noise
@@ -226,6 +223,7 @@ class Thresholds:
 
     # Words
     told_digits: int = 3  # significant, of rates and widths
+    plain_digits: int = 6  # a number of fewer digits before its point is told without an exponent
     told_to: float = 0.005  # of the range: levels that a person is asked to set are told as finely
 
     # The extended model

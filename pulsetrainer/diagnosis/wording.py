@@ -28,8 +28,8 @@ TEXTS: Mapping[str, str] = {
         "the squared error beyond noise. {signature}."
     ),
     "tested, small": (
-        "noise alone would look like it with a probability of {p:.3f}. How much of the error it is cannot be "
-        "told: all of it is no more than noise and levels may leave. {signature}."
+        "noise alone would look like it with a probability of {p:.3f}. What share of the error it causes "
+        "cannot be told: the whole error is no more than noise and levels may leave. {signature}."
     ),
     "extended": "With these causes in the model, {left:.3f} % of the span remains (rms of short averages).",
     "would have shown": (
@@ -93,8 +93,8 @@ TEXTS: Mapping[str, str] = {
         "added to it."
     ),
     "overshadowed": (
-        "The change accounts for {share:.2f} % of the squared error. Adding {names} would only reduce the "
-        "remainder, {left:.2g} % of the span: too little to be named."
+        "The change accounts for {share:.2f} % of the squared error. Adding {names} would only reduce what "
+        "remains, {left:.2g} % of the span: too little to be named."
     ),
 }
 # What a cause is known by; whether the records lack what shows it
@@ -125,9 +125,9 @@ ADVICE: Mapping[str, str] = {
         "{here:.2g} %. Then diagnose that recording.{command}"
     ),
     "tied, no better": (
-        "No recording that is known would tell {names} apart better than this one, on which they differ by "
-        "{here:.2g} % of the span (rms, after the best fit of the model). A longer one of the same kind "
-        "would, as noise averages out."
+        "We know of no recording that would tell {names} apart better than this one, on which they differ "
+        "by {here:.2g} % of the span (rms, after the best fit of the model), but for a longer one of the "
+        "same kind, as noise averages out."
     ),
     "lacks": f"To see what this recording cannot show, {AGAIN}",
     "unknown": (
@@ -163,8 +163,8 @@ ADVICE: Mapping[str, str] = {
     ),
     "correct": (
         "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
-        "correct). A model that was identified from it is identified again from what that gives; one from "
-        "a sound recording is kept."
+        "correct). If the model was identified from it, identify it again from the corrected one; a model "
+        "from a sound recording stays as it is."
     ),
     "correct, extend": (
         "The measurement is at fault, and the device does something that the model lacks. First take {names} "
@@ -172,8 +172,9 @@ ADVICE: Mapping[str, str] = {
         "diagnose the corrected recording with that model, and extend it."
     ),
     "conditions": (
-        "The recordings are of different conditions, such as load, zero or gain: the evidence tells which of "
-        "them the model as given predicts. Put the others right, or identify a model of each condition."
+        "The recordings were made in different conditions, such as load, zero or gain: the evidence says "
+        "which of them the model as given predicts. Put the others right, or identify a model for each "
+        "condition."
     ),
     "repair": "No model can hold this: put right what was found, and record again.",
     "other model": (
@@ -192,18 +193,18 @@ DOUBTS: Mapping[str, str] = {
     "may be a fault": (
         "a fault of the measurement in this recording alone would look like it: it is not added to the model"
     ),
-    "wanders": "what is left wanders still, so it may be a piece of that: it is neither added nor taken out",
+    "wanders": "what is left still wanders, so it may be a part of that: it is neither added nor taken out",
     "predicts little": (
-        "on parts of the recordings that were left out it takes away less than half of what could be, as "
-        "anything may where the model cannot follow a device of this kind"
+        "on parts of the recordings that were left out it explains less than half of what could be "
+        "explained, as any cause may where the model cannot follow a device of this kind"
     ),
     "spans zero": "its strength may be nothing, as the interval spans zero",
-    "no equal loops": "no minor loop was traced three times in equal time, which alone would show it",
+    "no equal loops": "only a minor loop traced three times in equal time would show it; there is none",
     "at bound": "a parameter, or the interval of one, is at the end of the range that was searched",
     "strength at bound": "its strength is at the end of the range that was searched, so it is something else",
     "own error": (
-        "with one rate and no rest it looks like what the model lacks of the device, and what is left is "
-        "nearly as large, or more than noise"
+        "on a recording of one rate without rests it cannot be told from an error of the model itself, and "
+        "what is left is nearly as large, or is more than noise"
     ),
 }
 OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o diagnostic.h5."
@@ -307,7 +308,7 @@ class Bench:
 
 def figure(value: float, digits: int = LIMITS.told_digits) -> str:
     """Return a number with some significant digits, and without an exponent where it needs none."""
-    return f"{float(f'{value:.{digits}g}') + 0.0:.{max(digits, 6)}g}"  # no negative zero
+    return f"{float(f'{value:.{digits}g}') + 0.0:.{max(digits, LIMITS.plain_digits)}g}"  # no negative zero
 
 
 def sentence(one: Evidence, words: Mapping[str, str]) -> str:

@@ -28,7 +28,7 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
             case _:
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=f"write the lowest and the highest: {name.rpartition('.')[2]} = [0.5, 1.5]",
+                    hint=f"write {name.rpartition('.')[2]} = [0.5, 1.5], the lowest and the highest",
                 )
     if not bounds:
         raise UsageError(f"{path} holds no bound, so nothing would be checked", hint=_HOW)

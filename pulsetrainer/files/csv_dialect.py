@@ -169,6 +169,9 @@ def _encoding(path: Path) -> str:
         start = stream.read(4096)
     if start.startswith(_UTF16_MARKS):
         return "utf-16"
+    low, high = start[: 2 * _TABLE : 2], start[1 : 2 * _TABLE : 2]
+    if high and not any(high) and all(low):  # without its mark
+        return "utf-16-le"
     if b"\0" in start:
         ours = start.startswith(b"\x89HDF")
         raise DataError(
@@ -225,6 +228,11 @@ def _says_a_unit(cell: str) -> bool:
     return is_unit(symbol_of(cell.strip("()[] "))) and not _is_number(cell)
 
 
+def _begins_with_text(row: list[str], last: list[str]) -> bool:
+    """Whether a line would be a row but for text in its first cell."""
+    return len(row) == len(last) > 1 and _is_text(row[0]) and all(map(_is_number, row[1:]))
+
+
 def _first_row(rows: list[list[str]]) -> int:
     """Return where the rows at the end of the sample begin that are of one kind."""
     start = len(rows)
@@ -242,6 +250,8 @@ def _above(rows: list[list[str]], parted: list[bool]) -> int:
     """
     kinds = [[_is_text(cell) for cell in row] for row in rows]
     start = _first_row(rows)
+    if start > 1 and _begins_with_text(rows[start - 1], rows[-1]) and all(kinds[start - 2]):
+        start -= 1  # a bad row below its heading, and no remark above it
     words = (any(kind) or not any(row) for kind, row in zip(kinds[:start], rows, strict=False))
     if len(rows) - start < _TABLE or not all(words):
         return 0
@@ -368,7 +378,7 @@ def _last_lines(path: Path, encoding: str) -> list[str]:
     with path.open("rb") as stream:
         start = max(path.stat().st_size - _LAST_BYTES, 0)
         stream.seek(start)
-        text = stream.read().decode("utf-16-le" if encoding == "utf-16" else "utf-8", "replace")
+        text = stream.read().decode("utf-16-le" if encoding.startswith("utf-16") else "utf-8", "replace")
     return [line for line in text.splitlines()[1 if start else 0 :] if line.strip()]
 
 

@@ -335,7 +335,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
         raise DataError(
             f"the time {column_words(name)} of {table.path} is in {unit!r}, expected s, ms, us, ns, min, h "
             "or d",
-            hint="convert it to seconds, choose another `time` column, or give a `rate_Hz`",
+            hint="convert it to seconds" + ", choose another `time` column, or give a `rate_Hz`" * of_record,
         )
     stamps = table.check_finite(name, remedy=_LEAVE_OUT) if of_record else table.check_finite(name)
     time_s = stamps if SECONDS[unit] == 1.0 else stamps * SECONDS[unit]
@@ -344,15 +344,16 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
         row = int(back[0]) + 1
         this, before = (f"{stamps[k]:.15g} {unit or 's'}" for k in (row, row - 1))
         if this != before:
-            hint = "sort the rows, choose another `time` column, give a `rate_Hz`, or cut the file into parts"
+            hint = "sort the rows"
+            other = ", choose another `time` column, give a `rate_Hz`, or cut the file into parts"
         elif all(column[row] == column[row - 1] for column in table.columns.values()):
-            hint = "drop the repeated rows, or give a `rate_Hz` instead of the time"
+            hint, other = "drop the repeated rows", ", or give a `rate_Hz` instead of the time"
         else:
-            hint = "its stamps are rounded too coarsely, or repeated: write them with more digits, or give a "
-            hint += "`rate_Hz` instead of the time"
+            hint = "its stamps are rounded too coarsely, or repeated: write them with more digits"
+            other = ", or give a `rate_Hz` instead of the time"
         raise DataError(
             f"the time in {table.path}, {column_words(name)}, does not increase at {table.place(row)}: "
             f"{this} after {before} ({back.size} such rows)",
-            hint=hint,
+            hint=hint + other * of_record,
         )
     return time_s

@@ -114,7 +114,8 @@ class Bench:
             if self._process.returncode == 2:
                 raise _explain(executable, options, complaint)
             raise DeviceError(
-                f"the bench did not start: {complaint}", hint="is /dev/ptmx there and permitted?"
+                f"the bench did not start: {complaint}",
+                hint="see whether /dev/ptmx exists and may be opened: ls -l /dev/ptmx",
             )
 
     @property

@@ -93,7 +93,7 @@ def capture(
     run = kept.run(played.name, complete=ending.complete, coil=ending.coil)
     raise_if_stopped(ending.fault, ending.remedy, "the capture", run)
     if run is None:
-        raise DeviceError("the device told no samples", hint="check the line to it")
+        raise DeviceError("the device sent no samples", hint="check the line to it")
     return run
 
 

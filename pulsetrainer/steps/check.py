@@ -172,7 +172,7 @@ def updated(model: Model, checked: Checked) -> Model:
     if checked.verdict == "changed":
         raise DataError(
             f"the shape of the hysteresis changed ({checked.shape_percent.value:.1f} % of the span is left): "
-            "no offset and no gain mends that",
+            "no offset or gain puts that right",
             hint="identify again: pulsetrainer capture identification, then identify",
         )
     check_updatable(model)
@@ -199,7 +199,7 @@ def check_updatable(model: Model) -> None:
     """Raise DataError for a model that an offset and a gain do not mend, as ``hindrance`` says."""
     if what := hindrance(model):
         raise DataError(
-            f"a model with {what} is not mended by an offset and a gain", hint="identify it again"
+            f"an offset and a gain cannot put right a model with {what}", hint="identify it again"
         )
 
 

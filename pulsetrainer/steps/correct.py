@@ -60,7 +60,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
         raise DataError(
             f"{diagnosis_name} is not a diagnosis of {run_name}: none of the records in it has these samples",
             hint="give the run that was diagnosed, which pulsetrainer show DIAGNOSIS.h5 tells, or diagnose "
-            f"this one: pulsetrainer diagnose {run_name} --model model.h5 -o new-diagnosis.h5",
+            "this one: pulsetrainer diagnose RUN.h5 --model model.h5 -o new-diagnosis.h5",
         )
     if delay_s and run.dt_s is None:
         raise DataError(

@@ -71,7 +71,7 @@ def extend(
         raise DataError(
             f"{model_name} is not the model that {diagnosis_name} is of",
             hint="give the model that was diagnosed, which pulsetrainer show DIAGNOSIS.h5 tells, or diagnose "
-            f"this one: pulsetrainer diagnose RUN.h5 --model {model_name} -o new-diagnosis.h5",
+            "this one: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o new-diagnosis.h5",
         )
     # the levels of a dual model lie on the output, and a refit moves them
     ends = model.edges[[0, -1]]

@@ -206,6 +206,6 @@ def _shorted(why: str) -> DeviceError:
 
 def _no_coil(duty: float) -> DeviceError:
     return DeviceError(
-        f"no coil: {100 * duty:.0f} % of the supply drive no current",
+        f"no coil: {100 * duty:.0f} % of the supply drives no current",
         hint="check the coil's plug and its wire, and that the supply is on",
     )

@@ -350,6 +350,12 @@ def test_what_was_measured_is_never_the_output(ready, words):
         (["--settings", "mine.json", "ports"], 2, "TOML"),
         (["--settings", "mine.toml", "ports"], 2, "current_A = 1.0 below [limits]"),
         (["diagnose", "played.h5", "--model", "model.h5", *OUT], 3, "evaluate played.h5"),
+        (["play", "normal", *OUT], 3, "normal is a pulse: pulsetrainer invert normal"),
+        (["play", "absent.h5", *OUT], 3, "waveform files here: drive.h5"),
+        (["show", "normal"], 3, "pulsetrainer files here: "),
+        (["identify", "run.h5", "--levels", "many", *OUT], 2, "leave it out, or see pulsetrainer identify"),
+        (["capture", "identification", "--levels", "many", *OUT], 2, "leave it out for the usual 48"),
+        (["invert", "normal", "--model", "model.h5"], 2, "pulsetrainer invert normal --model model.h5 -o"),
     ],
 )
 def test_the_next_step_is_one_that_helps(ready, words, code, hint):
@@ -358,6 +364,7 @@ def test_the_next_step_is_one_that_helps(ready, words, code, hint):
     (ready / "mine.toml").write_text('[limits]\ncurrent_A = "x"\n')
     told = pulsetrainer(ready, *words, "--json")
     assert (told.code, hint in told.json["error"]["hint"]) == (code, True), told
+    assert "Example:" not in told.json["error"]["hint"]
 
 
 def test_a_drive_longer_than_the_device_plays_is_refused_at_once(ready):

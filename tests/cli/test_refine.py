@@ -162,4 +162,4 @@ def test_a_drive_for_another_device_is_told(run, tmp_path):
             given = ("--passes", 1) if verb == "refine" else ("--repeats", 1)
             done = run(verb, "drive.h5", "-o", f"{verb}-{seed}.h5", *given, "--port", f"bench:?seed={seed}")
             assert done.code == 0, done.err
-            assert ("the model is of BENCH-0, and this is BENCH-4" in done.err) is told
+            assert ("the model is of BENCH-0, but this is BENCH-4" in done.err) is told

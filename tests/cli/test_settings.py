@@ -100,6 +100,14 @@ def test_dry_run_touches_nothing(run, tmp_path):
     assert run(*PLAN).code == 2
 
 
+@pytest.mark.parametrize(("signal", "noted"), [("identification", False), ("diagnostic", True)])
+def test_an_option_that_does_not_count_is_told(run, signal, noted):
+    """The diagnostic signal has its own speeds: --speed was taken in silence."""
+    done = run("capture", signal, "--speed", "3", "--dry-run", "-o", "out.h5")
+    assert done.code == 0
+    assert ("--speed does not count here" in done.err) == noted
+
+
 def test_dry_run_of_a_play_is_what_the_play_does(run, tmp_path):
     """Duration and peak current of the plan are those of the playback."""
     short = ("--levels", "8", "--current-max", "1", "--speed", "3")

@@ -67,6 +67,7 @@ def test_a_dry_run_refuses_gains_that_are_there(run, tmp_path):
     assert run(*words, "--overwrite").code == 0
     elsewhere = run(*words, "--port", "/dev/absent")
     assert (elsewhere.code, "BENCH-0" in elsewhere.err) == (0, True)
+    assert "BENCH-0" not in run(*words, "--port", "/dev/absent", "--overwrite").err
 
 
 def test_a_coil_is_measured_below_a_lowered_limit_that_its_duty_would_pass(run):

@@ -86,7 +86,7 @@ PACKAGES = {  # the tests that answer for a package
         "tests/api",
         "tests/cli",
     ),
-    "cli": ("tests/cli",),
+    "cli": ("tests/cli", "tests/api"),
 }
 MEMORY = 6_000_000_000  # a fault must not take the machine with it
 
@@ -244,10 +244,11 @@ def _order(fault: Fault, lines: dict[str, list[str]], times: Times, budget_s: fl
 
     What no single test runs (a constant) concerns all tests, first those that run anything in the file.
     What is run while a test is set up may serve the others of its file. What would take longer than the
-    budget is left out.
+    budget is left out. A program that was forked off a warm one names the test that this was warmed in as
+    well: "one (setup)|other (call)", and the last one counts.
     """
     wanted = lines if fault.at_import else {str(k) for k in fault.lines}
-    contexts = {one for line in wanted for one in lines.get(line, [])}
+    contexts = {one.rpartition("|")[2] for line in wanted for one in lines.get(line, [])}
     direct = {one.rsplit(" (", 1)[0] for one in contexts} & times.keys()
     shared = {one.split("::")[0] for one in contexts if one.endswith("(setup)")}
     besides = [

@@ -73,3 +73,14 @@ def test_every_fault_is_a_program():
     limit, *_, last = faults_in("example.py", SOURCE.encode())
     assert (limit.at_import, last.at_import) == (True, False)
     assert limit.text == "LIMIT = 0.5  # 2"
+
+
+def test_a_program_forked_off_a_warm_one_counts_for_the_test_that_started_it():
+    """Its lines name the test that the warm program was made for as well."""
+    import mutate
+
+    (fault, *_) = faults_in("a.py", b"def f(x):\n    return x + 1\n")
+    lines = {"2": ["t.py::warmed (setup)|t.py::asked (call)", "t.py::slow (call)"]}
+    times = {"t.py::asked": 1.0, "t.py::slow": 9.0, "t.py::warmed": 1.0}
+    assert mutate._order(fault, lines, times, 5.0) == ["t.py::asked"]
+    assert mutate._order(fault, lines, times, 50.0) == ["t.py::asked", "t.py::slow"]

@@ -77,7 +77,7 @@ def test_every_dialect_reads_to_the_same_numbers(data, tmp_path_factory):
     lines += data.draw(filler)
     text = data.draw(st.sampled_from(["\n", "\r\n"])).join(lines) + data.draw(st.sampled_from(["", "\n"]))
     path = tmp_path_factory.mktemp("dialect") / "t.csv"
-    path.write_bytes(text.encode(data.draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))))
+    path.write_bytes(text.encode(data.draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "utf-16-le"]))))
     read = read_table(path)
     np.testing.assert_array_equal(_numbers(read), rows)
     pieces = parse(path, detect(path), piece=data.draw(st.integers(1, 60)))
@@ -341,6 +341,12 @@ def test_a_column_whose_name_differs_in_case_from_the_time(table):
     """``t`` and ``T`` are time and temperature."""
     read = table("t/s,T/\N{DEGREE SIGN}C,strain/%\n" + 2 * _POINT)
     assert (read.index("T"), read.index("t"), read.index("Strain")) == (1, 0, 2)
+
+
+def test_text_in_the_first_cell_of_the_first_row_hides_no_heading(table):
+    """It is a bad row, named with its line, and can be left out; the names above it are names."""
+    text = "t,u,y\nbegin,0.0,0.0\n" + 2 * _POINT
+    _refused(table, text, "'begin' in column t, line 2")
 
 
 def test_a_line_of_text_above_numbers_is_a_comment(table):
