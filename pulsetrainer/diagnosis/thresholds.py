@@ -179,6 +179,7 @@ class Thresholds:
     rival_relevant: float = 0.3  # ... of the relevant fall of squares,
     own_error: float = 1.5  # times what is left: other kinds of plant reach 1.25, true causes fall to 1.54
     once_in_twenty: float = 1.645  # standard deviations of their difference under noise as it is
+    finer: float = 2.0  # times that doubt: a parameter that is not there would move the others
     cut_turns: float = 0.3  # of the second difference of the output: drawn plants needed up to 0.26
     rival_noise: float = 12.0  # ... and mean squares: the noise of comparing two fits
     alike: float = 0.9  # cosine of screened columns: above, a quick screen names both

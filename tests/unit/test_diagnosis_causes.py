@@ -193,7 +193,7 @@ def test_start_values_are_inside_the_bounds_and_scale_with_the_device():
             blocks = cause.starts(frames, residual)
             assert blocks, cause.id
             for values in (values for block in blocks for values in block):
-                pairs = zip(cause.parameters, values, strict=True)
+                pairs = zip(cause.quantities(frames[0]), values, strict=True)
                 assert all(q.low <= value <= q.high for q, value in pairs), cause.id
     assert CAUSE["condition-change"].starts(frames[:1], residual) == []
     ((sine, cosine),) = CAUSE["periodic"].starts(frames, residual)

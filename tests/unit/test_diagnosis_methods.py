@@ -189,8 +189,8 @@ def test_one_step_finds_a_parameter_that_enters_linearly():
     record = Record(u, 3.0 * u + 0.05 * np.arange(u.size) / 100, dt_s=0.01)
     problem = problem_for([record], 0.0, 1.5)
     near = weights_for(problem, (), None)
-    fitted = refit(problem, (Term(CAUSE["offset-drift"], (0.01, 0.0, 0.0)),), near, rounds=1)
-    assert fitted.terms[0].values == pytest.approx((0.05, 0.0, 0.0), rel=0.02, abs=1e-5)
+    fitted = refit(problem, (Term(CAUSE["offset-drift"], (0.01, 0.0)),), near, rounds=1)
+    assert fitted.terms[0].values == pytest.approx((0.05, 0.0), rel=0.02, abs=1e-5)
     assert fitted.squares < 1e-2 * near.squares
     time = problem.bins.time_s
     np.testing.assert_allclose(np.diff(fitted.slopes[:, 0]), np.diff(time), rtol=1e-6)
@@ -202,7 +202,7 @@ def test_a_drift_that_relaxes_is_told_to_its_begin():
     t = np.arange(u.size) * 0.01
     drift = 0.5 * (1.0 - np.exp(-t / (0.4 * t[-1])))
     problem = problem_for([Record(u, 3.0 * u + drift, dt_s=0.01)], 0.0, 1.5)
-    (term,) = refit(problem, (Term(CAUSE["offset-drift"], (0.01, 0.0, 0.0)),), None).terms
+    (term,) = refit(problem, (Term(CAUSE["offset-drift"].finer, (0.01, 0.0, 0.0)),), None).terms
     left = drift - term.cause.on_output(0.0 * u, term.values, replace(FRAME, dt_s=0.01, input=u))
     assert np.abs(left - left.mean()).max() < 0.02 * drift.max()
 
@@ -234,7 +234,7 @@ def test_a_refit_far_from_its_goal_is_given_up():
     lagged = CAUSE["output-lag"].on_output(3.0 * u, (0.08,), FRAME)
     problem = problem_for([Record(u, lagged, dt_s=0.01)], 0.0, 1.5)
     near = weights_for(problem, (), None)
-    begun = (Term(CAUSE["offset-drift"], (0.01, 0.0, 0.0)),)  # not what it is
+    begun = (Term(CAUSE["offset-drift"], (0.01, 0.0)),)  # not what it is
     free, one = refit(problem, begun, near), refit(problem, begun, near, rounds=1)
     assert refit(problem, begun, near, goal=free.squares * 1.01).squares == pytest.approx(free.squares)
     assert refit(problem, begun, near, goal=1e-9 * near.squares).squares <= one.squares
@@ -613,7 +613,7 @@ def test_a_line_needs_strokes_periods_and_samples(strokes, periods, samples, kno
         ("thermal-drift", [(0.02 / 16.0, 4.3)]),
         ("accommodation", [(0.05, 28.0), (0.05, 80.0), (0.05, 240.0)]),
         ("load-dependence", [(0.01 * 4.0 / 8.0,)]),
-        ("offset-drift", [(0.008, 0.0, 0.0), (0.0, 0.0032, 0.0), (0.0, 0.0, 20.8 * 0.08 / 10.0**2)]),
+        ("offset-drift", [(0.01 * 8.0 / 10.0, 0.0), (0.0, 4.0 * 0.01 * 8.0 / 10.0**2)]),
         ("clock-skew", [(1e-5,), (1e-4,)]),
     ],
 )

@@ -75,7 +75,8 @@ class Fit:
 
 
 def _term(name: str) -> Term:
-    return Term(CAUSE[name], tuple(q.small for q in CAUSE[name].parameters))
+    count = 2 if name == "offset-drift" else None  # without its twist
+    return Term(CAUSE[name], tuple(q.small for q in CAUSE[name].parameters[:count]))
 
 
 def _fit(squares: float, *names: str) -> Fit:
@@ -486,6 +487,23 @@ def test_a_cause_is_exchanged_for_a_better_one_of_its_family(monkeypatch):
     assert dict(after.p_values) == {"creep": 0.006, "delay": 0.007}
     assert not [names for names, _, _ in asked if "step" in names]
     assert asked[-1] == (("creep", "delay"), None, False)
+
+
+@pytest.mark.parametrize(("left", "noise", "told"), [(379.0, 1.0, 3), (381.0, 1.0, 2), (379.0, None, 2)])
+def test_a_finer_formula_is_taken_where_noise_cannot_make_the_difference(monkeypatch, left, noise, told):
+    """Twice the doubt, of which there are ten here, below the 400 that the plain formula leaves."""
+    drift = CAUSE["offset-drift"]
+    fits = {drift: 400.0, drift.finer: left}
+    for module in (exchange, acceptance):
+        monkeypatch.setattr(
+            module, "refit", lambda _, terms, *__, **___: Fit(fits[terms[-1].cause], tuple(terms))
+        )
+    monkeypatch.setattr(exchange, "doubt", lambda finer, plain, noise: 10.0)
+    monkeypatch.setattr(exchange, "ranked", lambda fitted, whole: ())
+    _refitting(monkeypatch, fitting, squares={frozenset(): 500.0})
+    plain = Fit(400.0, (Term(drift, (0.1, 0.2)),))
+    after = exchange.stage(_state(plain, scores=Screen(noise=noise)))
+    assert [len(term.values) for term in after.current.terms] == [told]
 
 
 def test_a_cause_is_exchanged_for_a_better_kind_of_its_own(monkeypatch):

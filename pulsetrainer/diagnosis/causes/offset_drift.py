@@ -1,12 +1,14 @@
 """the zero drifts slowly with time: y + b t, with a bend and a twist.
 
 Drifts slow down as a device warms up, or grow, and most of that happens near one end. What bend and twist add
-is zero at both ends of a record (0 to T), so that the rate is that from end to end.
+is zero at both ends of a record (0 to T), so that the rate is that from end to end. A twist is put in only
+where noise cannot make the difference (`stages.exchange`): one that is not there would move the zero.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -16,7 +18,8 @@ from pulsetrainer.diagnosis.thresholds import TINY
 
 _TRIED = 0.01  # of the span over the record
 _MIDDLE = 4.0  # the bend is largest in the middle: a quarter of c T^2
-_TWISTED = 20.8  # the twist at a fifth from the ends: 1/20.8 of d T^2
+_PLAIN = 2  # parameters, without a twist ...
+_TWISTED = 3  # ... and with it
 
 
 class OffsetDrift(Cause):
@@ -41,11 +44,21 @@ class OffsetDrift(Cause):
     lasting = False
     corrects = True
 
+    def __init__(self, count: int = _PLAIN) -> None:
+        self._count = count
+
+    @cached_property
+    def finer(self) -> Cause | None:
+        """The same with a twist."""
+        return OffsetDrift(_TWISTED) if self._count == _PLAIN else None
+
+    def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
+        return self.parameters[: self._count]
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         length = frames[0].time_s[-1] + frames[0].dt_s
         size = _TRIED * frames[0].span
-        sizes = (size / length, _MIDDLE * size / length**2, _TWISTED * size / length**2)
-        return [[tuple(one if j == k else 0.0 for j, one in enumerate(sizes)) for k in range(len(sizes))]]
+        return [[(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         return y + _drift(values, frame.time_s)

@@ -1,8 +1,10 @@
-"""Exchange: each cause against the others of its family, and its own other kinds.
+"""Exchange: each cause against the others of its family, its own other kinds, and its finer formula.
 
 When a cause was chosen, others were still missing. So each is taken out, every other one of its family and
 every other kind of its own is fitted in its place, and the best is kept. The new one inherits the p-value of
-the old: that something of this family is there was tested, which one of it was not (decision 044).
+the old: that something of this family is there was tested, which one of it was not (decision 044). A formula
+with one more parameter takes the place of its own only where neither noise nor what happens between two
+samples can make the difference, twice over.
 """
 
 from __future__ import annotations
@@ -11,18 +13,35 @@ from dataclasses import replace
 
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause
+from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.screening import ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
 from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
     """Return the state with each cause exchanged for a better one of its family, where there is one."""
     for cause in [term.cause for term in state.current.terms]:
         state = _exchanged(state, cause)
+    for term in state.current.terms:
+        state = _refined(state, term)
     return state
+
+
+def _refined(state: State, term: Term) -> State:
+    """Return the state with the finer formula of a cause, where the records show it."""
+    current, noise = state.current, state.scores.noise
+    if term.cause.finer is None or noise is None:
+        return state
+    others = [one for one in current.terms if one.cause is not term.cause]
+    finer = Term(term.cause.finer, (*term.values, 0.0))
+    trial = refit(state.problem, (*others, finer), current)
+    if current.squares - trial.squares <= LIMITS.finer * doubt(trial, current, noise):
+        return state
+    return replace(state, current=settled(state.problem, trial))
 
 
 def _exchanged(state: State, cause: Cause) -> State:
