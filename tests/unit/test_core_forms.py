@@ -99,15 +99,19 @@ def test_the_form_is_named_right(draws, form, count):
     assert found.count(form) / len(found) >= 0.95
 
 
-def test_a_loop_of_sharp_corners_that_leads_is_still_dual():
-    """A spring beside one sliding element: on a coarse plane weights of either sign leave half as much."""
-    rng = np.random.default_rng(0)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_loop_of_sharp_corners_that_leads_is_still_dual(seed):
+    """A spring beside one sliding element: on a coarse plane weights of either sign leave half as much.
+
+    On the levels of the command; on twenty of them they still do, and are taken.
+    """
+    rng = np.random.default_rng(seed)
     u = np.interp(np.linspace(0, 62, 1200), np.arange(63), [0.0, 1.0, 0.0, *rng.uniform(0, 1, 60)])
     force = 0.82 * u - 0.68 * devices.play(u, np.array([0.23]))[:, 0]
     force += rng.normal(0.0, 0.002 * np.ptp(force), u.size)
     tried = try_all([(u, force)], 0.0, 1.0)
     assert (tried.form, tried.to_fit) == ("signed", ("dual", "signed"))
-    assert fit([(u, force)], 0.0, 1.0, 20, form="auto").form == "dual"
+    assert fit([(u, force)], 0.0, 1.0, 48, form="auto").form == "dual"
 
 
 def test_records_of_unlike_ranges_are_judged_on_one_plane():
