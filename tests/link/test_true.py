@@ -148,7 +148,7 @@ def test_a_temperature_that_no_room_has_is_told(model):
     drive = pt.invert("normal", replace(model, extensions=(THERMAL,)), periods=2)
     with (
         pt.open_device("bench:?seed=1&coil=40") as device,
-        raises(DeviceError, "names it", named="the coil or the supply is another"),
+        raises(DeviceError, "names it", named="this is another coil or supply"),
     ):
         pt.play(drive, device, repeats=1)
 
