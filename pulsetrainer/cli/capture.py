@@ -82,13 +82,7 @@ def capture(
     )
     if table is not None:
         job.uses(table)
-    for option, name, counts in (
-        ("--speed", "speed_A_per_s", signal == "identification"),
-        ("--current-max", "current_max_A", table is None),
-    ):
-        source = context.get_parameter_source(name)
-        if not counts and source is not None and source.name == "COMMANDLINE":
-            job.notes([f"{option} does not count here: the signal {played.name} has its own"])
+    job.notes(_of_options(context, signal, played.name, own=table is None))
     course, earlier, at = Course(played, repeats), None, 0
     if resume:
         earlier = earlier_of(out, {name: context.params[name] for name in _SAME}, overwrite=overwrite)
@@ -123,3 +117,17 @@ def capture(
     if got.dropped_samples:
         job.notes([f"{got.dropped_samples} samples were lost on the wire; the rest is right"])
     job.show(*captured(out, played.name, got, info))
+
+
+def _of_options(context: typer.Context, signal: str, played: str, *, own: bool) -> list[str]:
+    """Return what is told of options that do not suit the signal; ``own``: it is no table."""
+    asked, by_us = context.params, signal == "identification"
+    useless = [("--speed", "speed_A_per_s")] * (not by_us) + [("--current-max", "current_max_A")] * (not own)
+    sources = [(option, context.get_parameter_source(name)) for option, name in useless]
+    given = [option for option, source in sources if source is not None and source.name == "COMMANDLINE"]
+    told = [f"{option} does not count here: the signal {played} has its own" for option in given]
+    step_A, level_A = asked["speed_A_per_s"] / asked["rate_Hz"], asked["current_max_A"] / asked["levels"]
+    if by_us and step_A > level_A:
+        far = f"the current moves {step_A:.3g} A a sample, past a level of {level_A:.3g} A"
+        told.append(f"{far}: lower --speed")
+    return told

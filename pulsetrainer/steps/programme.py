@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,6 +11,8 @@ from pulsetrainer.errors import UsageError
 from pulsetrainer.steps.conductor import Decision, Play
 
 USUAL_MINUTES = 5.0
+MOST_MINUTES = 1440  # a day: a longer one is a slip of the keys, and would be planned for minutes
+MOST_BEATS = 240 * MOST_MINUTES  # at the fastest rate
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +49,16 @@ def _check_length(minutes: float | None, beats: int | None) -> None:
             f"a session ends after minutes or after beats, got both: `minutes` {minutes:g}, `beats` {beats}",
             hint="give one of the two",
         )
-    if beats is not None and beats < 1:
-        raise UsageError(f"`beats` must be 1 or more, got {beats}", hint="20 last a quarter of a minute")
-    if minutes is not None and not 0 < minutes < math.inf:
-        raise UsageError(f"`minutes` must be a finite number above 0, got {minutes:g}", hint="5 are usual")
+    if beats is not None and not 1 <= beats <= MOST_BEATS:
+        raise UsageError(
+            f"`beats` must be 1 or more and at most {MOST_BEATS}, got {beats}",
+            hint="20 last a quarter of a minute",
+        )
+    if minutes is not None and not 0 < minutes <= MOST_MINUTES:
+        raise UsageError(
+            f"`minutes` must be above 0 and at most {MOST_MINUTES} (a day), got {minutes:g}",
+            hint="5 are usual",
+        )
 
 
 def number_of(name: str, pulses: Sequence[str]) -> int:

@@ -108,6 +108,14 @@ def test_an_option_that_does_not_count_is_told(run, signal, noted):
     assert ("--speed does not count here" in done.err) == noted
 
 
+@pytest.mark.parametrize(("speed", "noted"), [("31", False), ("32", True)])
+def test_a_signal_that_skips_levels_is_told(run, speed, noted):
+    """1.5 A over 48 levels at 1000 samples a second: a level is 0.03125 A."""
+    done = run("capture", "identification", "--speed", speed, "--dry-run", "-o", "out.h5")
+    assert done.code == 0
+    assert ("past a level of 0.0312 A: lower --speed" in done.err) == noted
+
+
 def test_dry_run_of_a_play_is_what_the_play_does(run, tmp_path):
     """Duration and peak current of the plan are those of the playback."""
     short = ("--levels", "8", "--current-max", "1", "--speed", "3")
