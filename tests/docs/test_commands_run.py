@@ -30,7 +30,7 @@ def given(made_once) -> Path:
 def _give(folder: Path) -> None:
     for line in (
         "pulsetrainer capture identification -o run.h5",
-        "pulsetrainer capture identification --speed 2 --levels 12 -o other.h5",
+        "pulsetrainer capture diagnostic -o other.h5",  # several rates and stops, as the page asks for
         "pulsetrainer identify run.h5 --levels 24 -o model.h5",
         "pulsetrainer invert normal --model model.h5 -o drive.h5",
         "pulsetrainer play drive.h5 -o played.h5",
