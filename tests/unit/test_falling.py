@@ -54,6 +54,7 @@ def _mirrored(
     return [(rising, model, up), (falling, turned, down)]
 
 
+@pytest.mark.slow
 def test_a_falling_copy_drifts_the_other_way_and_is_corrected_alike():
     """Verdict and correction are those of the rising record, times minus one."""
     one, other = _mirrored(_run(0.0, DRIFT), "offset-drift", "rate", DRIFT)
@@ -99,6 +100,7 @@ def test_a_falling_output_is_clipped_where_it_was_measured():
         assert f"exactly {sign * 11} N" in one.text
 
 
+@pytest.mark.slow
 def test_a_dependence_on_a_falling_output_is_drawn_over_what_was_measured():
     """Places and words are those of the record, and the places rise."""
     rising = _run(0.0, 0.0)
