@@ -121,11 +121,14 @@ def capture(
 
 def _of_options(context: typer.Context, signal: str, played: str, *, own: bool) -> list[str]:
     """Return what is told of options that do not suit the signal; ``own``: it is no table."""
-    asked, by_us = context.params, signal == "identification"
-    useless = [("--speed", "speed_A_per_s")] * (not by_us) + [("--current-max", "current_max_A")] * (not own)
-    sources = [(option, context.get_parameter_source(name)) for option, name in useless]
-    given = [option for option, source in sources if source is not None and source.name == "COMMANDLINE"]
-    told = [f"{option} does not count here: the signal {played} has its own" for option in given]
+    asked, by_us, told = context.params, signal == "identification", []
+    for option, name, counts in (
+        ("--speed", "speed_A_per_s", by_us),
+        ("--current-max", "current_max_A", own),
+    ):
+        source = context.get_parameter_source(name)
+        if not counts and source is not None and source.name == "COMMANDLINE":
+            told.append(f"{option} does not count here: the signal {played} has its own")
     step_A, level_A = asked["speed_A_per_s"] / asked["rate_Hz"], asked["current_max_A"] / asked["levels"]
     if by_us and step_A > level_A:
         far = f"the current moves {step_A:.3g} A a sample, past a level of {level_A:.3g} A"

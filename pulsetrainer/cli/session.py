@@ -90,7 +90,7 @@ def session(
     from pulsetrainer.steps.asked import check_asked_for
 
     names = [name for name in (part.strip() for part in pulses.split(",")) if name]
-    check_asked_for(answers, quiz, len(names))
+    check_asked_for(answers, quiz, names)
     tables = [pulse_file(name) for name in names]
     job = Job(context, inputs=(model,), tables=(changes, answers), outputs=(out, html))
     for path, name in zip(tables, names, strict=True):

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any
 
+from pulsetrainer.artefacts.units import SECONDS
+
 _TIME = r"(\d{1,2}):([0-5]\d)(?::([0-5]\d(?:[.,]\d+)?))?(?: ?([AaPp])[Mm])?"
 _CLOCK = re.compile(_TIME)
 _MINUTES = re.compile(r"(\b)(\d+):([0-5]\d[.,]\d+)(\b)")
@@ -29,7 +31,6 @@ _OF_RATE = {"": 1.0} | {
     for prefix, factor in (("", 1.0), ("k", 1e3), ("M", 1e6))
     for unit in ("Hz", "S/s", "Sa/s")
 }
-_OF_STEP = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "\u00b5s": 1e-6, "ns": 1e-9}
 _SLASHES = re.compile(rf"(\d{{1,2}})/(\d{{1,2}})/(\d{{4}}),? {_TIME}")
 
 
@@ -89,7 +90,7 @@ def stated_rate(comments: Iterable[str]) -> tuple[float, str] | None:
     told = {}
     for found in filter(None, map(_RATE.search, comments)):
         size = float(found["number"].replace(",", "."))
-        factor = (_OF_RATE if found["rate"] else _OF_STEP).get(found["unit"] or found["above"] or "")
+        factor = (_OF_RATE if found["rate"] else SECONDS).get(found["unit"] or found["above"] or "")
         if factor is not None and size > 0:
             told[size * factor if found["rate"] else 1.0 / (size * factor)] = found[0].strip()
     return next(iter(told.items())) if len(told) == 1 else None

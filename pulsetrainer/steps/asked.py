@@ -27,10 +27,15 @@ def check_force_range(low: float | None, high: float | None) -> None:
         )
 
 
-def check_asked_for(answers: object, quiz: int, pulses: int) -> None:
-    """Raise UsageError for answers that no quiz asks for, and for a quiz of so many pulses that is none."""
+def check_asked_for(answers: object, quiz: int, pulses: Sequence[str]) -> None:
+    """Raise UsageError for pulses named twice or not at all, answers without a quiz, a quiz that is none."""
+    if not pulses or len(set(pulses)) < len(pulses):
+        raise UsageError(
+            "a session needs pulses, each named once, got " + (", ".join(pulses) or "none"),
+            hint="name some of the library: normal,bifid",
+        )
     if quiz:
-        check_quiz(pulses, quiz)
+        check_quiz(len(pulses), quiz)
     elif answers:
         raise UsageError(
             "`answers` were given, but no quiz asks for them",

@@ -16,7 +16,7 @@ from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, check_peak
 from pulsetrainer.diagnosis.prediction import extended_of
-from pulsetrainer.errors import DataError, DeviceError, UsageError
+from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.asked import check_asked_for
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Pause, Play, Reach
 from pulsetrainer.steps.heat import coil_of, rest_force, thermometer_of
@@ -313,12 +313,7 @@ def programme(
 
     Raises as ``session``.
     """
-    if not names or len(set(names)) < len(names):
-        raise UsageError(
-            "a session needs pulses, each named once, got " + (", ".join(names) or "none"),
-            hint="name some of the library: normal,bifid",
-        )
-    check_asked_for(None if callable(answers) else answers, quiz, len(names))
+    check_asked_for(None if callable(answers) else answers, quiz, names)
     programme = Programme(
         names, rate=rate, amplitude=amplitude, beats=beats, minutes=minutes, changes=changes
     )

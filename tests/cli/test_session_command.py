@@ -203,6 +203,7 @@ def test_a_quiz_by_file(run, tmp_path):
     [
         (("--pulses", "normla"), 2, "normal"),
         (("--pulses", "normal,normal"), 2, "once"),
+        (("--pulses", "normal,normal", "--quiz", "4", "--answers", "right.txt"), 2, "once"),
         (("--pulses", "normal;bifid"), 2, "commas between the names: normal,bifid"),
         (("--rate", "10"), 2, "20 to 240"),
         (("--rate", "241"), 2, "20 to 240"),

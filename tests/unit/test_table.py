@@ -451,7 +451,8 @@ def test_stamps_of_more_digits_than_a_number_holds_are_told(table):
         ("Sample rate: 500 Hz", 500.0),
         ("Sampling Rate (kHz) = 2,5", 2500.0),
         ("sample interval, 4e-3 s", 250.0),
-        ("Sampling period: 5 min", None),
+        ("Sampling period: 5 min", 1.0 / 300.0),
+        ("Sampling period: 5 weeks", None),
         ("resampled by 3", None),
     ],
 )
