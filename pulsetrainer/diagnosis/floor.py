@@ -85,12 +85,16 @@ class Floor:
         problem = fitted.problem
         quiet = quiet_square(fitted.residual, problem.bins, problem.measured, np.abs(residual.rates(problem)))
         whole = float(np.mean(fitted.residual**2))  # elsewhere it may be less than where it is heard
-        square = max(min(quiet.square, whole), self.sampled)
+        sampled = min(self.sampled, whole)  # a bend between few samples looks like noise, until it is fitted
+        square = max(min(quiet.square, whole), sampled)
+        single = self.single * float(np.sqrt(sampled / self.sampled)) if self.sampled > 0.0 else self.single
         return replace(
             self,
             white=float(np.sqrt(square + self.held)),
-            noise=max(self.single, float(np.sqrt(square))),
-            doubtful=min(quiet.doubtful, square - self.sampled),
+            noise=max(single, float(np.sqrt(square))),
+            doubtful=min(quiet.doubtful, square - sampled),
+            single=single,
+            sampled=sampled,
         )
 
 

@@ -176,6 +176,7 @@ class Thresholds:
     closest: int = 3  # rivals refitted
     rival_screened: float = 0.5  # of the found cause's gain: rivals that score less are not refitted
     rival_gain: float = 0.005  # of that gain: as good, if no farther behind than the largest of this,
+    free_of_weights: float = 0.6  # of a hum in step with the loops: true ones have 0.8, devices up to 0.56
     rival_relevant: float = 0.3  # ... of the relevant fall of squares,
     own_error: float = 1.5  # times what is left: other kinds of plant reach 1.25, true causes fall to 1.54
     once_in_twenty: float = 1.645  # standard deviations of their difference under noise as it is

@@ -202,6 +202,10 @@ DOUBTS: Mapping[str, str] = {
     "no equal loops": "only a minor loop traced three times in equal time would show it; there is none",
     "at bound": "a parameter, or the interval of one, is at the end of the range that was searched",
     "strength at bound": "its strength is at the end of the range that was searched, so it is something else",
+    "in step": (
+        "it keeps step with the loops, and the model without it can follow most of it: it may be what the "
+        "device itself does. Loops at another rate would tell"
+    ),
     "own error": (
         "on a recording of one rate without rests it cannot be told from an error of the model itself, and "
         "what is left is nearly as large, or is more than noise"

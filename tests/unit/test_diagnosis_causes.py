@@ -351,6 +351,25 @@ def test_the_first_and_the_last_stroke_are_no_step():
         assert (times[0], times[-1]) == pytest.approx(sides, abs=0.03)
 
 
+@pytest.mark.parametrize(
+    ("loops", "frequency", "told"),
+    [
+        (np.sin, 2.0, True),  # twice that of the loops
+        (np.sin, 2.09, True),  # a tenth is what ten seconds tell apart
+        (np.sin, 2.11, False),
+        (np.sin, 0.5, False),
+        (lambda at: np.exp(-0.03 * at) * np.sin(at), 7.0, True),
+        (lambda at: np.sin(at) + np.sin(1.7 * at), 2.0, False),  # no one frequency
+        (np.zeros_like, 2.0, False),
+    ],
+)
+def test_a_hum_at_a_multiple_of_the_frequency_of_the_loops_is_in_step(loops, frequency, told):
+    """The device itself does what is in step with its input."""
+    frame = Frame(0.01, loops(2.0 * np.pi * 0.01 * np.arange(1000)), 1.0, 2.0)
+    assert CAUSE["periodic"].in_step((1.0, 0.0, frequency), [frame]) is told
+    assert not CAUSE["offset-drift"].in_step((1.0, 0.0), [frame])
+
+
 def test_clocks_that_part_by_less_than_half_a_sample_are_not_told():
     """One converter after the other does as much."""
     frames = [Frame(0.01, np.zeros(n), 1.0, 1.0) for n in (100, 10_000)]

@@ -146,6 +146,18 @@ def test_the_error_of_the_levels_falls_with_the_cell(monkeypatch, coarse, error)
     assert Floor(100, 1.0, 1.0, 1.0).at("coarse", fitted).discretisation == pytest.approx(error)
 
 
+@pytest.mark.parametrize(("left", "noise"), [(0.2, 0.2), (0.7, 0.5)])
+def test_noise_is_no_more_than_a_fit_leaves(monkeypatch, left, noise):
+    """A bend between few samples looks like noise of 0.5 from sample to sample, until it is fitted."""
+    monkeypatch.setattr(floor, "quiet_square", lambda *_: SimpleNamespace(square=0.01, doubtful=0.0))
+    monkeypatch.setattr(floor.residual, "rates", lambda problem: np.zeros(4))
+    problem = SimpleNamespace(bins=None, measured=np.zeros(4))
+    fitted = SimpleNamespace(problem=problem, residual=left * np.asarray([1.0, -1.0, 1.0, -1.0]))
+    heard = Floor(4, 10.0, 0.5, 0.5, single=0.5, sampled=0.25).heard(fitted)
+    assert (heard.white, heard.noise, heard.quick.white, heard.quick.noise) == pytest.approx((noise,) * 4)
+    assert heard.squares <= 4 * left**2 + 1e-12
+
+
 @pytest.mark.parametrize("jump", [0.0, 0.4])
 def test_steps_and_jumps_do_not_average_out(jump):
     """A twelfth of their squares, in the unit of the problem; the noise of single samples does."""
@@ -784,6 +796,7 @@ def test_evidence_names_its_cause_and_its_record():
         ([1.0] * 5, [9.0, 9.0, -0.9, 9.0], 0.5),
         ([1.0] * 5, [9.0, 9.0, -1.1, 9.0], 0.0),  # worse at some of the rates
         ([1.0] * 5, [], 0.5),  # too few blocks to sort by rates
+        ([1.0] * 5, [-9.0, 9.0, 9.0, 9.0], 0.0),
         ([1.0] * 4, [1.0] * 4, 0.0),  # too short a record
     ],
 )
@@ -795,3 +808,13 @@ def test_a_cause_repeats_on_pieces_of_the_time_and_at_other_rates(pieces, rates,
         rates=lambda fitted, _: np.asarray(rates) * (fitted is before),
     )
     assert repeats.repeated(told, before, after) == pytest.approx(share)
+
+
+def test_rates_that_only_the_smaller_model_can_be_asked_about_tell_nothing():
+    """The larger one needs what would be left out: that ended in an error of its own."""
+    before, after = SimpleNamespace(squares=30.0), SimpleNamespace(squares=20.0)
+    told = SimpleNamespace(
+        pieces=lambda fitted, _: np.full(5, 1.0 if fitted is before else 0.0),
+        rates=lambda fitted, _: np.zeros(4 if fitted is before else 0),
+    )
+    assert repeats.repeated(told, before, after) == pytest.approx(0.5)

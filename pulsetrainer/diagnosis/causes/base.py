@@ -203,6 +203,10 @@ class Cause:
         """Return whether so small a cause differs from what the moments of sampling do."""
         return True
 
+    def in_step(self, values: Values, frames: Sequence[Frame]) -> bool:
+        """Return whether a fault goes in step with the input, as only what the device itself does should."""
+        return False
+
     def choices(self, frames: Sequence[Frame]) -> float:
         """Return from how many independent values ``starts`` chooses by the residual; 0 where it does not."""
         return 0.0

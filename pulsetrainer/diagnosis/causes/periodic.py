@@ -22,6 +22,8 @@ _FINER = 41  # frequencies tried between the two neighbours of a line
 _TRIED = 0.003  # of the span
 _FAINT_NOISE = 1.5  # times the noise of single samples, rms: a smaller hum is part of the noise ...
 _FAINT = 0.005  # ... if it is no larger than this share of the span
+_ONE_LINE = 0.9  # of the power of an input of one frequency: loops of any shape and envelope have 0.97 ...
+_WIDE = 2  # ... in the highest line and so many on each side
 _INDEPENDENT = 0.51  # of the samples: so many frequencies are independent (sqrt(pi/3) / 2)
 
 
@@ -79,6 +81,17 @@ class Periodic(Cause):
         """Return whether it is a hum of the noise's size."""
         rms = float(np.hypot(sizes[0], sizes[1])) / np.sqrt(2.0)
         return bool(rms <= min(_FAINT_NOISE * noise, _FAINT))
+
+    def in_step(self, values: Values, frames: Sequence[Frame]) -> bool:
+        """Return whether the input has one frequency, of which this is a multiple as far as can be told."""
+        frame = max(frames, key=lambda one: one.input.size)
+        moved = frame.input - frame.input.mean()
+        power = np.abs(fft.rfft(moved * np.hanning(moved.size))) ** 2
+        k, apart = int(np.argmax(power)), 1.0 / (moved.size * frame.dt_s)
+        if k == 0 or np.sum(power[max(k - _WIDE, 0) : k + _WIDE + 1]) < _ONE_LINE * np.sum(power):
+            return False
+        own = _refined(moved, k * apart, apart, frame.dt_s)
+        return bool(abs(values[-1] - max(round(values[-1] / own), 1) * own) <= apart)
 
     def choices(self, frames: Sequence[Frame]) -> float:
         """Return from how many independent frequencies ``starts`` chooses: Baluev's W."""

@@ -73,7 +73,6 @@ def stage(state: State) -> State:
         said.append(Evidence("untimed", names=told))
     span = state.scale.span
     noise = span * state.floor_left.noise
-    quick = span * state.floor.quick.noise  # what averages do not have: slow noise is in both
     for record, one in _whole_and_each(judged, state):
         turned = condition_change.turned_over(one.measured, one.predicted, noise)
         if turned is not None and turned.left < one.speed.velocity:
@@ -82,10 +81,10 @@ def stage(state: State) -> State:
     if judged.speed.wrong:
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
-    elif (left := left_by(judged.measured, judged.predicted, quick)) <= span * state.left_rms:
+    elif _as_averages(state, judged) <= span * state.left_rms:
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
-        if state.verdict == "none" and _unexplained(state, left):
+        if state.verdict == "none" and _unexplained(state, judged):
             state = replace(state, verdict="unknown")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
     if changed is not None and not _brought_near(state, judged, noise):
@@ -196,9 +195,16 @@ def _left_out(state: State) -> float:
     return float(np.sqrt(max(state.held_out.error(state.baseline) / floor.count - floor.white**2, 0.0)))
 
 
-def _unexplained(state: State, left: float) -> bool:
-    """Whether a model that leaves so much (output unit, less noise) misses something, refitted or not."""
-    if state.question.quick or left <= LIMITS.unexplained_span * state.scale.span * state.floor.span:
+def _as_averages(state: State, judged: _Judged) -> float:
+    """Rms error of the model as given, output unit, with as much noise in it as in what the search leaves."""
+    return root_mean_square(state.problem.bins.average(judged.residuals))
+
+
+def _unexplained(state: State, judged: _Judged) -> bool:
+    """Whether the model as given misses something, noise apart, refitted or not."""
+    span = state.scale.span
+    left = left_by(judged.measured, judged.predicted, span * state.floor.quick.noise)
+    if state.question.quick or left <= LIMITS.unexplained_span * span * state.floor.span:
         return False
     return replace(state, current=state.baseline).unexplained
 

@@ -7,13 +7,13 @@ the rate are named together: there they are just a wider loop. Causes that equal
 here: equal loops differ by nothing else that is known.
 
 What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
-than the model without it, the interval of its strength (of a learned curve: of all its points) spans zero,
-a parameter or its interval ends where the search did, or its very strength sits there; it is slow and what is
-left still wanders from one tenth of the time to the next, it is slow, belongs to the record, and all causes
-together take away less than half of what can be lowered on blocks that were left out (which a device of
-another kind leaves), only equal loops would show it and there are none, or the record has one rate and no
-rest, where any cause looks like what a model lacks of the device, and it explains little more than what is
-left and slow, or that is more than noise.
+than the model without it, the interval of its strength (of a learned curve: of all its points) spans zero, a
+parameter or its interval ends where the search did, or its very strength sits there; it is a hum in step with
+the input, most of which the weights would hold; it is slow and what is left still wanders from one tenth of
+the time to the next, it is slow, belongs to the record, and all causes together take away less than half of
+what can be lowered on blocks that were left out (which a device of another kind leaves), only equal loops
+would show it and there are none, or the record has one rate and no rest, where any cause looks like what a
+model lacks of the device, and it explains little more than what is left and slow, or that is more than noise.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
 OWN_ERROR, STRONGEST, AT_BOUND = "own error", "strength at bound", "at bound"
-MAY_BE_NOTHING = "spans zero"
+MAY_BE_NOTHING, IN_STEP = "spans zero", "in step"
 
 
 def stage(state: State) -> State:
@@ -69,7 +69,7 @@ def _finding(state: State, term: Term) -> Finding:
 
 def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]:
     """Yield what speaks against a cause that was found: it is told, but with these words beside it."""
-    cause, known = term.cause, state.estimates[term.cause.id]
+    cause = term.cause
     if gain < 0 and cause.id not in state.by_contrast:  # the weights hold that: it predicts as well without
         yield WORSE
     if cause.by_contrast and not _equal_loops(state):
@@ -81,18 +81,37 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         of_all = state.held_out.gain(state.baseline, state.current, state.floor)
         if not cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
             yield LITTLE
+    if _is_in_step(state, term, fall):
+        yield IN_STEP
+    if _may_be_own_error(state, cause, fall):
+        yield OWN_ERROR
+    yield from _doubts_by_intervals(state, term)
+
+
+def _doubts_by_intervals(state: State, term: Term) -> Iterator[str]:
+    """Yield what the parameters of a cause and their intervals speak against it."""
+    cause, known = term.cause, state.estimates[term.cause.id]
     strengths = cause.strengths_of(known)
     nothing = bool(strengths) and all(one.lower <= 0 <= one.upper for one in strengths)
     if nothing:
         yield MAY_BE_NOTHING
-    if _may_be_own_error(state, cause, fall):
-        yield OWN_ERROR
     bounds = cause.quantities(state.problem.frames[0])
     at_end = [value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)]
     if any(at_end[: cause.strengths]) and not nothing:
         yield STRONGEST
     elif any(at_end) or _is_cut(state, known, bounds):
         yield AT_BOUND
+
+
+def _is_in_step(state: State, term: Term, fall: float) -> bool:
+    """Whether a cause is in step with the input, and without it the weights hold most of what it adds."""
+    if not term.cause.in_step(term.values, state.problem.frames):
+        return False
+    current, simulator = state.current, state.current.simulator
+    others = [one for one in current.terms if one is not term]
+    pairs = zip(simulator.full(current.terms), simulator.full(others), strict=True)
+    added = state.problem.bins.average([whole - rest for whole, rest in pairs])
+    return fall < LIMITS.free_of_weights * float(added @ added)
 
 
 def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:
