@@ -172,6 +172,10 @@ class Thresholds:
     contrast_settled: float = 0.1  # standard errors: a smaller change ends the rounds
     contrast_slope: float = 0.2  # of the strength: the density is smoothed (bench: 0.8 to 1.08)
 
+    # A drift told by the model as given
+    slowings: tuple[float, float, int] = (1.0, 100.0, 20)  # falls by 1/e in a record, from, to, and how many
+    relaxes: float = 0.9  # of what a parabola leaves, rms: what relaxes leaves less
+
     # Rivals
     closest: int = 3  # rivals refitted
     rival_screened: float = 0.5  # of the found cause's gain: rivals that score less are not refitted

@@ -140,7 +140,8 @@ def _time(
                 table, f"{table.path} has no time column", "give `time` or `rate_Hz`", whole=whole
             )
         time = table.names[place]
-        if _just_counts(table.columns[time]):
+        # no row is counted in ms; the licensed t_s of seconds does count rows
+        if _just_counts(table.columns[time]) and _unit_of_time(table, time) in ("", "s"):
             lack = f"the column {time} of {table.path} just counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=whole)
     heading = table.names[table.index(time)]

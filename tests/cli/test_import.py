@@ -220,6 +220,20 @@ def test_several_files_are_parts_of_one_run_or_runs_of_their_own(run, tmp_path, 
     assert [one["report"]["samples"] for one in done.json["runs"]] == [part.size for part in parts]
 
 
+@pytest.mark.parametrize(("heading", "rate_Hz"), [("t/ms", 1000.0), ("time [us]", 1e6), ("t (min)", 1 / 60)])
+def test_a_time_of_whole_steps_in_another_unit_is_no_count(run, tmp_path, heading, rate_Hz):
+    """A sample each millisecond counts 0, 1, 2 as rows do; its heading says what it is."""
+    t = np.arange(400)
+    u = 1.0 + np.sin(t / 30.0)
+    rows = np.stack((t, u, u**2), axis=1)
+    np.savetxt(
+        tmp_path / "r.csv", rows, fmt="%.6g", delimiter=",", header=f"{heading},u [A],y [N]", comments=""
+    )
+    done = run("import", "r.csv", "--input", "u", "--output", "y", "-o", "run.h5", "--json")
+    assert "counts the rows" not in done.err
+    assert done.json["facts"]["rate_Hz"] == pytest.approx(rate_Hz)
+
+
 def test_rows_that_are_merely_counted_are_no_time(run, tmp_path):
     """A magnetic loop is indexed 0, 1, 2: that is said, and only its order counts, unless --time insists."""
     done = run(*_words("bh_steel_m130_27s_1", "-o", "run.h5", "--json"))

@@ -135,8 +135,12 @@ def test_simple_formulas():
     np.testing.assert_allclose(trailing[1:], 1.5 * (1 - np.exp(-T[:-1] / 0.3)), atol=1.5 * DT / 0.3)
     bent = y + 0.2 * T + 0.1 * T * (T - T[-1])
     np.testing.assert_allclose(_shown("offset-drift", y, 0.2, 0.1), bent)  # as it was once kept
-    twisted = bent + 0.03 * T * (T - T[-1]) * (T / T[-1] - 0.5)
-    np.testing.assert_allclose(_shown("offset-drift", y, 0.2, 0.1, 0.03), twisted)
+    last = T[-1]
+    for slowing, gone in ((1.3, T), (-1.3, last - T)):  # an exponential below the chord of its ends
+        chord = np.interp(gone, [0.0, last], [1.0, np.exp(-1.3 * last)])
+        middle = np.exp(-1.3 * last / 2) - 0.5 * (1.0 + np.exp(-1.3 * last))
+        relaxing = y + 0.2 * T - 0.1 * last**2 / 4 * (np.exp(-1.3 * gone) - chord) / middle
+        np.testing.assert_allclose(_shown("offset-drift", y, 0.2, 0.1, slowing), relaxing, atol=1e-12)
     wave = 0.3 * np.sin(2 * np.pi * 7 * T) + 0.1 * np.cos(2 * np.pi * 7 * T)
     np.testing.assert_allclose(_shown("periodic", y, 0.3, 0.1, 7.0), y + wave, atol=1e-12)
     np.testing.assert_allclose(_shown("clock-skew", T, 0.01)[:300], 1.01 * T[:300], atol=1e-12)

@@ -57,8 +57,9 @@ def _diagnosis(
 def _added(name, y, t):
     """Output with a fault, and the parameters that say it."""
     if name == "offset-drift":
-        bent = 0.02 * t + (0.003 + 0.001 * (t / t[-1] - 0.5)) * t * (t - t[-1])
-        return y + bent, {"rate": 0.02, "bend": 0.003, "twist": 0.001}
+        lost = 1.0 - np.exp(-0.4 * t)  # half of it, and a quarter of the square of the length, in the middle
+        bend = -2.0 * (1.0 - np.exp(-0.2 * t[-1])) ** 2 / t[-1] ** 2
+        return y + lost + 0.02 * t, {"rate": 0.02 + lost[-1] / t[-1], "bend": bend, "slowing": 0.4}
     if name == "step":
         return np.where(t > 12, 0.4 + 1.03 * y, y), {"offset": 0.4, "gain": 0.03, "time": 12.0}
     if name == "periodic":

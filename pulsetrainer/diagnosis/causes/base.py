@@ -149,10 +149,9 @@ class Cause:
         """Return the causes of this id to be tried: what a formula leaves open, one or the other."""
         return (self,)
 
-    @property
-    def finer(self) -> Cause | None:
-        """The same with one more parameter, zero at first, for records that show it beyond doubt."""
-        return None
+    def finer(self, frame: Frame) -> list[tuple[Cause, float]]:
+        """The same with one more parameter, and values of it to begin with: for records that show it."""
+        return []
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""

@@ -34,14 +34,16 @@ def stage(state: State) -> State:
 def _refined(state: State, term: Term) -> State:
     """Return the state with the finer formula of a cause, where the records show it."""
     current, noise = state.current, state.scores.noise
-    if term.cause.finer is None or noise is None:
+    finer = term.cause.finer(state.problem.frames[0])
+    if not finer or noise is None:
         return state
     others = [one for one in current.terms if one.cause is not term.cause]
-    finer = Term(term.cause.finer, (*term.values, 0.0))
-    trial = refit(state.problem, (*others, finer), current)
-    if current.squares - trial.squares <= LIMITS.finer * doubt(trial, current, noise):
+    begun = [(*others, Term(cause, (*term.values, value))) for cause, value in finer]
+    trials = [refit(state.problem, terms, current) for terms in begun]
+    best = min(trials, key=lambda fitted: fitted.squares)
+    if current.squares - best.squares <= LIMITS.finer * doubt(best, current, noise):
         return state
-    return replace(state, current=settled(state.problem, trial))
+    return replace(state, current=settled(state.problem, best))
 
 
 def _exchanged(state: State, cause: Cause) -> State:

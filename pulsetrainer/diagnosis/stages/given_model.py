@@ -10,11 +10,13 @@ records.
   else the cause is `unknown`.
 - If the model as given leaves less than the search's best, the search found faults of its own coarser levels
   only: they are withdrawn. What the given one leaves may still be more than noise, and is then `unknown`.
-- If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), the
-  device is in another condition: `condition-change` comes first. Where that is all but a thousandth of the
-  squared error, other causes would only repair the rest of it, and are withdrawn. It is none where the
-  causes found, added to what the model as given says, bring it near; nor where refitted weights are far off
-  too on blocks that were left out: then no Preisach model describes the device, and that is `unknown`.
+- If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), and a
+  drift of the zero brings it near, that is the finding: refitted weights hide a drift that is over soon.
+- If it is far off without that, the device is in another condition: `condition-change` comes first. Where
+  that is all but a thousandth of the squared error, other causes would only repair the rest of it, and are
+  withdrawn. It is none where the causes found, added to what the model as given says, bring it near; nor
+  where refitted weights are far off too on blocks that were left out: then no Preisach model describes the
+  device, and that is `unknown`.
 
 What the raw data show stays, and so does what equal loops show, unless the model is of the wrong kind.
 """
@@ -22,16 +24,12 @@ What the raw data show stays, and so does what equal loops show, unless the mode
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.core import input_noise
-from pulsetrainer.core.initial_state import estimated_start, reaches_an_end, start_of
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import velocity
+from pulsetrainer.diagnosis import given_drift, velocity
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.condition_change import (
     Change,
@@ -43,37 +41,25 @@ from pulsetrainer.diagnosis.causes.condition_change import (
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Estimate, Finding
-from pulsetrainer.diagnosis.prediction import operator_of, predict
-from pulsetrainer.diagnosis.state import Given, State
+from pulsetrainer.diagnosis.judged import Judged, added, judge, whole_and_each
+from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 _CHANGED, _SPEED = "condition-change", "viscous"
-
-
-@dataclass(frozen=True)
-class _Judged:
-    """What the model as given says of the records."""
-
-    records: list[Record]
-    residuals: list[FloatArray]
-    measured: FloatArray  # (n,) outputs with weight, records one after another
-    predicted: FloatArray  # (n,)
-    speed: velocity.Comparison
-    polarity: int
 
 
 def stage(state: State) -> State:
     """Return the state with what the records say of the model as given."""
     if state.question.given is None:
         return state
-    judged = _judged(state, state.question.given)
+    judged = judge(state, state.question.given)
     said: list[Evidence] = []
     if not state.question.timed:
         told = tuple(c.id for c in library().values() if c.stage != "record" and not c.needs_time)
         said.append(Evidence("untimed", names=told))
     span = state.scale.span
     noise = span * state.floor_left.noise
-    for record, one in _whole_and_each(judged, state):
+    for record, one in whole_and_each(judged, state):
         turned = condition_change.turned_over(one.measured, one.predicted, noise)
         if turned is not None and turned.left < one.speed.velocity:
             state, more = _in_another_condition(withdrawn(state), turned, judged.polarity, record)
@@ -81,21 +67,21 @@ def stage(state: State) -> State:
     if judged.speed.wrong:
         said.append(velocity.evidence(judged.speed))
         state = _of_another_kind(state, judged)
-    elif _as_averages(state, judged) <= span * state.left_rms:
+    elif _is_as_good(state, judged):
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
         if state.verdict == "none" and _unexplained(state, judged):
             state = replace(state, verdict="unknown")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
     if changed is not None and not _brought_near(state, judged, noise):
-        state, more = _far_off(state, judged, changed, noise)
+        state, more = _drifted(state, judged, changed, noise) or _far_off(state, judged, changed, noise)
         said += more
     if any(one.found and one.seen is None for one in state.findings if one.cause.id == _CHANGED):
         said += _each_against(judged)
     return replace(state, evidence=(*said, *state.evidence))
 
 
-def _each_against(judged: _Judged) -> Iterator[Evidence]:
+def _each_against(judged: Judged) -> Iterator[Evidence]:
     """Yield how far each record is from the model as given: which of them differ from it, and how."""
     for k, (record, left) in enumerate(zip(judged.records, judged.residuals, strict=True)):
         kept = record.counts
@@ -108,73 +94,33 @@ def _each_against(judged: _Judged) -> Iterator[Evidence]:
         yield Evidence("each", _CHANGED, figures, record=k)
 
 
-def _judged(state: State, given: Given) -> _Judged:
-    """Predict the records; noise in the input is no motion."""
-    question, model = state.question, given.model
-    records = [state.scale.restored(record) for record in state.problem.records]
-    core = [
-        Record(
-            input_noise.clean(r.input).input,
-            r.output,
-            r.sample_weight,
-            start_of(r.input, question.low, question.high),
-        )
-        for r in records
-    ]
-    if not any(reaches_an_end(one.input, question.low, question.high) for one in core):
-        # a wrong guess of what came before would look like another zero
-        turned = [replace(one, output=model.polarity * one.output) for one in core]
-        before, _ = estimated_start(operator_of(model), turned)
-        core = [replace(one, start=before) for one in core]
-    steps = [r.dt_s for r in records]
-    # records have polarity 1: what the model says is turned alike
-    said = [
-        model.polarity * predict(model, one.input, step, one.start)
-        for one, step in zip(core, steps, strict=True)
-    ]
-    residuals = [one.output - p for one, p in zip(core, said, strict=True)]
-    kept = [one.counts for one in core]
-    return _Judged(
-        core,
-        residuals,
-        np.concatenate([one.output[k] for one, k in zip(core, kept, strict=True)]),
-        np.concatenate([p[k] for p, k in zip(said, kept, strict=True)]),
-        velocity.compare(core, steps, residuals),
-        model.polarity,
-    )
-
-
-def _whole_and_each(judged: _Judged, state: State) -> Iterator[tuple[int | None, _Judged]]:
-    """Yield all records, then each of several with its number: of two one may be turned over."""
-    yield None, judged
-    if len(judged.records) == 1:
-        return
-    steps = [r.dt_s for r in (state.scale.restored(record) for record in state.problem.records)]
-    for k, (record, left, step) in enumerate(zip(judged.records, judged.residuals, steps, strict=True)):
-        kept = record.counts
-        measured, speed = record.output[kept], velocity.compare([record], [step], [left])
-        predicted = measured - left[kept]
-        yield k, _Judged([record], [left], measured, predicted, speed, judged.polarity)
-
-
-def _brought_near(state: State, judged: _Judged, noise_rms: float) -> bool:
+def _brought_near(state: State, judged: Judged, noise_rms: float) -> bool:
     """Whether the causes found, added to what the model as given says, describe the records."""
     found = {one.cause.id for one in state.findings if one.found and not one.in_doubt}
     terms = [term for term in state.current.terms if term.cause.id in found]
     if not terms or not state.extends:
         return False
-    simulator = state.current.simulator
-    pairs = zip(simulator.full(terms), simulator.inner(()), judged.records, strict=True)
-    added = np.concatenate([(full - plain)[record.counts] for full, plain, record in pairs])
-    said = judged.predicted + state.scale.span * added
+    said = judged.predicted + judged.kept(added(state, terms))
     if Unlisted.id in found:  # a learned curve is known but for a constant
         said = said + np.mean(judged.measured - said)
     return is_near(judged.measured, said, noise_rms)
 
 
-def _far_off(
-    state: State, judged: _Judged, changed: Change, noise_rms: float
-) -> tuple[State, list[Evidence]]:
+def _drifted(
+    state: State, judged: Judged, changed: Change, noise_rms: float
+) -> tuple[State, list[Evidence]] | None:
+    """Return the state with the drift of the zero that the model as given tells; None where that is none."""
+    told = given_drift.told(state, judged, changed, noise_rms)
+    if told is None:
+        return None
+    finding, fitted = told
+    if len(fitted.terms) == 1:  # what was found beside another drift does not bring the given model nearer
+        state = replace(withdrawn(state), extends=state.extends)
+    assert finding.seen is not None
+    return _first(replace(state, current=fitted, repeated=fitted), finding), [finding.seen]
+
+
+def _far_off(state: State, judged: Judged, changed: Change, noise_rms: float) -> tuple[State, list[Evidence]]:
     """Tell another condition from a device that no refitted weights describe where they have not seen it."""
     span, percent = state.scale.span, PERCENT / changed.span
     given = left_by(judged.measured, judged.predicted, noise_rms)
@@ -195,15 +141,29 @@ def _left_out(state: State) -> float:
     return float(np.sqrt(max(state.held_out.error(state.baseline) / floor.count - floor.white**2, 0.0)))
 
 
-def _as_averages(state: State, judged: _Judged) -> float:
-    """Rms error of the model as given, output unit, with as much noise in it as in what the search leaves."""
-    return root_mean_square(state.problem.bins.average(judged.residuals))
+def _is_as_good(state: State, judged: Judged) -> bool:
+    """Whether the model as given leaves no more than the search's best.
+
+    A cause is withdrawn only with as much noise on either side. Where none was found there is nothing to be
+    withdrawn, and the given model's own error counts, noise apart.
+    """
+    fitted = [one for one in state.findings if one.found and one.cause.stage != "record"]
+    if any(one.cause.id not in state.by_contrast for one in fitted):
+        left = root_mean_square(state.problem.bins.average(judged.residuals))
+    else:
+        left = _left_by_given(state, judged)
+    return left <= state.scale.span * state.left_rms
 
 
-def _unexplained(state: State, judged: _Judged) -> bool:
+def _left_by_given(state: State, judged: Judged) -> float:
+    """Rms error of the model as given without the noise of single samples: slow noise averages have too."""
+    return left_by(judged.measured, judged.predicted, state.scale.span * state.floor.quick.noise)
+
+
+def _unexplained(state: State, judged: Judged) -> bool:
     """Whether the model as given misses something, noise apart, refitted or not."""
     span = state.scale.span
-    left = left_by(judged.measured, judged.predicted, span * state.floor.quick.noise)
+    left = _left_by_given(state, judged)
     if state.question.quick or left <= LIMITS.unexplained_span * span * state.floor.span:
         return False
     return replace(state, current=state.baseline).unexplained
@@ -221,7 +181,7 @@ def withdrawn(state: State, told: Collection[str] = ()) -> State:
     return replace(state, findings=findings, verdict=verdict, evidence=evidence, extends=False)
 
 
-def _of_another_kind(state: State, judged: _Judged) -> State:
+def _of_another_kind(state: State, judged: Judged) -> State:
     """Withdraw what was sought on top of the wrong kind of model."""
     state, speed = withdrawn(state), judged.speed
     direction = velocity.compare(judged.records, [None] * len(judged.records), judged.residuals)

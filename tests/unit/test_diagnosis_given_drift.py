@@ -1,0 +1,99 @@
+"""A drift told by the model as given, where refitted weights hide it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import pulsetrainer as pt
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
+from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.causes.offset_drift import OffsetDrift
+from pulsetrainer.diagnosis.given_drift import drift_in
+
+STEP_S = 0.02
+N = 6000
+LENGTH_S = N * STEP_S
+FRAME = Frame(STEP_S, np.zeros(N), 1.0, 1.0)
+
+
+def _average(signals):
+    return np.concatenate([one.reshape(-1, 10).mean(axis=1) for one in signals])
+
+
+@given(
+    st.floats(-1.0, 1.0), st.floats(0.2, 2.0), st.floats(2.0, 100.0), st.booleans(), st.integers(0, 2**32 - 1)
+)
+def test_a_drift_that_relaxes_or_grows_is_told_with_a_shift_beside_it(shift, size, times, grows, seed):
+    """The curve to a hundredth of its size, from the first sample on; noise is a hundredth as well."""
+    t = np.arange(N) * STEP_S
+    relaxed = size * -np.expm1(-times * (t[::-1] if grows else t) / LENGTH_S)
+    truth = relaxed - relaxed[0]
+    noise = 0.01 * size * np.random.default_rng(seed).standard_normal(N)
+    found = drift_in(_average([shift + truth + noise]), [FRAME], _average)
+    told = found.cause.on_output(np.zeros(N), found.values, FRAME)
+    assert len(found.values) == len(found.errors) == 3
+    assert np.abs(told - truth)[10:-10].max() < 0.03 * size
+    assert np.median(np.abs(told - truth)) < 0.01 * size
+
+
+def test_a_straight_drift_does_not_relax():
+    """What noise could make of it is not told."""
+    t = np.arange(N) * STEP_S
+    noise = 0.05 * np.random.default_rng(3).standard_normal(N)
+    found = drift_in(_average([0.002 * t + noise]), [FRAME], _average)
+    assert len(found.values) == 2
+    rate, bend = found.values
+    assert abs(rate - 0.002) < 3.0 * found.errors[0]
+    assert abs(bend) < 3.0 * found.errors[1]
+
+
+@pytest.fixture(scope="module")
+def calibrated() -> tuple[pt.Run, pt.Model]:
+    """Reversal curves of a steep density, and the model identified on them."""
+    plane = Plane.uniform(0.0, 1.0, 64)
+    i, j = plane.cell_indices
+    mass = np.exp(-(((i / 64 - 0.6) / 0.15) ** 2) - ((j / 64 - 0.4) / 0.15) ** 2)
+    plant = Preisach(plane, 0.5 * mass / mass.sum() / plane.areas, 0.5)
+    tips = np.stack((np.ones(16), np.linspace(0.9, 0.0, 16)), axis=1).ravel()
+    u = np.interp(np.arange(N), np.linspace(0, N - 1, tips.size + 1), np.append(0.0, tips))
+    y = plant(u) + 0.001 * np.random.default_rng(5).standard_normal(N)
+    run = pt.Run(time_s=np.arange(N) * STEP_S, input=u, output=y, input_unit="A", output_unit="N")
+    return run, pt.identify(run)
+
+
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_a_drift_that_is_over_soon_is_no_change_of_the_device(calibrated, polarity):
+    """It was called a change of condition, and what was taken out left three quarters of it."""
+    run, model = calibrated
+    if polarity < 0:
+        run = replace(run, output=-run.output)
+        model = pt.identify(run)
+    drift = 0.05 * -np.expm1(-run.time_s / 8.0)
+    faulty = replace(run, output=run.output + drift)
+    found = pt.diagnose(faulty, model, seed=1)
+    assert found.verdict == "offset-drift"
+    assert [one.cause for one in found.found] == ["offset-drift"]
+    done = pt.correct(faulty, found)
+    assert np.abs(done.output - run.output).max() < 0.05 * drift.max()
+
+
+def test_a_shifted_zero_stays_a_change_of_the_device(calibrated):
+    """It does not move in the record."""
+    run, model = calibrated
+    found = pt.diagnose(replace(run, output=run.output + 0.05), model, seed=1)
+    assert found.verdict == "condition-change"
+    assert "shifted by 0.05" in " ".join(found.evidence)
+
+
+def test_the_curve_is_that_of_the_cause():
+    """A parabola and an exponential of no slowing are one."""
+    y = np.zeros(N)
+    plain = OffsetDrift()
+    tiny = plain.relaxing.on_output(y, (0.1, 0.02, 2e-5 / LENGTH_S), FRAME)
+    np.testing.assert_allclose(tiny, plain.on_output(y, (0.1, 0.02), FRAME), atol=1e-3)
