@@ -188,6 +188,10 @@ class Thresholds:
     rival_noise: float = 12.0  # ... and mean squares: the noise of comparing two fits
     alike: float = 0.9  # cosine of screened columns: above, a quick screen names both
 
+    # A gain that wears off, against heat
+    worn: float = 0.02  # share of the output, tried first
+    worn_within: tuple[float, float] = (0.3, 3.0)  # of the record, tried first
+
     # Intervals
     student: float = 2.26  # 95 % of Student's t with the nine degrees of freedom of ten jackknife parts
     normal: float = 1.96  # 95 % of the normal distribution
