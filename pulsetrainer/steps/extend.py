@@ -9,6 +9,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Model, Run
 from pulsetrainer.errors import DataError
+from pulsetrainer.steps.arguments import named
 from pulsetrainer.steps.evaluate import evaluate
 from pulsetrainer.steps.one_thread import one_thread
 
@@ -47,7 +48,7 @@ def extend(
     ...
     pulsetrainer.errors.DataError: ...
     """
-    model_name, diagnosis_name = names or ("the model", "the diagnosis")
+    model_name, diagnosis_name = named(names, ("the model", "the diagnosis"))
     extended = diagnosis.extended
     if extended is None:
         why = (
