@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import linalg
@@ -88,7 +89,7 @@ def _closed(u: FloatArray, low: float, high: float) -> Iterator[tuple[int, int, 
     """Places of the turns B, A, B of an input's minor loops that close where they began."""
     same, narrowest = LIMITS.loop_same * (high - low), LIMITS.loop_narrowest * (high - low)
     turns = input_noise.real_turns(u, LIMITS.loop_turn * narrowest).tolist()
-    for earlier, begin, turn, end in zip(turns, turns[1:], turns[2:], turns[3:], strict=False):
+    for (earlier, begin), (turn, end) in zip(pairwise(turns), pairwise(turns[2:]), strict=False):
         before, top, bottom, back = u[[earlier, begin, turn, end]]
         closed = abs(back - top) < same and before < bottom + same
         if closed and top - bottom > narrowest and top < high - same and bottom > low + same:
