@@ -25,6 +25,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 class Wear(Cause):
     """A gain that falls with time, or with the way of the input."""
 
+    id = "wear"
     stage = "output"
     order = 50
     family = "slow gain"
@@ -35,7 +36,6 @@ class Wear(Cause):
     )
 
     def __init__(self, *, by_way: bool, zero: float) -> None:
-        self.id = "wear by way" if by_way else "wear by time"
         self._by_way = by_way
         self._zero = zero  # of the range of the output, from that of empty memory: where a gain does nothing
 
