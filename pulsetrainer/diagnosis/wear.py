@@ -27,12 +27,14 @@ class Wear(Cause):
 
     id = "wear"
     stage = "output"
-    order = 50
+    order = ThermalDrift.order
     family = "slow gain"
     title = formula = signature = excitation = source = ""
     parameters = (
-        Quantity("share", "1", -0.9, 0.9, 1e-3, "share of the {output} that is lost"),
-        Quantity("length", "1", 0.03, 10.0, 1e-3, "of the record, until it has followed"),
+        Quantity("share", "1", *LIMITS.worn_shares, LIMITS.worn_step, "share of the {output} that is lost"),
+        Quantity(
+            "length", "1", *LIMITS.worn_lengths, LIMITS.worn_step, "of the record, until it has followed"
+        ),
     )
 
     def __init__(self, *, by_way: bool, zero: float) -> None:
