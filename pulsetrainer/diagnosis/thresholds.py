@@ -192,10 +192,7 @@ class Thresholds:
     worn: float = 0.02  # share of the output, tried first
     worn_within: tuple[float, float] = (0.3, 3.0)  # of the record, tried first
     worn_shares: tuple[float, float] = (-0.9, 0.9)  # of the output: a gain that is gone is no gain
-    worn_lengths: tuple[float, float] = (
-        0.03,
-        10.0,
-    )  # of the record: what is faster is creep, slower straight
+    worn_lengths: tuple[float, float] = (0.03, 10.0)  # of the record: faster is creep, slower straight
     worn_step: float = 0.001  # of either, that matters little: for differences
 
     # Intervals
