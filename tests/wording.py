@@ -103,6 +103,10 @@ MESSAGES = {
         "--smoothing", "--smoothing auto", expected="a number from 0 to 1", got="'{got}'"
     ),
     "no such beat": Message("beat", "--beat", "fingerbp_AAC3_3", "6 ", "9"),
+    "not one name for each": Message(
+        "`{argument}` must hold", "one name for each", expected="{count}", got="got {got}"
+    ),
+    "recorded with other options": Message("other options", "the same options", "a.h5"),
     "not such an argument": Message("{argument} must", "", got="{got}"),
     "too few samples": Message("from one sample to the next", "a lower `speed_A_per_s`", got="{got}"),
     "method too large": Message("dense", "", got="{method}"),

@@ -58,7 +58,7 @@ def capture(
     """
     from pulsetrainer.files.input_file import check_resumable
     from pulsetrainer.files.signal_table import read_signal, signal_file
-    from pulsetrainer.steps.asked import EXCITATIONS
+    from pulsetrainer.steps.arguments import EXCITATIONS
 
     table = signal_file(signal, EXCITATIONS)
     job = Job(context, outputs=() if resume else (out,))

@@ -13,7 +13,7 @@ from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
 from pulsetrainer.report.figure_formats import figure_format
 from pulsetrainer.report.tables import picked
-from pulsetrainer.steps.asked import check_several
+from pulsetrainer.steps.arguments import check_several
 
 
 def compare(

@@ -12,7 +12,7 @@ import typer
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
-from pulsetrainer.steps.asked import check_once
+from pulsetrainer.steps.arguments import check_once
 
 
 def diagnose(

@@ -11,7 +11,7 @@ import pulsetrainer as pt
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
-from pulsetrainer.steps.asked import check_once
+from pulsetrainer.steps.arguments import check_once
 
 
 def evaluate(

@@ -10,7 +10,7 @@ import typer
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting, word_or_number
-from pulsetrainer.steps.asked import check_once
+from pulsetrainer.steps.arguments import check_once
 
 Reading = Literal["continuous", "relay"]
 _MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB

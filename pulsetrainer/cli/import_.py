@@ -12,7 +12,7 @@ import typer
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite, word_or_number
-from pulsetrainer.steps.asked import check_once
+from pulsetrainer.steps.arguments import check_once
 
 if TYPE_CHECKING:
     from pulsetrainer.steps.import_ import Imported

@@ -69,7 +69,7 @@ def invert(
     Example: pulsetrainer invert normal --model model.h5 -o drive.h5
     """
     from pulsetrainer.files.pulses import pulse_file, read_pulse
-    from pulsetrainer.steps.asked import check_beat, check_force_range
+    from pulsetrainer.steps.arguments import check_beat, check_force_range
 
     pulse = pulse_file(waveform)
     inputs = (model,) if learnt is None else (model, learnt)

@@ -87,7 +87,7 @@ def session(
     Example: pulsetrainer session --model extended.h5 -o session.h5 --pulses normal,bifid --minutes 2
     """
     from pulsetrainer.files.pulses import pulse_file
-    from pulsetrainer.steps.asked import check_asked_for
+    from pulsetrainer.steps.arguments import check_asked_for
 
     names = [name for name in (part.strip() for part in pulses.split(",")) if name]
     check_asked_for(answers, quiz, names)

@@ -14,8 +14,9 @@ one kind may be exchanged, which gives an exact test (Good, Permutation Tests, 2
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import linalg
@@ -61,37 +62,38 @@ class Contrast:
 
 def loops_of(records: Sequence[Record], low: float, high: float) -> list[Loop]:
     """Return the closed minor loops that were traced more than once, in equal time, by their kind."""
-    reach = high - low
-    found: list[tuple[int, int, int, int, float, float]] = []
-    for k, record in enumerate(records):
-        u = record.input
-        at = input_noise.real_turns(u, LIMITS.loop_turn * LIMITS.loop_narrowest * reach)
-        values = u[at]
-        for j in range(1, at.size - 2):
-            before, top, bottom, back = (values[j + k] for k in (-1, 0, 1, 2))
-            wide = top - bottom
-            closed = abs(back - top) < LIMITS.loop_same * reach and before < bottom + LIMITS.loop_same * reach
-            inside = top < high - LIMITS.loop_same * reach and bottom > low + LIMITS.loop_same * reach
-            if wide > LIMITS.loop_narrowest * reach and closed and inside:
-                whole = slice(int(at[j]), int(at[j + 2]) + 1)
-                if np.all(record.sample_weight[whole]):
-                    found.append((k, int(at[j]), int(at[j + 1]), int(at[j + 2]), float(bottom), float(top)))
-    kinds: list[tuple[float, float, float]] = []
+    same = LIMITS.loop_same * (high - low)
+    kinds: list[tuple[float, float, float]] = []  # bottom, top, and how long they took
     loops = []
-    for k, begin, turn, end, bottom, top in found:
-        took = (end - begin) * records[k].step
-        equal = [
-            kind
-            for kind, (a, b, seconds) in enumerate(kinds)
-            if max(abs(a - bottom), abs(b - top)) < LIMITS.loop_same * reach
-            and abs(seconds - took) < LIMITS.loop_same_time * seconds
-        ]
-        if not equal:
-            equal = [len(kinds)]
-            kinds.append((bottom, top, took))
-        loops.append(Loop(k, equal[0], begin, turn, end))
+    for k, record in enumerate(records):
+        for begin, turn, end in _closed(record.input, low, high):
+            if not np.all(record.sample_weight[begin : end + 1]):
+                continue
+            bottom, top = float(record.input[turn]), float(record.input[begin])
+            took = (end - begin) * record.step
+            equal = (
+                kind
+                for kind, (a, b, seconds) in enumerate(kinds)
+                if max(abs(a - bottom), abs(b - top)) < same
+                and abs(seconds - took) < LIMITS.loop_same_time * seconds
+            )
+            kind = next(equal, len(kinds))
+            if kind == len(kinds):
+                kinds.append((bottom, top, took))
+            loops.append(Loop(k, kind, begin, turn, end))
     number = np.bincount([loop.kind for loop in loops], minlength=1)
     return [loop for loop in loops if number[loop.kind] >= LIMITS.least_loops]
+
+
+def _closed(u: FloatArray, low: float, high: float) -> Iterator[tuple[int, int, int]]:
+    """Places of the turns B, A, B of an input's minor loops that close where they began."""
+    same, narrowest = LIMITS.loop_same * (high - low), LIMITS.loop_narrowest * (high - low)
+    turns = input_noise.real_turns(u, LIMITS.loop_turn * narrowest).tolist()
+    for (earlier, begin), (turn, end) in zip(pairwise(turns), pairwise(turns[2:]), strict=False):
+        before, top, bottom, back = u[[earlier, begin, turn, end]]
+        closed = abs(back - top) < same and before < bottom + same
+        if closed and top - bottom > narrowest and top < high - same and bottom > low + same:
+            yield begin, turn, end
 
 
 def contrasts(loops: Sequence[Loop], signals: Sequence[FloatArray]) -> FloatArray:
@@ -135,22 +137,18 @@ def fitted_contrast(
     if not loops:
         return None
     kind = np.asarray([loop.kind for loop in loops])
+    free = max(kind.size - np.unique(kind).size, 1)
     measured = contrasts(loops, [r.output for r in problem.records])
-    quantity = cause.parameters[0]
-    first = cause.starts(problem.frames, [])[0][0][0]
     others = _movable(loops, fitted)
-    value, p, error = 0.0, 1.0, float("inf")
-    current = fitted
+    quantity = cause.parameters[0]
+    step = LIMITS.contrast_first * cause.starts(problem.frames, [])[0][0][0]
+    value, p, error, current = 0.0, 1.0, float("inf"), fitted
     for number in range(LIMITS.contrast_rounds):
-        terms = fitted.terms if number == 0 else (*fitted.terms, Term(cause, (value,)))
         if number:
-            current = weights_for(problem, in_order(terms), current, rebuild=True)
-        base = current.simulator.full(in_order(terms))
-        step = (
-            LIMITS.contrast_first * first
-            if number == 0
-            else max(LIMITS.contrast_step * abs(value), quantity.small)
-        )
+            step = max(LIMITS.contrast_step * abs(value), quantity.small)
+            terms = in_order((*fitted.terms, Term(cause, (value,))))
+            current = weights_for(problem, terms, current, rebuild=True)
+        base = current.simulator.full(in_order(current.terms))
         moved = current.simulator.full(in_order((*fitted.terms, Term(cause, (value + step,)))))
         slope = contrasts(loops, [(b - a) / step for a, b in zip(base, moved, strict=True)])
         left = measured - contrasts(loops, base)
@@ -163,13 +161,11 @@ def fitted_contrast(
         if number == 0:
             p = permuted(slope, left, kind, rng)
         each = np.sum((left - change * slope) * slope, axis=1)
-        free = max(kind.size - np.unique(kind).size, 1)
         error = float(np.sqrt(np.sum(each**2) * kind.size / free)) / squares
         value = min(max(value + change, quantity.low), quantity.high)
         if p > LIMITS.contrast_hopeless or abs(change) < LIMITS.contrast_settled * error:
             break
-    at_bound = value in (quantity.low, quantity.high)
-    return Contrast(value, error, p, at_bound)
+    return Contrast(value, error, p, at_bound=value in (quantity.low, quantity.high))
 
 
 def _movable(loops: Sequence[Loop], fitted: Fitted) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.evidence import Evidence
 
-TOLD_BESIDE = ("at bound", "may be a fault")  # the name stands
+TOLD_BESIDE = ("at bound", "may be a fault", "may be wear", "not added")  # the name stands
 
 
 @dataclass(frozen=True)

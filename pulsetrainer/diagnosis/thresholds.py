@@ -189,6 +189,13 @@ class Thresholds:
     rival_noise: float = 12.0  # ... and mean squares: the noise of comparing two fits
     alike: float = 0.9  # cosine of screened columns: above, a quick screen names both
 
+    # A gain that wears off, against heat
+    worn: float = 0.02  # share of the output, tried first
+    worn_within: tuple[float, float] = (0.3, 3.0)  # of the record, tried first
+    worn_shares: tuple[float, float] = (-0.9, 0.9)  # of the output: a gain that is gone is no gain
+    worn_lengths: tuple[float, float] = (0.03, 10.0)  # of the record: faster is creep, slower straight
+    worn_step: float = 0.001  # of either, that matters little: for differences
+
     # Intervals
     student: float = 2.26  # 95 % of Student's t with the nine degrees of freedom of ten jackknife parts
     normal: float = 1.96  # 95 % of the normal distribution

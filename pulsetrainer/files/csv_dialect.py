@@ -36,6 +36,8 @@ _MINUS = "\N{MINUS SIGN}"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
 
+_Line = tuple[int, str]  # its number, from 1, and its text
+
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
@@ -125,23 +127,9 @@ def detect(path: Path) -> Dialect:
     DataError where it is no text, or no table; OSError where it cannot be read.
     """
     encoding = _encoding(path)
-    comments: list[tuple[int, str]] = []
-    lines: list[tuple[int, str]] = []
-    declared: str | None = None
-    remarked: set[int] = set()
-    with path.open(encoding=encoding, errors="surrogateescape", newline=None) as stream:
-        for count, line in enumerate(stream, 1):
-            text = line.strip()
-            if count == 1 and (found := _SIGNED_DELIMITER.fullmatch(text)):
-                declared = found[1]
-            elif text.startswith(_REMARKS):
-                remarked.add(count)
-                if len(lines) <= 2:
-                    comments.append((count, _remark(text)))
-            elif text:
-                lines.append((count, readable(line.strip("\r\n"))))
-            if len(lines) == _SAMPLE_LINES:
-                break
+    declared, lines, above = _first_lines(path, encoding)
+    remarked = {count for count, _ in above}
+    comments = [(count, _remark(text)) for count, text in above if len(lines) < 3 or count < lines[2][0]]
     if not lines:
         raise DataError(f"{path} is empty", hint="export the recording again")
     delimiter = declared or _delimiter([line for _, line in lines])
@@ -154,10 +142,29 @@ def detect(path: Path) -> Dialect:
     comments += [(lines[k][0], lines[k][1].strip()) for k in aside]
     lines = [line for k, line in enumerate(lines) if k not in aside]
     parted = [count - 1 in remarked for count, _ in lines]
-    above = _above([split(line, delimiter) for _, line in lines], parted)
-    comments += [(count, line.strip()) for count, line in lines[:above]]
-    dialect = _with_header(path, encoding, delimiter, lines[above:], sorted(comments))
+    start = _above([split(line, delimiter) for _, line in lines], parted)
+    comments += [(count, line.strip()) for count, line in lines[:start]]
+    dialect = _with_header(path, encoding, delimiter, lines[start:], sorted(comments))
     return replace(dialect, remarks=remarks)
+
+
+def _first_lines(path: Path, encoding: str) -> tuple[str | None, list[_Line], list[_Line]]:
+    """Return the delimiter that a file declares, its first lines, and the remarks among them."""
+    declared: str | None = None
+    lines: list[_Line] = []
+    remarks: list[_Line] = []
+    with path.open(encoding=encoding, errors="surrogateescape", newline=None) as stream:
+        for count, line in enumerate(stream, 1):
+            text = line.strip()
+            if count == 1 and (found := _SIGNED_DELIMITER.fullmatch(text)):
+                declared = found[1]
+            elif text.startswith(_REMARKS):
+                remarks.append((count, text))
+            elif text:
+                lines.append((count, readable(line.strip("\r\n"))))
+            if len(lines) == _SAMPLE_LINES:
+                break
+    return declared, lines, remarks
 
 
 def _remark(line: str) -> str:
@@ -295,8 +302,8 @@ def _with_header(
     path: Path,
     encoding: str,
     delimiter: str | None,
-    lines: list[tuple[int, str]],
-    commented: list[tuple[int, str]],
+    lines: list[_Line],
+    commented: list[_Line],
 ) -> Dialect:
     """Return the dialect, with what the lines above the first row say."""
     rows = [split(line, delimiter) for _, line in lines]

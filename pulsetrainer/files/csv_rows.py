@@ -14,7 +14,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.csv_dialect import MISSING, Dialect, column_words, has_thousands, number, readable
+from pulsetrainer.files.csv_dialect import Dialect, column_words, has_thousands, number, readable
 
 PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
 _SPARE = 1.02  # of the room that the first piece lets expect; what is never written to takes no memory
@@ -175,22 +175,22 @@ class _Reader:
                 )
                 continue
             for k, cell in enumerate(cells):
-                if k in dialect.text_columns or cell.lower() in MISSING:
-                    continue
-                value = number(cell, day_first=dialect.day_first)
-                if value is None and k not in self.needed:
-                    continue
-                if value is None:
-                    said = f"{self.path} has {self._place(cell, k, count)}: not a number"
-                    if has_thousands(cell):  # all large values are so: without them the record is another
-                        raise DataError(said, hint="export it without the separator of thousands")
-                    self.misfit = self.misfit or said
-                    continue
-                values[row, k] = value
+                if k not in dialect.text_columns:
+                    values[row, k] = self._value(cell, k, count)
             self._look_for_signs(count, cells)
         if self.comma and not dialect.decimal_comma:
             self.dialect = replace(dialect, decimal_comma=True)
         return values
+
+    def _value(self, cell: str, k: int, line: int) -> float:
+        """Return the number in a cell, NaN where there is none; the first that is needed is a misfit."""
+        value = number(cell, day_first=self.dialect.day_first)
+        if value is None and k in self.needed:
+            said = f"{self.path} has {self._place(cell, k, line)}: not a number"
+            if has_thousands(cell):  # all large values are so: without them the record is another
+                raise DataError(said, hint="export it without the separator of thousands")
+            self.misfit = self.misfit or said
+        return np.nan if value is None else value
 
     def _look_for_signs(self, line: int, cells: Sequence[str]) -> None:
         """Note the first decimal point and the first decimal comma; raise DataError where there are both."""

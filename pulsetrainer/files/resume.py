@@ -76,8 +76,12 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
             hint=f"wait for it, or look: pulsetrainer show {beside}",
         )
     lease = Lease(source)
-    run, header = store.read(source, Run), store.read_header(source)
-    _check_same(source, header.provenance.parameters, asked)
+    try:
+        run, header = store.read(source, Run), store.read_header(source)
+        _check_same(source, header.provenance.parameters, asked)
+    except BaseException:
+        lease.end()
+        raise
     contains = final is not None and _begins_with(run, final)
     return Earlier(source, run, header, lease, contains)
 

@@ -17,7 +17,7 @@ from pulsetrainer.device.codes import TICK_RATE_HZ
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal
 from pulsetrainer.errors import DeviceError, Interrupted, UsageError
-from pulsetrainer.steps.asked import EXCITATIONS
+from pulsetrainer.steps.arguments import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.recording import (
     InMemory,

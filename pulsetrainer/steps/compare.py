@@ -10,7 +10,7 @@ import numpy as np
 from pulsetrainer.artefacts import Evaluation, Session
 from pulsetrainer.artefacts.evaluation import HEADLINES
 from pulsetrainer.errors import DataError
-from pulsetrainer.steps.asked import check_several
+from pulsetrainer.steps.arguments import check_several, named
 from pulsetrainer.steps.quiz import score
 
 _RISING = (
@@ -66,14 +66,17 @@ def compare(
     [None, None, None]
     """
     check_several(evaluations)
+    titles = named(names, [f"number {k}" for k in range(1, len(evaluations) + 1)])
     sessions = [one for one in evaluations if isinstance(one, Session)]
     if sessions and len(sessions) < len(evaluations):
         given = ", ".join(
             f"{name} is {'a session' if isinstance(one, Session) else 'an evaluation'}"
-            for name, one in zip(names, evaluations, strict=False)
+            for name, one in zip(titles, evaluations, strict=True)
         )
-        said = "evaluations and sessions cannot be compared with each other"
-        raise DataError(f"{said}: {given}" if given else said, hint="give one kind or the other")
+        raise DataError(
+            f"evaluations and sessions cannot be compared with each other: {given}",
+            hint="give one kind or the other",
+        )
     tested = [one for one in evaluations if isinstance(one, Evaluation)]
     every = [_of_session(one) for one in sessions] or _named(tested, [one.figures() for one in tested])
     spreads = _named(tested, [_spreads(one) for one in tested])
@@ -88,9 +91,8 @@ def compare(
         for name in wanted
     )
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
-        listed = ", ".join(names) or "these evaluations"
         raise DataError(
-            f"no two of {listed} have a figure in common",
+            f"no two of {', '.join(titles)} have a figure in common",
             hint="evaluate the same pulses, with the same inversion, or the same models",
         )
     return metrics

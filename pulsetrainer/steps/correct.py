@@ -10,11 +10,12 @@ import numpy as np
 from pulsetrainer.artefacts import Diagnosis, Run
 from pulsetrainer.core import wild
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.asked import measured_of
 from pulsetrainer.diagnosis.causes import library, upright_values
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
+from pulsetrainer.diagnosis.question import measured_of
 from pulsetrainer.diagnosis.raw import Raw
 from pulsetrainer.errors import DataError
+from pulsetrainer.steps.arguments import named
 
 _DELAY = "delay"  # told by the caller: no record tells a recorder's from the device's
 
@@ -53,7 +54,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     ...
     pulsetrainer.errors.DataError: ...
     """
-    run_name, diagnosis_name = names or ("the run", "the diagnosis")
+    run_name, diagnosis_name = named(names, ("the run", "the diagnosis"))
     known = {one.fingerprint: k for k, one in enumerate(diagnosis.records)}
     parts = [(where, run.cut(where)) for where in run.slices]
     if not any(part.fingerprint in known for _, part in parts):

@@ -9,8 +9,9 @@ import numpy as np
 from pulsetrainer.artefacts import Diagnosis, Model, Run
 from pulsetrainer.diagnosis import procedure
 from pulsetrainer.diagnosis.answered import diagnosis_of
-from pulsetrainer.diagnosis.asked import question_of
+from pulsetrainer.diagnosis.question import question_of
 from pulsetrainer.errors import UsageError
+from pulsetrainer.steps.arguments import named
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -67,5 +68,6 @@ def diagnose(
             "diagnose needs at least one run", hint="pulsetrainer capture diagnostic -o diagnostic.h5"
         )
     rng = np.random.default_rng(seed)
+    names = named(names, [*(f"run {k}" for k in range(1, len(whole) + 1)), "the model"])
     question = question_of(whole, model, rng=rng, quick=quick, progress=progress, names=names)
     return diagnosis_of(procedure.diagnose(question))

@@ -26,6 +26,7 @@ from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.steps.arguments import named
 from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES, to_their_tips
 from pulsetrainer.steps.one_thread import one_thread
 
@@ -71,7 +72,8 @@ def evaluate(
     """
     given = [measured] if isinstance(measured, Playback | Run) else list(measured)
     tested = [models] if isinstance(models, Model) else list(models)
-    titles = list(names) or [f"{one.kind} {number}" for number, one in enumerate(given, 1)]
+    titles = named(names, [f"{one.kind} {number}" for number, one in enumerate(given, 1)])
+    called = named(model_names, [f"model {n}" for n in range(1, len(tested) + 1)], argument="model_names")
     played = [one for one in given if isinstance(one, Playback)]
     runs = [one for one in given if isinstance(one, Run)]
     if played and not runs:
@@ -83,9 +85,7 @@ def evaluate(
         errors = tuple(_of_playback(name, one) for name, one in zip(titles, played, strict=True))
         return Evaluation(waveforms=errors, model=played[-1].waveform.model)
     if len(runs) == 1 and not played and tested:
-        return _of_run(
-            titles[0], runs[0], tested, list(model_names) or [f"model {n}" for n in range(1, len(tested) + 1)]
-        )
+        return _of_run(titles[0], runs[0], tested, called)
     counts = {"playback": len(played), "run": len(runs), "model": len(tested)}
     got = [f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts.items() if count]
     raise UsageError(

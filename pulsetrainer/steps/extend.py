@@ -9,6 +9,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Model, Run
 from pulsetrainer.errors import DataError
+from pulsetrainer.steps.arguments import named
 from pulsetrainer.steps.evaluate import evaluate
 from pulsetrainer.steps.one_thread import one_thread
 
@@ -47,26 +48,10 @@ def extend(
     ...
     pulsetrainer.errors.DataError: ...
     """
-    model_name, diagnosis_name = names or ("the model", "the diagnosis")
+    model_name, diagnosis_name = named(names, ("the model", "the diagnosis"))
     extended = diagnosis.extended
     if extended is None:
-        why = (
-            "only screened for causes and fitted none"
-            if diagnosis.quick
-            else f"ended with the verdict {diagnosis.verdict!r} and found no property of the device that "
-            "repeats"
-        )
-        if diagnosis.correctable:
-            hint = (
-                "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis DIAGNOSIS.h5 -o corrected.h5"
-            )
-        elif diagnosis.quick:
-            hint = "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model model.h5 -o full.h5"
-        elif diagnosis.verdict == "none" or not diagnosis.next_experiment:
-            hint = "use the model as it is"
-        else:
-            hint = f"follow the advice of the diagnosis: {diagnosis.next_experiment}"
-        raise DataError(f"{diagnosis_name} {why}: there is nothing to extend the model by", hint=hint)
+        raise _nothing_in(diagnosis, diagnosis_name)
     if diagnosis.model not in ("", model.fingerprint):  # files of 0.1 do not name theirs
         raise DataError(
             f"{model_name} is not the model that {diagnosis_name} is of",
@@ -91,6 +76,24 @@ def extend(
         )
     extended = replace(extended, coil=model.coil, captured=model.captured)
     return extended if verify is None else _verified(model, extended, verify)
+
+
+def _nothing_in(diagnosis: Diagnosis, name: str) -> DataError:
+    """Say why a diagnosis has nothing to extend a model by, and what to do."""
+    why = (
+        "only screened for causes and fitted none"
+        if diagnosis.quick
+        else f"ended with the verdict {diagnosis.verdict!r} and found no property of the device that repeats"
+    )
+    if diagnosis.correctable:
+        hint = "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis DIAGNOSIS.h5 -o corrected.h5"
+    elif diagnosis.quick:
+        hint = "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model model.h5 -o full.h5"
+    elif diagnosis.verdict == "none" or not diagnosis.next_experiment:
+        hint = "use the model as it is"
+    else:
+        hint = f"follow the advice of the diagnosis: {diagnosis.next_experiment}"
+    return DataError(f"{name} {why}: there is nothing to extend the model by", hint=hint)
 
 
 def _verified(model: Model, extended: Model, run: Run) -> Model:

@@ -22,7 +22,7 @@ from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps import fit_notes
-from pulsetrainer.steps.asked import EXCITATIONS
+from pulsetrainer.steps.arguments import EXCITATIONS, named
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -99,7 +99,7 @@ def identify(
     100.0
     """
     whole = [runs] if isinstance(runs, Run) else list(runs)
-    titles = list(names) or [f"run {number}" for number in range(1, len(whole) + 1)]
+    titles = named(names, [f"run {number}" for number in range(1, len(whole) + 1)])
     _check_runs(titles, whole)
     notes = [
         f"{title} is incomplete; fitting the {run.input.size} samples it has"

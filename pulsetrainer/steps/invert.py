@@ -17,7 +17,7 @@ from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.device.limits import ON_TIME_S
 from pulsetrainer.diagnosis.prediction import extended_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
-from pulsetrainer.steps.asked import check_force_range
+from pulsetrainer.steps.arguments import check_force_range
 from pulsetrainer.steps.drive_layout import Layout, laid_out
 from pulsetrainer.steps.invertible import Invertible, invertible
 from pulsetrainer.steps.one_beat import one_beat

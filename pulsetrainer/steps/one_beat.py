@@ -8,7 +8,7 @@ from pulsetrainer.artefacts import Waveform
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
-from pulsetrainer.steps.asked import check_beat
+from pulsetrainer.steps.arguments import check_beat
 
 
 def shape_of(drive: Waveform) -> Shape:

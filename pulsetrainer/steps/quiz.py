@@ -8,7 +8,7 @@ import numpy as np
 
 from pulsetrainer.artefacts.session import Beats, Quiz, Score
 from pulsetrainer.errors import DataError
-from pulsetrainer.steps.asked import check_quiz
+from pulsetrainer.steps.arguments import check_quiz
 from pulsetrainer.steps.conductor import Decision, Play, Rest
 
 QUESTION_S = 12.0  # every question lasts as long, whatever the pulse

@@ -28,7 +28,7 @@ from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import check_peak
 from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.steps.asked import EXCITATIONS
+from pulsetrainer.steps.arguments import EXCITATIONS
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import in_part, raise_if_stopped
 

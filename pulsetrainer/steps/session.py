@@ -17,7 +17,7 @@ from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, check_peak
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError
-from pulsetrainer.steps.asked import check_asked_for
+from pulsetrainer.steps.arguments import check_asked_for
 from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Pause, Play, Reach
 from pulsetrainer.steps.heat import coil_of, rest_force, thermometer_of
 from pulsetrainer.steps.invertible import major_loop

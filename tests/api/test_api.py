@@ -81,6 +81,32 @@ def test_errors_are_python_exceptions(tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize(
+    ("verb", "given", "argument", "count"),
+    [
+        ("identify", ["run"], "names", 1),
+        ("diagnose", ["run", "model"], "names", 2),
+        ("evaluate", ["played"], "names", 1),
+        ("evaluate", ["run", "model"], "model_names", 1),
+        ("compare", [["evaluation"] * 3], "names", 3),
+        ("extend", ["model", "diagnosis"], "names", 2),
+        ("correct", ["run", "diagnosis"], "names", 2),
+    ],
+)
+def test_names_are_one_for_each(verb, given, argument, count):
+    """Too few or too many are a ValueError that says how many and what was given, in every verb."""
+
+    def loaded(of):
+        return list(map(loaded, of)) if isinstance(of, list) else pt.load(KEPT / f"{of}.h5")
+
+    for wrong in filter(None, (["a"] * (count - 1), ["a"] * (count + 1))):
+        with raises(
+            ArgumentError, "not one name for each", argument=argument, count=count, got=len(wrong)
+        ) as caught:
+            getattr(pt, verb)(*map(loaded, given), **{argument: wrong})
+        assert isinstance(caught.value, ValueError)
+
+
 def test_a_pulse_may_be_given_as_arrays_a_name_or_a_drive():
     """All three give the same drive."""
     model = pt.load(KEPT / "model.h5")

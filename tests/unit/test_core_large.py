@@ -34,7 +34,7 @@ def signal(kind, rng, n=4000):
 @pytest.mark.parametrize("smoothing", [0.0, 0.05])
 @pytest.mark.parametrize("kind", ["curves", "noisy", "random", "gaps"])
 def test_same_answer_as_the_dense_path(kind, smoothing):
-    """Objective, masses, offset and output agree; optimality is as good as stated."""
+    """Objective, masses, offset and output agree; optimality is as good as stated, after few steps."""
     rng = np.random.default_rng(1)
     u = signal(kind, rng)
     y = plant(120)(u) + rng.normal(0.0, 0.005, u.size)
@@ -48,6 +48,7 @@ def test_same_answer_as_the_dense_path(kind, smoothing):
         return equations.sum_of_squares(x, equations.offset(x)) + x @ (gram - equations.centred()[0]) @ x
 
     print(f"seed 1, {kind}, s = {smoothing}: {found.iterations} Newton steps, violation {found.kkt:.1e}")
+    assert found.iterations <= 13  # 10 to 12; up to 17 where the corrector aims at another product
     assert objective(found.masses) == pytest.approx(objective(dense.x), rel=1e-6)
     assert found.offset == pytest.approx(equations.offset(found.masses), abs=1e-9)
     ours, theirs = (Preisach(PLANE, x / PLANE.areas, equations.offset(x))(u) for x in (found.masses, dense.x))

@@ -7,6 +7,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from scipy.signal import butter, filtfilt
 
 from pulsetrainer.core.learning import BAND_HZ, STEP, LowPass, passes
 
@@ -40,3 +41,7 @@ def test_a_band_as_wide_as_the_samples_allow_filters_nothing():
     assert np.abs(narrow(TARGET) - TARGET).max() < 1e-2
     fast = np.where(np.arange(200) % 2, 1.0, -1.0)
     assert np.abs(narrow(fast)[20:-20]).max() < 0.2
+    slow = LowPass(BAND_HZ, 0.01 / BAND_HZ)  # padded by 300 samples, or as many as there are
+    np.testing.assert_allclose(slow(np.ones(9)), np.ones(9), atol=1e-9)
+    long = np.cumsum(np.random.default_rng(1).normal(size=2000))
+    np.testing.assert_array_equal(slow(long), filtfilt(*butter(2, 0.02), long, padlen=300))

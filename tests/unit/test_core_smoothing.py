@@ -202,6 +202,17 @@ def test_blocks_are_cut_where_the_memory_is_wiped_out():
     assert np.array_equal(smoothing.blocks(u[:3], 0.0, 1.0, 7), [0, 0, 0])
 
 
+@pytest.mark.parametrize(("memory", "count"), [(1.0, 200), (4.0, 125), (50.0, 40)])
+def test_a_block_lasts_twice_the_memory(monkeypatch, memory, count):
+    """No fewer than 40 and no more than 200 of them."""
+    counts, cut = [], smoothing.blocks
+    monkeypatch.setattr(smoothing, "blocks", lambda *where: counts.append(where[-1]) or cut(*where))
+    monkeypatch.setattr(smoothing, "_memory_of_residual", lambda *_, **__: memory)
+    u = np.abs((np.arange(1000) % 100) - 50) / 50.0
+    smoothing.choose([Record(u, u)], Plane.uniform(0.0, 1.0, 6), "continuous")
+    assert counts == [count]
+
+
 def test_folds_meet_every_place_of_a_curve():
     """Each fold once in five blocks; of curves as long as five blocks no fold has one place alone."""
     fold = smoothing.dealt(np.arange(200)).reshape(-1, 5)

@@ -13,7 +13,7 @@ from scipy import sparse, stats
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import asked, floor, intervals, repeats, residual, screening, velocity, wording
+from pulsetrainer.diagnosis import floor, intervals, question, repeats, residual, screening, velocity, wording
 from pulsetrainer.diagnosis.causes import library, stick_slip
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.design import bins_of
@@ -496,7 +496,7 @@ def _model(**more) -> Model:
 
 
 def _measured(run: Run, polarity: int = 1) -> Record:
-    record, stamps = asked.measured_of("a run", run, polarity, 0.0, 1.0)
+    record, stamps = question.measured_of("a run", run, polarity, 0.0, 1.0)
     return evenly(record, stamps)
 
 
@@ -516,10 +516,10 @@ def test_samples_stay_as_they_are_until_the_gates_have_seen_them():
     """Jittered stamps: the values of the record, bit by bit. Rounded stamps are even ones."""
     t = np.arange(200) * 0.01
     jittered = _run(t + 0.003 * RNG.uniform(-1, 1, 200))
-    record, stamps = asked.measured_of("a run", jittered, 1, 0.0, 1.0)
+    record, stamps = question.measured_of("a run", jittered, 1, 0.0, 1.0)
     np.testing.assert_array_equal(record.output, jittered.output)
     np.testing.assert_array_equal(stamps, jittered.time_s - jittered.time_s[0])
-    record, stamps = asked.measured_of("a run", _run(np.round(t / 3.0, 4)), 1, 0.0, 1.0)
+    record, stamps = question.measured_of("a run", _run(np.round(t / 3.0, 4)), 1, 0.0, 1.0)
     assert stamps is None
     assert record.dt_s == pytest.approx(0.01 / 3.0, rel=1e-3)
 
@@ -560,7 +560,14 @@ def test_a_record_has_a_hundred_samples(samples, fits):
 
 
 def _question(run: Run, model: Model):
-    return asked.question_of([run], model, rng=np.random.default_rng(0), quick=False, progress=lambda _: None)
+    return question.question_of(
+        [run],
+        model,
+        rng=np.random.default_rng(0),
+        quick=False,
+        progress=lambda _: None,
+        names=["run 1", "the model"],
+    )
 
 
 @pytest.mark.parametrize(("low", "high", "fits"), [(0.0, 1.0, True), (0.55, 1.0, False), (0.0, 0.45, False)])

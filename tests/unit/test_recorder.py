@@ -17,6 +17,7 @@ import store_examples as examples
 from pulsetrainer.artefacts import Run
 from pulsetrainer.errors import ArgumentError, DataError, ExistsError, UsageError
 from pulsetrainer.files import recorder as recorder_module
+from pulsetrainer.files.file_lock import is_abandoned
 from pulsetrainer.files.journal import Journal, Recording, blocks
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.recorder import RunRecorder
@@ -261,7 +262,8 @@ def partial(tmp_path):
     """Return what a killed capture of 300 samples leaves."""
     child = os.fork()
     if child == 0:
-        _record(RunRecorder(tmp_path / "a.h5", examples.header()), examples.run(300))
+        header = examples.header(parameters={"levels": 12})
+        _record(RunRecorder(tmp_path / "a.h5", header), examples.run(300))
         os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(child, 0)
     return tmp_path / "a.h5.partial"
@@ -361,6 +363,16 @@ def test_a_name_with_brackets_is_resumed(partial, tmp_path):
     earlier = earlier_of(tmp_path / "a[1].h5", {}, overwrite=False)
     earlier.close()
     assert earlier.path.name == "a[1].h5.partial"
+
+
+def test_what_cannot_be_resumed_is_let_go(partial, tmp_path):
+    """Refused for its options, it is free for others, as it was before."""
+    with raises(UsageError, "recorded with other options"):
+        earlier_of(tmp_path / "a.h5", {"levels": 24}, overwrite=False)
+    assert is_abandoned(partial)
+    earlier = earlier_of(tmp_path / "a.h5", {"levels": 12}, overwrite=False)
+    assert not is_abandoned(partial)
+    earlier.close()
 
 
 def test_an_artefact_that_a_fault_ended_goes_on(tmp_path):

@@ -42,6 +42,7 @@ class ThermalDrift(OfKinds):
     number = "cold"
     tried = (0.0, _BOTH_WAYS)  # share of the input's range at which nothing heats
     drifts = True
+    wears = True
     common = True
     parameters = (
         Quantity(

@@ -6,8 +6,8 @@ with the cause the errors must fall by at least half of what they fall by in the
 rise. Nor may they on any quarter of the blocks, sorted by their rate and predicted from the others: a formula
 that only fits the rates of one record misleads at others. A cause that does not do that fits, but does not
 repeat: it is told with these words, and is not added to the model; nor is one that is in doubt for
-another reason (`rivals`), nor one in whose place a fault of the measurement fits as well: that happened in
-this record, and not in the next. What equal loops show was tested by itself.
+another reason (`rivals`), nor one in whose place a fault of the measurement, or a gain that wears off, fits
+as well: that happened in this record, and not in the next. What equal loops show was tested by itself.
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
@@ -22,7 +22,7 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
-from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
+from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, MAY_BE_WEAR
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -34,7 +34,7 @@ def stage(state: State) -> State:
     kept = state.current
     asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
     told: dict[str, str] = {one.cause.id: A_FAULT for one in asked if _may_be_a_fault(one)}
-    told |= {one.cause.id: NOT_ADDED for one in asked if one.in_doubt}
+    told |= {one.cause.id: NOT_ADDED for one in asked if one.in_doubt or MAY_BE_WEAR in one.doubts}
     once = set(told) or _weakest(state, kept)
     while once:
         told = {**dict.fromkeys(once, DOUBT), **told}

@@ -12,8 +12,9 @@ parameter or its interval ends where the search did, or its very strength sits t
 the input, most of which the weights would hold; it is slow and what is left still wanders from one tenth of
 the time to the next, it is slow, belongs to the record, and all causes together take away less than half of
 what can be lowered on blocks that were left out (which a device of another kind leaves), only equal loops
-would show it and there are none, or the record has one rate and no rest, where any cause looks like what a
-model lacks of the device, and it explains little more than what is left and slow, or that is more than noise.
+would show it and there are none, a gain that wears off with time, or with the way of the input, fits as well,
+or the record has one rate and no rest, where any cause looks like what a model lacks of the device, and it
+explains little more than what is left and slow, or that is more than noise.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis import residual, wear
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause, Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
@@ -37,7 +38,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
 OWN_ERROR, STRONGEST, AT_BOUND = "own error", "strength at bound", "at bound"
-MAY_BE_NOTHING, IN_STEP = "spans zero", "in step"
+MAY_BE_NOTHING, MAY_BE_WEAR, IN_STEP = "spans zero", "may be wear", "in step"
 
 
 def stage(state: State) -> State:
@@ -69,38 +70,39 @@ def _finding(state: State, term: Term) -> Finding:
 
 def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]:
     """Yield what speaks against a cause that was found: it is told, but with these words beside it."""
-    cause = term.cause
+    cause, known = term.cause, state.estimates[term.cause.id]
     if gain < 0 and cause.id not in state.by_contrast:  # the weights hold that: it predicts as well without
         yield WORSE
     if cause.by_contrast and not _equal_loops(state):
         yield NO_LOOPS
     if cause.drifts:
-        left = residual.wander(state.current.residual, state.problem.measured)
-        if left > max(LIMITS.wander_left * state.current.squares, LIMITS.wander_fall * fall):
-            yield WANDERS
-        of_all = state.held_out.gain(state.baseline, state.current, state.floor)
-        if not cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
-            yield LITTLE
-    if _is_in_step(state, term, fall):
-        yield IN_STEP
-    if _may_be_own_error(state, cause, fall):
-        yield OWN_ERROR
-    yield from _doubts_by_intervals(state, term)
-
-
-def _doubts_by_intervals(state: State, term: Term) -> Iterator[str]:
-    """Yield what the parameters of a cause and their intervals speak against it."""
-    cause, known = term.cause, state.estimates[term.cause.id]
+        yield from _of_a_drift(state, term, fall)
     strengths = cause.strengths_of(known)
     nothing = bool(strengths) and all(one.lower <= 0 <= one.upper for one in strengths)
     if nothing:
         yield MAY_BE_NOTHING
+    if _is_in_step(state, term, fall):
+        yield IN_STEP
+    if _may_be_own_error(state, cause, fall):
+        yield OWN_ERROR
     bounds = cause.quantities(state.problem.frames[0])
     at_end = [value in (one.low, one.high) for value, one in zip(term.values, bounds, strict=True)]
     if any(at_end[: cause.strengths]) and not nothing:
         yield STRONGEST
     elif any(at_end) or _is_cut(state, known, bounds):
         yield AT_BOUND
+
+
+def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
+    """Yield what speaks against a slow cause."""
+    left = residual.wander(state.current.residual, state.problem.measured)
+    if left > max(LIMITS.wander_left * state.current.squares, LIMITS.wander_fall * fall):
+        yield WANDERS
+    of_all = state.held_out.gain(state.baseline, state.current, state.floor)
+    if not term.cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
+        yield LITTLE
+    if term.cause.wears and wear.is_as_good(state, term):
+        yield MAY_BE_WEAR
 
 
 def _is_in_step(state: State, term: Term, fall: float) -> bool:

@@ -25,7 +25,7 @@ def question_of(
     rng: np.random.Generator,
     quick: bool,
     progress: Callable[[float], None],
-    names: Sequence[str] = (),
+    names: Sequence[str],
 ) -> Question:
     """Return the question that runs ask of a model; ``names`` of the runs and of the model are for messages.
 
@@ -33,7 +33,7 @@ def question_of(
     too short, or has too few samples with a number.
     """
     low, high = input_range(model)
-    *called, model_name = names or (*(f"run {k}" for k in range(1, len(runs) + 1)), "the model")
+    *called, model_name = names
     records, notes, fingerprints = [], [], []
     stamps: list[FloatArray | None] = []
     corrected: list[tuple[str, ...]] = []

@@ -1,10 +1,10 @@
-"""What can be refused by a look at what was asked for; loads nothing, so that the answer comes at once."""
+"""What can be refused by a look at the arguments alone; loads nothing, so that the answer comes at once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pulsetrainer.errors import UsageError
+from pulsetrainer.errors import ArgumentError, UsageError
 
 EXCITATIONS = ("identification", "diagnostic")
 
@@ -55,6 +55,17 @@ def check_quiz(choices: int, questions: int) -> None:
             f"a quiz of {questions} question{'s' * (questions != 1)} cannot ask each of {choices} pulses",
             hint=f"ask at least {choices}",
         )
+
+
+def named(names: Sequence[str], usual: Sequence[str], *, argument: str = "names") -> Sequence[str]:
+    """Return the names that were given, or the usual ones; ArgumentError where there is not one for each."""
+    if names and len(names) != len(usual):
+        expected, got = (", ".join(map(repr, one)) for one in (usual, names))
+        raise ArgumentError(
+            f"`{argument}` must hold {len(usual)}, such as {expected}; got {len(names)}: {got}",
+            hint=f"give a list with one name for each, in this order, or leave `{argument}` out",
+        )
+    return names or usual
 
 
 def check_once(files: Sequence[object]) -> None:
