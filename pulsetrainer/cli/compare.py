@@ -61,16 +61,16 @@ def compare(
     ]
     job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})
     learners = isinstance(loaded[0], pt.Session)
+    # of two learners, or of one before and after; of a class the last less the first would say nothing
+    differ = ["difference"] if learners and len(loaded) == 2 else []
     words = {True: "better", False: "worse", None: ""}
     rows = []
     for m in metrics:
         owner, named = names.split(m.name)
         change = "-" if m.change is None else f"{round(m.change, 2):+.2f}" if round(m.change, 2) else "0.00"
-        verdict = [] if learners else [words[m.better]]
-        rows.append(
-            [f"{owner.removeprefix('session.')}: {named.words}", named.unit, *m.values, change, *verdict]
-        )
-    head = ["", "unit", *labels, *(["difference"] if learners else ["change", ""])]
+        last = [change] * len(differ) if learners else [change, words[m.better]]
+        rows.append([f"{owner.removeprefix('session.')}: {named.words}", named.unit, *m.values, *last])
+    head = ["", "unit", *labels, *(differ if learners else ["change", ""])]
     job.screen.table(f"{len(labels)} {loaded[0].kind}s side by side", head, rows)
     if not learners:
         job.screen.line(

@@ -54,7 +54,8 @@ def refine(
             refined = pt.refine(waveform, device, passes=passes, progress=progress)
         except (DeviceError, Interrupted) as error:
             if not isinstance(error.kept, pt.Waveform):
-                error.message += f"; {out} was not written"
+                if isinstance(error, DeviceError):
+                    error.message += f"; {out} was not written"
                 raise
             stopped, refined = error, error.kept
     title = f"{refined.name} refined on {info.serial}"

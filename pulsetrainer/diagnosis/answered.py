@@ -185,7 +185,8 @@ def _parameters(
     """Return estimates as parameters of the output as measured; ``measured``: they are that already."""
     assert state.question.given is not None
     polarity = 1 if measured else state.question.given.model.polarity
-    meanings = {q.name: q.meaning for q in cause.quantities(state.problem.frames[0])} | {"size": cause.size}
+    meanings = {q.name: q.meaning for q in cause.quantities(state.problem.frames[0])}
+    meanings |= {"size": cause.size, cause.number: cause.meant}
 
     def told(e: Estimate) -> Parameter:
         own = words.get("seconds", "s") if e.unit == "s" else e.unit

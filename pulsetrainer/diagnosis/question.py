@@ -65,7 +65,7 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
         raise DataError(
             f"{name} is in {run.input_unit} and {run.output_unit}, but {model_name} was identified in "
             f"{model.input_unit} and {model.output_unit}",
-            hint="use a model of the same device, in the same units",
+            hint="use a model of the same device; in other units, convert the columns and import again",
         )
     if model.reading != "continuous":
         raise DataError(

@@ -30,21 +30,31 @@ def draw(labels: Sequence[str], values: Mapping[str, Sequence[float | None]]) ->
     figure = Figure(figsize=(COLUMN_IN, 0.6 + _PANEL_IN * len(panels)), layout="constrained")
     axes_of = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     place = np.arange(len(labels))
+    learners = any(name.startswith(("session.", "quiz.")) for name in values)
     for axes, (metric, rows) in zip(axes_of, panels.items(), strict=True):
         colours, lines = cycle((BLUE, VERMILION, GREEN, INK)), cycle(_LINES)
         for stem, row in rows.items():
             line, marker = next(lines)
             known = np.asarray([np.nan if v is None else v for v in row], dtype=np.float64)
-            axes.plot(
-                place, known, color=next(colours), linestyle=line, marker=marker, markersize=4, label=stem
-            )
-        axes.set_title(str(split(metric)[1]))
-        sizes = [v for row in rows.values() for v in row if v is not None and np.isfinite(v)]
+            look = {"color": next(colours), "linestyle": line, "marker": marker, "markersize": 4}
+            if learners:  # between two learners there is nothing: points, no line
+                look["linestyle"] = "none"
+                ends = [f"{stem}.{metric.replace('_percent', f'_{end}_percent')}" for end in ("from", "to")]
+                if all(end in values for end in ends):
+                    interval = np.asarray([values[end] for end in ends], dtype=np.float64)
+                    axes.vlines(place, *interval, color=look["color"], linewidth=1.2)
+            axes.plot(place, known, **look, label=stem)
+        title = str(split(metric)[1])
+        axes.set_title(f"{title}, 95 % interval" if metric == "right_percent" else title)
+        upper = values.get("quiz.right_to_percent", ()) if metric == "right_percent" else ()
+        within = [*rows.values(), upper]
+        sizes = [v for row in within for v in row if v is not None and np.isfinite(v)]
         low, top = min(sizes, default=0.0), max(sizes, default=0.0)
         axes.set_ylim(min(1.1 * low, 0.0), 1.1 * top if top > 0 else 0.1 * abs(low) or 1.0)
         axes.yaxis.set_major_locator(MaxNLocator(5))
         axes.margins(x=0.08)
-    axes_of[0].legend(loc="best")
+    if not learners:
+        axes_of[0].legend(loc="best")
     upright = max(map(len, labels), default=0) * len(labels) <= 60
     axes_of[-1].set_xticks(place, labels, rotation=0 if upright else 30, ha="center" if upright else "right")
     return figure

@@ -51,9 +51,21 @@ def course(found: Diagnosis) -> Figure:
         panels.trace(below, found.time_s, left, **MODEL, label="with the causes found")
     below.axhline(0.0, **GUIDE)
     below.set_ylabel(label("measured − model", found.output_unit))
-    below.set_xlabel(label("time" if len(found.records) == 1 else "time, recordings one after another", "s"))
+    name = "sample number" if _timeless(found) else label("time", "s")
+    below.set_xlabel(name if len(found.records) == 1 else f"{name}, recordings one after another")
     panels.headroom(below)
     return figure
+
+
+def _timeless(found: Diagnosis) -> bool:
+    """Tell whether the recordings have no time: what stands for it counts their samples."""
+    return bool(found.records) and all(np.isnan(one.step_s) for one in found.records)
+
+
+def profiles(found: Diagnosis) -> list[Profile]:
+    """Return the profiles of two groups or more; of records without time none that needs it."""
+    kept = [one for one in found.profiles if one.name == "level" or not _timeless(found)]
+    return [one for one in kept if np.count_nonzero(np.isfinite(one.before)) > 1]
 
 
 @styled

@@ -170,6 +170,8 @@ def evaluation(errors: Evaluation) -> Figure:
             "this evaluation holds neither played waveforms nor models, so there is nothing to draw",
             hint="evaluate again, with pulsetrainer evaluate",
         )
+    if not pulses and len(errors.models) == 1:
+        return prediction(errors.models[0])
     figure = _sheet(2 * COLUMN_IN, _ROW_IN * rows)
     cells = figure.subfigures(rows, 2, squeeze=False)
     for row, played in zip(cells, pulses.values(), strict=False):

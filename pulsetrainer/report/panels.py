@@ -49,6 +49,7 @@ from pulsetrainer.report.style import (
 _DENSITY_GAMMA = 0.5
 _DENSITY_QUANTILE = 0.99
 _DENSITY_REACH = 2.0
+_CLOCK = 100.0  # lengths of the record that its first time is late: a date, which tick labels cannot hold
 _QUANTITIES = {
     "N": "force",
     "A": "current",
@@ -60,9 +61,14 @@ _QUANTITIES = {
 
 
 def abscissa(time_s: FloatArray | None, n: int) -> tuple[FloatArray, str]:
-    """Return the horizontal axis of a record with its label: time, or else the sample number."""
+    """Return the horizontal axis of a record with its label: time, or else the sample number.
+
+    Time stamps with a date are counted from the first one.
+    """
     if time_s is None:
         return np.arange(n, dtype=np.float64), "sample number"
+    if abs(time_s[0]) > _CLOCK * (time_s[-1] - time_s[0]):
+        return time_s - time_s[0], label("time since the first sample", "s")
     return time_s, label("time", "s")
 
 

@@ -168,7 +168,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
             raise DataError(
                 f"{title} was identified in {model.input_unit} and {model.output_unit}, "
                 f"but {name} is in {run.input_unit} and {run.output_unit}",
-                hint="use a model of the same device, in the same units",
+                hint="use a model of the same device; in other units, convert the columns and import again",
             )
         one = _of_model(title, model, run, found[0].rms if found else None)
         if model.fit and model.fit.warning:

@@ -208,8 +208,11 @@ def test_paper_has_everything(opened, report):
     for words in (*headings, provenance, page.locator("pre.history").text_content()):
         assert re.sub(r"\s+", "", unicodedata.normalize("NFKC", words)) in squeezed
     assert 2 <= len(document.pages) <= 8
-    for sheet in document.pages:  # the errors of a drive and their figures are not torn apart
+    squeezed_headings = tuple(re.sub(r"\s+", "", unicodedata.normalize("NFKC", one)) for one in headings)
+    for sheet in document.pages:
         said = re.sub(r"\s+", "", unicodedata.normalize("NFKC", sheet.extract_text()))
+        assert not said.endswith(squeezed_headings)  # a heading stays with what it is of
+        # the errors of a drive and their figures are not torn apart
         assert said.count("Errorswithandwithoutcompensation") == said.count("Hysteresisopensaloop")
 
 

@@ -131,6 +131,9 @@ def test_learners_side_by_side(tmp_path):
     low, high = (found[f"quiz.right_{end}_percent"]["values"][0] for end in ("from", "to"))
     assert low < 50.0 < high
     assert found["session.pressed.mean_abs_error_percent"]["values"] == [1.0, 1.0]
+    assert "difference" in pulsetrainer(tmp_path, "compare", "anna.h5", "ben.h5").out
+    pt.save(plain, tmp_path / "cleo.h5")
+    assert "difference" not in pulsetrainer(tmp_path, "compare", "anna.h5", "ben.h5", "cleo.h5").out
     assert pulsetrainer(tmp_path, "compare", "anna.h5", "other.h5").code == 3
     for name in ("carl", "dora"):
         pt.save(replace(plain, quiz=None), tmp_path / f"{name}.h5")

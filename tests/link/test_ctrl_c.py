@@ -142,6 +142,7 @@ def test_the_output_is_off_first_and_it_is_said_what_there_is(
         process.kill()
     refusal(Ran(process.returncode, out, err), 130, said)
     assert "Traceback" not in err
+    assert err.count("written") <= 1
     status = overheard.status()
     assert (State(status.state), Fault(status.fault)) == (State.IDLE, Fault.NONE)
     assert not status.flags & STATUS_OUTPUT_NOT_OFF

@@ -81,6 +81,12 @@ def test_creep_of_one_time_constant_or_of_five():
     assert CAUSE["creep"].restored((wide.constants()[0][1], a, tau))[0].kind == wide.kind
 
 
+def test_a_number_that_a_model_keeps_says_what_it_is():
+    """`extend` printed `middle 1`."""
+    assert {one.id for one in CAUSE.values() if one.number} == {one.id for one in CAUSE.values() if one.meant}
+    assert CAUSE["creep"].number == "middle"
+
+
 @pytest.mark.parametrize("cold", [True, False])
 def test_a_coil_heats_with_the_square_of_the_input(cold):
     """From rest to 3 above the low end at once: h rises, then relaxes to 9; or it begins at a twentieth.

@@ -18,7 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.figure import Figure
 
-from pulsetrainer.artefacts import Evaluation, Profile, Run, units
+from pulsetrainer.artefacts import Evaluation, Profile, Recorded, Run, units
 from pulsetrainer.errors import DataError
 from pulsetrainer.report import comparison_figure, diagnosis_figures, figures
 from pulsetrainer.report.directions import directions, turns
@@ -398,6 +398,17 @@ def test_a_comparison_shows_what_became_worse_than_nothing():
     assert second.get_ylim() == (0.0, 1.0)
 
 
+def test_learners_are_points_with_their_intervals():
+    """A line from one learner to the next looked like a trend, and the intervals were not drawn."""
+    ends = (("", 50.0), ("_from", 20.0), ("_to", 80.0))
+    rows = {f"quiz.right{end}_percent": (share, share + 1.0) for end, share in ends}
+    (axes,) = comparison_figure.draw(["anna", "ben"], rows).axes
+    assert [line.get_linestyle() for line in axes.lines] == ["None"]
+    drawn = [segment.tolist() for segment in axes.collections[0].get_segments()]
+    assert drawn == [[[0.0, 20.0], [0.0, 80.0]], [[1.0, 21.0], [1.0, 81.0]]]
+    assert axes.get_ylim()[1] > 81.0
+
+
 def test_each_line_of_a_comparison_looks_unlike_the_others():
     """The fifth pulse was drawn like the first."""
     rows = {f"pulse{k}.continuous.mean_error_reduction_percent": [90.0, 91.0] for k in range(20)}
@@ -444,3 +455,40 @@ def test_the_main_figures_of_a_run_and_its_heat():
     found = run_facts(Run(np.arange(6) / 2.0, np.array([0.0, 1.0, 2.0, 0.5, 1.0, 1.0]), np.zeros(6)))
     assert (found["samples"], found["seconds"], found["rate_Hz"], found["reversals"]) == (6, 2.5, 2.0, 2)
     assert warmth_words([-0.04, 3.0, 5.06]).startswith("+0.0 to +5.1 K")
+
+
+def test_stamps_with_a_date_are_counted_from_the_first_sample():
+    """Seconds since 1970 ran into each other below the figure."""
+    plain = examples.run()
+    dated = replace(plain, time_s=plain.time_s + 1.8e9)
+    for run, said in ((plain, "time [s]"), (dated, "time since the first sample [s]")):
+        below = figures.run(run).axes[1]
+        assert below.get_xlabel() == said
+        assert below.get_xlim()[1] < 1.1 * plain.time_s[-1]
+
+
+def test_the_prediction_of_one_model_fills_its_figure():
+    """The right half of the picture was empty."""
+    alone = figures.evaluation(Evaluation(models=(examples.model_evaluation(),)))
+    assert alone.get_size_inches()[0] < figures.evaluation(examples.model_comparison()).get_size_inches()[0]
+    assert len(alone.axes) == 2
+
+
+def test_a_diagnosis_without_time_draws_none():
+    """Its samples were called seconds, and groups of one place were drawn as a point."""
+    group, one = np.arange(3.0), np.full(3, np.nan)
+    one[1] = 1.0
+    timed = replace(
+        stored.diagnosis(),
+        records=(Recorded("", 0.1),),
+        profiles=(
+            Profile("rate", "1/s", group, group, group),
+            Profile("level", "A", group, group, group),
+            Profile("direction", "1", group, one, one),
+        ),
+    )
+    timeless = replace(timed, records=(Recorded("", float("nan")),))
+    assert [shown.name for shown in diagnosis_figures.profiles(timed)] == ["rate", "level"]
+    assert [shown.name for shown in diagnosis_figures.profiles(timeless)] == ["level"]
+    said = [diagnosis_figures.course(found).axes[1].get_xlabel() for found in (timed, timeless)]
+    assert said == ["time [s]", "sample number"]

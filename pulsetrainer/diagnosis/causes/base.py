@@ -116,6 +116,8 @@ class Cause:
     order: ClassVar[int]  # place in the chain
     family: ClassVar[str]  # causes of one family are easily taken for one another
     parameters: ClassVar[tuple[Quantity, ...]] = ()
+    number: ClassVar[str] = ""  # the name in a model of a number that its formula leaves open ...
+    meant: ClassVar[str] = ""  # ... and what it is, in words as those of a quantity
     size: ClassVar[str] = ""  # of what the size is that its gate tells, in words as those of a quantity
     strengths: ClassVar[int] = 1  # so many leading parameters enter almost linearly
     texts: ClassVar[Mapping[str, str]] = {}  # what its gate says, by the kind of firing, figures in braces
@@ -248,7 +250,6 @@ class Late(Cause):
 class OfKinds(Cause):
     """A cause whose formula leaves a number open: each of a few is tried, as a kind of its own."""
 
-    number: ClassVar[str]  # its name in a model
     tried: ClassVar[tuple[float, ...]]  # the first is meant where a model keeps none
 
     def __init__(self, kind: float | None = None) -> None:

@@ -43,6 +43,7 @@ class Creep(OfKinds):
     order = 80
     family = "slow memory"
     number = "middle"
+    meant = "share of the middle one of several time constants (1: it is the only one)"
     tried = (_EQUAL, _ALONE, _FIVE)  # shares of the middle time constant
     common = True
     parameters = (

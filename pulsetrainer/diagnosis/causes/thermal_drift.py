@@ -40,6 +40,7 @@ class ThermalDrift(OfKinds):
     order = 50
     family = "slow gain"
     number = "cold"
+    meant = "the {input} at which nothing heats, as a share of its range"
     tried = (0.0, _BOTH_WAYS)  # share of the input's range at which nothing heats
     drifts = True
     wears = True
