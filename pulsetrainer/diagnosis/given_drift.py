@@ -58,7 +58,7 @@ def told(state: State, judged: Judged, changed: Change, noise_rms: float) -> tup
     if others:
         beside = _with_drift(state, judged, others)
         nearer = left_by(judged.measured, beside[1], noise_rms)
-        if nearer < LIMITS.relaxes * near:
+        if nearer < LIMITS.nearer * near:
             (drift, said, moved), near = beside, nearer
         else:
             others = []
@@ -116,7 +116,7 @@ def drift_in(left: FloatArray, frames: Sequence[Frame], average: _Average) -> Dr
     best = float(min(tried.ravel(), key=squares))
     ends = np.sort(best * np.asarray((0.5, 2.0)))  # beyond its neighbours
     slowing = float(optimize.minimize_scalar(squares, bounds=ends, method="bounded").x)
-    relaxes = squares(slowing) < LIMITS.relaxes**2 * squares(0.0)
+    relaxes = squares(slowing) < LIMITS.nearer**2 * squares(0.0)
     known = columns(slowing if relaxes else 0.0)
     solved = _solved(known, left)
     values, rest = solved[1:], left - known @ solved

@@ -174,19 +174,19 @@ class Thresholds:
 
     # A drift told by the model as given
     slowings: tuple[float, float, int] = (1.0, 100.0, 20)  # falls by 1/e in a record, from, to, and how many
-    relaxes: float = 0.9  # of what a parabola leaves, rms: what relaxes leaves less
+    nearer: float = 0.9  # of what a parabola, or a drift alone, leaves (rms): what is put in leaves less
 
     # Rivals
     closest: int = 3  # rivals refitted
     rival_screened: float = 0.5  # of the found cause's gain: rivals that score less are not refitted
     rival_gain: float = 0.005  # of that gain: as good, if no farther behind than the largest of this,
-    free_of_weights: float = 0.6  # of a hum in step with the loops: true ones have 0.8, devices up to 0.56
     rival_relevant: float = 0.3  # ... of the relevant fall of squares,
     own_error: float = 1.5  # times what is left: other kinds of plant reach 1.25, true causes fall to 1.54
     once_in_twenty: float = 1.645  # standard deviations of their difference under noise as it is
     finer: float = 2.0  # times that doubt: a parameter that is not there would move the others
     cut_turns: float = 0.3  # of the second difference of the output: drawn plants needed up to 0.26
     rival_noise: float = 12.0  # ... and mean squares: the noise of comparing two fits
+    free_of_weights: float = 0.6  # of a hum in step with the loops: true ones have 0.8, devices up to 0.56
     alike: float = 0.9  # cosine of screened columns: above, a quick screen names both
 
     # A gain that wears off, against heat

@@ -27,7 +27,7 @@ class Wear(Cause):
 
     id = "wear"
     stage = "output"
-    order = ThermalDrift.order
+    order = ThermalDrift.order  # in its place
     family = "slow gain"
     title = formula = signature = excitation = source = ""
     parameters = (
@@ -50,9 +50,11 @@ class Wear(Cause):
 
 
 def is_as_good(state: State, term: Term) -> bool:
-    """Whether wear fits as well as heat that was found, in its place."""
+    """Whether wear fits as well in the place of a cause that was found, where it may look like that."""
+    zero = term.cause.wears_about
+    if zero is None:
+        return False
     current, without = state.current, state.without[term.cause.id]
-    zero = term.cause.kind if isinstance(term.cause, ThermalDrift) else 0.0
     for by_way, length in product((False, True), LIMITS.worn_within):
         worn = Term(Wear(by_way=by_way, zero=zero), (LIMITS.worn, length))
         trial = refit(state.problem, (*without.terms, worn), without)

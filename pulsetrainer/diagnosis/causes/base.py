@@ -137,7 +137,6 @@ class Cause:
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
     drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
-    wears: ClassVar[bool] = False  # in a short record a gain that wears off looks like it
     sudden: ClassVar[bool] = False  # a change at a moment, its last parameter
 
     def gate(self, raw: Raw) -> Firing | None:
@@ -200,6 +199,11 @@ class Cause:
     def is_background(self, sizes: Sequence[float], noise: float) -> bool:
         """Return whether its parameters make it a part of the noise: told, but no verdict."""
         return False
+
+    @property
+    def wears_about(self) -> float | None:
+        """Share of the output's range about which wear of the gain looks like it; None: it never does."""
+        return None
 
     def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:
         """Return whether so small a cause differs from what the moments of sampling do."""

@@ -43,7 +43,6 @@ class ThermalDrift(OfKinds):
     meant = "the {input} at which nothing heats, as a share of its range"
     tried = (0.0, _BOTH_WAYS)  # share of the input's range at which nothing heats
     drifts = True
-    wears = True
     common = True
     parameters = (
         Quantity(
@@ -51,6 +50,11 @@ class ThermalDrift(OfKinds):
         ),
         Quantity("tau", "s", 1.0, 300.0, 0.5, "time constant of the heat"),
     )
+
+    @property
+    def wears_about(self) -> float:
+        """In a short record a gain that wears off about the same zero looks like heat."""
+        return self.kind
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         strength, tau = self.parameters

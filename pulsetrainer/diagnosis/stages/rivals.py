@@ -101,7 +101,7 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
     of_all = state.held_out.gain(state.baseline, state.current, state.floor)
     if not term.cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
         yield LITTLE
-    if term.cause.wears and wear.is_as_good(state, term):
+    if wear.is_as_good(state, term):
         yield MAY_BE_WEAR
 
 
