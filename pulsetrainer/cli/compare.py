@@ -61,8 +61,7 @@ def compare(
     ]
     job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})
     learners = isinstance(loaded[0], pt.Session)
-    # of two learners, or of one before and after; of a class the last less the first would say nothing
-    differ = ["difference"] if learners and len(loaded) == 2 else []
+    differ = ["difference"] if learners and len(loaded) == 2 else []  # of a class it would say nothing
     words = {True: "better", False: "worse", None: ""}
     rows = []
     for m in metrics:
