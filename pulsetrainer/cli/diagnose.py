@@ -49,7 +49,7 @@ def diagnose(
             progress=progress,
         )
         header = job.save(out, found, f"Diagnosis of {', '.join(path.stem for path in runs)}")
-        commands = _commands(found, runs, model, out)
+        commands = next_commands(found, runs, model, out)
         if html is not None:
             from pulsetrainer.report.diagnosis_html import render_diagnosis
 
@@ -64,16 +64,16 @@ def diagnose(
         job.screen.whole(f"then: {line}")
 
 
-def _commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:
+def next_commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:
+    """Return the commands to go on with: to extend the model, or to correct the runs and begin again."""
     words: list[list[object]] = []
-    if found.next_command == "extend":
+    if found.next_command == "extend":  # fitted with all faults of the measurement taken out
         words.append(["extend", out, "--model", model, "-o", "extended.h5"])
-    if found.next_command and found.correctable:
+    if found.next_command == "correct":
         corrected = [f"{run.stem}-corrected.h5" for run in runs]
         pairs = zip(runs, corrected, strict=True)
         words += [["correct", run, "--diagnosis", out, "-o", made] for run, made in pairs]
-        if found.next_command == "correct":
-            again = ["--model", "model-corrected.h5", "-o", f"{out.stem}-corrected.h5"]
-            words.append(["identify", *corrected, "-o", "model-corrected.h5"])
-            words.append(["diagnose", *corrected, *again])
+        again = ["--model", "model-corrected.h5", "-o", f"{out.stem}-corrected.h5"]
+        words.append(["identify", *corrected, "-o", "model-corrected.h5"])
+        words.append(["diagnose", *corrected, *again])
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]

@@ -50,6 +50,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     rms, extended = rms_of(state, model), state.current if state.extends else state.baseline
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
+    inputs = np.concatenate([record.input for record in problem.records])
     bench = wording.Bench(
         scale,
         model.input_unit,
@@ -57,6 +58,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         given.ours,
         given.input_quantity,
         given.output_quantity,
+        (float(inputs.min()), float(inputs.max())),
     )
     sign, words = model.polarity, _words(given) | bench.numbers()
     dependences = learned(state, words)

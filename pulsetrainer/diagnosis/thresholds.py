@@ -237,7 +237,7 @@ class Thresholds:
     # Words
     told_digits: int = 3  # significant, of rates and widths
     plain_digits: int = 6  # a number of fewer digits before its point is told without an exponent
-    told_to: float = 0.005  # of the range: levels that a person is asked to set are told as finely
+    told_to: float = 0.02  # of the range: levels to be set are told to the power of ten below
 
     # The extended model
     inverse_rounds: int = 16  # of the inverse

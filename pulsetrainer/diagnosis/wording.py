@@ -255,6 +255,7 @@ class Bench:
     ours: bool = False  # recorded by this program, which plays experiments itself
     input: str = "input"  # what was measured, in words
     output: str = "output"
+    reached: tuple[float, float] = (0.0, 1.0)  # by the input, shares of the range: none is asked for beyond
 
     def numbers(self, faster: float = 1.0) -> dict[str, str]:
         """Levels, rates and times of the experiments, so much faster, to be set on that bench."""
@@ -292,7 +293,8 @@ class Bench:
         return with_unit(f"{', '.join(rest)} and {last}", self.unit)
 
     def _number(self, share: float) -> str:
-        step = LIMITS.told_to * self.scale.reach
+        step = float(f"1e{math.floor(math.log10(LIMITS.told_to * self.scale.reach))}")
+        share = min(max(share, self.reached[0]), self.reached[1])
         value = round((self.scale.low + share * self.scale.reach) / step) * step
         # a small swing about a large value needs more digits than most
         more = max(0, math.ceil(math.log10(max(abs(value), self.scale.reach) / self.scale.reach)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import pulsetrainer as pt
 from program import pulsetrainer
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter, Recorded
+from pulsetrainer.cli.diagnose import next_commands
 
 
 def _diagnosis(run: pt.Run, verdict: str, causes: tuple[Cause, ...]) -> Diagnosis:
@@ -91,6 +93,17 @@ def test_extend_points_at_correct(folder):
     done = pulsetrainer(folder, "extend", "diagnosis.h5", "--model", "model.h5", "-o", "no.h5", "--json")
     assert done.code == 3
     assert "pulsetrainer correct" in done.json["error"]["hint"]
+
+
+def test_a_diagnosis_that_extends_the_model_sends_no_one_to_correct(folder):
+    """The drift is out of the extended model; without one, the run is corrected and fitted anew."""
+    model = pt.Model(np.linspace(0.0, 1.0, 3), np.ones(3), 0.0, np.ones(3, bool))
+    found = replace(pt.load(folder / "diagnosis.h5"), verdict="creep", extended=model)
+    verbs = [
+        [line.split()[1] for line in next_commands(one, [Path("run.h5")], Path("model.h5"), Path("d.h5"))]
+        for one in (found, replace(found, extended=None), replace(found, extended=None, correctable=()))
+    ]
+    assert verbs == [["extend"], ["correct", "identify", "diagnose"], []]
 
 
 def test_the_way_on_names_the_diagnosis_that_was_given(folder):

@@ -747,6 +747,14 @@ def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
     assert "e+" not in said
 
 
+def test_no_level_is_asked_for_that_the_input_never_had():
+    """A dual model may span more than what was recorded: 0 to 1 A of -0.1 to 1.2 A."""
+    bench = wording.Bench(Scale(-0.1, 1.3), "A", reached=(0.1 / 1.3, 1.1 / 1.3))
+    one = Evidence("tied", figures={"there": 1.0, "here": 0.5}, names=("nested loops", "delay", "creep"))
+    said = wording.advice(one, bench)
+    assert "between 0 A and 1 A" in said
+
+
 def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
     """Between 99.95 A and 100.05 A: three digits would make all stops the same."""
     bench = wording.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
