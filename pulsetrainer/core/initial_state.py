@@ -22,6 +22,7 @@ from pulsetrainer.core.record import Record
 NEAR = 0.01  # of the range: a noisy record touches its extreme only once, late
 _APART = 0.005  # of the output's span: a first stroke that runs so far from the later ones is another ...
 _TIMES = 2.0  # ... if these run nearer to each other by this factor
+_MET = 0.5  # of how far they lie apart: strokes that differ by no more at the other end have met there
 _LEFT = 2.0  # times ``NEAR``: so far away the end is left, for noise crosses a single limit again and again
 _COMPARED = 0.2  # of the range: shorter strokes are not compared ...
 _PLACES = 20  # ... nor those of fewer samples; and at so many places
@@ -64,7 +65,8 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
     """First sample that counts of a record that begins at an end: 0, or the next end after a stroke apart.
 
     How far apart strokes lie that should be alike is read off the later ones from the same end; where there
-    is but one, off those from the other end.
+    is but one, off those from the other end. At the other end all memory is wiped out: what still differs
+    there is no matter of what came before.
     """
     reach = high - low
     away, back = inputs - low, high - inputs
@@ -82,10 +84,24 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
     alike = max(root_mean_square(one - np.median(beside, axis=0)) for one in beside)
     if apart <= max(_APART * float(np.ptp(outputs)), _TIMES * alike):
         return 0
+    if (
+        _apart_at_the_far_end(first + later, reach) > _MET * apart
+    ):  # a step, heat, creep: no memory lasts so long
+        return 0
     at_end = _at_end(away, NEAR * reach)
     left = int(np.flatnonzero(at_end[:-1] & ~at_end[1:])[0])
     ends = np.flatnonzero((at_end | (back <= NEAR * reach))[left + 1 :])
     return left + 1 + int(ends[0])  # where the second stroke begins at the latest
+
+
+def _apart_at_the_far_end(strokes: Sequence[tuple[FloatArray, FloatArray]], reach: float) -> float:
+    """How far from the later strokes the first one ends, at the other end; 0 where it does not get there."""
+    ends = [
+        float(np.mean(y[way >= (1.0 - _LEFT * NEAR) * reach])) if way[-1] >= (1.0 - NEAR) * reach else np.nan
+        for way, y in strokes
+    ]
+    apart = np.abs(ends[0] - np.asarray(ends[1:]))
+    return float(np.median(apart[np.isfinite(apart)])) if np.isfinite(apart).any() else 0.0
 
 
 def _strokes(away: FloatArray, outputs: FloatArray, reach: float) -> list[tuple[FloatArray, FloatArray]]:

@@ -17,6 +17,7 @@ TURNS = (0.0, 5.0, 0.5, 4.5, 1.0, 5.0, 0.0, 3.5, 0.8, 4.8, 0.0, 4.2, 1.1, 5.0, 0
 
 # The end where it begins is reached once more; and a path within the range of a model.
 RARE = (0.0, 4.0, 0.5, 5.0, 1.0, 5.0, 0.4, 3.5, 0.8, 4.8, 0.0, 4.5, 1.1, 5.0, 0.5)
+FULL = (0.0, 5.0, 0.0, 5.0, 0.0, 3.5, 0.8, 5.0, 0.0, 4.2, 1.1, 5.0, 0.0, 5.0, 0.0)
 WITHIN = (0.0, 5.0, 0.5, 4.5, 1.0, 5.0, 0.0, 3.5, 0.8, 4.8, 0.0, 4.2, 1.1, 5.0, 0.0, 5.0, 0.0)
 WIDE = (*(x for low in range(-5, 5) for x in (low, 6.0)), -6.0, 5.0, -4.0, 3.0, -2.0, 1.0)
 
@@ -80,6 +81,25 @@ def test_how_far_apart_a_first_stroke_lies(first, later, left_out, down):
         u, y = 5.0 - u, -y
     assert known_from(u, 0.0, 5.0, y) == (495 if left_out else 0)  # within a hundredth of the other end
     assert known_from(np.append(2.0, u), 0.0, 5.0, np.append(2.0, y)) == 1  # it came from elsewhere
+
+
+@pytest.mark.parametrize("effect", ["creep", "heat"])
+@pytest.mark.parametrize("down", [False, True])
+def test_what_goes_on_at_the_other_end_is_no_first_stroke(effect, down):
+    """There all memory is wiped out; a device that was cycled, and does something else, loses no sample."""
+    u, y = _record(cycled=True, turns=FULL)
+    fresh, virgin = _record(cycled=False, turns=FULL)
+    t = np.arange(u.size) * DT_S
+    spoilt = {
+        "creep": lambda y: y + 0.05 * np.ptp(y) * np.exp(-t / 3.0),
+        "heat": lambda y: y * (1.0 - 0.05 * (1.0 - np.exp(-t / 3.0))),
+    }[effect]
+    if down:
+        assert known_from(5.0 - u, 0.0, 5.0, -spoilt(y)) == 0
+        assert known_from(5.0 - fresh, 0.0, 5.0, -virgin) * DT_S == pytest.approx(2.0, abs=0.06)
+    else:
+        assert known_from(u, 0.0, 5.0, spoilt(y)) == 0
+        assert known_from(fresh, 0.0, 5.0, virgin) * DT_S == pytest.approx(2.0, abs=0.06)
 
 
 @pytest.mark.parametrize("seed", range(8))
