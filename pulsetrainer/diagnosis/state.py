@@ -172,7 +172,7 @@ class State:
         return {
             one.cause.id
             for one in self.findings
-            if one.found and one.cause.is_background(self._sizes(one), self.floor.noise)
+            if one.found and one.cause.is_background(self._sizes(one), self.floor, self.problem.frames)
         }
 
     def _sizes(self, finding: Finding) -> list[float]:

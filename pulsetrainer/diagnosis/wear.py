@@ -1,14 +1,16 @@
-"""A gain that wears off: what heat looks like in a recording that was too short for it, or never rests.
+"""What settles from the begin of a record on: heat in a short one looks like it, and a sudden change in any.
 
-    y - k (1 - e^(-x / l)) (y - y0),    x the time, or the way of the input
+    y - (1 - e^(-x / l)) (k (y - y0) + b),    x the time, or the way of the input
 
-It is no cause of the library: one record does not tell wear from a gain that wanders. Where it fits as well
-as heat, that does not go into a model, which would go on with it in the next record.
+Against heat the gain alone wears off (b = 0). It is no cause of the library: one record does not tell it from
+a gain that wanders. Where it fits as well, what was found does not go into a model, which would go on with it
+in the next record; and what settles is no step, and not taken out of the record as one.
 """
 
 from __future__ import annotations
 
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,7 +32,7 @@ class Wear(Cause):
     order = ThermalDrift.order  # in its place
     family = "slow gain"
     title = formula = signature = excitation = source = ""
-    parameters = (
+    parameters: ClassVar[tuple[Quantity, ...]] = (
         Quantity("share", "1", *LIMITS.worn_shares, LIMITS.worn_step, "share of the {output} that is lost"),
         Quantity(
             "length", "1", *LIMITS.worn_lengths, LIMITS.worn_step, "of the record, until it has followed"
@@ -42,22 +44,41 @@ class Wear(Cause):
         self._zero = zero  # of the range of the output, from that of empty memory: where a gain does nothing
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        """Output (n,) of the gain that is left."""
+        """Output (n,) of the gain, and of the zero, that are left."""
         done = frame.path if self._by_way else frame.time_s
-        share, length = values
+        share, length, *shift = values
         zero = frame.zero + self._zero * (frame.ends[1] - frame.ends[0])
-        return np.asarray(y + share * np.expm1(-done / (length * done[-1])) * (y - zero))
+        lost = share * (y - zero) + sum(shift) * frame.span
+        return np.asarray(y + np.expm1(-done / (length * done[-1])) * lost)
+
+
+class Settling(Wear):
+    """The same, of the zero as well: what a sudden change of both looks like."""
+
+    parameters = (
+        *Wear.parameters,
+        Quantity("shift", "1", *LIMITS.worn_shares, LIMITS.worn_step, "of the span, by which the zero falls"),
+    )
 
 
 def is_as_good(state: State, term: Term) -> bool:
-    """Whether wear fits as well in the place of a cause that was found, where it may look like that."""
-    zero = term.cause.wears_about
-    if zero is None:
+    """Whether what settles fits as well in the place of a cause that was found and may look like it."""
+    if term.cause.wears_about is None:
         return False
     current, without = state.current, state.without[term.cause.id]
-    for by_way, length in product((False, True), LIMITS.worn_within):
-        worn = Term(Wear(by_way=by_way, zero=zero), (LIMITS.worn, length))
+    for worn in _begun(term, state.problem.frames[0].length_s):
         trial = refit(state.problem, (*without.terms, worn), without)
         if trial.squares - current.squares < doubt(current, trial, state.scores.noise):
             return True
     return False
+
+
+def _begun(term: Term, length_s: float) -> list[Term]:
+    """What settles, at the lengths from which it is fitted."""
+    zero = term.cause.wears_about or 0.0
+    if not term.cause.sudden:
+        pairs = product((False, True), LIMITS.worn_within)
+        return [Term(Wear(by_way=way, zero=zero), (LIMITS.worn, length)) for way, length in pairs]
+    as_quickly = max(term.values[-1] / length_s, LIMITS.worn_lengths[0])
+    pairs = product((False, True), (*LIMITS.worn_within, as_quickly))
+    return [Term(Settling(by_way=way, zero=zero), (LIMITS.worn, length, 0.0)) for way, length in pairs]

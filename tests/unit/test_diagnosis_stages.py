@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pulsetrainer.diagnosis import design, fitting, residual, velocity, wording
+from pulsetrainer.diagnosis import design, fitting, residual, velocity, wear, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
@@ -1160,7 +1160,7 @@ def test_findings_come_in_order_and_gates_once_a_cause():
         _finding("viscous", 7.0, False),
     )
     state = _state(_fit(200.0), findings=findings, firings=firings)
-    state = replace(state, problem=SimpleNamespace(records=(1, 2, 3)))
+    state = replace(state, problem=SimpleNamespace(records=(1, 2, 3), frames=PROBLEM.frames))
     found = verdict.stage(state).findings
     assert [f.cause.id for f in found[:5]] == ["creep", "step", "quantisation", "viscous", "delay"]
     gate = found[2]
@@ -1788,18 +1788,44 @@ def test_at_one_rate_all_that_widen_the_loop_are_one_family(lacks, others):
 def test_a_slow_fault_that_predicts_less_than_half_is_doubted(monkeypatch, name, gain, said):
     """A step takes a part of what a device of another kind leaves; a cause of the device must repeat."""
     monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
+    monkeypatch.setattr(wear, "is_as_good", lambda state, term: False)
     state = _state(_fit(1.0, name), held_out=HeldOut(gain), estimates={name: ()})
     object.__setattr__(state.current, "residual", np.zeros(3))
     doubts = set(rivals._doubts(state, state.current.terms[0], 1.0, 1.0))
     assert ("predicts little" in doubts) is said
 
 
+@pytest.mark.parametrize(("sudden", "said"), [("step", "settles"), ("thermal-drift", "may be wear")])
+def test_what_settles_speaks_against_a_step_and_wear_against_heat(monkeypatch, sudden, said):
+    """A step that only settles is in doubt; heat keeps its name."""
+    monkeypatch.setattr(residual, "wander", lambda left, level: 0.0)
+    monkeypatch.setattr(wear, "is_as_good", lambda state, term: True)
+    state = _state(_fit(1.0, sudden), held_out=HeldOut(0.9), estimates={sudden: ()})
+    object.__setattr__(state.current, "residual", np.zeros(3))
+    doubts = tuple(rivals._doubts(state, state.current.terms[0], 1.0, 1.0))
+    assert said in doubts
+    assert replace(_finding(sudden, 1.0), doubts=(said,)).in_doubt is (sudden == "step")
+
+
+@pytest.mark.parametrize(("slow", "said"), [(0.9, "offset-drift"), (1.1, "none")])
+def test_a_drift_no_larger_than_slow_noise_takes_no_verdict(slow, said):
+    """Its rms about its mean, against what noise leaves in averages beyond that from sample to sample."""
+    (frame,) = PROBLEM.frames
+    rate = 0.01
+    moved = float(np.std(rate * frame.time_s))
+    found = replace(_finding("offset-drift", 50.0), parameters=(Estimate("rate", rate, "1", 0.0, 1.0),))
+    state = _state(_fit(200.0), findings=(found,))
+    floor = replace(state.floor, white=float(np.hypot(state.floor.quick.white, slow * moved)))
+    assert verdict.stage(replace(state, floor=floor, problem=PROBLEM)).verdict == said
+
+
 @pytest.mark.parametrize(
     ("share", "times", "said"), [(0.34, 2.9, True), (0.32, 2.9, False), (0.34, 3.5, False)]
 )
 @pytest.mark.parametrize("name", ["step", "creep"])
-def test_a_slow_cause_is_doubted_where_what_is_left_wanders(share, times, said, name):
+def test_a_slow_cause_is_doubted_where_what_is_left_wanders(monkeypatch, share, times, said, name):
     """More than a third of what is left, and a tenth of what the cause took away: by tenths of the time."""
+    monkeypatch.setattr(wear, "is_as_good", lambda state, term: False)
     number = np.arange(4000)
     level = np.sin(0.37 * number)
     noise = np.where(number % 2, 1.0, -1.0) * np.cos(0.01 * number)

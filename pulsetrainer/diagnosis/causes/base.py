@@ -23,6 +23,7 @@ from pulsetrainer.diagnosis.raw import Firing, Raw
 if TYPE_CHECKING:
     from pulsetrainer.diagnosis.finding import Estimate
     from pulsetrainer.diagnosis.fitting import Fitted
+    from pulsetrainer.diagnosis.floor import Floor
 
 _NO_LAG = 1e-7  # of a time step: a shorter time constant is none
 _NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
@@ -196,13 +197,13 @@ class Cause:
         """Return start values for a refit, nearer to what the residual shows than the grid of ``starts``."""
         return values
 
-    def is_background(self, sizes: Sequence[float], noise: float) -> bool:
+    def is_background(self, sizes: Sequence[float], floor: Floor, frames: Sequence[Frame]) -> bool:
         """Return whether its parameters make it a part of the noise: told, but no verdict."""
         return False
 
     @property
     def wears_about(self) -> float | None:
-        """Share of the output's range about which wear of the gain looks like it; None: it never does."""
+        """Share of the output's range about which a gain that settles looks like it; None: it never does."""
         return None
 
     def can_be_told(self, values: Values, frames: Sequence[Frame]) -> bool:

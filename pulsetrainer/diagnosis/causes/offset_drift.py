@@ -12,13 +12,16 @@ from another zero then. The model as given does (`given_drift`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 from pulsetrainer.diagnosis.thresholds import TINY
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.floor import Floor
 
 _TRIED = 0.01  # of the span over the record
 _MIDDLE = 4.0  # the bend is largest in the middle: a quarter of c T^2
@@ -54,7 +57,8 @@ class OffsetDrift(Cause):
             "against the model as given the zero of the {output} moves by {moved:+.2g}{in_y}, and beside "
             "that the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings hide some of "
             "it"
-        )
+        ),
+        "background": "a drift no larger than the slow noise beside it: it is told, but is no verdict",
     }
 
     def __init__(self, count: int = _PLAIN) -> None:
@@ -74,6 +78,11 @@ class OffsetDrift(Cause):
         length = frames[0].time_s[-1] + frames[0].dt_s
         size = _TRIED * frames[0].span
         return [[(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]]
+
+    def is_background(self, sizes: Sequence[float], floor: Floor, frames: Sequence[Frame]) -> bool:
+        """Return whether it is no larger than a noise that is slow itself."""
+        moved = np.concatenate([_drift(tuple(sizes), frame.time_s) for frame in frames])
+        return bool(np.var(moved) <= floor.white**2 - floor.quick.white**2)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         return y + _drift(values, frame.time_s)

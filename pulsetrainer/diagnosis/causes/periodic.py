@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy import fft, ndimage, signal
@@ -12,6 +12,9 @@ from scipy import fft, ndimage, signal
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 from pulsetrainer.diagnosis.thresholds import TINY
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.floor import Floor
 
 _SLOWEST_Hz = 0.4  # slower lines are drift ...
 _PERIODS = 8.0  # ... as are lines of which the record holds fewer periods
@@ -77,10 +80,10 @@ class Periodic(Cause):
         """Return by what a parameter is multiplied when the output is; of later records it has a number."""
         return super().sign(name.partition(" ")[0], polarity)
 
-    def is_background(self, sizes: Sequence[float], noise: float) -> bool:
+    def is_background(self, sizes: Sequence[float], floor: Floor, frames: Sequence[Frame]) -> bool:
         """Return whether it is a hum of the noise's size."""
         rms = float(np.hypot(sizes[0], sizes[1])) / np.sqrt(2.0)
-        return bool(rms <= min(_FAINT_NOISE * noise, _FAINT))
+        return bool(rms <= min(_FAINT_NOISE * floor.noise, _FAINT))
 
     def in_step(self, values: Values, frames: Sequence[Frame]) -> bool:
         """Return whether the input has one frequency, of which this is a multiple as far as can be told."""

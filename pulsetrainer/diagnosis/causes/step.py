@@ -52,6 +52,11 @@ class Step(Cause):
         """The same at one sample."""
         return Step(1.0)
 
+    @property
+    def wears_about(self) -> float:
+        """What settles from the begin on looks like a step, about empty memory as that."""
+        return 0.0
+
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         """Blocks of parameter values to try: the same moments, whatever the residual."""
         first, last = _sides(frames)

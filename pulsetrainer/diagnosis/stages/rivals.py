@@ -12,9 +12,10 @@ parameter or its interval ends where the search did, or its very strength sits t
 the input, most of which the weights would hold; it is slow and what is left still wanders from one tenth of
 the time to the next, it is slow, belongs to the record, and all causes together take away less than half of
 what can be lowered on blocks that were left out (which a device of another kind leaves), only equal loops
-would show it and there are none, a gain that wears off with time, or with the way of the input, fits as well,
-or the record has one rate and no rest, where any cause looks like what a model lacks of the device, and it
-explains little more than what is left and slow, or that is more than noise.
+would show it and there are none, a gain that wears off with time, or with the way of the input, fits as well
+(of a step: whatever settles from the begin of the record on), or the record has one rate and no rest, where
+any cause looks like what a model lacks of the device, and it explains little more than what is left and slow,
+or that is more than noise.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
 OWN_ERROR, STRONGEST, AT_BOUND = "own error", "strength at bound", "at bound"
-MAY_BE_NOTHING, MAY_BE_WEAR, IN_STEP = "spans zero", "may be wear", "in step"
+MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, IN_STEP = "spans zero", "may be wear", "settles", "in step"
 
 
 def stage(state: State) -> State:
@@ -102,7 +103,7 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
     if not term.cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
         yield LITTLE
     if wear.is_as_good(state, term):
-        yield MAY_BE_WEAR
+        yield SETTLES if term.cause.sudden else MAY_BE_WEAR
 
 
 def _is_in_step(state: State, term: Term, fall: float) -> bool:
