@@ -104,7 +104,10 @@ def of_a_curve(one: Parameter) -> bool:
 def parameter(one: Parameter) -> str:
     """Return a parameter with its unit, its 95 % interval and what it is of."""
     known = math.isfinite(one.lower) and one.lower < one.upper
-    interval = f" (95 %: {one.lower:.3g} to {one.upper:.3g})" if known else ""
+    low, high = f"{one.lower:.3g}", f"{one.upper:.3g}"
+    half = max(one.upper - one.value, one.value - one.lower)
+    between = f"{low} to {high}" if low != high else f"± {half:.1g}"  # "7 to 7" would tell nothing
+    interval = f" (95 %: {between})" if known else ""
     return with_unit(f"{one.value:.4g}", one.unit) + interval + (f": {one.meaning}" if one.meaning else "")
 
 

@@ -214,8 +214,10 @@ def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> N
         axes.axhline(y, **{**GUIDE, "color": INK, "zorder": 3})
 
 
-def prediction(panel: FigureBase, model: ModelEvaluation, reach: float | None = None) -> None:
-    """Draw a measured record with a model's prediction of it, and the residual below.
+def prediction(
+    panel: FigureBase, model: ModelEvaluation, reach: float | None = None, quantity: str = ""
+) -> None:
+    """Draw a measured record of a quantity with a model's prediction of it, and the residual below.
 
     With ``reach`` the residual is drawn from -reach to reach, so that several models compare by eye.
     """
@@ -223,7 +225,7 @@ def prediction(panel: FigureBase, model: ModelEvaluation, reach: float | None = 
     x, name = abscissa(model.time_s, model.output.size)
     trace(above, x, model.output, **GROUND, label="measured")
     trace(above, x, model.predicted, **MODEL, label="predicted")
-    above.set_ylabel(label(quantity_of(model.output_unit), model.output_unit))
+    above.set_ylabel(label(quantity or quantity_of(model.output_unit), model.output_unit))
     above.set_title(f"{PurePath(model.name).stem}: rms {model.rms_percent:.3g} % of span (dotted: ± rms)")
     headroom(above)
     residual(below, x, model.output - model.predicted, model.rms)

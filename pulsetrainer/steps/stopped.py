@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from pulsetrainer.device.follower import INTERRUPTED
@@ -19,6 +20,12 @@ def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> No
         hint=remedy or "remove the cause; the next command clears the fault",
         kept=kept,
     )
+
+
+def kept_in(where: Path, many: int, what: str) -> str:
+    """Say what a file keeps of a play that did not reach its end: how many beats, or samples."""
+    were = f"{what} was" if many == 1 else f"{what}s were"
+    return f"; {many} {were} kept in {where} (complete=false)"
 
 
 def in_part(fault: str, begun_s: float) -> str:

@@ -115,7 +115,7 @@ def _model(group):
 
 def _prediction(file):
     """Return every number of the models' table by the name that it has in the page."""
-    names = ("rms", "rms_percent", "max_percent", "gain_percent")
+    names = ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent")
     found = {
         f"{PurePath(group.attrs['name']).stem}.{name}": group[name][()]
         for group in file["models"].values()

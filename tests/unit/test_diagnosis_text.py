@@ -57,6 +57,8 @@ def test_a_parameter_is_told_with_unit_interval_and_meaning():
     assert (
         parameters([Parameter("tau", 1.5, "s", NAN, NAN)])["tau"] == "1.5 s"
     )  # a file of 0.1, a quick screen
+    narrow = parameters([Parameter("f", 7.0, "Hz", 6.9999, 7.0003)])
+    assert narrow["f"] == "7 Hz (95 %: ± 0.0003)"  # "7 to 7" told nothing
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -474,6 +474,15 @@ def test_the_prediction_of_one_model_fills_its_figure():
     assert len(alone.axes) == 2
 
 
+def test_a_prediction_names_the_quantity_as_the_model_does():
+    """A magnet's said "output [mT]"."""
+    model = replace(stored.model(), output_quantity="flux density")
+    one = replace(examples.model_evaluation(), output_unit="mT")
+    for models in ((one,), (one, one)):
+        drawn = figures.evaluation(Evaluation(models=models, model=model))
+        assert {a.get_ylabel() for a in drawn.axes} == {"flux density [mT]", "residual [mT]"}
+
+
 def test_a_diagnosis_without_time_draws_none():
     """Its samples were called seconds, and groups of one place were drawn as a point."""
     group, one = np.arange(3.0), np.full(3, np.nan)
