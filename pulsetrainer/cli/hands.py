@@ -54,7 +54,7 @@ class Hands:
                     f"a quiz is answered by key, and {dark}",
                     hint="run it on a terminal, or give the answers in a file: --answers answers.txt",
                 )
-            return Steered(chosen) if dark else self._asked(chosen)
+            return Steered(chosen, chosen.share_at) if dark else self._asked(chosen)
         if dark:
             if "small" in dark:
                 screen.note(f"{dark}; there are no keys")
@@ -85,4 +85,4 @@ class Hands:
             + (", answered" if self._answers else "")
             + (f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops" if wrong else "")
         )
-        return Steered(steering, view=live, screen=live.on_screen())
+        return Steered(steering, quiz.share_at, live, live.on_screen())

@@ -145,7 +145,8 @@ def _facts(imported: Imported) -> dict[str, Any]:
     shown["loop"] = f"{direction} (correlation {report.correlation:+.2f})"
     shown["coverage_percent"] = report.coverage_percent
     low, high = report.input_range
-    shown["told apart by minor loops"] = minor_words(report.minor_percent) if high > low else "none"
+    apart = minor_words(report.minor_percent, report.coverage_percent)
+    shown["told apart by minor loops"] = apart if high > low else "none"
     even = f"even but for the gap{'s' if report.gaps > 1 else ''}" if report.gaps else "even"
     stamps = {True: even, False: "uneven", None: "none: only the order counts"}[report.even]
     shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps

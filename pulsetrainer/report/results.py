@@ -57,7 +57,7 @@ def identified(out: Path, model: Model, seconds: float) -> Said:
         "fit rms": with_unit(f"{fit.rms:.4g}", unit),
         "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
         "cells switched": f"{fit.coverage_percent:.1f} %",
-        "told apart by minor loops": minor_words(fit.minor_percent)
+        "told apart by minor loops": minor_words(fit.minor_percent, fit.coverage_percent)
         + f", on the plane of the {model.edges_quantity}" * (model.form == "dual"),
         "smoothing": f"{share:.3g} of the range of the {model.input_quantity}" if share else "none",
         "loop": loop_words(model),

@@ -431,6 +431,7 @@ def test_nothing_gives_a_question_away(tmp_path):
     words = ("--pulses", "bifid,parvus-et-tardus", "--quiz", 2, "--seed", 7)
     terminal = Terminal(tmp_path, *SHORT, *words, port="bench:")
     terminal.until(lambda: b"question 1 of 2" in terminal.seen)
+    terminal.until(lambda: b"Q stop" in terminal.seen)  # before a wrong key, too
     shown = [terminal.seen.count(name) for name in (b"bifid", b"parvus-et-tardus")]
     terminal.until(lambda: terminal.seen.count(b"bifid") > shown[0] + 5)
     # both names stand in the list of choices and nowhere else: as often
