@@ -90,10 +90,20 @@ def room(axes: Axes, share: float = 0.16) -> None:
     axes.set_ylim(low, high + share * (high - low))
 
 
-def headroom(axes: Axes, share: float = 0.16) -> None:
-    """Make room above the curves and put the legend there, in one row: it never covers a curve."""
+def headroom(axes: Axes, share: float = 0.16, markerscale: float = 1.0) -> None:
+    """Make room above the curves and put the legend there, in one row: it never covers a curve.
+
+    ``markerscale`` makes the points of the legend larger than those of the data, which they looked like.
+    """
     room(axes, share)
-    axes.legend(loc="upper left", ncols=4, columnspacing=1.0, handlelength=1.8, borderaxespad=0.2)
+    axes.legend(
+        loc="upper left",
+        ncols=4,
+        columnspacing=1.0,
+        handlelength=1.8,
+        borderaxespad=0.2,
+        markerscale=markerscale,
+    )
 
 
 def quantity_of(unit: str, otherwise: str = "output") -> str:

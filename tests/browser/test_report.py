@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import unicodedata
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path, PurePath
 
 import h5py
+import numpy as np
 import pytest
+import store_examples
+
+from pulsetrainer.artefacts import Quiz
+from pulsetrainer.report.score_sheet import render_session
+from pulsetrainer.steps.quiz import score
 
 MEASURING = Path(__file__).with_name("measuring.js").read_text()
 
@@ -214,6 +222,32 @@ def test_paper_has_everything(opened, report):
         assert not said.endswith(squeezed_headings)  # a heading stays with what it is of
         # the errors of a drive and their figures are not torn apart
         assert said.count("Errorswithandwithoutcompensation") == said.count("Hysteresisopensaloop")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("questions", [4, 8, 12, 16])
+def test_a_score_sheet_on_paper_keeps_its_provenance_together(browser, tmp_path, questions):
+    """Two lines of sources were the second sheet of a quiz of four, half of the provenance that of twelve."""
+    pypdf = pytest.importorskip("pypdf", reason="pypdf is not installed")
+    names = ("normal", "bifid")
+    quiz = Quiz(names, names * (questions // 2), names * (questions // 2), np.ones(questions))
+    html = tmp_path / "sheet.html"
+    html.write_text(
+        render_session(
+            replace(store_examples.session(), quiz=quiz), score(quiz), {},
+            title="Session", created="2026-01-02T03:04:05Z", history=["pulsetrainer session"] * 3,
+            provenance_json=json.dumps({f"key {k}": "a value of some length" for k in range(40)}),
+        )
+    )  # fmt: skip
+    page = browser.new_page()
+    page.goto(html.as_uri())
+    page.pdf(path=html.with_suffix(".pdf"), prefer_css_page_size=True)
+    page.close()
+    sheets = [sheet.extract_text() for sheet in pypdf.PdfReader(html.with_suffix(".pdf")).pages]
+    (at,) = [k for k, said in enumerate(sheets) if "Provenance" in said]
+    assert all(words in sheets[at] for words in ("pulsetrainer session", "key 39", "Augmentation index"))
+    assert at == len(sheets) - 1 <= 1
+    assert "normal: 1 beat," in sheets[0]
 
 
 @pytest.mark.slow

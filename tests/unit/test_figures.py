@@ -303,6 +303,13 @@ def test_the_temperature_is_drawn_where_heat_was_tracked():
         assert encode(after, "png").startswith(b"\x89PNG")
 
 
+def test_the_points_of_a_legend_are_no_beats():
+    """One beside the others, as small as they: it looked like the error of a beat."""
+    below = figures.draw(stored.session()).axes[1]
+    drawn = {line.get_markersize() for line in below.lines}
+    assert all(line.get_markersize() > 2 * max(drawn) for line in below.get_legend().get_lines())
+
+
 def test_a_session_without_a_sample_has_no_figure():
     """It was cut off before it began."""
     session = stored.session()
