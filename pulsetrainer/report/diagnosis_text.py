@@ -77,7 +77,9 @@ def answer(one: Cause, found: Diagnosis) -> str:
         return "no"
     if one.p_value > LIMITS.p_max:
         return "no: noise does as much"
-    return "no: another explains more" if found.quick else "no: not confirmed by the refit"
+    if not found.quick:
+        return "no: not confirmed by the refit"
+    return "no: another explains more" if found.found else "no: too small to matter"
 
 
 def parameters(several: Sequence[Parameter]) -> dict[str, str]:

@@ -162,7 +162,7 @@ def pressed(
         "force": f"{reach_N[0]:.2f} .. {reach_N[1]:.2f} N at full amplitude",
         "error": f"{error}, of full force",
         "timing": f"beats begin within {figures['beat_timing_max_ms']:.2g} ms of their time",
-        "as asked": f"{', '.join(spread)} (standard deviation)" if spread else None,
+        **({"as asked": f"{', '.join(spread)} (standard deviation)"} if spread else {}),
         **({"coil": warmth_words(warmth_K)} if warmth_K else {}),
     }
 
