@@ -62,7 +62,10 @@ def known(value: float | None, metric: str, form: str) -> Number:
 
 
 def offset(predicted: ModelEvaluation, metric: str) -> Number:
-    """Return the offset of a run against a model for the page, an empty place in files that have none."""
+    """Return the offset of a run against a model for the page, an empty place in files that have none.
+
+    Its metric is no model's ``offset``: a file may be called model.h5.
+    """
     found = known(predicted.offset, metric, ".3g")
     return found if beyond_rounding(predicted.offset, predicted.rms) else replace(found, text="0")
 

@@ -126,8 +126,9 @@ def _model(group):
 def _prediction(file):
     """Return every number of the models' table by the name that it has in the page."""
     names = ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent")
+    called = {"offset": "run_offset"}  # a model has an offset of its own
     found = {
-        f"{PurePath(group.attrs['name']).stem}.{name}": group[name][()]
+        f"{PurePath(group.attrs['name']).stem}.{called.get(name, name)}": group[name][()]
         for group in file["models"].values()
         for name in names
     }
