@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from pulsetrainer.device.follower import INTERRUPTED
@@ -24,7 +23,7 @@ def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> No
     )
 
 
-def kept_in(where: Path, many: int, what: str) -> str:
+def kept_in(where: object, many: int, what: str) -> str:
     """Say what a file keeps of a play that did not reach its end: how many beats, or samples."""
     were = f"{what} was" if many == 1 else f"{what}s were"
     return f"; {many} {were} kept in {where} (complete=false)"
