@@ -23,6 +23,7 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.device.gains import DELIVERED
+from pulsetrainer.device.limits import Limits
 from pulsetrainer.device.opening import DEFAULT_PORT
 from pulsetrainer.device.ports import list_ports
 from pulsetrainer.device.schemes import redact
@@ -30,7 +31,7 @@ from pulsetrainer.device.trace import Trace
 from pulsetrainer.diagnosis import gates, wording
 from pulsetrainer.errors import Interrupted, PulsetrainerError
 from pulsetrainer.simulation import build
-from pulsetrainer.steps.stopped import raise_if_stopped
+from pulsetrainer.steps.stopped import UNKNOWN_REMEDY, raise_if_stopped
 from pulsetrainer.version import __version__
 
 State = Literal["ok", "warning", "problem"]
@@ -77,13 +78,15 @@ def examine(
     port: str | None = None,
     *,
     capture: bool = True,
+    limits: Limits | None = None,
     settings: str = "",
     tuned: Path | None = None,
     progress: Callable[[float], None] = lambda _share: None,
 ) -> Result:
     """Look at versions, compiler, emulator, folder, ports and device; with ``capture`` its coil is driven.
 
-    ``settings`` says in words which are in force, ``tuned`` is the file with the gains that `tune` found.
+    ``limits`` hold meanwhile; ``settings`` says in words which are in force, ``tuned`` is the file with the
+    gains that `tune` found.
     """
     looks: list[Callable[[], Iterator[Finding]]] = [
         _versions,
@@ -92,7 +95,7 @@ def examine(
         _folder,
         lambda: iter([_finding("settings", settings or "none: defaults")]),
         _ports,
-        lambda: _device(port, tuned, capture=capture),
+        lambda: _device(port, limits or Limits(), tuned, capture=capture),
     ]
     found: list[Finding] = []
     for number, look in enumerate(looks):
@@ -179,9 +182,9 @@ def _ports() -> Iterator[Finding]:
 # --- the device -----------------------------------------------------------------------------------------
 
 
-def _device(port: str | None, tuned: Path | None, *, capture: bool) -> Iterator[Finding]:
+def _device(port: str | None, limits: Limits, tuned: Path | None, *, capture: bool) -> Iterator[Finding]:
     try:
-        with open_device(port, tuned=tuned) as device:
+        with open_device(port, limits=limits, tuned=tuned) as device:
             yield from _identity(device, redact(port or DEFAULT_PORT))
             own = (
                 f"those of `pulsetrainer tune`, from {tuned}" if device.gains != DELIVERED else "as delivered"
@@ -217,7 +220,9 @@ def _short_capture(device: Device) -> Iterator[Finding]:
     if recording.fault == INTERRUPTED:
         raise_if_stopped(recording.fault, recording.remedy, "the short capture")
     if recording.fault:
-        yield _finding("short capture", f"it ended early: {recording.fault}", problem=recording.remedy)
+        yield _finding(
+            "short capture", f"it ended early: {recording.fault}", problem=recording.remedy or UNKNOWN_REMEDY
+        )
         return
     if lost := recording.dropped_samples:
         cable = "use a shorter or shielded cable, another USB port, no hub"

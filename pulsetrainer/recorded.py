@@ -23,7 +23,7 @@ from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.quiz import Blind
 from pulsetrainer.steps.recording import Watch, decimation_for, record
 from pulsetrainer.steps.session import perform
-from pulsetrainer.steps.stopped import raise_if_stopped
+from pulsetrainer.steps.stopped import kept_in, raise_if_stopped
 
 
 class Captured(NamedTuple):
@@ -82,7 +82,7 @@ def capture_into(
         error = Interrupted("stopped by you") if isinstance(stopped, KeyboardInterrupt) else stopped
         if recorder.samples:
             where = recorder.partial if recorder.partial.exists() else out
-            error.message += f"; {recorder.samples} samples were kept in {where} (complete=false)"
+            error.message += kept_in(where, recorder.samples, "sample")
             error.hint = error.hint or "go on with the same command and --resume"
         raise error from stopped.__cause__
     return Captured(

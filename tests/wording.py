@@ -196,6 +196,7 @@ MESSAGES = {
     "stopped before a repeat": Message(
         "stopped by you", "run the command again", got="run.h5 was not written"
     ),
+    "two sessions at once": Message("got 2 sessions", "pulsetrainer compare"),
     "stopped with beats": Message("stopped by you", "evaluate", got="beats were kept in run.h5"),
     "stopped before a beat": Message("stopped by you", "run the command again", got="run.h5 was not written"),
     "interrupted": Message("stopped by you", "--resume", got=KEPT),

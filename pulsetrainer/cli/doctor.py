@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from pulsetrainer.cli.console import Screen, plain
-from pulsetrainer.cli.options import AsJson, Port
+from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Port
 from pulsetrainer.files import settings
 from pulsetrainer.report.tables import folded
 
@@ -22,6 +22,8 @@ def doctor(
     capture: Annotated[
         bool, typer.Option(help="Drive the coil for 3 s, to half its range, and look at what comes back.")
     ] = True,
+    limit_current: LimitCurrent = None,
+    limit_force: LimitForce = None,
     json: AsJson = False,
 ) -> None:
     """Check this computer, its ports and the device.
@@ -30,6 +32,7 @@ def doctor(
 
     Example: pulsetrainer doctor --port /dev/ttyUSB0
     """
+    from pulsetrainer.device.limits import Limits
     from pulsetrainer.doctor import examine
     from pulsetrainer.errors import QualityError
 
@@ -39,7 +42,8 @@ def doctor(
     rows = settings.effective(file, os.environ)
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
     with screen.bar("looking") as progress:
-        result = examine(port, capture=capture, settings=words, tuned=file, progress=progress)
+        held = Limits(limit_current, limit_force)
+        result = examine(port, capture=capture, limits=held, settings=words, tuned=file, progress=progress)
     stand = "stands" if result.problems == 1 else "stand"
     problem = f"{result.problems} of {len(result.findings)} findings {stand} in the way"
     failed = QualityError(problem, hint="follow the fixes, from the top") if result.problems else None
@@ -48,7 +52,7 @@ def doctor(
         width = max(len(one.name) for one in result.findings)
         for one in result.findings:
             lead = f"{_MARKS[one.state]:<8} {one.name:<{width}}  "
-            if one.name == "versions":  # a list of words that nobody copies
+            if one.name in ("versions", "settings"):  # lists of words that nobody copies
                 screen.whole(folded(lead, one.found, min(_WIDTH, screen.width)))
             else:
                 screen.line(lead, one.found)

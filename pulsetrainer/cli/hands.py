@@ -48,17 +48,17 @@ class Hands:
         UsageError where a quiz is to be answered by key, and there is none.
         """
         dark = "a result in JSON has no live view" if screen.as_json else why_not()
-        if isinstance(chosen, Blind):
-            if by_key and dark:
-                raise UsageError(
-                    f"a quiz is answered by key, and {dark}",
-                    hint="run it on a terminal, or give the answers in a file: --answers answers.txt",
-                )
-            return Steered(chosen) if dark else self._asked(chosen)
+        if isinstance(chosen, Blind) and by_key and dark:
+            raise UsageError(
+                f"a quiz is answered by key, and {dark}",
+                hint="run it on a terminal, or give the answers in a file: --answers answers.txt",
+            )
         if dark:
             if "small" in dark:
                 screen.note(f"{dark}; there are no keys")
             return Steered(chosen, chosen.share_at)
+        if isinstance(chosen, Blind):
+            return self._asked(chosen)
         steering = Steering(chosen, [Pulse(shape).own_bpm for shape in shapes])
         live = Live(lambda key, _s: steering.press(key), self.names, blind=False)
         live.status = lambda: "paused" if steering.paused else ""
@@ -85,4 +85,4 @@ class Hands:
             + (", answered" if self._answers else "")
             + (f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops" if wrong else "")
         )
-        return Steered(steering, view=live, screen=live.on_screen())
+        return Steered(steering, quiz.share_at, live, live.on_screen())

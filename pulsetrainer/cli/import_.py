@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -121,7 +121,9 @@ def import_(
 def _show(
     job: Job, groups: dict[Path, tuple[Path, ...]], read: list[tuple[Imported, Mapping[str, str]]]
 ) -> None:
-    facts = [{**how, **_facts(one)} for one, how in read]
+    from pulsetrainer.report.results import imported
+
+    facts = [{**how, **imported(one.run, one.report)} for one, how in read]
     runs = [
         {"output": target, "report": {"files": group} | plain(one.report), "facts": figures}
         for (target, group), (one, _), figures in zip(groups.items(), read, facts, strict=True)
@@ -130,25 +132,3 @@ def _show(
     for (target, group), figures in zip(groups.items(), facts, strict=True):
         known = {name: value for name, value in figures.items() if value is not None}
         job.screen.facts(f"{target}: {', '.join(path.name for path in group)}", known)
-
-
-def _facts(imported: Imported) -> dict[str, Any]:
-    from pulsetrainer.artefacts.units import with_unit
-    from pulsetrainer.report.facts import minor_words, run_facts
-
-    report = imported.report
-    shown = run_facts(imported.run, report.reversals)
-    if report.false_reversals:
-        noise = with_unit(f"{report.input_noise:.2g}", report.input_unit)
-        shown["noise in the input"] = f"{noise}; {report.false_reversals} more reversals are noise"
-    direction = "unclear, identify tries both" if report.polarity == "unclear" else report.polarity
-    shown["loop"] = f"{direction} (correlation {report.correlation:+.2f})"
-    shown["coverage_percent"] = report.coverage_percent
-    low, high = report.input_range
-    shown["told apart by minor loops"] = minor_words(report.minor_percent) if high > low else "none"
-    even = f"even but for the gap{'s' if report.gaps > 1 else ''}" if report.gaps else "even"
-    stamps = {True: even, False: "uneven", None: "none: only the order counts"}[report.even]
-    shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps
-    for name in ("signal", "complete", "dropped_samples"):  # the title; of a device, not of a file
-        shown.pop(name, None)
-    return shown

@@ -62,7 +62,7 @@ class Live:
 
         if self._blind:
             choices = "  ".join(f"{letter} {name}" for letter, name in zip(LETTERS, self._names))  # noqa: B905
-            return Text(f"{self.status()}\n{choices}")
+            return Text(f"{self.status()}\n{choices}  Q stop")
         width = max(os.get_terminal_size(sys.stderr.fileno()).columns - 2, 20)
         force = np.concatenate(self._traces)
         lines = plotted(force, width, _ROWS)

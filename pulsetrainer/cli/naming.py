@@ -159,5 +159,7 @@ def _several(path: Path, given: Any, option: str) -> str:
 
 def _cut_off(path: Path) -> str:
     """Name what a recording left that was cut off before it had this name; empty where there is none."""
+    if path.suffix == ".partial" and path.with_suffix("").is_file():
+        return f"it was not cut off: {shlex.quote(str(path.with_suffix('')))} is whole"
     left = path.with_name(f"{path.name}.partial")
     return f"it was cut off: {shlex.quote(str(left))} holds what there is" if left.is_file() else ""

@@ -49,7 +49,7 @@ def say_pressed(
     """Write the sheet and say what came out, also where the session was stopped."""
     from pulsetrainer.errors import PulsetrainerError
     from pulsetrainer.files import store
-    from pulsetrainer.steps.stopped import raise_if_stopped
+    from pulsetrainer.steps.stopped import kept_in, raise_if_stopped
 
     job.notes(done.notes)
     if html is not None:
@@ -57,7 +57,7 @@ def say_pressed(
     try:
         raise_if_stopped(done.fault, done.remedy, "the session")
     except PulsetrainerError as error:
-        error.message += f"; {done.beats.start_s.size} beats were kept in {out} (complete=false)"
+        error.message += kept_in(out, done.beats.start_s.size, "beat")
         error.hint = error.hint or "evaluate what there is, or press another one into another file"
         raise
     quizzed, right = _quizzed(quiz)

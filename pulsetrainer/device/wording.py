@@ -12,10 +12,12 @@ from pulsetrainer.device.limits import less_current
 FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
 # What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
-    codes.Fault.OVER_FORCE: "raise `limit_force_N` where it was lowered, or "
-    + less_current("`current_max_A` well below the current told here"),
+    codes.Fault.OVER_FORCE: "check the force sensor where nothing pressed so hard; raise `limit_force_N` "
+    "where it was lowered, or " + less_current("`current_max_A` well below the current told here"),
     codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where the supply "
     "or the coil has been changed, set the gains again: pulsetrainer tune -o pulsetrainer.toml",
+    codes.Fault.CURRENT_FROZEN: "check the current sensor, its wires and its supply",
+    codes.Fault.NO_CURRENT: "check the supply, its plug, and the wires of the coil and of the current sensor",
     codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
     codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
     codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",

@@ -19,6 +19,7 @@ from pulsetrainer.artefacts import (
 )
 from pulsetrainer.artefacts.units import unit_of, with_unit
 from pulsetrainer.core.coverage import coverage
+from pulsetrainer.core.initial_state import estimated_start
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual, wording
@@ -29,7 +30,7 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.forms import static_behind
 from pulsetrainer.diagnosis.learned import learned
-from pulsetrainer.diagnosis.prediction import predict
+from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.diagnosis.raw import evenly, noise_of
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.stages.raw_data import masked_by
@@ -47,7 +48,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     scale = state.scale
     percent = PERCENT / float(np.ptp(problem.measured))
     of_samples = PERCENT / float(np.ptp(np.concatenate([r.output[r.counts] for r in problem.records])))
-    rms, extended = rms_of(state, model), state.current if state.extends else state.baseline
+    rms, extended = rms_of(state, model, estimate=True), state.current if state.extends else state.baseline
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
     inputs = np.concatenate([record.input for record in problem.records])
@@ -133,17 +134,24 @@ def _words(given: Given) -> Words:
     }
 
 
-def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = ()) -> float:
+def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = (), *, estimate: bool = False) -> float:
     """Rms error of a model, as given or extended, over the single samples with weight, as measured.
 
     ``faults`` holds what faults of the measurement did to each record (n,), which is no error of a model.
+    ``estimate``: a model without extensions begins, as in `evaluate`, where it predicts best; else at rest.
     """
-    question, errors = state.question, []
-    for k, own in enumerate(question.records):
-        masked = masked_by(own, [firing for record, firing in state.firings if record == k])
+    question, errors, start = state.question, [], None
+    counted = [
+        masked_by(own, [firing for record, firing in state.firings if record == k])
+        for k, own in enumerate(question.records)
+    ]
+    if estimate and not model.extensions:
+        turned = [replace(one, output=model.polarity * one.output) for one in counted]
+        start, _ = estimated_start(operator_of(model), turned)
+    for k, (own, masked) in enumerate(zip(question.records, counted, strict=True)):
         stamps = question.stamps[k] if question.stamps else None
         even = evenly(masked, stamps)
-        said = predict(model, even.input, even.step) * model.polarity
+        said = predict(model, even.input, even.step, start) * model.polarity
         if stamps is not None:
             said = np.interp(stamps, np.arange(said.size) * even.step, said)
         fault = faults[k] if faults else 0.0

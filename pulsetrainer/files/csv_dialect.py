@@ -321,7 +321,8 @@ def _with_header(
     unremarked = len(names) == len(first) + 1 and names[-1].lower() in _REMARK_HEADINGS
     if len(names) != len(first) and not unremarked:
         raise DataError(
-            f"{path} has {len(names)} column names, but {len(first)} columns in line {lines[heads][0]}",
+            f"{path} has {len(names)} column name{'s' * (len(names) != 1)}, but {len(first)} columns in line "
+            f"{lines[heads][0]}",
             hint="correct the header; decimal commas need another delimiter, such as a semicolon",
         )
     columns = [_filled(k, body) for k in range(len(names))]

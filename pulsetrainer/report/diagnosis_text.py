@@ -77,7 +77,9 @@ def answer(one: Cause, found: Diagnosis) -> str:
         return "no"
     if one.p_value > LIMITS.p_max:
         return "no: noise does as much"
-    return "no: another explains more" if found.quick else "no: not confirmed by the refit"
+    if not found.quick:
+        return "no: not confirmed by the refit"
+    return "no: another explains more" if found.found else "no: too small to matter"
 
 
 def parameters(several: Sequence[Parameter]) -> dict[str, str]:
@@ -104,7 +106,10 @@ def of_a_curve(one: Parameter) -> bool:
 def parameter(one: Parameter) -> str:
     """Return a parameter with its unit, its 95 % interval and what it is of."""
     known = math.isfinite(one.lower) and one.lower < one.upper
-    interval = f" (95 %: {one.lower:.3g} to {one.upper:.3g})" if known else ""
+    low, high = f"{one.lower:.3g}", f"{one.upper:.3g}"
+    half = max(one.upper - one.value, one.value - one.lower)
+    between = f"{low} to {high}" if low != high else f"± {half:.1g}"  # "7 to 7" would tell nothing
+    interval = f" (95 %: {between})" if known else ""
     return with_unit(f"{one.value:.4g}", one.unit) + interval + (f": {one.meaning}" if one.meaning else "")
 
 

@@ -73,6 +73,7 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
 
 
 _HARDLY = 50.0  # % of the cells: with fewer a person should know what the coverage does not say
+_ALL = 99.95  # % of the cells: what is printed as 100.0
 _LOOPS = {
     "counterclockwise": "counterclockwise, the output lags",
     "clockwise": "clockwise, the output leads",
@@ -96,9 +97,10 @@ def warmth_words(kelvin: Sequence[float] | FloatArray) -> str:
     return f"{first:+.1f} to {last:+.1f} K against calibration, made up for"
 
 
-def minor_words(percent: float) -> str:
+def minor_words(percent: float, switched_percent: float) -> str:
     """Say how many cells minor loops tell apart, and what of the others is known."""
-    rest = "; the rest only the major loop has switched" if percent < _HARDLY else ""
+    nothing = ", or nothing" if switched_percent < _ALL else ""
+    rest = f"; the rest only the major loop has switched{nothing}" if percent < _HARDLY else ""
     return f"{percent:.0f} % of the cells{rest}"
 
 

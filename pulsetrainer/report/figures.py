@@ -164,6 +164,7 @@ def evaluation(errors: Evaluation) -> Figure:
     pulses: dict[str, list[WaveformEvaluation]] = {}
     for one in errors.waveforms:
         pulses.setdefault(one.name, []).append(one)
+    quantity = errors.model.output_quantity if errors.model else ""
     rows = len(pulses) + pairs
     if rows == 0:
         raise DataError(
@@ -171,7 +172,7 @@ def evaluation(errors: Evaluation) -> Figure:
             hint="evaluate again, with pulsetrainer evaluate",
         )
     if not pulses and len(errors.models) == 1:
-        return prediction(errors.models[0])
+        return prediction(errors.models[0], quantity=quantity)
     figure = _sheet(2 * COLUMN_IN, _ROW_IN * rows)
     cells = figure.subfigures(rows, 2, squeeze=False)
     for row, played in zip(cells, pulses.values(), strict=False):
@@ -182,7 +183,7 @@ def evaluation(errors: Evaluation) -> Figure:
         panels.loops(row[1], played, among)
     reach = panels.largest_residual(errors.models)
     for cell, predicted in zip(cells[len(pulses) :].flat, errors.models, strict=False):
-        panels.prediction(cell, predicted, reach)
+        panels.prediction(cell, predicted, reach, quantity)
     return figure
 
 

@@ -11,7 +11,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from operator import attrgetter
 from pathlib import PurePath
@@ -22,12 +22,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from pulsetrainer.artefacts import Evaluation, FloatArray, Model, WaveformEvaluation
+from pulsetrainer.artefacts import Evaluation, FloatArray, Model, ModelEvaluation, WaveformEvaluation
 from pulsetrainer.artefacts.evaluation import METRICS, PUBLISHED
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import diagnosis_figures, figures, heat_figures, panels, session_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
-from pulsetrainer.report.names import NAMES, OVERVIEW, digits
+from pulsetrainer.report.names import NAMES, OVERVIEW, beyond_rounding, digits
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
 
@@ -59,6 +59,15 @@ def number(value: float | None, metric: str = "", form: str = "", *, published: 
 def known(value: float | None, metric: str, form: str) -> Number:
     """Return a number for the page; an empty place where it was not measured."""
     return number(value if value is not None and math.isfinite(value) else None, metric, form)
+
+
+def offset(predicted: ModelEvaluation, metric: str) -> Number:
+    """Return the offset of a run against a model for the page, an empty place in files that have none.
+
+    Its metric is no model's ``offset``: a file may be called model.h5.
+    """
+    found = known(predicted.offset, metric, ".3g")
+    return found if beyond_rounding(predicted.offset, predicted.rms) else replace(found, text="0")
 
 
 def count(value: int, metric: str) -> Number:
@@ -164,7 +173,19 @@ def environment() -> Environment:
     made.filters |= {"unbroken": unbroken, "unit": shown, "digits": format, "rounded": digits}
     made.tests["of_a_curve"] = of_a_curve
     made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS, "Number": Number}
-    for tool in (number, known, count, metric, picture, reach, densest, label, panels.titled, panels.scale):
+    for tool in (
+        number,
+        known,
+        offset,
+        count,
+        metric,
+        picture,
+        reach,
+        densest,
+        label,
+        panels.titled,
+        panels.scale,
+    ):
         made.globals[tool.__name__] = tool
     for drawing in (figures, heat_figures, diagnosis_figures, session_figures, panels):
         made.globals[drawing.__name__.rpartition(".")[2]] = drawing

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 FORCE: Final = "% of full force"
+_ROUNDING: Final = 1e-6
 _DRIVES: Final = ("scaled", "compensated")
 
 
@@ -82,6 +83,11 @@ def split(dotted: str) -> tuple[str, Named]:
 def headed(kind: str, title: str) -> str:
     """Return a title that says of which kind the artefact is, once."""
     return title if title.lower().startswith(kind) else f"{kind}: {title}"
+
+
+def beyond_rounding(offset: float, rms: float) -> float:
+    """Return an offset; one far below the error, which is the rounding of numbers, as nothing."""
+    return 0.0 if abs(offset) <= _ROUNDING * rms else offset
 
 
 def digits(value: float) -> str:

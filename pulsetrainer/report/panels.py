@@ -90,10 +90,20 @@ def room(axes: Axes, share: float = 0.16) -> None:
     axes.set_ylim(low, high + share * (high - low))
 
 
-def headroom(axes: Axes, share: float = 0.16) -> None:
-    """Make room above the curves and put the legend there, in one row: it never covers a curve."""
+def headroom(axes: Axes, share: float = 0.16, markerscale: float = 1.0) -> None:
+    """Make room above the curves and put the legend there, in one row: it never covers a curve.
+
+    ``markerscale`` makes the points of the legend larger than those of the data, which they looked like.
+    """
     room(axes, share)
-    axes.legend(loc="upper left", ncols=4, columnspacing=1.0, handlelength=1.8, borderaxespad=0.2)
+    axes.legend(
+        loc="upper left",
+        ncols=4,
+        columnspacing=1.0,
+        handlelength=1.8,
+        borderaxespad=0.2,
+        markerscale=markerscale,
+    )
 
 
 def quantity_of(unit: str, otherwise: str = "output") -> str:
@@ -214,8 +224,10 @@ def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> N
         axes.axhline(y, **{**GUIDE, "color": INK, "zorder": 3})
 
 
-def prediction(panel: FigureBase, model: ModelEvaluation, reach: float | None = None) -> None:
-    """Draw a measured record with a model's prediction of it, and the residual below.
+def prediction(
+    panel: FigureBase, model: ModelEvaluation, reach: float | None = None, quantity: str = ""
+) -> None:
+    """Draw a measured record of a quantity with a model's prediction of it, and the residual below.
 
     With ``reach`` the residual is drawn from -reach to reach, so that several models compare by eye.
     """
@@ -223,7 +235,7 @@ def prediction(panel: FigureBase, model: ModelEvaluation, reach: float | None = 
     x, name = abscissa(model.time_s, model.output.size)
     trace(above, x, model.output, **GROUND, label="measured")
     trace(above, x, model.predicted, **MODEL, label="predicted")
-    above.set_ylabel(label(quantity_of(model.output_unit), model.output_unit))
+    above.set_ylabel(label(quantity or quantity_of(model.output_unit), model.output_unit))
     above.set_title(f"{PurePath(model.name).stem}: rms {model.rms_percent:.3g} % of span (dotted: ± rms)")
     headroom(above)
     residual(below, x, model.output - model.predicted, model.rms)

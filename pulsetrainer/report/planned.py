@@ -61,5 +61,6 @@ def to_be_pressed(plan: Any, limit_N: float | None) -> dict[str, str]:
         "parts": f"{plan.parts}: {limit}",
         "heat": f"{plan.heat_percent:.0f} % of the limit at most, from cold; "
         + (f"{len(plan.pauses)} pauses to cool, {pauses:.0f} s in all" if pauses else "no pause to cool"),
-        "force": f"{plan.peak_force_N:.2f} N at most, by the model, as each part begins{above}",
+        "force": f"{plan.peak_force_N:.2f} N at most, by the model, as each part begins; "
+        f"{plan.pulse_force_N:.2f} N in the pulses{above}",
     }

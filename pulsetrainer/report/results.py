@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Waveform
+from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.units import with_seconds, with_unit
-from pulsetrainer.report.facts import loop_words, minor_words, span_words, warmth_words
+from pulsetrainer.report.facts import loop_words, minor_words, run_facts, span_words, warmth_words
 from pulsetrainer.report.tables import picked
 
 _SMALL = 0.1  # of a unit: three decimals would not tell a range of less
@@ -57,7 +57,7 @@ def identified(out: Path, model: Model, seconds: float) -> Said:
         "fit rms": with_unit(f"{fit.rms:.4g}", unit),
         "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
         "cells switched": f"{fit.coverage_percent:.1f} %",
-        "told apart by minor loops": minor_words(fit.minor_percent)
+        "told apart by minor loops": minor_words(fit.minor_percent, fit.coverage_percent)
         + f", on the plane of the {model.edges_quantity}" * (model.form == "dual"),
         "smoothing": f"{share:.3g} of the range of the {model.input_quantity}" if share else "none",
         "loop": loop_words(model),
@@ -162,7 +162,7 @@ def pressed(
         "force": f"{reach_N[0]:.2f} .. {reach_N[1]:.2f} N at full amplitude",
         "error": f"{error}, of full force",
         "timing": f"beats begin within {figures['beat_timing_max_ms']:.2g} ms of their time",
-        "as asked": f"{', '.join(spread)} (standard deviation)" if spread else None,
+        **({"as asked": f"{', '.join(spread)} (standard deviation)"} if spread else {}),
         **({"coil": warmth_words(warmth_K)} if warmth_K else {}),
     }
 
@@ -250,3 +250,23 @@ def _left(found: Diagnosis, model: Model) -> dict[str, str]:
         "error before": f"{found.rms_percent:.3f} % of the span, rms of single samples",
         "error now": f"{found.extended_rms_percent:.3f} %; noise alone is {found.noise_percent:.3f} %",
     }
+
+
+def imported(run: Run, report: Any) -> dict[str, Any]:
+    """Say what is in a run that was measured elsewhere."""
+    shown = run_facts(run, report.reversals)
+    if report.false_reversals:
+        noise = with_unit(f"{report.input_noise:.2g}", report.input_unit)
+        shown["noise in the input"] = f"{noise}; {report.false_reversals} more reversals are noise"
+    direction = "unclear, identify tries both" if report.polarity == "unclear" else report.polarity
+    shown["loop"] = f"{direction} (correlation {report.correlation:+.2f})"
+    shown["coverage_percent"] = report.coverage_percent
+    low, high = report.input_range
+    apart = minor_words(report.minor_percent, report.coverage_percent)
+    shown["told apart by minor loops"] = apart if high > low else "none"
+    even = f"even but for the gap{'s' if report.gaps > 1 else ''}" if report.gaps else "even"
+    stamps = {True: even, False: "uneven", None: "none: only the order counts"}[report.even]
+    shown["time stamps"] = f"{stamps}, made even" if report.resampled else stamps
+    for name in ("signal", "complete", "dropped_samples"):  # the title; of a device, not of a file
+        shown.pop(name, None)
+    return shown

@@ -42,7 +42,10 @@ def render_session(
         "session.html.j2",
         **header,
         session=session,
-        pressed=[f"{name}: {number} beats" for name, number in zip(session.pulses, count, strict=True)],
+        pressed=[
+            f"{name}: {number} beat{'s' * (number != 1)}"
+            for name, number in zip(session.pulses, count.tolist(), strict=True)
+        ],
         rhythm=_rhythm(asked) if asked else None,
         rows=[(*NAMES[name], number(value[name], name, form)) for name, form in _FIGURES],
         quiz=quiz,

@@ -27,10 +27,10 @@ def course(session: Session) -> Figure:
         )
     warm_s, warm_K = session.temperature_s, session.temperature_K
     if warm_s is None or warm_K is None:
-        figure = Figure(figsize=(COLUMN_IN, 4.8), layout="constrained")
+        figure = Figure(figsize=(COLUMN_IN, 4.0), layout="constrained")
         above, below = figure.subplots(2, 1, height_ratios=(1.5, 1.0))
     else:
-        figure = Figure(figsize=(COLUMN_IN, 6.4), layout="constrained")
+        figure = Figure(figsize=(COLUMN_IN, 5.6), layout="constrained")
         above, below, lowest = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 0.8))
         heat_figures.temperature(lowest, warm_s, warm_K)
     middle = session.time_s[session.time_s.size // 2]
@@ -48,10 +48,10 @@ def course(session: Session) -> Figure:
         beats.start_s, percent * beats.max_error, ".", markersize=3, color=VERMILION, label="max error"
     )
     below.plot(beats.start_s, percent * beats.mean_error, ".", markersize=3, color=BLUE, label="mean error")
-    below.set_ylabel("error [% of full force]")
+    below.set_ylabel("error\n[% of full force]")
     below.set_xlabel(label("start of the beat", "s"))
     below.set_ylim(bottom=0.0)
-    panels.headroom(below, 0.3)
+    panels.headroom(below, 0.3, markerscale=3.0)
     return figure
 
 

@@ -78,7 +78,7 @@ SETTINGS: Final[Any] = {
     "axes.spines.right": False,
     "axes.xmargin": 0.01,
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-3, 5),
+    "axes.formatter.limits": (-4, 5),  # 0.002, not 2 and far from it 1e-3
     "grid.color": GRID,
     "grid.linewidth": 0.6,
     "xtick.color": MUTED,

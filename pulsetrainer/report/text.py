@@ -13,7 +13,7 @@ from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import tables
 from pulsetrainer.report.diagnosis_text import sections
 from pulsetrainer.report.facts import facts
-from pulsetrainer.report.names import FORCE, NAMES, OVERVIEW, split
+from pulsetrainer.report.names import FORCE, NAMES, OVERVIEW, beyond_rounding, split
 from pulsetrainer.report.tables import Facts, Table
 
 _TITLED = {
@@ -23,7 +23,6 @@ _TITLED = {
 _WIDTH = 110  # of a table, unless a screen says otherwise
 _LABEL_WIDTH, _COLUMN_WIDTH = 32, 13
 _TEXT_WIDTH = 80
-_ROUNDING = 1e-6
 _PREDICTION = ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent")
 _FIGURES = (*OVERVIEW, "compensated.current_tracking_max_percent")
 
@@ -70,11 +69,11 @@ def _title(width: int) -> str:
 
 
 def _predictions(evaluation: Evaluation) -> Table:
-    """How each model predicts the run; an offset far below the error is the rounding of numbers."""
+    """How each model predicts the run."""
     models = evaluation.models
     fields = [f for f in _PREDICTION if f != "gain_percent" or len(models) > 1]
     heads = [(NAMES[f].words, NAMES[f].unit or shown(models[0].output_unit)) for f in fields]
-    rounded = [replace(m, offset=m.offset if abs(m.offset) > _ROUNDING * m.rms else 0.0) for m in models]
+    rounded = [replace(m, offset=beyond_rounding(m.offset, m.rms)) for m in models]
     return Table(
         "prediction of the run",
         ("model", *(",\n".join(filter(None, head)) for head in heads)),

@@ -86,12 +86,15 @@ def evaluate(
         return Evaluation(waveforms=errors, model=played[-1].waveform.model)
     if len(runs) == 1 and not played and tested:
         return _of_run(titles[0], runs[0], tested, called)
-    counts = {"playback": len(played), "run": len(runs), "model": len(tested)}
+    sessions = len(given) - len(played) - len(runs)  # of which the command evaluates one
+    counts = {"playback": len(played), "run": len(runs), "session": sessions, "model": len(tested)}
     got = [f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts.items() if count]
     raise UsageError(
-        "evaluate takes playbacks, or one run together with the models to test on it; got "
+        "evaluate takes playbacks, or one run together with the models to test on it, or one session; got "
         + (", ".join(got) or "nothing"),
-        hint="pulsetrainer evaluate run.h5 --model model.h5",
+        hint="one session at a time; side by side: pulsetrainer compare ben.h5 carla.h5"
+        if sessions
+        else "pulsetrainer evaluate run.h5 --model model.h5",
     )
 
 

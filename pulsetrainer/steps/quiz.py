@@ -73,6 +73,10 @@ class Blind:
         """How many there are."""
         return len(self._asked)
 
+    def share_at(self, _time_s: float) -> float:
+        """How much of it is over: an answer may take any time."""
+        return self.question / self.questions
+
     def __call__(self, number: int, time_s: float) -> Decision:
         """Return what is played next."""
         at = self.question

@@ -150,6 +150,7 @@ class Plan:
     pauses: tuple[Pause, ...]  # to let the coil cool
     heat_percent: float  # the most, of that at which the device stops
     peak_force_N: float  # foretold by the model
+    pulse_force_N: float  # the most that a beat presses; below the peak where pulses are lower
     peak_current_A: float
     rms_current_A: float
 
@@ -177,14 +178,15 @@ def plan(
     reach = reach_of(model, beating, rates)
     coil_of(model, asked=track_heat)
     count = dict.fromkeys((pulse.name for pulse in beating), 0)
-    square = peak_A = peak_N = 0.0
+    square = peak_A = peak_N = pulse_N = 0.0
 
     def give(piece: Given) -> None:
-        nonlocal square, peak_A, peak_N
+        nonlocal square, peak_A, peak_N, pulse_N
         rehearsal.stream(piece.input, RATE_HZ, piece.predicted)
         square += float(np.sum(piece.input**2))
         peak_A, peak_N = max(peak_A, float(piece.input.max())), max(peak_N, float(piece.predicted.max()))
         if piece.beat is not None:
+            pulse_N = max(pulse_N, float(piece.predicted.max()))
             count[beating[piece.beat.play.pulse].name] += 1
 
     conductor = Conductor(extended_of(model), beating, reach, rhythm, decide, give)
@@ -204,6 +206,7 @@ def plan(
         pauses=tuple(conductor.pauses),
         heat_percent=100.0 * rehearsal.most_heat,
         peak_force_N=peak_N,
+        pulse_force_N=pulse_N,
         peak_current_A=peak_A,
         rms_current_A=float(np.sqrt(square / (conductor.time_s * RATE_HZ))),
     )

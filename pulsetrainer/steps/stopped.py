@@ -7,6 +7,8 @@ from typing import Any
 from pulsetrainer.device.follower import INTERRUPTED
 from pulsetrainer.errors import DeviceError, Interrupted
 
+UNKNOWN_REMEDY = "remove the cause; the next command clears the fault"
+
 
 def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> None:
     """Raise DeviceError or Interrupted for a play that did not reach its end, with what was ``kept``."""
@@ -16,9 +18,15 @@ def raise_if_stopped(fault: str, remedy: str, what: str, kept: Any = None) -> No
         raise Interrupted(f"stopped by you during {what}; the output was switched off first", kept=kept)
     raise DeviceError(
         f"{fault}, during {what}",  # what is wrong first: it may be that current flows on
-        hint=remedy or "remove the cause; the next command clears the fault",
+        hint=remedy or UNKNOWN_REMEDY,
         kept=kept,
     )
+
+
+def kept_in(where: object, many: int, what: str) -> str:
+    """Say what a file keeps of a play that did not reach its end: how many beats, or samples."""
+    were = f"{what} was" if many == 1 else f"{what}s were"
+    return f"; {many} {were} kept in {where} (complete=false)"
 
 
 def in_part(fault: str, begun_s: float) -> str:

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import unicodedata
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path, PurePath
 
 import h5py
+import numpy as np
 import pytest
+import report_examples
+import store_examples
+
+from pulsetrainer.artefacts import Evaluation, Quiz
+from pulsetrainer.report.html import render_evaluation
+from pulsetrainer.report.score_sheet import render_session
+from pulsetrainer.steps.quiz import score
 
 MEASURING = Path(__file__).with_name("measuring.js").read_text()
 
@@ -115,9 +125,10 @@ def _model(group):
 
 def _prediction(file):
     """Return every number of the models' table by the name that it has in the page."""
-    names = ("rms", "rms_percent", "max_percent", "gain_percent")
+    names = ("rms", "rms_percent", "max_percent", "gain_percent", "offset", "shape_rms_percent")
+    called = {"offset": "run_offset"}  # a model has an offset of its own
     found = {
-        f"{PurePath(group.attrs['name']).stem}.{name}": group[name][()]
+        f"{PurePath(group.attrs['name']).stem}.{called.get(name, name)}": group[name][()]
         for group in file["models"].values()
         for name in names
     }
@@ -214,6 +225,54 @@ def test_paper_has_everything(opened, report):
         assert not said.endswith(squeezed_headings)  # a heading stays with what it is of
         # the errors of a drive and their figures are not torn apart
         assert said.count("Errorswithandwithoutcompensation") == said.count("Hysteresisopensaloop")
+
+
+HEADER = {"title": "On paper", "created": "2026-01-02T03:04:05Z", "history": ["pulsetrainer session"] * 3}
+
+
+def sheets_of(browser, folder, html):
+    """Print a page; return what stands on each sheet, without blanks."""
+    pypdf = pytest.importorskip("pypdf", reason="pypdf is not installed")
+    (folder / "page.html").write_text(html)
+    page = browser.new_page()
+    page.goto((folder / "page.html").as_uri())
+    page.pdf(path=folder / "page.pdf", prefer_css_page_size=True)
+    page.close()
+    texts = [sheet.extract_text() for sheet in pypdf.PdfReader(folder / "page.pdf").pages]
+    return [re.sub(r"\s+", "", unicodedata.normalize("NFKC", text)) for text in texts]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("questions", [4, 8, 12, 16])
+def test_a_score_sheet_on_paper_keeps_its_provenance_together(browser, tmp_path, questions):
+    """Two lines of sources were the second sheet of a quiz of four, half of the provenance that of twelve."""
+    names = ("normal", "bifid")
+    quiz = Quiz(names, names * (questions // 2), names * (questions // 2), np.ones(questions))
+    session = replace(store_examples.session(), quiz=quiz)
+    header = {
+        **HEADER,
+        "provenance_json": json.dumps({f"key {k}": "a value of some length" for k in range(40)}),
+    }
+    sheets = sheets_of(browser, tmp_path, render_session(session, score(quiz), {}, **header))
+    (at,) = [k for k, said in enumerate(sheets) if "Provenance" in said]
+    assert all(words in sheets[at] for words in ("pulsetrainersession", "key39", "Augmentationindex"))
+    assert at == len(sheets) - 1 <= 1
+    assert "normal:1beat,bifid:1beat." in sheets[0]
+
+
+@pytest.mark.slow
+def test_the_result_of_six_inversions_is_one_sheet(browser, tmp_path):
+    """As of the demo: three rows of its table began the next sheet, on which a part had no room then."""
+    played = tuple(
+        report_examples.waveform_evaluation(name, inversion, 1.0, seed)
+        for seed, name in enumerate(("normal", "bifid"))
+        for inversion in ("closest-match", "continuous", "extended")
+    )
+    sheets = sheets_of(
+        browser, tmp_path, render_evaluation(Evaluation(waveforms=played), **HEADER, provenance_json="{}")
+    )
+    assert sheets[0].count("publisheddevice") == 2
+    assert [said.count("Errorswithandwithoutcompensation") for said in sheets[:4]] == [0, 2, 2, 2]
 
 
 @pytest.mark.slow

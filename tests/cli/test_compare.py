@@ -135,6 +135,9 @@ def test_learners_side_by_side(tmp_path):
     pt.save(plain, tmp_path / "cleo.h5")
     assert "difference" not in pulsetrainer(tmp_path, "compare", "anna.h5", "ben.h5", "cleo.h5").out
     assert pulsetrainer(tmp_path, "compare", "anna.h5", "other.h5").code == 3
+    refusal(pulsetrainer(tmp_path, "evaluate", "anna.h5", "ben.h5", "--json"), 2, "two sessions at once")
+    whole = pulsetrainer(tmp_path, "evaluate", "anna.h5.partial")
+    assert "it was not cut off: anna.h5 is whole" in whole.err
     for name in ("carl", "dora"):
         pt.save(replace(plain, quiz=None), tmp_path / f"{name}.h5")
     done = pulsetrainer(tmp_path, "compare", "carl.h5", "dora.h5", "-o", "pressed.svg")

@@ -55,6 +55,23 @@ def test_the_gains_of_tune_are_in_force(run):
         assert ("tuned.toml" in found["gains"]["found"]) == bool(words)
 
 
+def test_the_limits_of_the_settings_hold(run, tmp_path):
+    """It pressed 6.3 N where the file allowed 3, and told the device's own limits as those in force."""
+    (tmp_path / "pulsetrainer.toml").write_text("[limits]\ncurrent_A = 1.0\nforce_N = 3.0\n")
+    found = _named(run("doctor", "--port", "bench:", "--json"))
+    assert found["device"]["found"].endswith("limits 1 A and 3 N")
+    assert "force above its limit" in found["short capture"]["found"]
+    gentle = _named(run("doctor", "--port", "bench:", "--limit-current", 0.3, "--json"))
+    assert gentle["saturation"]["found"].startswith("none up to 0.3 A")
+
+
+@pytest.mark.parametrize("broken", ["current-zero", "stuck-on"])
+def test_a_fault_that_ends_the_look_has_a_fix(run, broken):
+    """A frozen current sensor was a problem without one, and the advice was to follow the fixes."""
+    found = _named(run("doctor", "--port", f"bench:?break={broken}@0.5", "--json"))
+    assert found["short capture"]["fix"]
+
+
 def test_an_absent_port_is_a_problem_with_a_fix(run):
     """As text, as a person reads it; nothing is captured."""
     done = run("doctor", "--port", "/dev/ttyNOWHERE")

@@ -81,9 +81,17 @@ def test_a_dry_run_tells_beats_length_current_and_pauses_as_they_come(run, tmp_p
     assert plan["peak_current_A"] == pytest.approx(kept.reference.max(), abs=2e-4)
     assert plan["rms_current_A"] == pytest.approx(np.sqrt(np.mean(kept.reference**2)), rel=1e-3)
     assert plan["peak_force_N"] == pytest.approx(kept.output.max(), rel=0.1)
+    first_s = kept.beats.start_s[0]
+    assert plan["pulse_force_N"] == pytest.approx(kept.output[kept.time_s > first_s].max(), rel=0.1)
     said = [f"a pause of {p['seconds']:.0f} s after {p['at_s']:.0f} s" for p in plan["pauses"]]
     assert [note.partition(",")[0] for note in kept.notes] == said
     assert bool(said) is ("hot.csv" in words)
+
+
+def test_a_dry_run_tells_how_hard_low_pulses_press(run):
+    """At 40 % it told the slow press at the beginning only."""
+    plan = run(*SHORT, "--amplitude", 40, "--beats", 2, "--dry-run", "--json").json
+    assert 0.35 < plan["pulse_force_N"] / plan["peak_force_N"] < 0.5
 
 
 def test_a_dry_run_of_a_quiz_by_key_needs_the_keys_too(run):
@@ -431,6 +439,7 @@ def test_nothing_gives_a_question_away(tmp_path):
     words = ("--pulses", "bifid,parvus-et-tardus", "--quiz", 2, "--seed", 7)
     terminal = Terminal(tmp_path, *SHORT, *words, port="bench:")
     terminal.until(lambda: b"question 1 of 2" in terminal.seen)
+    terminal.until(lambda: b"Q stop" in terminal.seen)  # before a wrong key, too
     shown = [terminal.seen.count(name) for name in (b"bifid", b"parvus-et-tardus")]
     terminal.until(lambda: terminal.seen.count(b"bifid") > shown[0] + 5)
     # both names stand in the list of choices and nowhere else: as often

@@ -211,6 +211,8 @@ def model_evaluation(name="model", size=0.2, gain=0.0, *, time=True):
         time_s=np.arange(n) * 0.01 if time else None,
         output=output,
         predicted=output - error,
+        offset=float(error.mean()),
+        shape_rms_percent=100 * float(error.std() / np.ptp(output)),
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+import pulsetrainer as pt
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
@@ -397,3 +398,25 @@ def test_what_does_not_vary_is_refused(constant):
     )
     with raises(DataError, "does not vary", constant=constant):
         diagnose(Question([record], 0.0, 1.5, np.random.default_rng(0)))
+
+
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_the_model_as_given_begins_where_evaluate_says(polarity):
+    """Inside its range a record leaves open what came before: from rest it told 4.6 %, of half a per cent."""
+    rng, operator = np.random.default_rng(4), _operator()
+    whole = excitations.diagnostic(0.0, 1.5, rate_Hz=100.0).value
+    inside = 0.75 + 0.5 * np.sin(np.arange(6000) / 60) * (1 - np.arange(6000) / 8000)
+    demagnetised = np.concatenate(
+        (0.75 + 0.75 * np.cos(np.arange(4000) / 10) * np.linspace(1, 0, 4000), inside)
+    )
+    run, other = (
+        pt.Run(
+            np.arange(u.size) / 100.0,
+            u,
+            polarity * (operator(v)[-u.size :] + 0.03 * rng.standard_normal(u.size)),
+        )
+        for u, v in ((whole, whole), (inside, demagnetised))
+    )
+    model = pt.identify(run, levels=24, smoothing=0.0)
+    told = pt.diagnose(other, model, quick=True)
+    assert told.rms_percent == pytest.approx(pt.evaluate(other, model).models[0].rms_percent, rel=0.02)

@@ -27,17 +27,19 @@ def test_a_cause_that_was_not_found_says_why():
     tie = replace(_cause(small, found=True), cause="delay", confounded_with=("creep",))
     whole = replace(store_examples.diagnosis(), causes=(), quick=False)
     quick, tied = replace(whole, quick=True), replace(whole, causes=(tie,))
+    other = replace(quick, causes=(_cause(small, found=True),))
     said = [
         answer(_cause(small, found=True), whole),
         answer(_cause(small, found=True, doubts=("it may be nothing",)), whole),
         answer(_cause(small), whole),
-        answer(_cause(small), quick),
+        answer(_cause(small), quick),  # nothing was found: no other cause explains more
+        answer(_cause(small), other),
         answer(_cause(large), whole),
         answer(_cause(None), whole),
         answer(_cause(large), tied),  # noise does not do as much where it could be instead of a cause
     ]
     assert len(set(said)) == len(said)
-    assert [one.startswith("no") for one in said] == [False, False, *[True] * 5]
+    assert [one.startswith("no") for one in said] == [False, False, *[True] * 6]
     assert answer(_cause(LIMITS.p_max), whole) == said[2]  # the limit itself is significant
 
 
@@ -57,6 +59,8 @@ def test_a_parameter_is_told_with_unit_interval_and_meaning():
     assert (
         parameters([Parameter("tau", 1.5, "s", NAN, NAN)])["tau"] == "1.5 s"
     )  # a file of 0.1, a quick screen
+    narrow = parameters([Parameter("f", 7.0, "Hz", 6.9999, 7.0003)])
+    assert narrow["f"] == "7 Hz (95 %: ± 0.0003)"  # "7 to 7" told nothing
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -303,6 +303,13 @@ def test_the_temperature_is_drawn_where_heat_was_tracked():
         assert encode(after, "png").startswith(b"\x89PNG")
 
 
+def test_the_points_of_a_legend_are_no_beats():
+    """One beside the others, as small as they: it looked like the error of a beat."""
+    below = figures.draw(stored.session()).axes[1]
+    drawn = {line.get_markersize() for line in below.lines}
+    assert all(line.get_markersize() > 2 * max(drawn) for line in below.get_legend().get_lines())
+
+
 def test_a_session_without_a_sample_has_no_figure():
     """It was cut off before it began."""
     session = stored.session()
@@ -472,6 +479,15 @@ def test_the_prediction_of_one_model_fills_its_figure():
     alone = figures.evaluation(Evaluation(models=(examples.model_evaluation(),)))
     assert alone.get_size_inches()[0] < figures.evaluation(examples.model_comparison()).get_size_inches()[0]
     assert len(alone.axes) == 2
+
+
+def test_a_prediction_names_the_quantity_as_the_model_does():
+    """A magnet's said "output [mT]"."""
+    model = replace(stored.model(), output_quantity="flux density")
+    one = replace(examples.model_evaluation(), output_unit="mT")
+    for models in ((one,), (one, one)):
+        drawn = figures.evaluation(Evaluation(models=models, model=model))
+        assert {a.get_ylabel() for a in drawn.axes} == {"flux density [mT]", "residual [mT]"}
 
 
 def test_a_diagnosis_without_time_draws_none():

@@ -16,7 +16,7 @@ import store_examples
 
 from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.report.diagnosis_html import headline
-from pulsetrainer.report.html import render_evaluation
+from pulsetrainer.report.html import offset, render_evaluation
 
 PUBLISHED = {
     "normal": {
@@ -158,10 +158,18 @@ def test_numbers_of_models_on_a_run(comparison):
     shown = comparison.numbers()
     for model in examples.model_comparison().models:
         stem = model.name.removesuffix(".h5")
-        for field in ("rms", "rms_percent", "max_percent", "gain_percent"):
+        assert shown[f"{stem}.run_offset"][0][0] == model.offset
+        for field in ("rms", "rms_percent", "max_percent", "gain_percent", "shape_rms_percent"):
             assert shown[f"{stem}.{field}"][0][0] == getattr(model, field)
     assert shown["model.creep.amplitude"][0] == (0.051, "0.051")
     assert shown["model.creep.amplitude.lower"][0][0] == 0.047
+
+
+def test_an_offset_that_is_rounding_is_none_and_one_of_an_older_file_is_not_known():
+    """A model on its own run has none: 4.8e-14 was what the numbers could not hold."""
+    for value, said in ((4.8e-14, "0"), (-0.0123, "−0.0123"), (float("nan"), "")):
+        one = replace(examples.model_evaluation(), offset=value)
+        assert offset(one, "model.run_offset").text == said
 
 
 def test_model_numbers(page):

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pulsetrainer.core import excitations, input_noise
 from pulsetrainer.core.coverage import coverage, minor_coverage
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.report.facts import minor_words
 
 PLANE = Plane.uniform(0.0, 1.0, 12)
 
@@ -37,6 +38,13 @@ def test_reversal_curves_and_the_diagnostic_signal_tell_all_apart():
     ]
     assert minor_coverage(PLANE, [np.concatenate(curves)]) == 1.0
     assert minor_coverage(PLANE, [excitations.diagnostic(0.0, 1.0, rate_Hz=200.0).value]) == 1.0
+
+
+def test_what_nothing_has_switched_is_not_said_of_the_major_loop():
+    """Of a record that was cut, 7 % of the cells were told apart, and the rest was called switched."""
+    assert minor_words(7.0, 100.0).endswith("the rest only the major loop has switched")
+    assert minor_words(7.0, 7.7).endswith("the rest only the major loop has switched, or nothing")
+    assert minor_words(99.0, 99.0) == "99 % of the cells"
 
 
 def test_a_small_loop_tells_its_own_cells_apart():

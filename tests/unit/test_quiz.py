@@ -152,9 +152,11 @@ def test_a_beat_is_told_when_its_question_is_answered():
     beats = Beats(start_s, *(np.ones(start_s.size) for _ in range(7)))
     assert blind(4, 3.0) == Play(2, 1.0, None, 3.0 + QUESTION_S)
     assert blind.told(beats).start_s.max() < 3.0
+    assert blind.share_at(9.0) == 0.0
     said.append((CHOICES[1], 9.0))
     assert blind(20, 3.0 + QUESTION_S + GAP_S) == Rest()
     assert blind.told(beats).start_s.size == start_s.size  # nothing is open
+    assert blind.share_at(20.0) == 0.5  # its bar stood still to the end
     second_s = 3.0 + QUESTION_S + 2 * GAP_S
     assert isinstance(blind(24, second_s), Play)
     told = blind.told(beats)

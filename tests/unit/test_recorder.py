@@ -23,6 +23,7 @@ from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.recorder import RunRecorder
 from pulsetrainer.files.resume import earlier_of
 from pulsetrainer.files.store import read, read_header, write
+from pulsetrainer.steps.stopped import kept_in
 from wording import raises
 
 SEED = 20260102
@@ -52,6 +53,12 @@ def _tree(path):
 
         file.visititems(take)
     return tree
+
+
+@pytest.mark.parametrize(("many", "said"), [(1, "1 beat was kept"), (2, "2 beats were kept")])
+def test_what_was_kept_is_counted(many, said):
+    """It said "1 beats were kept"."""
+    assert kept_in(Path("run.h5"), many, "beat") == f"; {said} in run.h5 (complete=false)"
 
 
 def test_the_same_file_as_the_store_writes(tmp_path):

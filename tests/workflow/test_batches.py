@@ -99,15 +99,47 @@ def test_snakemake_makes_what_the_commands_make(batch, hand):
     assert "<svg" in (batch / "out/left/report.html").read_text()
 
 
+def make(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run the Makefile in ``folder``."""
+    command = ["make", "-f", str(ROOT / "workflow" / "Makefile"), f"PT={program()}", "OUT=out", *words]
+    quiet = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    return subprocess.run(command, cwd=folder, env=quiet, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    "line", ["bench 3\tbench:?seed=3", "right  bench:?seed=4", "right\t", "left\tbench:?seed=5"]
+)
+def test_a_device_without_name_or_port_is_no_other_device(tmp_path, line):
+    """A blank in a name, or blanks for the tab, left the port empty: the default device was played."""
+    (tmp_path / "bad.tsv").write_text(f"name\tport\nleft\tbench:?seed=3\n{line}\n")
+    done = make(tmp_path, "--dry-run", "DEVICES=bad.tsv")
+    assert done.returncode == 2
+    assert "bad.tsv, line 3" in done.stderr
+    assert "capture" not in done.stdout
+    done = snakemake(tmp_path, "--cores", 1, "--dry-run", devices="bad.tsv", pulses=["normal"])
+    assert done.returncode != 0
+    assert "bad.tsv" in done.said
+
+
+def test_a_pulse_that_is_added_is_played(tmp_path):
+    """Make took its drive for an intermediate file, and found nothing to be done."""
+    (tmp_path / "one.tsv").write_text("name\tport\r\nleft\tbench:?seed=3\r\n")
+    (tmp_path / "out/left").mkdir(parents=True)
+    for name in ("run.h5", "model.h5", "drive-normal.h5", "played-normal.h5", "evaluation.h5", "report.html"):
+        (tmp_path / "out/left" / name).touch()
+    done = make(tmp_path, "--dry-run", "DEVICES=one.tsv", "PULSES=normal")
+    assert "Nothing to be done" in done.stdout
+    done = make(tmp_path, "--dry-run", "DEVICES=one.tsv", "PULSES=normal bifid")
+    assert "drive-bifid.h5 --port 'bench:?seed=3'" in done.stdout
+    assert "capture" not in done.stdout
+
+
 @pytest.mark.slow
 def test_make_makes_what_the_commands_make(tmp_path, hand):
     """The same commands by pattern rules, side by side."""
     (tmp_path / "two.tsv").write_text(DEVICES)
     options = [f"{name.upper()}={words}" for name, words in SHORT.items()]
-    command = ["make", "-f", str(ROOT / "workflow" / "Makefile"), "-j2", f"PT={program()}", "DEVICES=two.tsv"]
-    command += ["OUT=out", "PULSES=normal", *options, "out/right/report.html"]
-    quiet = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
-    done = subprocess.run(command, cwd=tmp_path, env=quiet, capture_output=True, text=True, check=False)
+    done = make(tmp_path, "-j2", "DEVICES=two.tsv", "PULSES=normal", *options, "out/right/report.html")
     assert done.returncode == 0, done.stderr
     assert same(tmp_path / "out/right/evaluation.h5", hand / "evaluation.h5")
     assert not (tmp_path / "out/left").exists()
