@@ -73,10 +73,12 @@ class Dialect:
 
 def split(line: str, delimiter: str | None) -> list[str]:
     """Return the cells of a line, stripped."""
+    if '"' in line:
+        text = line if delimiter else line.replace("\t", " ").strip()
+        cells = next(csv.reader([text], delimiter=delimiter or " ", skipinitialspace=True))
+        return [cell.strip() for cell in cells]
     if delimiter is None:
         return line.split()
-    if '"' in line:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
     return [cell.strip() for cell in line.split(delimiter)]
 
 
@@ -241,17 +243,26 @@ def _begins_with_text(row: list[str], last: list[str]) -> bool:
 
 
 def _first_row(rows: list[list[str]]) -> int:
-    """Return where the rows at the end of the sample begin that are of one kind."""
-    start = len(rows)
-    while start and _is_row(rows[start - 1], rows[-1]):
+    """Return where the rows of one kind begin, whatever bad rows are among them."""
+    last = rows[-1]
+    start = next((k for k, row in enumerate(rows) if _tells_as_much(row, last)), len(rows))
+    while start and _is_row(rows[start - 1], last):
         start -= 1
     return start
+
+
+def _tells_as_much(row: list[str], last: list[str]) -> bool:
+    """Whether a line has numbers wherever the last row has some, and text only where that has text."""
+    return len(row) == len(last) and all(
+        _is_number(cell) if _is_number(below) else _is_text(below) or not _is_text(cell)
+        for cell, below in zip(row, last, strict=True)
+    )
 
 
 def _above(rows: list[list[str]], parted: list[bool]) -> int:
     """Return how many lines stand above the table and its headings: what an instrument says about itself.
 
-    The table is the rows at the end of the sample that are of one kind, ten or more. Rows of numbers above,
+    The table is the rows of one kind up to the end of the sample, ten or more. Rows of numbers above,
     or headings of another count, are in error, and 0 is returned. Names stand directly above their units:
     ``parted`` says above which lines there is a remark.
     """

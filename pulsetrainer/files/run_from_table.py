@@ -85,7 +85,7 @@ def run_from_table(
     )
     _check_distinct(table, input=input, output=output, reference=reference)
     notes: tuple[str, ...] = ()
-    whole = table.rows
+    whole = table
     if skip_bad_rows:
         table, notes = _without_bad_rows(table, counted=rate_Hz is not None)
     columns = {name: np.ascontiguousarray(table.check_finite(name, remedy=_LEAVE_OUT)) for name in wanted}
@@ -93,9 +93,7 @@ def run_from_table(
         raise DataError(
             f"{table.path} has {table.rows} row, a run needs two or more", hint="export the record again"
         )
-    when = (
-        _Time(None, "no time") if no_time else _time(table, wanted, time, rate_Hz, whole=table.rows == whole)
-    )
+    when = _Time(None, "no time") if no_time else _time(table, wanted, time, rate_Hz, whole)
     _check_distinct(table, input=input, output=output, reference=reference, time=time)
     run = Run(
         time_s=when.s,
@@ -124,11 +122,11 @@ class _Time(NamedTuple):
 
 
 def _time(
-    table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float | None, *, whole: bool
+    table: Table, wanted: Sequence[str], time: str | None, rate_Hz: float | None, whole: Table
 ) -> _Time:
     """Return the time by a rate, in a column, or, where neither is given, what the file has by itself.
 
-    ``whole``: all rows are there, so that they may be counted.
+    ``whole`` is the table before rows were left out: it tells whether a column counts them.
     """
     rate_Hz = table.rate_Hz if rate_Hz is None and time is None else rate_Hz
     if rate_Hz is not None:
@@ -137,13 +135,13 @@ def _time(
         place = _own_column(table, {table.index(name) for name in wanted})
         if place is None:
             return _counted(
-                table, f"{table.path} has no time column", "give `time` or `rate_Hz`", whole=whole
+                table, f"{table.path} has no time column", "give `time` or `rate_Hz`", whole=table is whole
             )
         time = table.names[place]
         # no row is counted in ms; the licensed t_s of seconds does count rows
-        if _just_counts(table.columns[time]) and _unit_of_time(table, time) in ("", "s"):
+        if _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s"):
             lack = f"the column {time} of {table.path} just counts the rows, so it is not used as time"
-            return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=whole)
+            return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
     heading = table.names[table.index(time)]
     unit = _unit_of_time(table, heading)
     notes: tuple[str, ...] = ()
@@ -314,12 +312,12 @@ def _unknown_unit(table: Table, name: str) -> str:
 
 
 def _just_counts(values: FloatArray) -> bool:
-    """Whether a column is 0, 1, 2, or 1, 2, 3."""
+    """Whether a column is 0, 1, 2, or 1, 2, 3, wherever something stands in it."""
     if values.size < _COUNTED or values[0] not in (0.0, 1.0):
         return False
+    parts = ((k, values[k : k + _BLOCK]) for k in range(0, values.size, _BLOCK))
     return all(
-        np.array_equal(values[k : k + _BLOCK], values[0] + np.arange(k, min(k + _BLOCK, values.size)))
-        for k in range(0, values.size, _BLOCK)
+        bool(np.all((part == values[0] + np.arange(k, k + part.size)) | np.isnan(part))) for k, part in parts
     )
 
 

@@ -280,6 +280,14 @@ def test_habits_of_instruments(table, text, names, units):
     assert text.splitlines()[read.line_of(read.rows - 1) - 1] == text.splitlines()[-1]
 
 
+@pytest.mark.parametrize("heading", [[], ["t,u,y,state"]])
+def test_no_row_above_a_bad_one_is_taken_for_a_comment(table, heading):
+    """Of a table with a column of text only the rows behind the bad one were read, without a word."""
+    rows = [f"{0.1 * k:.1f},{k % 5},{k % 3},ok" for k in range(60)]
+    rows[40] += ",1"
+    _refused(table, "\n".join([*heading, *rows]), f"5 columns in line {41 + len(heading)}")
+
+
 @pytest.mark.parametrize("remark", ["", "\tbegin"])
 def test_a_heading_of_remarks_may_have_no_cells(table, remark):
     """LabVIEW names a column of comments and ends its rows before it, most often all of them."""
@@ -754,6 +762,13 @@ def test_a_column_that_just_counts_is_no_time(table, first, counts):
     """From 0 or 1 in steps of 1; one that begins elsewhere is time."""
     read = table("n,u,y\n" + "".join(f"{first + k},{k % 5},{k % 3}\n" for k in range(20)))
     assert (read_run(read.path, **COLUMNS).time_s is None) == counts
+
+
+def test_rows_that_count_are_no_time_where_some_are_left_out(table):
+    """The numbers of the rows that stay have gaps, and are seconds no more than before."""
+    rows = [f"{k},{k % 5},{k % 3}" for k in range(20)]
+    read = table("\n".join(["n,u,y", *rows[:7], "7,,1", *rows[8:]]))
+    assert read_run(read.path, **COLUMNS, skip_bad_rows=True).time_s is None
 
 
 def test_time_that_does_not_increase_names_the_line(table):

@@ -21,6 +21,7 @@ import numpy as np
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.turns import at_their_tips
 from pulsetrainer.diagnosis import gates
+from pulsetrainer.diagnosis.coarse_input import as_it_moved
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
 from pulsetrainer.diagnosis.state import Question
@@ -51,7 +52,8 @@ def stage(question: Question) -> Masked:
         for record, times, known in zip(question.records, stamps, corrected, strict=True)
     ]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
-    even = [evenly(record, times) for record, times in zip(masked, stamps, strict=True)]
+    moved = map(as_it_moved, masked)
+    even = [evenly(record, times) for record, times in zip(moved, stamps, strict=True)]
     times = [np.asarray(one.step * np.arange(one.input.size)) if one.timed else None for one in even]
     inputs = at_their_tips([(one.input, one.output) for one in even], times, [one.counts for one in even])
     even = [replace(one, input=u) for one, u in zip(even, inputs, strict=True)]
