@@ -36,6 +36,7 @@ def diagnose(
     """
     check_once(runs)
     job = Job(context, inputs=(*runs, model), outputs=(out, html))
+    from pulsetrainer.files import store
     from pulsetrainer.report.diagnosis_text import sections
     from pulsetrainer.report.results import diagnosed
 
@@ -49,7 +50,9 @@ def diagnose(
             progress=progress,
         )
         header = job.save(out, found, f"Diagnosis of {', '.join(path.stem for path in runs)}")
-        commands = next_commands(found, runs, model, out)
+        known = set(store.read_header(model).provenance.inputs.values())
+        own = not known or bool(known & set(header.provenance.inputs.values()))
+        commands = next_commands(found, runs, model, out, own=own)
         if html is not None:
             from pulsetrainer.report.diagnosis_html import render_diagnosis
 
@@ -64,8 +67,11 @@ def diagnose(
         job.screen.whole(f"then: {line}")
 
 
-def next_commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path) -> list[str]:
-    """Return the commands to go on with: to extend the model, or to correct the runs and begin again."""
+def next_commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path, *, own: bool) -> list[str]:
+    """Return the commands to go on with: to extend the model, or to correct the runs and begin again.
+
+    A model that was not identified from its ``own`` runs is not at fault, and stays.
+    """
     words: list[list[object]] = []
     if found.next_command == "extend":  # fitted with all faults of the measurement taken out
         words.append(["extend", out, "--model", model, "-o", "extended.h5"])
@@ -73,7 +79,7 @@ def next_commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path)
         corrected = [f"{run.stem}-corrected.h5" for run in runs]
         pairs = zip(runs, corrected, strict=True)
         words += [["correct", run, "--diagnosis", out, "-o", made] for run, made in pairs]
-        again = ["--model", "model-corrected.h5", "-o", f"{out.stem}-corrected.h5"]
-        words.append(["identify", *corrected, "-o", "model-corrected.h5"])
-        words.append(["diagnose", *corrected, *again])
+        again = Path(f"{model.stem}-corrected.h5") if own else model
+        words += [["identify", *corrected, "-o", again]] if own else []
+        words.append(["diagnose", *corrected, "--model", again, "-o", f"{out.stem}-corrected.h5"])
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]

@@ -76,9 +76,10 @@ def is_as_good(state: State, term: Term) -> bool:
 def _begun(term: Term, length_s: float) -> list[Term]:
     """What settles, at the lengths from which it is fitted."""
     zero = term.cause.wears_about or 0.0
-    if not term.cause.sudden:
-        pairs = product((False, True), LIMITS.worn_within)
-        return [Term(Wear(by_way=way, zero=zero), (LIMITS.worn, length)) for way, length in pairs]
-    as_quickly = max(term.values[-1] / length_s, LIMITS.worn_lengths[0])
-    pairs = product((False, True), (*LIMITS.worn_within, as_quickly))
-    return [Term(Settling(by_way=way, zero=zero), (LIMITS.worn, length, 0.0)) for way, length in pairs]
+    lengths: tuple[float, ...] = LIMITS.worn_within
+    if term.cause.sudden:  # it may have settled as quickly as that
+        lengths = (*lengths, max(term.values[-1] / length_s, LIMITS.worn_lengths[0]))
+    pairs = product((False, True), lengths)
+    if term.cause.moves_zero:
+        return [Term(Settling(by_way=way, zero=zero), (LIMITS.worn, length, 0.0)) for way, length in pairs]
+    return [Term(Wear(by_way=way, zero=zero), (LIMITS.worn, length)) for way, length in pairs]

@@ -28,7 +28,7 @@ _NEW = 3e-4  # of the force: a change of the loss that is worth another inverse
 
 
 def thermal_of(model: Model) -> Thermal | None:
-    """Return the thermal term of a model, None where it has none, or one of a device driven both ways."""
+    """Return the thermal term of a model; None where it has none, or one that says where it is cold."""
     for extension in model.extensions:
         value = {parameter.name: parameter.value for parameter in extension.parameters}
         if extension.cause == "thermal-drift" and "cold" not in value:

@@ -99,11 +99,22 @@ def test_a_diagnosis_that_extends_the_model_sends_no_one_to_correct(folder):
     """The drift is out of the extended model; without one, the run is corrected and fitted anew."""
     model = pt.Model(np.linspace(0.0, 1.0, 3), np.ones(3), 0.0, np.ones(3, bool))
     found = replace(pt.load(folder / "diagnosis.h5"), verdict="creep", extended=model)
-    verbs = [
-        [line.split()[1] for line in next_commands(one, [Path("run.h5")], Path("model.h5"), Path("d.h5"))]
-        for one in (found, replace(found, extended=None), replace(found, extended=None, correctable=()))
+    fault, nothing = replace(found, extended=None), replace(found, extended=None, correctable=())
+
+    def commands(one: Diagnosis, name: str = "a.h5", *, own: bool = True) -> list[str]:
+        return next_commands(one, [Path("r.h5")], Path(name), Path("d.h5"), own=own)
+
+    assert [[line.split()[1] for line in commands(one)] for one in (found, fault, nothing)] == [
+        ["extend"],
+        ["correct", "identify", "diagnose"],
+        [],
     ]
-    assert verbs == [["extend"], ["correct", "identify", "diagnose"], []]
+    for name in ("a", "a-corrected"):  # a second round overwrites nothing
+        again = f"{name}-corrected.h5"
+        assert commands(fault, f"{name}.h5")[1] == f"pulsetrainer identify r-corrected.h5 -o {again}"
+    assert commands(fault, own=False)[1:] == [
+        "pulsetrainer diagnose r-corrected.h5 --model a.h5 -o d-corrected.h5"
+    ]
 
 
 def test_the_way_on_names_the_diagnosis_that_was_given(folder):

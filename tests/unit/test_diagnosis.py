@@ -115,6 +115,7 @@ def test_a_cause_without_strength_does_nothing(name):
         [("creep", (1.0, 0.07, 1.0))],  # of one time constant
         [("thermal-drift", (0.02, 10.0))],
         [("thermal-drift", (0.5, 0.06, 10.0))],  # driven both ways
+        [("thermal-drift", (0.0, 0.02, 10.0, 0.05))],  # of which the zero moves
         [("field-lag", (0.003,)), ("creep", (0.03, 1.0)), ("thermal-drift", (0.006, 20.0))],
     ],
 )

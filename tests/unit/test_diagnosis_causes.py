@@ -119,6 +119,24 @@ def test_a_coil_that_is_driven_both_ways_is_cold_in_the_middle():
     assert CAUSE["thermal-drift"].kinds()[1] is both_ways  # of two refits the terms are the same
 
 
+def test_heat_may_move_the_zero():
+    """By a shift beside the loss of gain; the model then keeps where it is cold, and comes back."""
+    frame = _frame(np.full(T.size, 3.0), low=-1.0, ends=(-3.0, 5.0), zero=-3.0)
+    y, k, tau, shift = 2.0 + T, 0.02, 0.7, -0.3
+    for plain in CAUSE["thermal-drift"].kinds():
+        ((moving, none),) = plain.finer(frame)
+        still = plain.on_output(y, (k, tau), frame)
+        np.testing.assert_array_equal(moving.on_output(y, (k, tau, none), frame), still)
+        heat = (y - still) / (k * (y - (1.0 if plain.kind else -3.0)))
+        shown = moving.on_output(y, (k, tau, shift), frame)
+        np.testing.assert_allclose(shown, still + shift * heat, atol=1e-12)
+        kept = tuple(value for _, value, _ in moving.constants())
+        again, values = CAUSE["thermal-drift"].restored((*kept, k, tau, shift))
+        np.testing.assert_array_equal(again.on_output(y, values, frame), shown)
+        assert moving.finer(frame) == []
+        assert len(moving.quantities(frame)) == len(plain.quantities(frame)) + 1
+
+
 def test_a_widening_trails_by_the_root_of_the_rate():
     """On a steady ramp u - v = k sqrt(u'), falling as rising; a vanishing coefficient changes nothing."""
     cause, k, frame = CAUSE["rate-widening"], 0.05, _frame()

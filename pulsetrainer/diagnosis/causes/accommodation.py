@@ -29,7 +29,7 @@ class Accommodation(Cause):
     needs_time = False
     parameters = (
         Quantity("amplitude", "1", -0.5, 1.0, 0.002, "what follows over cycles, per change at once"),
-        Quantity("path", "{u}", 0.3, 700.0, 0.3, "way of the {input} until it has followed"),
+        Quantity("path", "{u}", 2.0, 700.0, 0.3, "way of the {input} until it has followed"),
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:

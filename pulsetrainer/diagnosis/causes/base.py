@@ -138,6 +138,7 @@ class Cause:
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
     drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
+    moves_zero: bool = False  # as well as the gain: so may what settles and looks like it
     sudden: ClassVar[bool] = False  # a change at a moment, its last parameter
 
     def gate(self, raw: Raw) -> Firing | None:

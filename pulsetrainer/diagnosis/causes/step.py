@@ -41,6 +41,7 @@ class Step(Cause):
         Quantity("time", "s", 0.0, 1e6, 0.01, "of the change, since the first sample"),
     )
     sudden = True
+    moves_zero = True
     lasting = False
     corrects = True
 

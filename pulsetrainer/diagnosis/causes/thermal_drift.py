@@ -1,8 +1,10 @@
-"""the output falls with heat: y - k h (y - y0), tau h' = (u - u0)^2 - h.
+"""the output falls with heat: y - k h (y - y0) + b h, tau h' = (u - u0)^2 - h.
 
 Neither zero is taken from the data's own, which may lie anywhere. Two kinds are tried: of a device that is
 driven one way, u0 is the lower end of the input's range and y0 the output of empty memory; of one that is
-driven both ways, u0 is the middle of the range and y0 that of the output.
+driven both ways, u0 is the middle of the range and y0 that of the output. That heat moves the zero besides
+(b), or that the gain is about another y0, is put in only where noise cannot make the difference
+(`stages.exchange`).
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Frame, OfKinds, Quantity, Values, low_pass, spread
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, OfKinds, Quantity, Values, low_pass, spread
 
 _TRIED = 0.02  # coefficient
 _FASTEST_S = 5.0  # a wire's: what is faster is creep
@@ -21,6 +23,7 @@ _SLOWEST = 0.43  # of the record: what is slower is drift
 _RATIO = 3.0  # from one time constant to the next: a wire's, a coil's, an iron core's
 _BOUNDS = (0.01, 3.2)  # of the record
 _NOT_COLD = 0.05  # of the heat that the largest input would lead to
+_PLAIN = 2  # parameters where the zero stays
 _BOTH_WAYS = 0.5  # of the range: the input at which a device that is driven both ways stays cold
 
 
@@ -29,7 +32,7 @@ class ThermalDrift(OfKinds):
 
     id = "thermal-drift"
     title = "the {output} falls with a slow average of the squared {input}, as with heat"
-    formula = "y - k h (y - y0), tau h' = (u - u0)^2 - h"
+    formula = "y - k h (y - y0) + b h, tau h' = (u - u0)^2 - h"
     signature = (
         "the error is proportional to the output, follows a slow average of the squared input "
         "and recovers at rest"
@@ -49,7 +52,27 @@ class ThermalDrift(OfKinds):
             "coefficient", "1/({u})^2", -1.1, 1.1, 0.002, "share of the {output} lost, per squared {input}"
         ),
         Quantity("tau", "s", 1.0, 300.0, 0.5, "time constant of the heat"),
+        Quantity("shift", "{y}/({u})^2", -1.1, 1.1, 0.002, "change of its zero, per squared {input}"),
     )
+
+    def __init__(self, kind: float | None = None, *, moves_zero: bool = False) -> None:
+        super().__init__(kind)
+        self.moves_zero = moves_zero
+
+    def constants(self) -> tuple[tuple[str, float, str], ...]:
+        """Return at which input it is cold, which only the plain formula of the first kind leaves open."""
+        return ((self.number, self.kind, "1"),) if self.moves_zero else super().constants()
+
+    def restored(self, values: Values) -> tuple[Cause, Values]:
+        """Return the cause and its parameters: with the shift of a zero there are four values."""
+        if len(values) <= _PLAIN + 1:
+            kind, own = values[:-_PLAIN], values[-_PLAIN:]
+            return ThermalDrift(*kind), own
+        return ThermalDrift(values[0], moves_zero=True), values[1:]
+
+    def finer(self, frame: Frame) -> list[tuple[Cause, float]]:
+        """The same that moves the zero."""
+        return [] if self.moves_zero else [(ThermalDrift(self.kind, moves_zero=True), 0.0)]
 
     @property
     def wears_about(self) -> float:
@@ -57,13 +80,12 @@ class ThermalDrift(OfKinds):
         return self.kind
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
-        strength, tau = self.parameters
+        strength, tau, shift = self.parameters
         hottest = (1.0 - self.kind) ** 2  # heat of the largest input, squared ranges
         low, high = (share * frame.length_s for share in _BOUNDS)
-        return (
-            replace(strength, low=strength.low / hottest, high=strength.high / hottest),
-            replace(tau, low=min(tau.low, low), high=high),
-        )
+        one, other = (replace(q, low=q.low / hottest, high=q.high / hottest) for q in (strength, shift))
+        known = (one, replace(tau, low=min(tau.low, low), high=high), other)
+        return known if self.moves_zero else known[:_PLAIN]
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         slowest = _SLOWEST * frames[0].length_s
@@ -85,7 +107,8 @@ class ThermalDrift(OfKinds):
             squared = np.append(begin, squared)
         heat = low_pass(squared, values[1], frame.dt_s, frame.past, "heat")[-y.size :]
         about = frame.zero + self.kind * (frame.ends[1] - frame.ends[0])
-        return np.asarray(y - values[0] * heat * (y - about))
+        coefficient, _, *shift = values
+        return np.asarray(y - heat * (coefficient * (y - about) - sum(shift)))
 
     def _power(self, frame: Frame) -> FloatArray:
         """What heats: (n,) squared input, from where it is cold, input unit squared."""
