@@ -22,8 +22,8 @@ def doctor(
     capture: Annotated[
         bool, typer.Option(help="Drive the coil for 3 s, to half its range, and look at what comes back.")
     ] = True,
-    limit_current: LimitCurrent = None,
-    limit_force: LimitForce = None,
+    limit_current_A: LimitCurrent = None,
+    limit_force_N: LimitForce = None,
     json: AsJson = False,
 ) -> None:
     """Check this computer, its ports and the device.
@@ -42,7 +42,7 @@ def doctor(
     rows = settings.effective(file, os.environ)
     words = "; ".join(f"{one.key} = {value} ({source})" for one, value, source in rows)
     with screen.bar("looking") as progress:
-        held = Limits(limit_current, limit_force)
+        held = Limits(limit_current_A, limit_force_N)
         result = examine(port, capture=capture, limits=held, settings=words, tuned=file, progress=progress)
     stand = "stands" if result.problems == 1 else "stand"
     problem = f"{result.problems} of {len(result.findings)} findings {stand} in the way"

@@ -136,15 +136,15 @@ def test_every_setting_reaches_all_commands_that_take_it():
     """A limit, a port: wherever there is the option; the first command of each setting is named here."""
     commands = typer.main.get_command(app).commands
     plays = {name for name, one in commands.items() if {p.name for p in one.params} & {"limit_force_N"}}
-    assert plays == {"capture", "play", "session", "refine", "check", "tune"}
+    assert plays == {"capture", "play", "session", "refine", "check", "tune", "doctor"}
     reach = {one.key: set(takers(one, commands)) for one in SETTINGS}
     assert reach["limits.current_A"] == reach["limits.force_N"] == plays
-    assert reach["port"] == plays | {"doctor"}
+    assert reach["port"] == plays
     assert reach["levels"] == {"capture", "identify"}
     assert {key for key, names in reach.items() if not names} == set()
     given = defaults({"limits.force_N": 5.0, "port": "bench:"}, commands)
     assert given["session"] == {"limit_force_N": 5.0, "port": "bench:"}
-    assert given["doctor"] == {"port": "bench:"}
+    assert given["doctor"] == given["session"]
 
 
 def test_verbose_says_what_is_done_on_stderr(run):
