@@ -51,4 +51,5 @@ def test_a_zero_that_heat_moves_is_found_only_where_it_moves(moved):
     assert found.extended is not None
     unseen = _record(np.random.default_rng(4), moved)
     plain, extended = pt.evaluate(unseen, [pt.identify(run), found.extended]).models
-    assert extended.rms_percent < 0.21 < 0.25 < plain.rms_percent  # the noise is 0.2 %
+    assert plain.rms_percent > 0.25
+    assert extended.rms_percent < 0.21  # the noise is 0.2 %
