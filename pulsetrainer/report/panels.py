@@ -340,11 +340,13 @@ def drives(panel: FigureBase, waveform: Waveform) -> None:
     trace(above, waveform.time_s, waveform.target, **TARGET, label="target")
     measured = "pressed in the kept pass, mean" if waveform.passes else "predicted by the model"
     trace(above, waveform.time_s, waveform.predicted, **MODEL, label=measured)
-    above.set_ylabel(label(quantity_of(waveform.output_unit), waveform.output_unit))
+    model = waveform.model
+    pressed, driven = (model.output_quantity, model.input_quantity) if model else ("", "")
+    above.set_ylabel(label(pressed or quantity_of(waveform.output_unit), waveform.output_unit))
     above.set_title(f"{titled(waveform)}: what is asked for, and the drive")
     trace(below, waveform.time_s, waveform.scaled, **SCALED, label="scaled")
     trace(below, waveform.time_s, waveform.compensated, **COMPENSATED, label=waveform.inversion)
-    below.set_ylabel(label(f"drive: {quantity_of(waveform.input_unit)}", waveform.input_unit))
+    below.set_ylabel(label(f"drive: {driven or quantity_of(waveform.input_unit)}", waveform.input_unit))
     below.set_xlabel(label("time", "s"))
     unscored(above, waveform)
     unscored(below, waveform, name="")

@@ -490,6 +490,13 @@ def test_a_prediction_names_the_quantity_as_the_model_does():
         assert {a.get_ylabel() for a in drawn.axes} == {"flux density [mT]", "residual [mT]"}
 
 
+def test_a_drive_names_its_quantities_as_the_model_does():
+    """That of a piezo said "output [µm]" where its model says stroke."""
+    model = replace(stored.model(), input_quantity="voltage", output_quantity="stroke")
+    drawn = figures.draw(replace(examples.waveform(), model=model, input_unit="V", output_unit="um"))
+    assert [a.get_ylabel() for a in drawn.axes[:2]] == ["stroke [um]", "drive: voltage [V]"]
+
+
 def test_a_diagnosis_without_time_draws_none():
     """Its samples were called seconds, and groups of one place were drawn as a point."""
     group, one = np.arange(3.0), np.full(3, np.nan)
