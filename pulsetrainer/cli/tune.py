@@ -103,9 +103,8 @@ def _would(
 
 
 def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> None:
-    from pulsetrainer.device.codes import PARAMETERS
+    from pulsetrainer.device.codes import PARAMETER
 
-    units = {parameter.name: parameter.unit for parameter in PARAMETERS}
     job.notes(found.notes)
     if out is None:
         job.notes(["the loop gains are not kept: give `out` pulsetrainer.toml to write them down"])
@@ -116,7 +115,7 @@ def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> N
         {
             "coil": f"{found.resistance_ohm:.2f} ohm, {1e3 * found.inductance_H:.1f} mH, supply "
             f"{found.supply_V:.1f} V {'by the diode' if supply_V is None else 'as given'}",
-            **{name: f"{value} {units[name]}" for name, value in found.gains.values().items()},
+            **{name: f"{value} {PARAMETER[name].unit}" for name, value in found.gains.values().items()},
             "margins": f"gain {found.margins.gain:.1f}, phase {found.margins.phase_deg:.0f} degrees",
             "tracking": f"{after:.2f} % of the range at worst"
             + ("" if before is None else f", {before:.2f} % before"),

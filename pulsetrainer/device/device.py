@@ -21,17 +21,11 @@ from pulsetrainer.device.follower import STOPPED, Follower
 from pulsetrainer.device.gains import DELIVERED, Gains
 from pulsetrainer.device.heat import HeatMemory, course
 from pulsetrainer.device.identity import DeviceInfo
-from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire
+from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire, ticks_per_sample, to_wire
 from pulsetrainer.device.player import Player, tells_duty
-from pulsetrainer.device.reference import ticks_per_sample, to_wire
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.trace import Block, FloatArray, Trace
-from pulsetrainer.device.wording import (
-    NOT_OFF_REMEDY,
-    describe_fault,
-    describe_not_off,
-    flows_A,
-)
+from pulsetrainer.device.wording import NOT_OFF_REMEDY, describe_fault, describe_not_off, flows_A
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 
 _LOG = logging.getLogger(__name__)
@@ -183,10 +177,10 @@ class Device:
 
         Limits can only be lowered: the range ends at the absolute limit compiled into the firmware.
         """
-        rows = {p.name: p for p in codes.PARAMETERS}
-        if name not in rows:
-            raise ArgumentError(f"the device has no parameter {name!r}", hint=f"there are: {', '.join(rows)}")
-        row = rows[name]
+        if name not in codes.PARAMETER:
+            known = ", ".join(codes.PARAMETER)
+            raise ArgumentError(f"the device has no parameter {name!r}", hint=f"there are: {known}")
+        row = codes.PARAMETER[name]
         if not row.minimum <= value <= row.maximum:
             raise ArgumentError(
                 f"{name}={value} is outside {row.minimum}..{row.maximum} {row.unit}",

@@ -13,11 +13,13 @@ from pulsetrainer.device.codes import (
     MAGIC,
     PROTOCOL_MAJOR,
     PROTOCOL_MINOR,
+    Fault,
+    NakCode,
 )
 from pulsetrainer.device.frames import Frame, FrameReader, encode
 from pulsetrainer.device.schemes import TIMEOUTS_S
 from pulsetrainer.device.transport import Transport
-from pulsetrainer.device.wording import fault_text, refusal_text
+from pulsetrainer.device.wording import told
 from pulsetrainer.errors import DeviceError
 
 _HELLO_S = 3.0
@@ -41,10 +43,10 @@ class RefusedError(DeviceError):
 
     def __init__(self, port: str, nak: m.Nak) -> None:
         self.nak = nak
-        fault = fault_text(nak.fault)
+        fault = told(Fault, nak.fault)
         super().__init__(
             f"the device on {port} refused {_NAMES.get(nak.command, hex(nak.command))}: "
-            f"{refusal_text(nak.code)}" + (f" (latched fault: {fault})" if fault else ""),
+            f"{told(NakCode, nak.code)}" + (f" (latched fault: {fault})" if fault else ""),
             hint="run the command again; if it is refused again, restart the device",
         )
 
