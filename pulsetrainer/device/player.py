@@ -282,10 +282,11 @@ class Player:
 
     def _judge(self, status: m.StatusReply, refused: str) -> Outcome:
         if status.boot_nonce != self._hello.boot_nonce:
+            cause = told(codes.ResetCause, status.reset_cause)
             return Outcome(
                 -1,
                 played_to_end=False,
-                fault=f"the device restarted in mid-play (cause: {told(codes.ResetCause, status.reset_cause)})",
+                fault=f"the device restarted in mid-play (cause: {cause})",
                 remedy="check its power supply and cable; nothing was started again",
             )
         last_tick = (self._feed.size - 1) * self._ticks_per_sample
@@ -296,9 +297,8 @@ class Player:
         if not_off:  # above everything else
             fault = f"{not_off} (first: {fault})" if fault else not_off
         if not fault and status.state != codes.State.IDLE:
-            fault = (
-                f"the device did not come to rest after the play (state: {told(codes.State, status.state)})"
-            )
+            state = told(codes.State, status.state)
+            fault = f"the device did not come to rest after the play (state: {state})"
         # Refused before it started: the numbers in the status are those of an earlier play.
         started = status.session == self._play_session
         to_end = started and status.tick > last_tick and not fault
