@@ -48,10 +48,7 @@ _NEXT = {
     "then `pulsetrainer evaluate played.h5 -o evaluation.h5`",
     ("diagnosis", "run"): "run `pulsetrainer diagnose {file} --model model.h5 -o diagnosis.h5`",
     ("diagnosis", "model"): "run `pulsetrainer diagnose RUN.h5 --model {file} -o diagnosis.h5`",
-    (
-        "run",
-        "playback",
-    ): "a run comes from `pulsetrainer capture`; of a playback the errors are told by "
+    ("run", "playback"): "a run comes from `pulsetrainer capture`; of a playback the errors are told by "
     "`pulsetrainer evaluate {file} -o evaluation.h5`",
     ("run", "model"): "give the run it was identified from: `pulsetrainer show {file}` tells its history",
     ("run", "diagnosis"): "give the run that was diagnosed: `pulsetrainer show {file}` tells its history",

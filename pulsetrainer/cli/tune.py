@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
@@ -20,17 +20,15 @@ _FOLLOWED = ("normal", "bifid")  # where no drive is given
 
 
 def tune(
-    context: typer.Context,
+    context: Context,
     port: Port = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--out", help="File of settings to write the gains into, such as pulsetrainer.toml."
-        ),
+        Option("-o", "--out", help="File of settings to write the gains into, such as pulsetrainer.toml."),
     ] = None,
     supply_V: Annotated[
         float | None,
-        typer.Option(
+        Option(
             "--supply",
             callback=positive,
             help="Voltage of the supply, V, where you have measured it; default: told by the diode's 0.6 V.",
@@ -38,7 +36,7 @@ def tune(
     ] = None,
     drive: Annotated[
         list[Path],
-        typer.Option(
+        Option(
             help="Drive that the coil must follow; may be given again. Default: two pulses of the library.",
             show_default=False,
         ),
