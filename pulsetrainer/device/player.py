@@ -10,13 +10,13 @@ from __future__ import annotations
 import contextlib
 import threading
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.exchange import AbandonedError, Exchange, NoAnswerError, RefusedError
 from pulsetrainer.device.feed import Feed
+from pulsetrainer.device.schemes import Clock
 from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.device.wording import (
     NOT_OFF_REMEDY,
@@ -65,7 +65,7 @@ class Player:
         *,
         hello: m.HelloReply,
         seen: tuple[int, int],
-        monotonic: Callable[[], float],
+        monotonic: Clock,
         piece_s: float = float("inf"),
     ) -> None:
         self._exchange = exchange
@@ -209,8 +209,7 @@ class Player:
     def _credit(self) -> int:
         """Room in the device's buffer by what telemetry says it has played; never more than there is."""
         return max(
-            self._ack.credit,
-            min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + self.played),
+            self._ack.credit, min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + self.played)
         )
 
     def _beat_due(self) -> bool:

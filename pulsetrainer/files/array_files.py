@@ -83,15 +83,7 @@ def _read_mat(path: Path) -> Columns:
 
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=True)
-    except (
-        MatReadError,
-        ValueError,
-        TypeError,
-        NotImplementedError,
-        KeyError,
-        IndexError,
-        zlib.error,
-    ) as error:
+    except (MatReadError, ValueError, TypeError, NotImplementedError, LookupError, zlib.error) as error:
         raise _unreadable(path, "a MATLAB file", error) from error
     found: dict[str, Any] = {}
     for name, value in content.items():

@@ -84,12 +84,7 @@ def compare(
     wanted = [
         n for n in dict.fromkeys(n for one in every for n in one) if everything or n.endswith(headlines)
     ]
-    metrics = tuple(
-        _metric(
-            name, tuple(one.get(name) for one in every), max((s.get(name, 0.0) for s in spreads), default=0.0)
-        )
-        for name in wanted
-    )
+    metrics = tuple(_metric(name, every, spreads) for name in wanted)
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
         raise DataError(
             f"no two of {', '.join(titles)} have a figure in common",
@@ -150,7 +145,9 @@ def _of_session(one: Session) -> dict[str, float]:
     return found
 
 
-def _metric(name: str, values: tuple[float | None, ...], spread: float) -> Metric:
+def _metric(name: str, every: Sequence[dict[str, float]], spreads: Sequence[dict[str, float]]) -> Metric:
+    values = tuple(one.get(name) for one in every)
+    spread = max((one.get(name, 0.0) for one in spreads), default=0.0)
     there = [v for v in values if v is not None]
     change = there[-1] - there[0] if len(there) > 1 else None
     better = None
