@@ -37,7 +37,7 @@ def compare(
     job = Job(context, inputs=evaluations, outputs=(out,))
     from pulsetrainer.files import store
     from pulsetrainer.report import names
-    from pulsetrainer.report.comparison_text import as_csv, labels_of
+    from pulsetrainer.report.results import as_csv, labels_of
 
     labels = labels_of(evaluations)
     with job.working("comparing"):

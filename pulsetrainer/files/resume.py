@@ -81,15 +81,11 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
     except BaseException:
         lease.end()
         raise
-    contains = final is not None and _begins_with(run, final)
-    return Earlier(source, run, header, lease, contains)
-
-
-def _begins_with(run: Run, earlier: Run) -> bool:
-    size = earlier.input.size
-    return np.array_equal(run.input[:size], earlier.input, equal_nan=True) and np.array_equal(
-        run.output[:size], earlier.output, equal_nan=True
+    contains = final is not None and all(
+        np.array_equal(now[: before.size], before, equal_nan=True)
+        for now, before in ((run.input, final.input), (run.output, final.output))
     )
+    return Earlier(source, run, header, lease, contains)
 
 
 def _unfinished(path: Path, *, must_read: bool) -> Run | None:

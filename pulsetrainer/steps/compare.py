@@ -13,13 +13,9 @@ from pulsetrainer.errors import DataError
 from pulsetrainer.steps.arguments import check_several, named
 from pulsetrainer.steps.quiz import score
 
-_RISING = (
-    "mean_error_reduction_percent",
-    "gain_percent",
-    "right_percent",
-    "right_from_percent",
-    "right_to_percent",
-)  # more is better
+_RISING = (  # more is better
+    "mean_error_reduction_percent", "gain_percent", "right_percent", "right_from_percent", "right_to_percent",
+)  # fmt: skip
 _SAME = 0.005  # smaller changes are no change: a figure is shown with two digits
 
 
@@ -123,10 +119,7 @@ def _named(evaluations: Sequence[Evaluation], every: Sequence[dict[str, float]])
             renamed |= {f"{m.short_name}.": "model." for m in one.models}
         named = figures
         for old, new in renamed.items():
-            named = {
-                new + name.removeprefix(old) if name.startswith(old) else name: value
-                for name, value in named.items()
-            }
+            named = {new + n.removeprefix(old) if n.startswith(old) else n: v for n, v in named.items()}
         found.append(named)
     return found
 
