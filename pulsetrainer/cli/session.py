@@ -28,15 +28,11 @@ def session(
         str, Option(help="Names of the library or CSV files, separated by commas; each gets an equal share.")
     ] = "normal",
     rate: Annotated[
-        float | None, Option(help="Beats a minute, 20 to 240; default: each pulse's own.", show_default=False)
+        float | None, Option(help="Beats a minute, 20 to 240; default: each pulse's own.")
     ] = None,
     amplitude: Annotated[float, Option(help="Height of the pulses, % of what the model reaches.")] = 100.0,
-    minutes: Annotated[
-        float | None, Option(help="Length; default: 5, or the quiz's.", show_default=False)
-    ] = None,
-    beats: Annotated[
-        int | None, Option(help="Length in beats, instead of minutes.", show_default=False)
-    ] = None,
+    minutes: Annotated[float | None, Option(help="Length; default: 5, or the quiz's.")] = None,
+    beats: Annotated[int | None, Option(help="Length in beats, instead of minutes.")] = None,
     variability: Annotated[
         float, Option(min=0, max=25, help="Standard deviation of the intervals between beats, %.")
     ] = 0.0,
@@ -49,21 +45,16 @@ def session(
         Option(
             min=0,
             help="Seed of the rhythm and of a quiz's order; default: 0, for a quiz a new one each time.",
-            show_default=False,
         ),
     ] = None,
     changes: Annotated[
-        Path | None,
-        Option(help="Table of what changes when: t_s and any of rate, amplitude, pulse.", show_default=False),
+        Path | None, Option(help="Table of what changes when: t_s and any of rate, amplitude, pulse.")
     ] = None,
     quiz: Annotated[int, Option(min=0, help="Number of questions; 0: no quiz.")] = 0,
     answers: Annotated[
-        Path | None,
-        Option(help="Answers to the quiz, a pulse name a line; default: by key.", show_default=False),
+        Path | None, Option(help="Answers to the quiz, a pulse name a line; default: by key.")
     ] = None,
-    html: Annotated[
-        Path | None, Option(help="Score sheet to write.", show_default=False, envvar=variable("html"))
-    ] = None,
+    html: Annotated[Path | None, Option(help="Score sheet to write.", envvar=variable("html"))] = None,
     track_heat: TrackHeat = None,
     port: Port = None,
     limit_current_A: LimitCurrent = None,

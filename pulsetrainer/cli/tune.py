@@ -37,8 +37,7 @@ def tune(
     drive: Annotated[
         list[Path],
         Option(
-            help="Drive that the coil must follow; may be given again. Default: two pulses of the library.",
-            show_default=False,
+            help="Drive that the coil must follow; may be given again. Default: two pulses of the library."
         ),
     ] = [],  # noqa: B006
     limit_current_A: LimitCurrent = None,
