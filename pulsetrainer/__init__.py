@@ -32,33 +32,10 @@ if TYPE_CHECKING:
     from pulsetrainer.steps.transfer import transfer
 
 __all__ = [
-    "Diagnosis",
-    "Evaluation",
-    "Model",
-    "Playback",
-    "Run",
-    "Session",
-    "Waveform",
-    "__version__",
-    "capture",
-    "check",
-    "compare",
-    "correct",
-    "diagnose",
-    "evaluate",
-    "extend",
-    "identify",
-    "invert",
-    "load",
-    "open_device",
-    "play",
-    "read_table",
-    "refine",
-    "save",
-    "session",
-    "transfer",
-    "tune",
-]
+    "Diagnosis", "Evaluation", "Model", "Playback", "Run", "Session", "Waveform", "__version__", "capture",
+    "check", "compare", "correct", "diagnose", "evaluate", "extend", "identify", "invert", "load",
+    "open_device", "play", "read_table", "refine", "save", "session", "transfer", "tune",
+]  # fmt: skip
 
 _OF_THE_API = ("invert", "load", "open_device", "read_table", "save", "session", "tune")
 

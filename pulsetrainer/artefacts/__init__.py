@@ -12,35 +12,10 @@ from pulsetrainer.artefacts.session import Beats, Quiz, Score, Session
 from pulsetrainer.artefacts.waveform import RefinePass, Waveform
 
 __all__ = [
-    "KINDS",
-    "LARGEST",
-    "Attribute",
-    "Beats",
-    "BoolArray",
-    "Cause",
-    "Data",
-    "Dependence",
-    "Diagnosis",
-    "DriveError",
-    "DrivePlayback",
-    "Evaluation",
-    "Extension",
-    "Fit",
-    "FloatArray",
-    "Model",
-    "ModelEvaluation",
-    "Parameter",
-    "Playback",
-    "Profile",
-    "Quiz",
-    "Recorded",
-    "RefinePass",
-    "Run",
-    "Score",
-    "Session",
-    "Waveform",
-    "WaveformEvaluation",
-    "beyond_all_quantities",
-]
+    "KINDS", "LARGEST", "Attribute", "Beats", "BoolArray", "Cause", "Data", "Dependence", "Diagnosis",
+    "DriveError", "DrivePlayback", "Evaluation", "Extension", "Fit", "FloatArray", "Model",
+    "ModelEvaluation", "Parameter", "Playback", "Profile", "Quiz", "Recorded", "RefinePass", "Run", "Score",
+    "Session", "Waveform", "WaveformEvaluation", "beyond_all_quantities",
+]  # fmt: skip
 
 KINDS: dict[str, type] = {k.kind: k for k in (Run, Model, Waveform, Playback, Evaluation, Diagnosis, Session)}

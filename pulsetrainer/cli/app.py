@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Annotated, Any
 
 import typer
+from typer import Option
 
 from pulsetrainer.cli import guard, settings
 from pulsetrainer.cli.naming import Command
@@ -44,17 +45,17 @@ def _version(wanted: bool) -> None:
 def root(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+        bool, Option("--version", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
     settings_file: Annotated[
         str | None,
-        typer.Option(
+        Option(
             "--settings",
             help="File of settings; default: pulsetrainer.toml here, or in the user's configuration.",
         ),
     ] = None,
-    debug: Annotated[bool, typer.Option("--debug", help="Show the whole traceback of an error.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Say on stderr what is being done.")] = False,
+    debug: Annotated[bool, Option("--debug", help="Show the whole traceback of an error.")] = False,
+    verbose: Annotated[bool, Option("--verbose", help="Say on stderr what is being done.")] = False,
 ) -> None:
     """Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import (
@@ -25,10 +25,9 @@ _SAME = ("signal", "levels", "current_max_A", "speed_A_per_s", "rate_Hz", "condi
 
 
 def capture(
-    context: typer.Context,
+    context: Context,
     signal: Annotated[
-        str,
-        typer.Argument(help="identification, diagnostic, or a CSV file with the columns t_s and current_A."),
+        str, Argument(help="identification, diagnostic, or a CSV file with the columns t_s and current_A.")
     ],
     out: Out,
     port: Port = None,
@@ -40,10 +39,10 @@ def capture(
         float, setting("speed_A_per_s", "--speed", "Speed of the identification signal, A/s.")
     ] = 0.75,
     rate_Hz: Annotated[float, setting("rate_Hz", "--rate", "Samples a second, Hz.")] = 1000.0,
-    condition: Annotated[bool, typer.Option(help="Go around the major loop once before recording.")] = True,
-    repeats: Annotated[int, typer.Option(min=1, help="How often the signal is played, without a pause.")] = 1,
+    condition: Annotated[bool, Option(help="Go around the major loop once before recording.")] = True,
+    repeats: Annotated[int, Option(min=1, help="How often the signal is played, without a pause.")] = 1,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Continue an interrupted recording into this output.")
+        bool, Option("--resume", help="Continue an interrupted recording into this output.")
     ] = False,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
@@ -119,7 +118,7 @@ def capture(
     job.show(*captured(out, played.name, got, info))
 
 
-def _of_options(context: typer.Context, signal: str, played: str, *, own: bool) -> list[str]:
+def _of_options(context: Context, signal: str, played: str, *, own: bool) -> list[str]:
     """Return what is told of options that do not suit the signal; ``own``: it is no table."""
     asked, by_us, told = context.params, signal == "identification", []
     for option, name, counts in (

@@ -6,7 +6,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
@@ -24,13 +24,13 @@ _VERDICTS = {
 
 
 def check(
-    context: typer.Context,
-    model: Annotated[Path, typer.Argument(help="Model of the device.", metavar="MODEL.h5")],
+    context: Context,
+    model: Annotated[Path, Argument(help="Model of the device.", metavar="MODEL.h5")],
     port: Port = None,
     update: Annotated[
-        bool, typer.Option("--update", help="Write a model with the present offset and gain.")
+        bool, Option("--update", help="Write a model with the present offset and gain.")
     ] = False,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write, with --update.")] = None,
+    out: Annotated[Path | None, Option("-o", "--out", help="File to write, with --update.")] = None,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
     overwrite: Overwrite = False,

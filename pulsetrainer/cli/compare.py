@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
@@ -17,15 +17,12 @@ from pulsetrainer.steps.arguments import check_several
 
 
 def compare(
-    context: typer.Context,
+    context: Context,
     evaluations: Annotated[
-        list[Path],
-        typer.Argument(help="Evaluations or sessions, the oldest first.", metavar="EVALUATION.h5..."),
+        list[Path], Argument(help="Evaluations or sessions, the oldest first.", metavar="EVALUATION.h5...")
     ],
-    out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="Figure (png, svg, pdf) or table (csv).")
-    ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All figures, not only the headlines.")] = False,
+    out: Annotated[Path | None, Option("-o", "--out", help="Figure (png, svg, pdf) or table (csv).")] = None,
+    everything: Annotated[bool, Option("--all", help="All figures, not only the headlines.")] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
@@ -40,7 +37,7 @@ def compare(
     job = Job(context, inputs=evaluations, outputs=(out,))
     from pulsetrainer.files import store
     from pulsetrainer.report import names
-    from pulsetrainer.report.comparison_text import as_csv, labels_of
+    from pulsetrainer.report.results import as_csv, labels_of
 
     labels = labels_of(evaluations)
     with job.working("comparing"):
@@ -73,7 +70,6 @@ def compare(
     job.screen.table(f"{len(labels)} {loaded[0].kind}s side by side", head, rows)
     if not learners:
         job.screen.line(
-            "change: ",
-            "from the first to the last; one within the spread between repeats gets no verdict",
+            "change: ", "from the first to the last; one within the spread between repeats gets no verdict"
         )
     job.wrote(out)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -13,12 +13,12 @@ from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
 
 def correct(
-    context: typer.Context,
-    run: Annotated[Path, typer.Argument(help="Run that was diagnosed.", metavar="RUN.h5")],
-    diagnosis: Annotated[Path, typer.Option(help="Diagnosis of the run.")],
+    context: Context,
+    run: Annotated[Path, Argument(help="Run that was diagnosed.", metavar="RUN.h5")],
+    diagnosis: Annotated[Path, Option(help="Diagnosis of the run.")],
     out: Out,
     delay: Annotated[
-        float, typer.Option(min=0.0, help="Delay of the recorder of the output, s, if it has one.")
+        float, Option(min=0.0, help="Delay of the recorder of the output, s, if it has one.")
     ] = 0.0,
     overwrite: Overwrite = False,
     json: AsJson = False,

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -16,15 +16,13 @@ from pulsetrainer.steps.arguments import check_once
 
 
 def diagnose(
-    context: typer.Context,
-    runs: Annotated[list[Path], typer.Argument(help="Runs of the device.", metavar="RUN.h5...")],
-    model: Annotated[Path, typer.Option(help="Model to be diagnosed.")],
+    context: Context,
+    runs: Annotated[list[Path], Argument(help="Runs of the device.", metavar="RUN.h5...")],
+    model: Annotated[Path, Option(help="Model to be diagnosed.")],
     out: Out,
-    html: Annotated[Path | None, typer.Option(help="Report to write.")] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Only screen: takes seconds, refits nothing.")
-    ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated null distribution.")] = 0,
+    html: Annotated[Path | None, Option(help="Report to write.")] = None,
+    quick: Annotated[bool, Option("--quick", help="Only screen: takes seconds, refits nothing.")] = False,
+    seed: Annotated[int, Option(min=0, help="Seed of the simulated null distribution.")] = 0,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:

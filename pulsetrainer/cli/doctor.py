@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import Annotated
 
-import typer
+from typer import Context, Option
 
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Port
@@ -17,10 +17,10 @@ _WIDTH = 100
 
 
 def doctor(
-    context: typer.Context,
+    context: Context,
     port: Port = None,
     capture: Annotated[
-        bool, typer.Option(help="Drive the coil for 3 s, to half its range, and look at what comes back.")
+        bool, Option(help="Drive the coil for 3 s, to half its range, and look at what comes back.")
     ] = True,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.console import Screen, plain
@@ -15,17 +15,15 @@ from pulsetrainer.steps.arguments import check_once
 
 
 def evaluate(
-    context: typer.Context,
+    context: Context,
     inputs: Annotated[
         list[Path],
-        typer.Argument(help="Playbacks, one run, or one session.", metavar="PLAYED.h5...|RUN.h5|SESSION.h5"),
+        Argument(help="Playbacks, one run, or one session.", metavar="PLAYED.h5...|RUN.h5|SESSION.h5"),
     ],
-    model: Annotated[list[Path], typer.Option(help="Model to test on the run; may be given again.")] = [],  # noqa: B006
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="File to write.")] = None,
-    html: Annotated[Path | None, typer.Option(help="Report to write.")] = None,
-    bounds: Annotated[
-        Path | None, typer.Option(help="TOML file of bounds; a figure outside them: exit 1.")
-    ] = None,
+    model: Annotated[list[Path], Option(help="Model to test on the run; may be given again.")] = [],  # noqa: B006
+    out: Annotated[Path | None, Option("-o", "--out", help="File to write.")] = None,
+    html: Annotated[Path | None, Option(help="Report to write.")] = None,
+    bounds: Annotated[Path | None, Option(help="TOML file of bounds; a figure outside them: exit 1.")] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
@@ -15,9 +15,9 @@ _TABLES = (".csv", ".txt")
 
 
 def export(
-    context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
-    out: Annotated[Path, typer.Option("-o", "--out", help="Table to write, as CSV.", metavar="FILE.csv")],
+    context: Context,
+    file: Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    out: Annotated[Path, Option("-o", "--out", help="Table to write, as CSV.", metavar="FILE.csv")],
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -13,12 +13,12 @@ from pulsetrainer.cli.options import AsJson, Out, Overwrite
 
 
 def extend(
-    context: typer.Context,
-    diagnosis: Annotated[Path, typer.Argument(help="Diagnosis of the model.", metavar="DIAGNOSIS.h5")],
-    model: Annotated[Path, typer.Option(help="Model that was diagnosed.")],
+    context: Context,
+    diagnosis: Annotated[Path, Argument(help="Diagnosis of the model.", metavar="DIAGNOSIS.h5")],
+    model: Annotated[Path, Option(help="Model that was diagnosed.")],
     out: Out,
     verify: Annotated[
-        Path | None, typer.Option(help="Run, not diagnosed, that each cause must predict better.")
+        Path | None, Option(help="Run, not diagnosed, that each cause must predict better.")
     ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,

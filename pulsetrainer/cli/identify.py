@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -17,8 +17,8 @@ _MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
 
 
 def identify(
-    context: typer.Context,
-    runs: Annotated[list[Path], typer.Argument(help="Runs to fit together.", metavar="RUN.h5...")],
+    context: Context,
+    runs: Annotated[list[Path], Argument(help="Runs to fit together.", metavar="RUN.h5...")],
     out: Out,
     levels: Annotated[
         int | None,
@@ -32,22 +32,21 @@ def identify(
     ] = None,
     form: Annotated[
         Literal["auto", "direct", "dual", "signed"],
-        typer.Option(
+        Option(
             help="direct: the output lags; dual: it leads, roles exchanged; signed: weights of either sign; "
             "auto: by held-out blocks."
         ),
     ] = "auto",
     reading: Annotated[
-        Reading,
-        typer.Option("--reading", help="How the weights are read: continuous, or relay as in the paper."),
+        Reading, Option("--reading", help="How the weights are read: continuous, or relay as in the paper.")
     ] = "continuous",
-    operator: Annotated[Reading | None, typer.Option("--operator", hidden=True)] = None,
+    operator: Annotated[Reading | None, Option("--operator", hidden=True)] = None,
     method: Annotated[
-        Literal["joint", "alternating"], typer.Option(help="joint, or alternating as in the paper.")
+        Literal["joint", "alternating"], Option(help="joint, or alternating as in the paper.")
     ] = "joint",
     smoothing: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="auto|0|NUMBER",
             help="Length below which the density is smoothed, share of the input range; "
             "auto: by held-out blocks (default; 0 with relay).",
@@ -55,11 +54,11 @@ def identify(
     ] = None,
     bootstrap: Annotated[
         int,
-        typer.Option(
+        Option(
             min=0, max=10_000, help="Refits to resampled blocks, for 90 % intervals; 200 take about a minute."
         ),
     ] = 0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the resampling.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Seed of the resampling.")] = 0,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 from pulsetrainer.cli.console import plain
 from pulsetrainer.cli.job import Job
@@ -21,48 +21,36 @@ _RATES_HZ = {"least": sys.float_info.min, "most": sys.float_info.max}  # above 0
 
 
 def import_(
-    context: typer.Context,
+    context: Context,
     files: Annotated[
         list[Path],
-        typer.Argument(
+        Argument(
             help="CSV, TSV, .npz, .npy, .mat or .wav; several are parts of one run.", metavar="FILE.csv..."
         ),
     ],
-    out: Annotated[
-        Path, typer.Option("-o", "--out", help="File to write; '{name}.h5' makes a run of each file.")
-    ],
-    input_column: Annotated[
-        str, typer.Option("--input", help="Column of the input, a current for instance.")
-    ],
-    output_column: Annotated[
-        str, typer.Option("--output", help="Column of the output, a force for instance.")
-    ],
+    out: Annotated[Path, Option("-o", "--out", help="File to write; '{name}.h5' makes a run of each file.")],
+    input_column: Annotated[str, Option("--input", help="Column of the input, a current for instance.")],
+    output_column: Annotated[str, Option("--output", help="Column of the output, a force for instance.")],
     time_column: Annotated[
-        str | None, typer.Option("--time", help="Column of the time; default: the first one.")
+        str | None, Option("--time", help="Column of the time; default: the first one.")
     ] = None,
-    reference_column: Annotated[
-        str | None, typer.Option("--reference", help="Column of the reference.")
-    ] = None,
-    input_unit: Annotated[
-        str | None, typer.Option(help="Unit of the input; default: from the header.")
-    ] = None,
-    output_unit: Annotated[
-        str | None, typer.Option(help="Unit of the output; default: from the header.")
-    ] = None,
-    rate: Annotated[float | None, typer.Option(help="Samples a second, instead of a time column.")] = None,
+    reference_column: Annotated[str | None, Option("--reference", help="Column of the reference.")] = None,
+    input_unit: Annotated[str | None, Option(help="Unit of the input; default: from the header.")] = None,
+    output_unit: Annotated[str | None, Option(help="Unit of the output; default: from the header.")] = None,
+    rate: Annotated[float | None, Option(help="Samples a second, instead of a time column.")] = None,
     no_time: Annotated[
-        bool, typer.Option("--no-time", help="Ignore time: only the order of the samples counts.")
+        bool, Option("--no-time", help="Ignore time: only the order of the samples counts.")
     ] = False,
     resample: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="even|HZ",
             help="Make the time steps even: at the median step, or at a rate. Default: left as they are.",
         ),
     ] = None,
     skip_bad_rows: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--skip-bad-rows",
             help="Leave out rows with a blank cell, NaN or text, or too few cells; they are counted.",
         ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -13,27 +13,24 @@ from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting
 
 
 def invert(
-    context: typer.Context,
-    waveform: Annotated[
-        str, typer.Argument(help="A name of the library (normal, bifid, ...) or a CSV file.")
-    ],
-    model: Annotated[Path, typer.Option(help="Model to invert.")],
+    context: Context,
+    waveform: Annotated[str, Argument(help="A name of the library (normal, bifid, ...) or a CSV file.")],
+    model: Annotated[Path, Option(help="Model to invert.")],
     out: Out,
     method: Annotated[
         Literal["continuous", "closest-match", "extended"] | None,
-        typer.Option(
+        Option(
             help="continuous (default), closest-match as in the paper, or extended (default of an extended "
             "model)."
         ),
     ] = None,
     force_min: Annotated[
-        float | None,
-        typer.Option(help="Force (or other output) at the foot of the pulse; default: the lowest."),
+        float | None, Option(help="Force (or other output) at the foot of the pulse; default: the lowest.")
     ] = None,
-    force_max: Annotated[float | None, typer.Option(help="Force at its top; default: the highest.")] = None,
+    force_max: Annotated[float | None, Option(help="Force at its top; default: the highest.")] = None,
     beat: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="N|mean",
             help="Beat of a recorded pulse: its number from 1, or the mean. Default: all is one period.",
         ),
@@ -52,10 +49,10 @@ def invert(
     ] = None,
     learnt: Annotated[
         Path | None,
-        typer.Option(help="Another pulse, refined with this model: what was learnt there is asked for too."),
+        Option(help="Another pulse, refined with this model: what was learnt there is asked for too."),
     ] = None,
     despite_warning: Annotated[
-        bool, typer.Option("--despite-warning", help="Invert a model that does not describe its own record.")
+        bool, Option("--despite-warning", help="Invert a model that does not describe its own record.")
     ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,

@@ -48,10 +48,7 @@ _NEXT = {
     "then `pulsetrainer evaluate played.h5 -o evaluation.h5`",
     ("diagnosis", "run"): "run `pulsetrainer diagnose {file} --model model.h5 -o diagnosis.h5`",
     ("diagnosis", "model"): "run `pulsetrainer diagnose RUN.h5 --model {file} -o diagnosis.h5`",
-    (
-        "run",
-        "playback",
-    ): "a run comes from `pulsetrainer capture`; of a playback the errors are told by "
+    ("run", "playback"): "a run comes from `pulsetrainer capture`; of a playback the errors are told by "
     "`pulsetrainer evaluate {file} -o evaluation.h5`",
     ("run", "model"): "give the run it was identified from: `pulsetrainer show {file}` tells its history",
     ("run", "diagnosis"): "give the run that was diagnosed: `pulsetrainer show {file}` tells its history",
@@ -73,7 +70,10 @@ def next_step(problem: PulsetrainerError) -> str:
         )
         return f"restore it from a copy, or make it again {how}"
     if isinstance(problem, NotAnArtefactError):
-        return _after_foreign_file(problem.path)
+        if problem.path.suffix.lower() in _TABLES:
+            return f"import the table first: pulsetrainer import {shlex.quote(str(problem.path))} -o run.h5"
+        elsewhere = "a recording from elsewhere comes in with `pulsetrainer import`"
+        return f"give a file that pulsetrainer wrote; {elsewhere}"
     return problem.hint
 
 
@@ -131,11 +131,3 @@ def _after_wrong_kind(problem: WrongKindError) -> str:
         if (kind, problem.found) in _NEXT:
             return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))
     return f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"
-
-
-def _after_foreign_file(path: Path) -> str:
-    if path.suffix.lower() in _TABLES:
-        return f"import the table first: pulsetrainer import {shlex.quote(str(path))} -o run.h5"
-    return (
-        "give a file that pulsetrainer wrote; a recording from elsewhere comes in with `pulsetrainer import`"
-    )

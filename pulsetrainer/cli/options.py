@@ -6,17 +6,17 @@ import math
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from typer import BadParameter, CallbackParam, Option
 
 from pulsetrainer.files.settings import SETTINGS, variable
 
 
-def positive(value: float | None, param: typer.CallbackParam) -> float | None:
+def positive(value: float | None, param: CallbackParam) -> float | None:
     """Refuse a number that is not above 0 and finite; None is no choice."""
     if value is not None and not 0 < value < math.inf:
         unit = next((one.unit for one in SETTINGS if one.variable == param.envvar and one.unit), "")
         least, got = (f"{number:g} {unit}".rstrip() for number in (0.0, value))
-        raise typer.BadParameter(f"must be a finite number above {least}, got {got}")
+        raise BadParameter(f"must be a finite number above {least}, got {got}")
     return value
 
 
@@ -29,7 +29,7 @@ def word_or_number(text: str | None, word: str, option: str, must: str, *, least
     except ValueError:
         value = math.nan
     if not least <= value <= most:
-        raise typer.BadParameter(f"must be {must}, got {text!r}", param_hint=option)
+        raise BadParameter(f"must be {must}, got {text!r}", param_hint=option)
     return value
 
 
@@ -38,31 +38,29 @@ def setting(key: str, name: str, words: str, **more: Any) -> Any:
 
     Without ``min`` any number above 0 goes.
     """
-    return typer.Option(
+    return Option(
         name, help=words, envvar=variable(key), callback=None if "min" in more else positive, **more
     )
 
 
-Out = Annotated[Path, typer.Option("-o", "--out", help="File to write.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing output.")]
-AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
+Out = Annotated[Path, Option("-o", "--out", help="File to write.")]
+Overwrite = Annotated[bool, Option("--overwrite", help="Replace an existing output.")]
+AsJson = Annotated[bool, Option("--json", help="One JSON object on stdout.")]
 Port = Annotated[
     str | None,
-    typer.Option(
+    Option(
         "--port",
         help="bench: (default), bench:?seed=3, qemu:, /dev/ttyUSB0, COM3 or socket://host:port.",
         envvar="PULSETRAINER_PORT",
     ),
 ]
-DryRun = Annotated[
-    bool, typer.Option("--dry-run", help="Say what would be played; touch no port, write nothing.")
-]
+DryRun = Annotated[bool, Option("--dry-run", help="Say what would be played; touch no port, write nothing.")]
 ShowLive = Annotated[
-    bool, typer.Option("--live", help="Draw the loop on the terminal while it grows; quiet in a pipe.")
+    bool, Option("--live", help="Draw the loop on the terminal while it grows; quiet in a pipe.")
 ]
 TrackHeat = Annotated[
     bool | None,
-    typer.Option(
+    Option(
         "--track-heat/--no-track-heat",
         help="Tell the coil's temperature from the duty and make up for the force it costs; "
         "default: where the model has a thermal term and was captured with the duty.",

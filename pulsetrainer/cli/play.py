@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Context
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 
 def play(
-    context: typer.Context,
-    drive: Annotated[Path, typer.Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
+    context: Context,
+    drive: Annotated[Path, Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
     out: Out,
     port: Port = None,
     repeats: Annotated[

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
@@ -13,13 +13,13 @@ from pulsetrainer.report.figure_formats import figure_format
 
 
 def plot(
-    context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    context: Context,
+    file: Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")],
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="File to write; default: beside it, as PNG.")
+        Path | None, Option("-o", "--out", help="File to write; default: beside it, as PNG.")
     ] = None,
     data: Annotated[
-        bool, typer.Option("--data", help="Write what is drawn as a table too, beside the figure, as CSV.")
+        bool, Option("--data", help="Write what is drawn as a table too, beside the figure, as CSV.")
     ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from pulsetrainer.cli.console import Screen
 from pulsetrainer.cli.options import AsJson
 
@@ -24,12 +22,9 @@ def ports(json: AsJson = False) -> None:
     screen.result({"ports": found})
     if found:
         names = list(found[0].__dataclass_fields__)
-        rows = [[_shown(getattr(port, name)) for name in names] for port in found]
+        unknown = ("", "n/a")
+        cells = [[getattr(port, name) for name in names] for port in found]
+        rows = [[None if cell in unknown else cell for cell in row] for row in cells]
         screen.table("serial ports", [_HEADS.get(name, name) for name in names], rows)
     else:
         screen.note("no serial port; plug the device in, or use the simulated one: --port bench:")
-
-
-def _shown(value: Any) -> Any:
-    """Return a cell; None where the system knows nothing."""
-    return None if value in ("", "n/a") else value

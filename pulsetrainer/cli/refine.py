@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -14,13 +14,11 @@ from pulsetrainer.report.tables import picked
 
 
 def refine(
-    context: typer.Context,
-    drive: Annotated[Path, typer.Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
+    context: Context,
+    drive: Annotated[Path, Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
     out: Out,
     port: Port = None,
-    passes: Annotated[
-        int, typer.Option(min=1, help="Passes at most; the first one plays the drive as it is.")
-    ] = 5,
+    passes: Annotated[int, Option(min=1, help="Passes at most; the first one plays the drive as it is.")] = 5,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
     dry_run: DryRun = False,

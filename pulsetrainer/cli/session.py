@@ -6,7 +6,7 @@ import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
@@ -21,57 +21,40 @@ _MOST_SEED = 2**31
 
 
 def session(
-    context: typer.Context,
-    model: Annotated[Path, typer.Option(help="Model of the device, best an extended one.")],
+    context: Context,
+    model: Annotated[Path, Option(help="Model of the device, best an extended one.")],
     out: Out,
     pulses: Annotated[
-        str,
-        typer.Option(
-            help="Names of the library or CSV files, separated by commas; each gets an equal share."
-        ),
+        str, Option(help="Names of the library or CSV files, separated by commas; each gets an equal share.")
     ] = "normal",
     rate: Annotated[
-        float | None,
-        typer.Option(help="Beats a minute, 20 to 240; default: each pulse's own.", show_default=False),
+        float | None, Option(help="Beats a minute, 20 to 240; default: each pulse's own.")
     ] = None,
-    amplitude: Annotated[
-        float, typer.Option(help="Height of the pulses, % of what the model reaches.")
-    ] = 100.0,
-    minutes: Annotated[
-        float | None, typer.Option(help="Length; default: 5, or the quiz's.", show_default=False)
-    ] = None,
-    beats: Annotated[
-        int | None, typer.Option(help="Length in beats, instead of minutes.", show_default=False)
-    ] = None,
+    amplitude: Annotated[float, Option(help="Height of the pulses, % of what the model reaches.")] = 100.0,
+    minutes: Annotated[float | None, Option(help="Length; default: 5, or the quiz's.")] = None,
+    beats: Annotated[int | None, Option(help="Length in beats, instead of minutes.")] = None,
     variability: Annotated[
-        float, typer.Option(min=0, max=25, help="Standard deviation of the intervals between beats, %.")
+        float, Option(min=0, max=25, help="Standard deviation of the intervals between beats, %.")
     ] = 0.0,
     respiration: Annotated[
-        float, typer.Option(min=0, max=30, help="Swing of the intervals with the breath, %.")
+        float, Option(min=0, max=30, help="Swing of the intervals with the breath, %.")
     ] = 0.0,
-    ectopic: Annotated[float, typer.Option(min=0, max=50, help="Share of premature beats, %.")] = 0.0,
+    ectopic: Annotated[float, Option(min=0, max=50, help="Share of premature beats, %.")] = 0.0,
     seed: Annotated[
         int | None,
-        typer.Option(
+        Option(
             min=0,
             help="Seed of the rhythm and of a quiz's order; default: 0, for a quiz a new one each time.",
-            show_default=False,
         ),
     ] = None,
     changes: Annotated[
-        Path | None,
-        typer.Option(
-            help="Table of what changes when: t_s and any of rate, amplitude, pulse.", show_default=False
-        ),
+        Path | None, Option(help="Table of what changes when: t_s and any of rate, amplitude, pulse.")
     ] = None,
-    quiz: Annotated[int, typer.Option(min=0, help="Number of questions; 0: no quiz.")] = 0,
+    quiz: Annotated[int, Option(min=0, help="Number of questions; 0: no quiz.")] = 0,
     answers: Annotated[
-        Path | None,
-        typer.Option(help="Answers to the quiz, a pulse name a line; default: by key.", show_default=False),
+        Path | None, Option(help="Answers to the quiz, a pulse name a line; default: by key.")
     ] = None,
-    html: Annotated[
-        Path | None, typer.Option(help="Score sheet to write.", show_default=False, envvar=variable("html"))
-    ] = None,
+    html: Annotated[Path | None, Option(help="Score sheet to write.", envvar=variable("html"))] = None,
     track_heat: TrackHeat = None,
     port: Port = None,
     limit_current_A: LimitCurrent = None,

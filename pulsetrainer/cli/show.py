@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Context
 
 import pulsetrainer as pt
 from pulsetrainer.cli.evaluate import show_tables
@@ -15,8 +15,8 @@ from pulsetrainer.report.tables import picked
 
 
 def show(
-    context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="Any file this program wrote.", metavar="FILE.h5")],
+    context: Context,
+    file: Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")],
     json: AsJson = False,
 ) -> None:
     """Say what is in a file.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
@@ -20,17 +20,15 @@ _FOLLOWED = ("normal", "bifid")  # where no drive is given
 
 
 def tune(
-    context: typer.Context,
+    context: Context,
     port: Port = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--out", help="File of settings to write the gains into, such as pulsetrainer.toml."
-        ),
+        Option("-o", "--out", help="File of settings to write the gains into, such as pulsetrainer.toml."),
     ] = None,
     supply_V: Annotated[
         float | None,
-        typer.Option(
+        Option(
             "--supply",
             callback=positive,
             help="Voltage of the supply, V, where you have measured it; default: told by the diode's 0.6 V.",
@@ -38,9 +36,8 @@ def tune(
     ] = None,
     drive: Annotated[
         list[Path],
-        typer.Option(
-            help="Drive that the coil must follow; may be given again. Default: two pulses of the library.",
-            show_default=False,
+        Option(
+            help="Drive that the coil must follow; may be given again. Default: two pulses of the library."
         ),
     ] = [],  # noqa: B006
     limit_current_A: LimitCurrent = None,
@@ -103,9 +100,8 @@ def _would(
 
 
 def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> None:
-    from pulsetrainer.device.codes import PARAMETERS
+    from pulsetrainer.device.codes import PARAMETER
 
-    units = {parameter.name: parameter.unit for parameter in PARAMETERS}
     job.notes(found.notes)
     if out is None:
         job.notes(["the loop gains are not kept: give `out` pulsetrainer.toml to write them down"])
@@ -116,7 +112,7 @@ def _show(job: Job, out: Path | None, found: Tuned, supply_V: float | None) -> N
         {
             "coil": f"{found.resistance_ohm:.2f} ohm, {1e3 * found.inductance_H:.1f} mH, supply "
             f"{found.supply_V:.1f} V {'by the diode' if supply_V is None else 'as given'}",
-            **{name: f"{value} {units[name]}" for name, value in found.gains.values().items()},
+            **{name: f"{value} {PARAMETER[name].unit}" for name, value in found.gains.values().items()},
             "margins": f"gain {found.margins.gain:.1f}, phase {found.margins.phase_deg:.0f} degrees",
             "tracking": f"{after:.2f} % of the range at worst"
             + ("" if before is None else f", {before:.2f} % before"),

@@ -143,3 +143,4 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("feed_inductance", 9, 0, 3191, 65_535, "counts per 256 units per tick"),
     Parameter("feed_offset", 10, 0, 374, 1000, "counts while the reference is not zero"),
 )
+PARAMETER = {row.name: row for row in PARAMETERS}

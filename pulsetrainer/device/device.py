@@ -17,21 +17,15 @@ from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.exchange import Exchange
 from pulsetrainer.device.feed import Feed
-from pulsetrainer.device.follower import STOPPED, Follower
+from pulsetrainer.device.follower import STOPPED, Asked, Follower, OnBlock
 from pulsetrainer.device.gains import DELIVERED, Gains
 from pulsetrainer.device.heat import HeatMemory, course
 from pulsetrainer.device.identity import DeviceInfo
-from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire
+from pulsetrainer.device.limits import RAMP_S, Limits, check_cool, checked_wire, ticks_per_sample, to_wire
 from pulsetrainer.device.player import Player, tells_duty
-from pulsetrainer.device.reference import ticks_per_sample, to_wire
-from pulsetrainer.device.schemes import OpenPort
-from pulsetrainer.device.trace import Block, FloatArray, Trace
-from pulsetrainer.device.wording import (
-    NOT_OFF_REMEDY,
-    describe_fault,
-    describe_not_off,
-    flows_A,
-)
+from pulsetrainer.device.schemes import Clock, OpenPort, Sleep
+from pulsetrainer.device.trace import FloatArray, Trace
+from pulsetrainer.device.wording import NOT_OFF_REMEDY, describe_fault, describe_not_off, flows_A
 from pulsetrainer.errors import ArgumentError, DeviceError, PulsetrainerError
 
 _LOG = logging.getLogger(__name__)
@@ -52,9 +46,9 @@ class Device:
         self,
         port: OpenPort,
         *,
-        monotonic: Callable[[], float] = time.monotonic,
-        sleep: Callable[[float], None] = time.sleep,
-        now: Callable[[], float] = time.time,
+        monotonic: Clock = time.monotonic,
+        sleep: Sleep = time.sleep,
+        now: Clock = time.time,
         memory: HeatMemory | None = None,
     ) -> None:
         self._port = port
@@ -183,10 +177,10 @@ class Device:
 
         Limits can only be lowered: the range ends at the absolute limit compiled into the firmware.
         """
-        rows = {p.name: p for p in codes.PARAMETERS}
-        if name not in rows:
-            raise ArgumentError(f"the device has no parameter {name!r}", hint=f"there are: {', '.join(rows)}")
-        row = rows[name]
+        if name not in codes.PARAMETER:
+            known = ", ".join(codes.PARAMETER)
+            raise ArgumentError(f"the device has no parameter {name!r}", hint=f"there are: {known}")
+        row = codes.PARAMETER[name]
         if not row.minimum <= value <= row.maximum:
             raise ArgumentError(
                 f"{name}={value} is outside {row.minimum}..{row.maximum} {row.unit}",
@@ -227,9 +221,9 @@ class Device:
         rate_Hz: float,
         *,
         decimation: int = 10,
-        on_block: Callable[[Block], None] | None = None,
+        on_block: OnBlock | None = None,
         keep: bool = True,
-        should_stop: Callable[[], bool] | None = None,
+        should_stop: Asked | None = None,
     ) -> Trace:
         """Play a coil current and return what the device measured meanwhile.
 
@@ -271,8 +265,8 @@ class Device:
         *,
         lead_s: float = 0.4,
         decimation: int = 10,
-        on_block: Callable[[Block], None] | None = None,
-        should_stop: Callable[[], bool] | None = None,
+        on_block: OnBlock | None = None,
+        should_stop: Asked | None = None,
     ) -> Trace:
         """Play a coil current that is made while it is played.
 
@@ -329,11 +323,11 @@ class Device:
     def _perform(
         self,
         player: Player,
-        on_block: Callable[[Block], None] | None,
-        should_stop: Callable[[], bool] | None,
+        on_block: OnBlock | None,
+        should_stop: Asked | None,
         *,
         keep: bool,
-        top_up: Callable[[], bool] | None = None,
+        top_up: Asked | None = None,
     ) -> Trace:
         """Let a player play in a thread of its own, and follow what it brings back."""
         thread = threading.Thread(target=player.run, name="pulsetrainer-play", daemon=True)

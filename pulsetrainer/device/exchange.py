@@ -5,19 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.codes import (
-    FIRMWARE_MAJOR,
-    FIRMWARE_MINOR,
-    FIRMWARE_PATCH,
-    MAGIC,
-    PROTOCOL_MAJOR,
-    PROTOCOL_MINOR,
-)
 from pulsetrainer.device.frames import Frame, FrameReader, encode
-from pulsetrainer.device.schemes import TIMEOUTS_S
+from pulsetrainer.device.schemes import TIMEOUTS_S, Clock
 from pulsetrainer.device.transport import Transport
-from pulsetrainer.device.wording import fault_text, refusal_text
+from pulsetrainer.device.wording import told
 from pulsetrainer.errors import DeviceError
 
 _HELLO_S = 3.0
@@ -41,10 +34,10 @@ class RefusedError(DeviceError):
 
     def __init__(self, port: str, nak: m.Nak) -> None:
         self.nak = nak
-        fault = fault_text(nak.fault)
+        fault = told(codes.Fault, nak.fault)
         super().__init__(
             f"the device on {port} refused {_NAMES.get(nak.command, hex(nak.command))}: "
-            f"{refusal_text(nak.code)}" + (f" (latched fault: {fault})" if fault else ""),
+            f"{told(codes.NakCode, nak.code)}" + (f" (latched fault: {fault})" if fault else ""),
             hint="run the command again; if it is refused again, restart the device",
         )
 
@@ -53,12 +46,7 @@ class Exchange:
     """One command at a time; telemetry goes to ``on_telemetry`` whenever it comes."""
 
     def __init__(
-        self,
-        transport: Transport,
-        port: str,
-        *,
-        monotonic: Callable[[], float],
-        timeouts_s: tuple[float, ...] = TIMEOUTS_S,
+        self, transport: Transport, port: str, *, monotonic: Clock, timeouts_s: tuple[float, ...] = TIMEOUTS_S
     ) -> None:
         self._transport = transport
         self._port = port
@@ -159,12 +147,12 @@ class Exchange:
         self._transport.discard()
         self._reader.clear()
         deadline = self._monotonic() + _HELLO_S
-        command = m.Hello(MAGIC, PROTOCOL_MAJOR, PROTOCOL_MINOR)
+        command = m.Hello(codes.MAGIC, codes.PROTOCOL_MAJOR, codes.PROTOCOL_MINOR)
         while self._monotonic() < deadline:
             self._seq = (self._seq + 1) & 0xFF
             self._send(command, self._seq)
             reply = self._reply(command, _HELLO_TRY_S)
-            if isinstance(reply, m.HelloReply) and reply.magic == MAGIC:
+            if isinstance(reply, m.HelloReply) and reply.magic == codes.MAGIC:
                 self._check_version(reply)
                 self._check_sense(reply)
                 return reply
@@ -192,11 +180,11 @@ class Exchange:
         firmware = (reply.firmware_major, reply.firmware_minor, reply.firmware_patch)
         name = f"the device on {self._port} (firmware {_dotted(firmware)})"
         theirs: tuple[int, ...] = (reply.major, reply.minor)
-        ours: tuple[int, ...] = (PROTOCOL_MAJOR, PROTOCOL_MINOR)
-        if reply.major != PROTOCOL_MAJOR:
+        ours: tuple[int, ...] = (codes.PROTOCOL_MAJOR, codes.PROTOCOL_MINOR)
+        if reply.major != codes.PROTOCOL_MAJOR:
             said = f"speaks protocol {_dotted(theirs)}, this program {_dotted(ours)}"
         else:
-            theirs, ours = firmware, (FIRMWARE_MAJOR, FIRMWARE_MINOR, FIRMWARE_PATCH)
+            theirs, ours = firmware, (codes.FIRMWARE_MAJOR, codes.FIRMWARE_MINOR, codes.FIRMWARE_PATCH)
             if _generation(theirs) == _generation(ours):
                 return
             said = f"is of another generation than this program's firmware {_dotted(ours)}"
@@ -215,7 +203,7 @@ def _parsed(kind: type[m.Message], payload: bytes) -> m.Message:
     size = kind.layout().size
     if kind is m.HelloReply and len(payload) >= _GREETING_AT_LEAST and len(payload) != size:
         greeting = m.HelloReply.parse(payload[:size].ljust(size, b"\0"))
-        if greeting.magic == MAGIC and greeting.major != PROTOCOL_MAJOR:
+        if greeting.magic == codes.MAGIC and greeting.major != codes.PROTOCOL_MAJOR:
             return greeting
     return kind.parse(payload)
 

@@ -7,9 +7,12 @@ from collections.abc import Callable
 from pulsetrainer.device import codes
 from pulsetrainer.device.plausibility import ForceWatch
 from pulsetrainer.device.player import Player
+from pulsetrainer.device.schemes import Clock, Sleep
 from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 
+OnBlock = Callable[[Block], None]  # gets telemetry as it comes
+Asked = Callable[[], bool]  # is asked again and again
 INTERRUPTED = "interrupted"  # the fault of a play that the user stopped
 STOPPED = "stopped"
 _TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a change of threads
@@ -18,25 +21,13 @@ _TAKE_EVERY_S = 0.02  # in bigger pieces than the wire's: each one costs a chang
 class Follower:
     """Takes in what a player brings back while it plays in a thread of its own."""
 
-    def __init__(
-        self,
-        player: Player,
-        tick_rate_Hz: float,
-        *,
-        monotonic: Callable[[], float],
-        sleep: Callable[[float], None],
-    ) -> None:
+    def __init__(self, player: Player, tick_rate_Hz: float, *, monotonic: Clock, sleep: Sleep) -> None:
         self._player, self._tick_rate_Hz = player, tick_rate_Hz
         self._monotonic, self._sleep = monotonic, sleep
         self._watch = ForceWatch()
 
     def follow(
-        self,
-        on_block: Callable[[Block], None] | None,
-        should_stop: Callable[[], bool] | None,
-        *,
-        keep: bool,
-        top_up: Callable[[], bool] | None,
+        self, on_block: OnBlock | None, should_stop: Asked | None, *, keep: bool, top_up: Asked | None
     ) -> bool:
         """Hand over the telemetry as it comes until the play has ended; True if Ctrl-C hastened the end."""
         player, watch = self._player, self._watch

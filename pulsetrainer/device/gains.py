@@ -21,9 +21,8 @@ class Gains:
     feed_offset: int
 
     def __post_init__(self) -> None:
-        rows = {p.name: p for p in codes.PARAMETERS}
         for name, value in self.values().items():
-            row = rows[name]
+            row = codes.PARAMETER[name]
             if isinstance(value, bool) or not isinstance(value, int):
                 raise ArgumentError(
                     f"the gain {name} must be a whole number, got {value!r}", hint="tune again"

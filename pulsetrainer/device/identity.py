@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pulsetrainer.device import messages as m
-from pulsetrainer.device.wording import reset_text, serial_text
+from pulsetrainer.device.codes import ResetCause
+from pulsetrainer.device.wording import serial_text, told
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +38,6 @@ class DeviceInfo:
             force_limit_N=hello.force_trip / 1_000,
             on_time_limit_s=float(hello.on_time_s),
             heartbeat_s=hello.heartbeat_ms / 1_000,
-            reset_cause=reset_text(hello.reset_cause),
+            reset_cause=told(ResetCause, hello.reset_cause),
             latched_fault=latched_fault,
         )

@@ -5,12 +5,11 @@ from __future__ import annotations
 import logging
 import os
 import time
-from collections.abc import Callable
 
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import Limits
 from pulsetrainer.device.ports import find_device_port
-from pulsetrainer.device.schemes import OpenPort, find_opener, redact
+from pulsetrainer.device.schemes import Clock, OpenPort, Sleep, find_opener, redact
 from pulsetrainer.device.transport import SerialTransport
 
 _LOG = logging.getLogger(__name__)
@@ -22,8 +21,8 @@ def open_device(
     port: str | None,
     *,
     limits: Limits | None = None,
-    monotonic: Callable[[], float] = time.monotonic,
-    sleep: Callable[[float], None] = time.sleep,
+    monotonic: Clock = time.monotonic,
+    sleep: Sleep = time.sleep,
 ) -> Device:
     """Open a device and greet it; without a port the environment's ``PULSETRAINER_PORT``, else the bench.
 
@@ -45,7 +44,7 @@ def open_device(
         raise
 
 
-def _open_port(port: str, monotonic: Callable[[], float]) -> OpenPort:
+def _open_port(port: str, monotonic: Clock) -> OpenPort:
     opener = find_opener(port)
     if opener is not None:
         return opener(port, monotonic)

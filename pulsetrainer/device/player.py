@@ -10,13 +10,13 @@ from __future__ import annotations
 import contextlib
 import threading
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.exchange import AbandonedError, Exchange, NoAnswerError, RefusedError
 from pulsetrainer.device.feed import Feed
+from pulsetrainer.device.schemes import Clock
 from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.device.wording import (
     NOT_OFF_REMEDY,
@@ -24,8 +24,7 @@ from pulsetrainer.device.wording import (
     describe_not_off,
     flows_A,
     remedy_of,
-    reset_text,
-    state_text,
+    told,
 )
 from pulsetrainer.errors import DeviceError, PulsetrainerError
 
@@ -66,7 +65,7 @@ class Player:
         *,
         hello: m.HelloReply,
         seen: tuple[int, int],
-        monotonic: Callable[[], float],
+        monotonic: Clock,
         piece_s: float = float("inf"),
     ) -> None:
         self._exchange = exchange
@@ -210,8 +209,7 @@ class Player:
     def _credit(self) -> int:
         """Room in the device's buffer by what telemetry says it has played; never more than there is."""
         return max(
-            self._ack.credit,
-            min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + self.played),
+            self._ack.credit, min(self._hello.wave_buffer, self._hello.wave_buffer - self._sent + self.played)
         )
 
     def _beat_due(self) -> bool:
@@ -283,10 +281,11 @@ class Player:
 
     def _judge(self, status: m.StatusReply, refused: str) -> Outcome:
         if status.boot_nonce != self._hello.boot_nonce:
+            cause = told(codes.ResetCause, status.reset_cause)
             return Outcome(
                 -1,
                 played_to_end=False,
-                fault=f"the device restarted in mid-play (cause: {reset_text(status.reset_cause)})",
+                fault=f"the device restarted in mid-play (cause: {cause})",
                 remedy="check its power supply and cable; nothing was started again",
             )
         last_tick = (self._feed.size - 1) * self._ticks_per_sample
@@ -297,7 +296,8 @@ class Player:
         if not_off:  # above everything else
             fault = f"{not_off} (first: {fault})" if fault else not_off
         if not fault and status.state != codes.State.IDLE:
-            fault = f"the device did not come to rest after the play (state: {state_text(status.state)})"
+            state = told(codes.State, status.state)
+            fault = f"the device did not come to rest after the play (state: {state})"
         # Refused before it started: the numbers in the status are those of an earlier play.
         started = status.session == self._play_session
         to_end = started and status.tick > last_tick and not fault

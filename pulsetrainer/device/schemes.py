@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 TIMEOUTS_S = (0.05, 0.05, 0.05, 0.05, 0.05, 0.5)
 
 Clock = Callable[[], float]
+Sleep = Callable[[float], None]
 
 
 class Machine(Protocol):
@@ -28,7 +29,6 @@ class Machine(Protocol):
 
     def close(self) -> None:
         """End it."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,19 +24,15 @@ class Transport(Protocol):
 
     def read(self) -> bytes:
         """Return what has arrived, waiting a few milliseconds for the first byte."""
-        ...
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
-        ...
 
     def discard(self) -> None:
         """Forget what has arrived."""
-        ...
 
     def close(self) -> None:
         """Give the port back."""
-        ...
 
 
 class SerialTransport:

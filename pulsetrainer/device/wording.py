@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from enum import IntEnum
 
 from pulsetrainer.device import codes
@@ -31,36 +30,23 @@ _REMEDY: dict[int, str] = {
 }
 
 NOT_OFF_REMEDY = "pull the supply's plug, then have the device's output transistor and current sensor checked"
+_KINDS: dict[type[IntEnum], str] = {
+    codes.Fault: "fault",
+    codes.NakCode: "refusal",
+    codes.ResetCause: "cause",
+    codes.State: "state",
+}
 # Above the noise and the zero of the current sensor; the firmware calls it stray current, too.
 _FLOWS_A = 0.1
 
 
-def _told(number: int, known: Mapping[int, str], kind: str) -> str:
-    return known.get(number, f"{kind} {number}, which this program does not know")
-
-
-def fault_text(number: int) -> str:
-    """Return a fault in words; empty for none."""
-    return _told(number, {int(one): one.text for one in codes.Fault}, "fault")
-
-
-def refusal_text(number: int) -> str:
-    """Return why a command was refused."""
-    return _told(number, {int(one): one.text for one in codes.NakCode}, "refusal")
-
-
-def _names(numbers: type[IntEnum]) -> dict[int, str]:
-    return {int(one): one.name.lower().replace("_", " ") for one in numbers}
-
-
-def reset_text(number: int) -> str:
-    """Return why the device last started."""
-    return _told(number, _names(codes.ResetCause), "cause")
-
-
-def state_text(number: int) -> str:
-    """Return what the device is doing."""
-    return _told(number, _names(codes.State), "state")
+def told(kind: type[IntEnum], number: int) -> str:
+    """Return what a number of the wire means, of a fault or a refusal in its own words; no fault is empty."""
+    try:
+        known = kind(number)
+    except ValueError:
+        return f"{_KINDS[kind]} {number}, which this program does not know"
+    return known.text if isinstance(known, codes.Told) else known.name.lower().replace("_", " ")
 
 
 def remedy_of(fault: int) -> str:
@@ -79,7 +65,7 @@ def describe_fault(status: m.StatusReply, tick_rate_Hz: float) -> str:
     if not status.fault:
         return ""
     return (
-        f"{fault_text(status.fault)} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
+        f"{told(codes.Fault, status.fault)} (at {status.fault_tick / tick_rate_Hz:.4f} s: "
         f"reference {status.fault_reference * codes.CURRENT_UNIT_A:.4f} A, "
         f"current {status.fault_current * codes.CURRENT_UNIT_A:.4f} A, "
         f"force {status.fault_force * codes.FORCE_UNIT_N:.3f} N)"

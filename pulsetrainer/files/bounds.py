@@ -16,10 +16,7 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
     UsageError where the file cannot be read, is no TOML or is empty, or a bound is not a pair low <= high.
     """
     if not path.exists():
-        raise UsageError(
-            f"the file of bounds {path} does not exist",
-            hint=f"check its name, or {_HOW}",
-        )
+        raise UsageError(f"the file of bounds {path} does not exist", hint=f"check its name, or {_HOW}")
     bounds = {}
     for name, pair in leaves(read_toml(path, "bounds")):
         match pair:

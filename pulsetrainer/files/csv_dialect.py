@@ -310,11 +310,7 @@ def _numbers(names: list[str], below: list[str]) -> bool:
 
 
 def _with_header(
-    path: Path,
-    encoding: str,
-    delimiter: str | None,
-    lines: list[_Line],
-    commented: list[_Line],
+    path: Path, encoding: str, delimiter: str | None, lines: list[_Line], commented: list[_Line]
 ) -> Dialect:
     """Return the dialect, with what the lines above the first row say."""
     rows = [split(line, delimiter) for _, line in lines]

@@ -159,9 +159,7 @@ def _attribute(plan: FieldPlan, value: Any) -> Any:
 
 
 def _put_list(group: h5py.Group, plan: FieldPlan, value: Any) -> None:
-    items = [_attribute(plan, item) for item in value]
-    if plan.type is str:
-        items_array = np.array(items, dtype=object)
-        group.attrs.create(plan.path, items_array, shape=(len(items),), dtype=h5py.string_dtype())
-    else:
-        group.attrs.create(plan.path, np.array(items, dtype=plan.type), shape=(len(items),))
+    items = np.array(
+        [_attribute(plan, item) for item in value], dtype=object if plan.type is str else plan.type
+    )
+    group.attrs.create(plan.path, items, dtype=h5py.string_dtype() if plan.type is str else None)

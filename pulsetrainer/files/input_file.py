@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import glob
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -75,10 +75,13 @@ def unreadable(path: Path | str, error: OSError) -> DataError:
 def _files_in(folder: Path) -> str:
     """Return a hint with the first few files of a folder that was given in place of a file."""
     files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
-    sound = list(islice((str(path) for path in files if is_sound(path)), 5))
-    if not sound:
-        return "name another: it holds no file that can be read"
-    return f"name a file in it: {', '.join(sound)}"
+    offered = ", ".join(map(str, _offered(files)))
+    return f"name a file in it: {offered}" if offered else "name another: it holds no file that can be read"
+
+
+def _offered(files: Iterable[Path]) -> list[Path]:
+    """Return the first five files that can be read."""
+    return list(islice(filter(is_sound, files), 5))
 
 
 def _names_in(folder: Path, path: Path) -> str:
@@ -89,9 +92,9 @@ def _names_in(folder: Path, path: Path) -> str:
     near = difflib.get_close_matches(path.name, names, n=10, cutoff=0.5)
     near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
     near = near or [name for name in names if name.endswith(path.suffix or ".h5")]
-    near = list(islice((name for name in near if is_sound(folder / name)), 5))
+    offered = ", ".join(file.name for file in _offered(folder / name for name in near))
     where = "here" if folder == Path() else f"in {folder}"
-    return f"files {where}: {', '.join(near)}" if near else f"no file {where} has a similar name"
+    return f"files {where}: {offered}" if offered else f"no file {where} has a similar name"
 
 
 def near_names(path: Path, kinds: Sequence[str]) -> list[str]:
@@ -110,7 +113,7 @@ def near_names(path: Path, kinds: Sequence[str]) -> list[str]:
         return []
     near = difflib.get_close_matches(path.name, names, n=5, cutoff=0.5)
     near += [name for name in names if name not in near]
-    return list(islice((name for name in near if is_sound(path.with_name(name))), 5))
+    return [file.name for file in _offered(map(path.with_name, near))]
 
 
 def is_sound(path: Path) -> bool:

@@ -9,9 +9,10 @@ What ``append`` has returned from survives the death of the program. The file is
 A ``HEAD`` is JSON: the header of the artefact and the run's texts. Whoever goes on with a recording adds
 another, and the last one counts. ``DATA`` is little-endian float64 (4, n): time, reference, input, output.
 ``PART`` is the same, and its first sample comes after a pause. The journal of a session has ``GOAL`` instead,
-(5, n) with the targets, and ``BEAT``, the beats that are over, as in ``session_journal``. The last block may
-be incomplete, where the writer was killed or is writing: it is ignored. Anything else that does not fit is
-damage.
+(5, n) with the targets, and ``BEAT``, written as beats are over: JSON with the beats and the windows of
+temperature that are new since the block before it, the quiz as far as it is answered, and the other fields of
+the session as they stand now. The last block may be incomplete, where the writer was killed or is writing: it
+is ignored. Anything else that does not fit is damage.
 """
 
 from __future__ import annotations
@@ -20,22 +21,24 @@ import dataclasses
 import json
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 import numpy as np
 
-from pulsetrainer.artefacts import FloatArray, Run, Session
+from pulsetrainer.artefacts import Beats, FloatArray, Quiz, Run, Session
 from pulsetrainer.artefacts.run import seam_of
+from pulsetrainer.artefacts.session import BEAT_COLUMNS
 from pulsetrainer.errors import DamagedFileError, DataError
 from pulsetrainer.files.input_file import JOURNAL
 from pulsetrainer.files.provenance import Header, Provenance
-from pulsetrainer.files.session_journal import session_of
 
 COLUMNS = ("time_s", "reference", "input", "output")
 PRESSED = ("time_s", "target", "reference", "input", "output")
+WINDOW = ("temperature_s", "temperature_K")
+CUT_OFF = "the record ends before the session does: it was cut off, or is still going on"
 PIECE = 1 << 16  # samples at a time, where not all are to be in memory
 DATA, PART, GOAL, BEAT = b"DATA", b"PART", b"GOAL", b"BEAT"
 _WIDTHS = {DATA: len(COLUMNS), PART: len(COLUMNS), GOAL: len(PRESSED)}  # of blocks that hold samples
@@ -158,7 +161,7 @@ class Recording:
         columns = np.concatenate([np.zeros((len(names), 0)), *samples], axis=1)
         arrays: dict[str, Any] = dict(zip(names, columns, strict=True))
         if said:
-            return cls(header, session_of(path, arrays, said), found[-1].end)
+            return cls(header, _session_of(path, arrays, said), found[-1].end)
         ends = np.cumsum([block.samples.shape[1] for block in found]).tolist()
         starts = [
             begin for begin, block in zip([0, *ends], found, strict=False) if begin and block.tag == PART
@@ -181,3 +184,34 @@ def _described(path: Path, block: Block) -> tuple[Header, dict[str, Any]]:
         raise DamagedFileError(
             f"{path} does not say what it records: {error}", path=path, artefact="run"
         ) from error
+
+
+def _session_of(path: Path, samples: Mapping[str, FloatArray], blocks: Sequence[bytes]) -> Session:
+    """Return the session in a journal, not complete, from its samples and its BEAT blocks.
+
+    DamagedFileError where these are not as they were written.
+    """
+    try:
+        said = [json.loads(block) for block in blocks]
+        rows = np.asarray([row for one in said for row in one["beats"]], dtype=np.float64)
+        beats = Beats.of(rows.reshape(-1, len(BEAT_COLUMNS)).T)
+        windows = np.asarray([row for one in said for row in one["windows"]], dtype=np.float64)
+        warm = dict(zip(WINDOW, windows.reshape(-1, len(WINDOW)).T, strict=True)) if windows.size else {}
+        plain = {name: _tupled(value) for name, value in said[-1]["fields"].items()}
+        fields: dict[str, Any] = {**samples, **plain, **warm, "complete": False, "fault": CUT_OFF}
+        return Session(beats=beats, quiz=_quiz(said[-1]["quiz"]), **fields)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise DamagedFileError(
+            f"{path} does not say what was pressed: {error}", path=path, artefact="session"
+        ) from error
+
+
+def _quiz(said: Mapping[str, Any] | None) -> Quiz | None:
+    if said is None:
+        return None
+    times = {"response_s": np.asarray(said["response_s"], dtype=np.float64)}
+    return Quiz(**{name: _tupled(value) for name, value in said.items()} | times)
+
+
+def _tupled(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

@@ -157,12 +157,7 @@ class Header:
 
 
 def make_header(
-    title: str,
-    *,
-    argv: Sequence[str],
-    now: datetime,
-    ancestors: Sequence[Header] = (),
-    **made: Any,
+    title: str, *, argv: Sequence[str], now: datetime, ancestors: Sequence[Header] = (), **made: Any
 ) -> Header:
     """Return the header of a new artefact, with what ``made`` it: the fields of ``Provenance``.
 

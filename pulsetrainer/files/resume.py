@@ -55,26 +55,25 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
     atomic_write.check_output(path, overwrite=True)
     check_resumable(path)
     found = interrupted(path)
-    source = found[0][0] if found else None
-    final = None
-    if path.exists():
-        final = _unfinished(path, must_read=source is None)
-        if final is None and source is not None and not overwrite:
-            raise ExistsError(path, f"{source} can be resumed, but {path} already exists")
-        if final is None and source is None:
+    final = _unfinished(path, must_read=not found) if path.exists() else None
+    if path.exists() and final is None:
+        if not found:
             raise UsageError(
                 f"there is nothing to resume: {path} is complete",
                 hint="use it as it is; to record again, leave --resume out and name another output",
             )
-        if final is not None and (not found or final.input.size >= found[0][1]):
-            source = path
-    if source is None:
+        if not overwrite:
+            raise ExistsError(path, f"{found[0][0]} can be resumed, but {path} already exists")
+    if final is not None:
+        found.insert(0, (path, final.input.size))  # of equals this one counts
+    if not found:
         cut_off = f"{path.name}.partial"
         beside = min((one.name for one in path.parent.glob(f"{glob.escape(cut_off)}*")), default=cut_off)
         raise UsageError(
             f"{beside} is being written by another program, or is no capture that can be read",
             hint=f"wait for it, or look: pulsetrainer show {beside}",
         )
+    source, _ = max(found, key=lambda pair: pair[1])
     lease = Lease(source)
     try:
         run, header = store.read(source, Run), store.read_header(source)
@@ -82,15 +81,11 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
     except BaseException:
         lease.end()
         raise
-    contains = final is not None and _begins_with(run, final)
-    return Earlier(source, run, header, lease, contains)
-
-
-def _begins_with(run: Run, earlier: Run) -> bool:
-    size = earlier.input.size
-    return np.array_equal(run.input[:size], earlier.input, equal_nan=True) and np.array_equal(
-        run.output[:size], earlier.output, equal_nan=True
+    contains = final is not None and all(
+        np.array_equal(now[: before.size], before, equal_nan=True)
+        for now, before in ((run.input, final.input), (run.output, final.output))
     )
+    return Earlier(source, run, header, lease, contains)
 
 
 def _unfinished(path: Path, *, must_read: bool) -> Run | None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from pulsetrainer.artefacts import Session
-from pulsetrainer.files.journal import BEAT, GOAL, PRESSED
+from pulsetrainer.files.journal import BEAT, CUT_OFF, GOAL, PRESSED, WINDOW
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.recorder import RunRecorder
-from pulsetrainer.files.session_journal import CUT_OFF, SessionWriter
 
 
 class SessionRecorder(RunRecorder):
@@ -25,12 +28,20 @@ class SessionRecorder(RunRecorder):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         self._fields: Mapping[str, Any] = {}
-        self._writer = SessionWriter()
+        self._beats = self._windows = 0  # that are written
         super().__init__(*args, **options)
 
     def judge(self, fields: Mapping[str, Any]) -> None:
         """Take in what the session amounts to so far, its fields that are no samples; fails as ``append``."""
-        self._add(BEAT, self._writer.block(fields))
+        beats, quiz = fields["beats"], fields["quiz"]
+        rows = beats.columns.T[self._beats :]
+        told = [np.zeros(0) if fields[name] is None else fields[name] for name in WINDOW]
+        windows = np.stack(told, axis=1)[self._windows :]
+        plain = {name: value for name, value in fields.items() if name not in ("beats", "quiz", *WINDOW)}
+        asked = None if quiz is None else asdict(quiz) | {"response_s": quiz.response_s.tolist()}
+        said = {"beats": rows.tolist(), "windows": windows.tolist(), "fields": plain, "quiz": asked}
+        self._beats, self._windows = self._beats + len(rows), self._windows + len(windows)
+        self._add(BEAT, json.dumps(said).encode())
         self._fields = {**fields, "fault": CUT_OFF}
 
     def keep(self, fields: Mapping[str, Any], header: Header) -> None:

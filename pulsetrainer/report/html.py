@@ -106,27 +106,13 @@ def densest(model: Model) -> tuple[float, float, float] | None:
     return float(off_diagonal[k]), up, down
 
 
-def page(
-    template: str,
-    *,
-    title: str,
-    created: str,
-    provenance_json: str,
-    history: Sequence[str] = (),
-    **content: Any,
-) -> str:
-    """Return one self-contained HTML page with its content and what the header of an artefact says of it."""
-    return (
-        environment()
-        .get_template(template)
-        .render(
-            title=title,
-            created=created,
-            provenance=indented(provenance_json),
-            history=tuple(history),
-            **content,
-        )
-    )
+def page(template: str, *, provenance_json: str, history: Sequence[str] = (), **content: Any) -> str:
+    """Return one self-contained HTML page with its content and what the header of an artefact says of it.
+
+    Of the header ``title`` and ``created`` are wanted too.
+    """
+    provenance = indented(provenance_json)
+    return environment().get_template(template).render(provenance=provenance, history=history, **content)
 
 
 def render_evaluation(

@@ -60,14 +60,10 @@ NAMES: Final = {
 
 # what is said first of a pulse, as dotted names within it
 OVERVIEW: Final = (
-    "scaled.mean_abs_error_percent",
-    "compensated.mean_abs_error_percent",
-    "mean_error_reduction_percent",
-    "scaled.max_abs_error_percent",
-    "compensated.max_abs_error_percent",
-    "scaled.hysteresis_percent",
-    "compensated.hysteresis_percent",
-)
+    "scaled.mean_abs_error_percent", "compensated.mean_abs_error_percent", "mean_error_reduction_percent",
+    "scaled.max_abs_error_percent", "compensated.max_abs_error_percent",
+    "scaled.hysteresis_percent", "compensated.hysteresis_percent",
+)  # fmt: skip
 
 
 def split(dotted: str) -> tuple[str, Named]:

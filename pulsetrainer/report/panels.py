@@ -51,13 +51,8 @@ _DENSITY_QUANTILE = 0.99
 _DENSITY_REACH = 2.0
 _CLOCK = 100.0  # lengths of the record that its first time is late: a date, which tick labels cannot hold
 _QUANTITIES = {
-    "N": "force",
-    "A": "current",
-    "T": "flux density",
-    "V": "voltage",
-    "Pa": "pressure",
-    "N*m": "torque",
-}
+    "N": "force", "A": "current", "T": "flux density", "V": "voltage", "Pa": "pressure", "N*m": "torque",
+}  # fmt: skip
 
 
 def abscissa(time_s: FloatArray | None, n: int) -> tuple[FloatArray, str]:

@@ -97,18 +97,8 @@ class Ledger:
             if there.all():
                 key = beat.play.pulse, beat.in_record
                 self._means.setdefault(key, _MeanBeat()).add(beat, x, y)
-        self._rows.extend(
-            (
-                beat.start_s,
-                beat.interval_s,
-                beat.play.pulse,
-                100.0 * beat.play.amplitude * beat.strength,
-                gain,
-                late,
-                mean,
-                most,
-            )
-        )
+        asked = 100.0 * beat.play.amplitude * beat.strength
+        self._rows.extend((beat.start_s, beat.interval_s, beat.play.pulse, asked, gain, late, mean, most))
 
     @property
     def is_beating(self) -> bool:

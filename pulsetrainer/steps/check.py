@@ -41,18 +41,10 @@ _SHAPE_OF_FIT = 2.0  # times what the model left of its own record, without nois
 _LAG_S = 0.02  # lags of this and less are alike at the pace of a check
 _CREEPS_S = (0.3, 1.0, 3.0)
 # Causes that a gain and an offset leave as they are: they scale with the force, or act before it.
-_SCALABLE = frozenset(
-    (
-        "delay",
-        "field-lag",
-        "rate-widening",
-        "output-lag",
-        "resonance",
-        "creep",
-        "thermal-drift",
-        "accommodation",
-    )
-)
+_SCALABLE = {
+    "delay", "field-lag", "rate-widening", "output-lag", "resonance", "creep", "thermal-drift",
+    "accommodation",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

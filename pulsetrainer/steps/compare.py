@@ -13,13 +13,9 @@ from pulsetrainer.errors import DataError
 from pulsetrainer.steps.arguments import check_several, named
 from pulsetrainer.steps.quiz import score
 
-_RISING = (
-    "mean_error_reduction_percent",
-    "gain_percent",
-    "right_percent",
-    "right_from_percent",
-    "right_to_percent",
-)  # more is better
+_RISING = (  # more is better
+    "mean_error_reduction_percent", "gain_percent", "right_percent", "right_from_percent", "right_to_percent",
+)  # fmt: skip
 _SAME = 0.005  # smaller changes are no change: a figure is shown with two digits
 
 
@@ -84,12 +80,7 @@ def compare(
     wanted = [
         n for n in dict.fromkeys(n for one in every for n in one) if everything or n.endswith(headlines)
     ]
-    metrics = tuple(
-        _metric(
-            name, tuple(one.get(name) for one in every), max((s.get(name, 0.0) for s in spreads), default=0.0)
-        )
-        for name in wanted
-    )
+    metrics = tuple(_metric(name, every, spreads) for name in wanted)
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
         raise DataError(
             f"no two of {', '.join(titles)} have a figure in common",
@@ -128,10 +119,7 @@ def _named(evaluations: Sequence[Evaluation], every: Sequence[dict[str, float]])
             renamed |= {f"{m.short_name}.": "model." for m in one.models}
         named = figures
         for old, new in renamed.items():
-            named = {
-                new + name.removeprefix(old) if name.startswith(old) else name: value
-                for name, value in named.items()
-            }
+            named = {new + n.removeprefix(old) if n.startswith(old) else n: v for n, v in named.items()}
         found.append(named)
     return found
 
@@ -150,7 +138,9 @@ def _of_session(one: Session) -> dict[str, float]:
     return found
 
 
-def _metric(name: str, values: tuple[float | None, ...], spread: float) -> Metric:
+def _metric(name: str, every: Sequence[dict[str, float]], spreads: Sequence[dict[str, float]]) -> Metric:
+    values = tuple(one.get(name) for one in every)
+    spread = max((one.get(name, 0.0) for one in spreads), default=0.0)
     there = [v for v in values if v is not None]
     change = there[-1] - there[0] if len(there) > 1 else None
     better = None

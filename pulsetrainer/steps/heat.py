@@ -98,10 +98,7 @@ def take_temperature(device: Device, thermometer: Thermometer, high_A: float) ->
             f"{trace.dropped_samples} were lost",
             hint="check the cable to the device, then run the command again; `no_track_heat` leaves heat out",
         )
-    _check_plausible(thermometer.temperature_K)
-
-
-def _check_plausible(kelvin: float) -> None:
+    kelvin = thermometer.temperature_K
     if not _COLDEST_K <= kelvin <= _HOTTEST_K:
         raise DeviceError(
             f"the duty says that the coil is {kelvin:+.0f} K against calibration, expected "

@@ -133,7 +133,8 @@ def identify(
     notes += fit_notes.of_wild(wild_ones)
     operator, plane = fitted.operator, fitted.identified.operator.plane
     notes += [*fit_notes.of_form(fitted, measured[0], form), *_of_offsets(titles, fitted, measured)]
-    notes += _of_first_strokes(titles, measured, operator.low, operator.high)
+    strokes = [first_stroke_words(run.input, run.output, operator.low, operator.high) for run in measured]
+    notes += [f"{title}: {words}" for title, words in zip(titles, strokes, strict=True) if words]
     notes += [] if fitted.evenly_spaced else [_CROWDED]
     progress(0.4 if bootstrap else 0.8)
     ensemble = _resampled(fitted, bootstrap, seed, notes)
@@ -327,12 +328,6 @@ def _of_offsets(names: Sequence[str], fitted: Fitted, runs: Sequence[Run]) -> li
     shift = f"{with_unit(f'{apart:.3g}', runs[0].output_unit)} ({100 * apart / span:.2f} % of the span)"
     found = f"the outputs of the runs are shifted against each other by up to {shift}"
     return [f"{found}: each was fitted with an offset of its own ({listed}); the model has their mean"]
-
-
-def _of_first_strokes(names: Sequence[str], runs: Sequence[Run], low: float, high: float) -> list[str]:
-    """Say of which runs the first stroke lies apart from the later ones."""
-    said = [first_stroke_words(run.input, run.output, low, high) for run in runs]
-    return [f"{name}: {words}" for name, words in zip(names, said, strict=True) if words]
 
 
 def _of_gaps(plane: Plane, covered: BoolArray, unit: str) -> list[str]:

@@ -139,15 +139,12 @@ def _notes_on_time(name: str, report: Report) -> list[str]:
             f"{name} has {report.gaps} gap{plural} (more than 1.5 usual time steps), the longest of {longest}"
             f"{filled}"
         )
-    if (
-        report.even is False
-        and not report.resampled
-        and report.shortest_step_s is not None
-        and report.longest_step_s is not None
-    ):
+    if report.even is False and not report.resampled:
+        ends = (report.shortest_step_s or 0.0, report.longest_step_s or 0.0)
+        steps = " to ".join(map(with_seconds, ends))
         notes.append(
-            f"the time stamps of {name} are uneven, steps of {with_seconds(report.shortest_step_s)} to "
-            f"{with_seconds(report.longest_step_s)}; kept as they are (`resample` even makes them even)"
+            f"the time stamps of {name} are uneven, steps of {steps}; kept as they are "
+            "(`resample` even makes them even)"
         )
     return notes
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pulsetrainer.core.coil import LoopGains
-from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, PARAMETERS
+from pulsetrainer.device.codes import CURRENT_UNIT_A, DUTY_FULL, PARAMETER
 from pulsetrainer.device.gains import Gains
 
-_MOST = {p.name: p.maximum for p in PARAMETERS}
 # Counts of a parameter for one unit of a gain in A, s and duty: see ``firmware/core/pid.h``.
 _COUNTS = DUTY_FULL * CURRENT_UNIT_A
 _PER = {
@@ -18,7 +17,7 @@ _PER = {
 }
 # The duty is the reference: its counts, in units of the current.
 OPEN_LOOP = Gains(pid_kp=0, pid_ki=0, feed_resistance=65535, feed_inductance=0, feed_offset=0)
-MOST_PROPORTIONAL = _MOST["pid_kp"] / _PER["pid_kp"]  # duty for an A
+MOST_PROPORTIONAL = PARAMETER["pid_kp"].maximum / _PER["pid_kp"]  # duty for an A
 
 
 def to_wire(gains: LoopGains, dt_s: float) -> Gains:
@@ -30,7 +29,9 @@ def to_wire(gains: LoopGains, dt_s: float) -> Gains:
         "feed_inductance": gains.feed_inductance / dt_s,
         "feed_offset": gains.feed_offset,
     }
-    return Gains.of({name: min(round(value * _PER[name]), _MOST[name]) for name, value in wanted.items()})
+    return Gains.of(
+        {name: min(round(value * _PER[name]), PARAMETER[name].maximum) for name, value in wanted.items()}
+    )
 
 
 def from_wire(gains: Gains, dt_s: float) -> LoopGains:

@@ -46,13 +46,7 @@ _REMEDY: dict[int, str] = {
     "sensors; or raise `limit_force_N` where it was lowered",
     Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor",
     **dict.fromkeys(
-        (
-            Fault.NO_FORCE,
-            Fault.FORCE_FROZEN,
-            Fault.FORCE_IMPLAUSIBLE,
-            Fault.FORCE_ZERO,
-            Fault.FORCE_RAIL,
-        ),
+        (Fault.NO_FORCE, Fault.FORCE_FROZEN, Fault.FORCE_IMPLAUSIBLE, Fault.FORCE_ZERO, Fault.FORCE_RAIL),
         _SENSOR,
     ),
 }

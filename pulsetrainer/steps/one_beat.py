@@ -18,8 +18,7 @@ def shape_of(drive: Waveform) -> Shape:
     """
     if not np.isfinite(drive.period_s):
         raise DataError(
-            f"the drive {drive.name} does not say how long its beats are",
-            hint="make it again from the pulse",
+            f"the drive {drive.name} does not say how long its beats are", hint="make it again from the pulse"
         )
     first = int(np.flatnonzero(drive.scored)[0])
     one = slice(first, first + round(drive.period_s * drive.rate_Hz))

@@ -46,11 +46,9 @@ class Sink(Protocol):
         /,
     ) -> None:
         """Take samples in, arrays (n,) in s, N, A, A and N."""
-        ...
 
     def judge(self, fields: Mapping[str, Any], /) -> None:
         """Take in what the session amounts to so far: before the first samples, and after every beat."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,22 +51,18 @@ class Sink(Protocol):
     @property
     def samples(self) -> int:
         """How many samples it holds."""
-        ...
 
     @property
     def end_s(self) -> float:
         """Time of the last sample."""
-        ...
 
     def append(
         self, time_s: FloatArray, reference_A: FloatArray, current_A: FloatArray, force_N: FloatArray, /
     ) -> None:
         """Take samples in, arrays (n,) in s, A, A and N."""
-        ...
 
     def begin_part(self) -> None:
         """Say that the device was off since the last sample."""
-        ...
 
 
 class InMemory:

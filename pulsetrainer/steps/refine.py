@@ -113,12 +113,7 @@ def refine(
         return pressed.output[middle]
 
     learnt = learning.passes(
-        drive.target[middle],
-        inverse,
-        respond,
-        smooth=smooth,
-        start=start[middle],
-        careful=True,
+        drive.target[middle], inverse, respond, smooth=smooth, start=start[middle], careful=True
     )
     try:
         for one in learnt:

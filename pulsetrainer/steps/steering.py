@@ -12,14 +12,9 @@ RATE_STEP_BPM = 5.0
 AMPLITUDE_STEP = 0.1
 _LEAST = 0.1  # of the reach
 KEYS = {
-    "+": "faster",
-    "-": "slower",
-    ">": "stronger",
-    "<": "weaker",
-    "p": "next pulse",
-    " ": "pause, go on",
-    "q": "stop",
-}
+    "+": "faster", "-": "slower", ">": "stronger", "<": "weaker",
+    "p": "next pulse", " ": "pause, go on", "q": "stop",
+}  # fmt: skip
 
 
 @dataclass

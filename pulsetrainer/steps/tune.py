@@ -189,11 +189,7 @@ class _Tuning(Measurement):
     """One device being tuned."""
 
     def __init__(
-        self,
-        device: Device,
-        pulses: Sequence[Shape | Waveform],
-        supply_V: float | None,
-        progress: Progress,
+        self, device: Device, pulses: Sequence[Shape | Waveform], supply_V: float | None, progress: Progress
     ) -> None:
         super().__init__(device, supply_known=supply_V is not None, progress=progress)
         self._pulses, self._supply_V = pulses, supply_V

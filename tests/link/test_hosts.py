@@ -211,9 +211,9 @@ def test_a_stuck_wire_does_not_keep_a_play_alive(wire, repeated):
 )
 def test_an_old_and_a_new_host_on_this_firmware(wire, monkeypatch, host, older):
     """Both versions and what to do are said; and whoever arms nevertheless is refused by the firmware."""
-    monkeypatch.setattr(exchange, "PROTOCOL_MAJOR", host)
-    one = wire("bench:")
     theirs = f"protocol {codes.PROTOCOL_MAJOR}."
+    monkeypatch.setattr(codes, "PROTOCOL_MAJOR", host)
+    one = wire("bench:")
     with raises(DeviceError, f"older {older}", ours=f"this program {host}.", theirs=theirs):
         one.session.hello()
     one.ask(m.WaveBegin(1, 10, 0))

@@ -15,7 +15,7 @@ from pulsetrainer.device import codes
 from pulsetrainer.device import messages as m
 from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.transport import PortLostError, SerialTransport
-from pulsetrainer.device.wording import fault_text, refusal_text, reset_text, state_text
+from pulsetrainer.device.wording import told
 from pulsetrainer.errors import DeviceError
 from wording import raises
 
@@ -23,22 +23,14 @@ UNKNOWN = 201
 HALF_AMP = np.full(500, 0.5)
 
 
-@pytest.mark.parametrize(
-    ("known", "told"),
-    [
-        (codes.Fault, fault_text),
-        (codes.NakCode, refusal_text),
-        (codes.ResetCause, reset_text),
-        (codes.State, state_text),
-    ],
-)
-def test_every_number_has_words(known, told):
+@pytest.mark.parametrize("kind", [codes.Fault, codes.NakCode, codes.ResetCause, codes.State])
+def test_every_number_has_words(kind):
     """Each known number has words of its own; an unknown one is named as it is."""
-    texts = [told(number) for number in known]
+    texts = [told(kind, number) for number in kind]
     assert len(set(texts)) == len(texts)
     for number in range(256):
-        assert isinstance(told(number), str)
-    assert str(UNKNOWN) in told(UNKNOWN)
+        assert isinstance(told(kind, number), str)
+    assert str(UNKNOWN) in told(kind, UNKNOWN)
     assert str(UNKNOWN) not in "".join(texts)
 
 
