@@ -1,8 +1,8 @@
 """How small an error can be, and how large an effect must be to matter.
 
-What no cause can lower is the noise of the averages and the discretisation error, of the plane's levels and of
-an input that is read in coarse steps; an effect smaller than the
-latter, than 0.3 of the former or than 0.03 % of the span is irrelevant, however significant it is.
+What no cause can lower is the noise of the averages and the discretisation error, of the plane's levels and
+of an input that is read in coarse steps; an effect smaller than the latter, than 0.3 of the former or than
+0.03 % of the span is irrelevant, however significant it is.
 """
 
 from __future__ import annotations
