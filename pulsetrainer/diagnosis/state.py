@@ -18,6 +18,7 @@ from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.noise import burstiness
+from pulsetrainer.diagnosis.pinched import pinched_at
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.raw import Firing
 from pulsetrainer.diagnosis.residual import RATES
@@ -119,9 +120,25 @@ class State:
         return burstiness(self.current.residual, problem.bins, problem.measured) > LIMITS.burstiness
 
     @property
+    def pinched(self) -> float | None:
+        """Input, of its range, at which all branches meet; None where a curve was learned beside them."""
+        if any(term.cause.id == "unlisted" for term in self.current.terms):
+            return None
+        records = self.problem.records
+        u = np.concatenate([one.input[one.counts] for one in records])
+        y = np.concatenate([one.output[one.counts] for one in records])
+        return pinched_at(u, y, self.floor.single)
+
+    @property
     def floor_left(self) -> Floor:
-        """The floor under what is left: what comes in bursts is no noise."""
-        return self.floor.quick if self.in_bursts else self.floor
+        """The floor under what is left: what comes in bursts is no noise.
+
+        Nor is what is left of a pinched loop, of which the levels of the plane explain little.
+        """
+        if self.pinched is None:
+            return self.floor.quick if self.in_bursts else self.floor
+        most = LIMITS.unexplained_span * self.floor.span
+        return replace(self.floor.quick, discretisation=min(self.floor.discretisation, most))
 
     @property
     def floor_rms(self) -> float:
@@ -130,10 +147,13 @@ class State:
 
     @property
     def unexplained(self) -> bool:
-        """Whether more than half of what can be explained is left, and enough to matter."""
+        """Whether more than half of what can be explained is left, and enough to matter.
+
+        Any cause explains some of a pinched loop, which no Preisach operator has: there all of it counts.
+        """
         floor = self.floor_left
         left = self.current.squares - floor.squares
-        half = LIMITS.unexplained * floor.reducible(self.baseline)
+        half = LIMITS.unexplained * floor.reducible(self.baseline) if self.pinched is None else 0.0
         small = floor.count * (LIMITS.unexplained_span * floor.span) ** 2
         return left > max(half, small, LIMITS.unexplained_relevant * floor.relevant)
 
