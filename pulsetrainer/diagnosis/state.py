@@ -18,7 +18,6 @@ from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.noise import burstiness
-from pulsetrainer.diagnosis.pinched import pinched_at
 from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.raw import Firing
 from pulsetrainer.diagnosis.residual import RATES
@@ -92,6 +91,7 @@ class State:
     advice: Evidence = field(default_factory=lambda: Evidence("none"))
     repeated: Fitted | None = None  # the model with the causes that repeat, once that was asked
     repeated_estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)  # as ``estimates``
+    pinched_at: float | None = None  # input, of its range, at which all branches of the loop meet
     extends: bool = True  # False: what was found is no fault of the model as given
 
     @property
@@ -120,14 +120,9 @@ class State:
         return burstiness(self.current.residual, problem.bins, problem.measured) > LIMITS.burstiness
 
     @property
-    def pinched(self) -> float | None:
-        """Input, of its range, at which all branches meet; None where a curve was learned beside them."""
-        if any(term.cause.id == "unlisted" for term in self.current.terms):
-            return None
-        records = self.problem.records
-        u = np.concatenate([one.input[one.counts] for one in records])
-        y = np.concatenate([one.output[one.counts] for one in records])
-        return pinched_at(u, y, self.floor.single)
+    def beyond_any(self) -> bool:
+        """Whether the loop is one that no Preisach operator has, and no curve was learned beside it."""
+        return self.pinched_at is not None and all(term.cause.id != "unlisted" for term in self.current.terms)
 
     @property
     def floor_left(self) -> Floor:
@@ -135,7 +130,7 @@ class State:
 
         Nor is what is left of a pinched loop, of which the levels of the plane explain little.
         """
-        if self.pinched is None:
+        if not self.beyond_any:
             return self.floor.quick if self.in_bursts else self.floor
         most = LIMITS.unexplained_span * self.floor.span
         return replace(self.floor.quick, discretisation=min(self.floor.discretisation, most))
@@ -153,7 +148,7 @@ class State:
         """
         floor = self.floor_left
         left = self.current.squares - floor.squares
-        half = LIMITS.unexplained * floor.reducible(self.baseline) if self.pinched is None else 0.0
+        half = LIMITS.unexplained * floor.reducible(self.baseline) if not self.beyond_any else 0.0
         small = floor.count * (LIMITS.unexplained_span * floor.span) ** 2
         return left > max(half, small, LIMITS.unexplained_relevant * floor.relevant)
 

@@ -47,8 +47,9 @@ def stage(state: State) -> State:
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:
         figures = {"white": percent * state.floor.white, "times": state.floor.slow}
         said.append(Evidence("bursts" if state.in_bursts else "slow noise", figures=figures))
-    if state.verdict == "unknown" and (at := state.pinched) is not None:
-        said.append(Evidence("pinched", figures={"at": state.scale.low + at * state.scale.reach}))
+    if state.verdict == "unknown" and state.pinched_at is not None:
+        at = state.scale.low + state.pinched_at * state.scale.reach
+        said.append(Evidence("pinched", figures={"at": at}))
     if state.verdict in ("none", "inconclusive") and not state.question.quick:
         said += _not_accepted(state)
     if state.question.quick:
