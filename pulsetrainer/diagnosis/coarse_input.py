@@ -48,7 +48,7 @@ def _steps_of(record: Record) -> IntArray | None:
 
 
 def _moves_between(u: FloatArray, y: FloatArray, at: IntArray) -> bool:
-    """Whether an output (n,) moves evenly between two steps, ``at``, the same way of an input (n,)."""
+    """Whether an output (n,) moves evenly between two steps ``at`` of an input (n,) that go the same way."""
     begin, end = at[:-1], at[1:]
     way = np.sign(u[end] - u[begin])
     held = (end - begin > 1) & (way == np.sign(u[begin] - u[begin - 1]))
@@ -62,7 +62,7 @@ def _moves_between(u: FloatArray, y: FloatArray, at: IntArray) -> bool:
 
 
 def _between(u: FloatArray, at: IntArray) -> FloatArray:
-    """Input (n,) through the middles of its steps, ``at``, and at rest at what is read for longer."""
+    """Input (n,) through the middles of its steps ``at``, and at rest at what is read for longer."""
     length = np.diff(at).astype(np.float64)
     length = np.concatenate((length[:1], length, length[-1:]))  # of the readings before and after each step
     stay = length[1:-1]

@@ -219,6 +219,11 @@ class Thresholds:
     unexplained_relevant: float = 4.0  # times the relevant fall of squares: less left is not worth a word ...
     unexplained_span: float = 0.002  # ... nor is less of the span: plants of other kinds leave up to that
 
+    # A pinched loop
+    pinch_groups: int = 51  # of the input's range, in each of which the branches are as far apart as they are
+    pinch: float = 0.15  # of their distance on both sides: drawn memristors have up to 0.09, others from 0.45
+    pinch_beside: float = 0.02  # of the span, rms: what is narrower on both sides is no loop
+
     # The model as given
     speed_groups: int = 40  # of equal velocity, whose mean outputs stand against the model
     speed_window: int = 9  # samples of the parabolas whose slope is the velocity

@@ -10,10 +10,13 @@ told apart later.
 
 from __future__ import annotations
 
+import numpy as np
+
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.floor import floor_of
 from pulsetrainer.diagnosis.forms import base_of
 from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.pinched import pinched_at
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.residual import excitation_limits
 from pulsetrainer.diagnosis.stages.raw_data import Masked
@@ -38,6 +41,7 @@ def stage(masked: Masked) -> State:
     floor = floor.heard(fitted).at(coarse, fitted)
     lacks = tuple(excitation_limits(problem))
     held_out = HeldOut(problem)
-    return State(
-        masked.question, firings, masked.scale, problem, coarse, fitted, floor, held_out, lacks, fitted
-    )
+    # whole records: here it does not matter what was before them
+    u, y = (np.concatenate(one) for one in ([r.input for r in records], [r.output for r in records]))
+    known = (masked.question, firings, masked.scale, problem, coarse, fitted, floor, held_out, lacks, fitted)
+    return State(*known, pinched_at=pinched_at(u, y, floor.single))

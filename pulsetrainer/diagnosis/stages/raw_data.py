@@ -6,9 +6,11 @@ follow its reference, an input outside the range that was identified. Each gate 
 cause. A gate that fires is a finding, and the samples it names are left out of everything that follows:
 filled in, since causes filter the output and wild samples must not reach the filters.
 
-Only then are the records brought to even time steps, sharp turns of the input to where the lines beside them
-meet, and all to units of their own: the range of the input, the span of the output, and a second that follows
-from how fast the input moves. Nothing that is decided from here on knows a second, an ampere or a newton.
+Only then is an input that was read in coarse steps followed between them, unless the output moves with the
+steps and so saw them. The records are brought to even time steps, sharp turns of the input to where the lines
+beside them meet, and all to units of their own: the range of the input, the span of the output, and a second
+that follows from how fast the input moves. Nothing that is decided from here on knows a second, an ampere or
+a newton.
 """
 
 from __future__ import annotations
