@@ -75,8 +75,8 @@ class Fit:
 
 
 def _term(name: str) -> Term:
-    count = 2 if name == "offset-drift" else None  # one that does not relax
-    return Term(CAUSE[name], tuple(q.small for q in CAUSE[name].parameters[:count]))
+    quantities = CAUSE[name].quantities(PROBLEM.frames[0])  # of the plain formula
+    return Term(CAUSE[name], tuple(q.small for q in quantities))
 
 
 def _fit(squares: float, *names: str) -> Fit:
