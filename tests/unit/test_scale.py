@@ -86,8 +86,8 @@ def test_every_unit_of_the_library_is_known():
     scale = Scale(reach=4.0, span=3.0, second=25.0)
     known = {
         "1": 1.0, "{u}": 4.0, "{y}": 3.0, "s": 25.0, "Hz": 1 / 25, "1/s": 1 / 25, "{y}/s": 3 / 25,
-        "{u}/{y}": 4 / 3, "{y} s/{u}": 3 * 25 / 4, "1/({u})^2": 1 / 16, "{y}/({u})^2": 3 / 16, "({u})^2": 16.0, "({y})^2": 9.0,
-        "{u}/s": 4 / 25, "{y}/s^2": 3 / 625, "({u} s)^0.5": 10.0,
+        "{u}/{y}": 4 / 3, "{y} s/{u}": 3 * 25 / 4, "1/({u})^2": 1 / 16, "({u})^2": 16.0, "({y})^2": 9.0,
+        "{u}/s": 4 / 25, "{y}/s^2": 3 / 625, "{y}/({u})^2": 3 / 16, "({u} s)^0.5": 10.0,
     }  # fmt: skip
     of_causes = {quantity.unit for cause in library().values() for quantity in cause.parameters}
     assert of_causes | {state.unit for state in STATES} <= set(known)
