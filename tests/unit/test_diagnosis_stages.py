@@ -1394,8 +1394,8 @@ def test_what_may_be_a_fault_of_the_measurement_is_not_added(monkeypatch, rival,
     ("explains", "beside", "found"), [(9.9, (), False), (10.1, (), True), (9.9, (rivals.WORSE,), False)]
 )
 def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, beside, found):
-    """Only where it matters little."""
-    monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
+    """Only where it matters little; then what is left is refitted without it."""
+    monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
     findings = (
         _finding("creep", 80.0, doubts=beside),
@@ -1406,6 +1406,26 @@ def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, 
     assert after.repeated.names == (("creep",) if not beside else ())
     # what is in doubt for another reason was never asked whether it repeats
     assert after.findings[1].doubts == (rivals.MAY_BE_NOTHING, repetition.NOT_ADDED)
+    assert after.current.names == (("creep", "viscous") if found else ("creep",))
+    assert after.findings[0].explains_percent == pytest.approx(80.0 if found else 30.0)
+
+
+def _refitted(problem, terms, near) -> Fit:
+    """A fit of squares 500, without any one of its causes 800: that is 30 % of what can be explained."""
+    return Fit(500.0, tuple(terms), _without={term.cause.id: Fit(800.0) for term in terms})
+
+
+@pytest.mark.parametrize("settles", [True, False])
+def test_a_step_beside_what_is_gone_is_asked_again_whether_it_settles(monkeypatch, settles):
+    """Beside a slow cause it was a small rest of that; without it, it is that in the whole."""
+    monkeypatch.setattr(repetition, "refit", _refitted)
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    monkeypatch.setattr(wear, "is_as_good", lambda state, term: settles and len(state.current.terms) == 1)
+    findings = (_finding("step", 2.0), _finding("thermal-drift", 9.0, doubts=(rivals.MAY_BE_NOTHING,)))
+    after = repetition.stage(_state(_fit(500.0, "step", "thermal-drift"), findings=findings))
+    assert [one.found for one in after.findings] == [True, False]
+    assert after.findings[0].doubts == ((rivals.SETTLES,) if settles else ())
+    assert after.findings[0].explains_percent == pytest.approx(30.0)
 
 
 @pytest.mark.parametrize(("larger", "found"), [(1.0, True), (1e4, False)])

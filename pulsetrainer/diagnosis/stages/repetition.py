@@ -11,18 +11,21 @@ as well: that happened in this record, and not in the next. What equal loops sho
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
-cent of the span, was not found: it mends the formula of another cause, or nothing.
+cent of the span, was not found: it mends the formula of another cause, or nothing. What is left beside it is
+refitted without it, and a step asked again whether it only settles.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from pulsetrainer.diagnosis import wear
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
-from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, MAY_BE_WEAR
+from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -45,8 +48,34 @@ def stage(state: State) -> State:
         for one in state.findings
     )
     findings = tuple(replace(one, found=one.found and not _is_nothing(state, one)) for one in findings)
-    current = state.current if any(one.found for one in findings) else state.baseline
-    return replace(state, findings=findings, current=current, repeated=kept)
+    return _without_what_is_gone(replace(state, findings=findings, repeated=kept))
+
+
+def _without_what_is_gone(state: State) -> State:
+    """Return the state with the fit of what was found, asked again: the rest leaves what it took away."""
+    found = {one.cause.id for one in state.findings if one.found}
+    terms = [term for term in state.current.terms if term.cause.id in found]
+    if len(terms) == len(state.current.terms):
+        return state
+    if not terms:
+        return replace(state, current=state.baseline)
+    current = refit(state.problem, terms, state.current)
+    known = {one.cause.id: one for one in current.terms}
+    without = {name: current.without(one) for name, one in known.items()}
+    state = replace(state, current=current, without=without)
+    findings = [
+        _asked_again(state, one, known[one.cause.id]) if one.cause.id in known else one
+        for one in state.findings
+    ]
+    return replace(state, findings=tuple(findings))
+
+
+def _asked_again(state: State, finding: Finding, term: Term) -> Finding:
+    """Return a finding with its share where others are gone; what only settles is no step then either."""
+    gain = state.without[term.cause.id].squares - state.current.squares
+    settles = term.cause.sudden and SETTLES not in finding.doubts and wear.is_as_good(state, term)
+    doubts = (*finding.doubts, SETTLES) if settles else finding.doubts
+    return replace(finding, explains_percent=state.explains(gain), doubts=doubts)
 
 
 def _may_be_a_fault(finding: Finding) -> bool:
