@@ -221,7 +221,7 @@ DOUBTS: Mapping[str, str] = {
 OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o diagnostic.h5."
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``Bench.numbers``
 LACKS: Mapping[str, str] = {
-    "rates": "it has one rate of change only",
+    "rates": "nearly all of it was run at one rate",
     "holds": "the {input} never rests for {hold_least} or more",
     "length": "it is shorter than {short}",
 }
