@@ -1,7 +1,8 @@
 """How small an error can be, and how large an effect must be to matter.
 
-What no cause can lower is the noise of the averages and the discretisation error; an effect smaller than the
-latter, than 0.3 of the former or than 0.03 % of the span is irrelevant, however significant it is.
+What no cause can lower is the noise of the averages and the discretisation error, of the plane's levels and
+of an input that is read in coarse steps; an effect smaller than the latter, than 0.3 of the former or than
+0.03 % of the span is irrelevant, however significant it is.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis.coarse_input import hidden_square
 from pulsetrainer.diagnosis.fitting import Fitted, weights_for
 from pulsetrainer.diagnosis.noise import quiet_square
 from pulsetrainer.diagnosis.problem import Problem
@@ -33,6 +35,7 @@ class Floor:
     single: float = 0.0  # rms of single samples, by their differences
     doubtful: float = 0.0  # mean square of what may be slow noise, or slow errors of the model
     sampled: float = 0.0  # mean square of what that leaves in an average
+    hidden: float = 0.0  # mean square of what coarse steps of the input hide, part of the discretisation
 
     @property
     def squares(self) -> float:
@@ -76,9 +79,8 @@ class Floor:
         """
         refitted = weights_for(coarse, fitted.terms, None)
         fall = max(refitted.squares - fitted.squares, 0.0) / self.count
-        return replace(
-            self, discretisation=float(np.sqrt(fall / ((LIMITS.levels / LIMITS.coarse_levels) ** 2 - 1.0)))
-        )
+        square = fall / ((LIMITS.levels / LIMITS.coarse_levels) ** 2 - 1.0)
+        return replace(self, discretisation=float(np.sqrt(square + self.hidden)))
 
     def heard(self, fitted: Fitted) -> Floor:
         """Return the floor with the noise that is heard in what a fit leaves, coloured as it is."""
@@ -113,5 +115,8 @@ def floor_of(
     held = (step**2 + jump**2) / UNIFORM  # does not average out
     sampled = noise**2 * float(np.mean(1.0 / problem.bins.sizes))
     white = float(np.sqrt(sampled + held))
+    hidden = float(np.mean([hidden_square(r) for r in measured])) / span**2
     span = float(np.ptp(problem.measured))
-    return Floor(problem.bins.count, span, noise, white, held=held, single=noise, sampled=sampled)
+    return Floor(
+        problem.bins.count, span, noise, white, held=held, single=noise, sampled=sampled, hidden=hidden
+    )

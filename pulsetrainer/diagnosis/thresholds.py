@@ -44,6 +44,10 @@ class Thresholds:
     line_share: float = 0.5  # of the squares of these: one line with more is a hum, and no noise ...
     line_samples: int = 1000  # ... of so many: of fewer one line has much by chance
     line_wide: int = 3  # lines on each side that a window spreads it over
+    coarse_reading: float = 0.004  # of the input's range: finer steps of its reading hurt no fit
+    least_held: int = 100  # readings that stay between two steps the same way: fewer tell nothing
+    read_evenly: float = 0.5  # of an even motion, while the reading stays: such an output saw no steps
+    not_between: float = 0.5  # of a coarse step of the input: so much is not known beside turns and rests
     coarse_noise: float = 1.5  # times the noise: larger steps of the output do not average out
 
     # Static fit
@@ -210,6 +214,11 @@ class Thresholds:
     unexplained: float = 0.5  # of the reducible part: with more left the cause is unknown
     unexplained_relevant: float = 4.0  # times the relevant fall of squares: less left is not worth a word ...
     unexplained_span: float = 0.002  # ... nor is less of the span: plants of other kinds leave up to that
+
+    # A pinched loop
+    pinch_groups: int = 51  # of the input's range, in each of which the branches are as far apart as they are
+    pinch: float = 0.15  # of their distance on both sides: drawn memristors have up to 0.09, others from 0.45
+    pinch_beside: float = 0.02  # of the span, rms: what is narrower on both sides is no loop
 
     # The model as given
     speed_groups: int = 40  # of equal velocity, whose mean outputs stand against the model

@@ -6,9 +6,11 @@ follow its reference, an input outside the range that was identified. Each gate 
 cause. A gate that fires is a finding, and the samples it names are left out of everything that follows:
 filled in, since causes filter the output and wild samples must not reach the filters.
 
-Only then are the records brought to even time steps, sharp turns of the input to where the lines beside them
-meet, and all to units of their own: the range of the input, the span of the output, and a second that follows
-from how fast the input moves. Nothing that is decided from here on knows a second, an ampere or a newton.
+Only then is an input that was read in coarse steps followed between them, unless the output moves with the
+steps and so saw them. The records are brought to even time steps, sharp turns of the input to where the lines
+beside them meet, and all to units of their own: the range of the input, the span of the output, and a second
+that follows from how fast the input moves. Nothing that is decided from here on knows a second, an ampere or
+a newton.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import numpy as np
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.turns import at_their_tips
 from pulsetrainer.diagnosis import gates
+from pulsetrainer.diagnosis.coarse_input import as_it_moved
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
 from pulsetrainer.diagnosis.state import Question
@@ -51,7 +54,8 @@ def stage(question: Question) -> Masked:
         for record, times, known in zip(question.records, stamps, corrected, strict=True)
     ]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
-    even = [evenly(record, times) for record, times in zip(masked, stamps, strict=True)]
+    moved = map(as_it_moved, masked)
+    even = [evenly(record, times) for record, times in zip(moved, stamps, strict=True)]
     times = [np.asarray(one.step * np.arange(one.input.size)) if one.timed else None for one in even]
     inputs = at_their_tips([(one.input, one.output) for one in even], times, [one.counts for one in even])
     even = [replace(one, input=u) for one, u in zip(even, inputs, strict=True)]
