@@ -91,6 +91,7 @@ class State:
     advice: Evidence = field(default_factory=lambda: Evidence("none"))
     repeated: Fitted | None = None  # the model with the causes that repeat, once that was asked
     repeated_estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)  # as ``estimates``
+    pinched_at: float | None = None  # input, of its range, at which all branches of the loop meet
     extends: bool = True  # False: what was found is no fault of the model as given
 
     @property
@@ -119,9 +120,20 @@ class State:
         return burstiness(self.current.residual, problem.bins, problem.measured) > LIMITS.burstiness
 
     @property
+    def beyond_any(self) -> bool:
+        """Whether the loop is one that no Preisach operator has, and no curve was learned beside it."""
+        return self.pinched_at is not None and all(term.cause.id != "unlisted" for term in self.current.terms)
+
+    @property
     def floor_left(self) -> Floor:
-        """The floor under what is left: what comes in bursts is no noise."""
-        return self.floor.quick if self.in_bursts else self.floor
+        """The floor under what is left: what comes in bursts is no noise.
+
+        Nor is what is left of a pinched loop, of which the levels of the plane explain little.
+        """
+        if not self.beyond_any:
+            return self.floor.quick if self.in_bursts else self.floor
+        most = LIMITS.unexplained_span * self.floor.span
+        return replace(self.floor.quick, discretisation=min(self.floor.discretisation, most))
 
     @property
     def floor_rms(self) -> float:
@@ -130,10 +142,13 @@ class State:
 
     @property
     def unexplained(self) -> bool:
-        """Whether more than half of what can be explained is left, and enough to matter."""
+        """Whether more than half of what can be explained is left, and enough to matter.
+
+        Any cause explains some of a pinched loop, which no Preisach operator has: there all of it counts.
+        """
         floor = self.floor_left
         left = self.current.squares - floor.squares
-        half = LIMITS.unexplained * floor.reducible(self.baseline)
+        half = LIMITS.unexplained * floor.reducible(self.baseline) if not self.beyond_any else 0.0
         small = floor.count * (LIMITS.unexplained_span * floor.span) ** 2
         return left > max(half, small, LIMITS.unexplained_relevant * floor.relevant)
 

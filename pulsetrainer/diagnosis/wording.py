@@ -77,6 +77,11 @@ TEXTS: Mapping[str, str] = {
         "{velocity:.1f} %, and one with a part in proportion to {input} {beside:.1f} %. Use a model of a "
         "damper and a spring"
     ),
+    "pinched": (
+        "All branches of the loop pass through one point, where the {input} is about {at:.3g}{in_u}. A "
+        "Preisach model has no such loop, so the model does not describe this record, and what is left is "
+        "taken for no noise. A resistor with a memory (a memristor) has one: use a model y = G(w) u"
+    ),
     "given better": (
         "The model as given predicts these recordings better than any extension that was tried, so none is "
         "proposed."

@@ -2,8 +2,8 @@
 
 What the static model leaves and what it would leave if nothing were wrong; for each cause found, what its
 gate saw or its p-value and share; what is left with all of them; where the rest is largest, when nothing
-explains it and it is more than noise; whether what is taken for noise is slow; which cause screening took for
-significant, where nothing was found; what the records lack.
+explains it and it is more than noise; whether what is taken for noise is slow; whether the loop is pinched;
+which cause screening took for significant, where nothing was found; what the records lack.
 """
 
 from __future__ import annotations
@@ -47,6 +47,9 @@ def stage(state: State) -> State:
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:
         figures = {"white": percent * state.floor.white, "times": state.floor.slow}
         said.append(Evidence("bursts" if state.in_bursts else "slow noise", figures=figures))
+    if state.verdict == "unknown" and state.pinched_at is not None:
+        at = state.scale.low + state.pinched_at * state.scale.reach
+        said.append(Evidence("pinched", figures={"at": at}))
     if state.verdict in ("none", "inconclusive") and not state.question.quick:
         said += _not_accepted(state)
     if state.question.quick:

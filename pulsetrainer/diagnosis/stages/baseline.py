@@ -10,10 +10,13 @@ told apart later.
 
 from __future__ import annotations
 
+import numpy as np
+
 from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.floor import floor_of
 from pulsetrainer.diagnosis.forms import base_of
 from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.pinched import pinched_at
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.residual import excitation_limits
 from pulsetrainer.diagnosis.stages.raw_data import Masked
@@ -38,6 +41,9 @@ def stage(masked: Masked) -> State:
     floor = floor.heard(fitted).at(coarse, fitted)
     lacks = tuple(excitation_limits(problem))
     held_out = HeldOut(problem)
-    return State(
-        masked.question, firings, masked.scale, problem, coarse, fitted, floor, held_out, lacks, fitted
-    )
+    # as they were measured: what has no weight, such as all before the memory is known, is filled in by now
+    whole = masked.question.records
+    u, y = (np.concatenate(one) for one in ([r.input for r in whole], [r.output for r in whole]))
+    level = (u - masked.scale.low) / masked.scale.reach
+    known = (masked.question, firings, masked.scale, problem, coarse, fitted, floor, held_out, lacks, fitted)
+    return State(*known, pinched_at=pinched_at(level, y, floor.single * masked.scale.span))

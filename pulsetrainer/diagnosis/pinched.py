@@ -1,0 +1,38 @@
+"""Whether all branches of a loop pass through one point within it, as those of a memristor do at zero.
+
+A resistor with a memory, y = G(w) u with a state w of its own, has no output where it has no input, whatever
+its state. The loops of a Preisach operator are widest within: its weights close them at an end of the input's
+range only, or where they leave a gap of no hysteresis at all (and then they describe the record).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.diagnosis.thresholds import LIMITS
+
+
+def pinched_at(level: FloatArray, output: FloatArray, noise: float) -> float | None:
+    """Return the input through which all branches pass at one output, None where there is none.
+
+    Parameters
+    ----------
+    level, output
+        Input, in units of its range, and output (n,).
+    noise
+        Of single samples of the output, rms.
+    """
+    number = np.clip((level * LIMITS.pinch_groups).astype(np.int64), 0, LIMITS.pinch_groups - 1)
+    width = np.zeros(LIMITS.pinch_groups)
+    for k in np.unique(number):
+        own = number == k
+        u, y = level[own] - level[own].mean(), output[own] - output[own].mean()
+        slope = float(u @ y) / max(float(u @ u), LIMITS.rounding)
+        width[k] = np.sqrt(max(float(np.mean((y - slope * u) ** 2)) - noise**2, 0.0))
+    told = np.bincount(number, minlength=width.size) >= LIMITS.least_moving
+    beside = np.minimum(np.maximum.accumulate(width), np.maximum.accumulate(width[::-1])[::-1])
+    wide = told & (beside > LIMITS.pinch_beside * float(np.ptp(output)))
+    ratio = np.where(wide, width / np.maximum(beside, LIMITS.rounding), 1.0)
+    k = int(np.argmin(ratio))
+    return (k + 0.5) / LIMITS.pinch_groups if ratio[k] < LIMITS.pinch else None
