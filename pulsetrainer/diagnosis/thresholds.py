@@ -45,8 +45,8 @@ class Thresholds:
     line_samples: int = 1000  # ... of so many: of fewer one line has much by chance
     line_wide: int = 3  # lines on each side that a window spreads it over
     coarse_reading: float = 0.004  # of the input's range: finer steps of its reading hurt no fit
-    least_held: int = 100  # readings that stay, between two steps the same way: fewer tell nothing
-    read_evenly: float = 0.5  # of an even motion: an output that moves so at one reading saw no steps
+    least_held: int = 100  # readings that stay between two steps the same way: fewer tell nothing
+    read_evenly: float = 0.5  # of an even motion, while the reading stays: such an output saw no steps
     not_between: float = 0.5  # of a coarse step of the input: so much is not known beside turns and rests
     coarse_noise: float = 1.5  # times the noise: larger steps of the output do not average out
 

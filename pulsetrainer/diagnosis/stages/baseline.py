@@ -41,7 +41,9 @@ def stage(masked: Masked) -> State:
     floor = floor.heard(fitted).at(coarse, fitted)
     lacks = tuple(excitation_limits(problem))
     held_out = HeldOut(problem)
-    # whole records: here it does not matter what was before them
-    u, y = (np.concatenate(one) for one in ([r.input for r in records], [r.output for r in records]))
+    # as they were measured: what has no weight, such as all before the memory is known, is filled in by now
+    whole = masked.question.records
+    u, y = (np.concatenate(one) for one in ([r.input for r in whole], [r.output for r in whole]))
+    level = (u - masked.scale.low) / masked.scale.reach
     known = (masked.question, firings, masked.scale, problem, coarse, fitted, floor, held_out, lacks, fitted)
-    return State(*known, pinched_at=pinched_at(u, y, floor.single))
+    return State(*known, pinched_at=pinched_at(level, y, floor.single * masked.scale.span))
