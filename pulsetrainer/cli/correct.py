@@ -38,8 +38,8 @@ def correct(
     from pulsetrainer.artefacts.units import with_unit
 
     masked = int((~corrected.counts).sum())
-    changed = abs(corrected.output - measured.output)
-    most = float(changed[changed >= 0].max())  # lost samples are not numbers
+    changed = abs(corrected.output - measured.output)[corrected.counts]  # what is left out was filled in
+    most = float(changed[changed >= 0].max(initial=0.0))  # lost samples are not numbers
     payload = {"output": out, "corrected": corrected.corrected, "masked_samples": masked}
     rows = {
         "taken out": ", ".join(corrected.corrected),

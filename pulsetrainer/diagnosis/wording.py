@@ -163,8 +163,8 @@ ADVICE: Mapping[str, str] = {
         "recording."
     ),
     "again": (
-        "What was found does not repeat within these recordings, so nothing is added to the model. Record "
-        "again, and diagnose both recordings together."
+        "What was found is in doubt, or does not repeat within these recordings, so nothing is added to the "
+        "model. Record again, and diagnose both recordings together."
     ),
     "correct": (
         "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
