@@ -18,7 +18,8 @@ from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.series import series_of
 from pulsetrainer.files.table import write_table
 
-NUMBERS = st.floats(-1e99, 1e99, allow_nan=False)
+# all but what stands for no reading in any table; Hypothesis draws numbers of the source too
+NUMBERS = st.floats(-1e99, 1e99, allow_nan=False).filter(lambda one: abs(one) not in (9.9e37, 9.91e37))
 
 
 FILES = sorted((Path(__file__).parents[1] / "data" / "files-0.1").glob("*.h5"))
