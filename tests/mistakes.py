@@ -33,6 +33,7 @@ def lay_out(folder: Path) -> None:
     (folder / "wrong.toml").write_text("levles = 48\n")
     (folder / "bare").mkdir()
     (folder / "bare.toml").write_text("")
+    (folder / "pulse.toml").write_text("normal = 3\n")
     (folder / "one.toml").write_text('"normal.continuous.mean_error_reduction_percent" = 90\n')
 
 
@@ -221,6 +222,14 @@ _WORDS_OF_A_TIRED_HAND = {
     "bounds of nothing": ("evaluate played.h5 --bounds bare.toml", 2, "holds no bound", "= [90, 100]"),
     "a bound of one number": (
         *("evaluate played.h5 --bounds one.toml", 2, "a pair [low, high], got 90", "lowest and the highest"),
+    ),
+    "a bound of a pulse": (
+        *(
+            "evaluate played.h5 --bounds pulse.toml",
+            2,
+            "the bound normal in pulse.toml",
+            "normal.continuous.mean",
+        ),
     ),
     "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),
 }

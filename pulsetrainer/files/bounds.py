@@ -23,9 +23,10 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
             case [low, high] if {type(low), type(high)} <= {int, float} and low <= high:
                 bounds[name] = float(low), float(high)
             case _:
+                of, _, figure = name.rpartition(".")
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=f"write {name.rpartition('.')[2]} = [0.5, 1.5], the lowest and the highest",
+                    hint=f"write {figure} = [0.5, 1.5], the lowest and the highest" if of else _HOW,
                 )
     if not bounds:
         raise UsageError(f"{path} holds no bound, so nothing would be checked", hint=_HOW)
