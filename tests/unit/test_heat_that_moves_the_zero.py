@@ -37,11 +37,12 @@ def _record(rng: np.random.Generator, moved: float) -> pt.Run:
     return pt.Run(time_s=STEP_S * np.arange(u.size), input=u, output=noisy)
 
 
-@pytest.mark.parametrize("moved", [0.0, MOVED])
+@pytest.mark.parametrize("moved", [pytest.param(0.0, marks=pytest.mark.slow), MOVED])
 def test_a_zero_that_heat_moves_is_found_only_where_it_moves(moved):
     """The loss, the time constant and the shift lie within their intervals, or there is no shift."""
     run = _record(np.random.default_rng(3), moved)
-    found = pt.diagnose(run, pt.identify(run))
+    model = pt.identify(run)
+    found = pt.diagnose(run, model)
     assert found.verdict == "thermal-drift", found
     told = {p.name: p for p in found.found[0].parameters}
     truth = {"coefficient": LOST, "tau": TAU_S} | ({"shift": moved} if moved else {})
@@ -50,6 +51,6 @@ def test_a_zero_that_heat_moves_is_found_only_where_it_moves(moved):
         assert told[name].lower <= value <= told[name].upper, (name, told[name])
     assert found.extended is not None
     unseen = _record(np.random.default_rng(4), moved)
-    plain, extended = pt.evaluate(unseen, [pt.identify(run), found.extended]).models
+    plain, extended = pt.evaluate(unseen, [model, found.extended]).models
     assert plain.rms_percent > 0.25
     assert extended.rms_percent < 0.21  # the noise is 0.2 %
