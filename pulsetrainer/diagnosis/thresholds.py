@@ -193,7 +193,7 @@ class Thresholds:
     free_of_weights: float = 0.6  # of a hum in step with the loops: true ones have 0.8, devices up to 0.56
     alike: float = 0.9  # cosine of screened columns: above, a quick screen names both
 
-    # A gain that wears off, against heat
+    # What settles, against heat and steps
     worn: float = 0.02  # share of the output, tried first
     worn_within: tuple[float, float] = (0.3, 3.0)  # of the record, tried first
     worn_shares: tuple[float, float] = (-0.9, 0.9)  # of the output: a gain that is gone is no gain

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from form_devices import play
 
 import pulsetrainer as pt
 from pulsetrainer.core.record import Record
@@ -14,18 +15,9 @@ from pulsetrainer.diagnosis.coarse_input import as_it_moved, hidden_square
 STEP = 1 / 55
 
 
-def _play(u: np.ndarray, width: float) -> np.ndarray:
-    """Return a play of an input (n,)."""
-    out, at = np.empty_like(u), float(u[0])
-    for k, one in enumerate(u.tolist()):
-        at = min(max(at, one - width), one + width)
-        out[k] = at
-    return out
-
-
 def _device(u: np.ndarray) -> np.ndarray:
     """Output (n,) of plays of several widths, a Preisach device."""
-    return 0.3 * u + sum(weight * _play(u, width) for width, weight in ((0.02, 0.3), (0.1, 0.4), (0.2, 0.3)))
+    return 0.3 * u + play(u, np.array([0.02, 0.1, 0.2])) @ [0.3, 0.4, 0.3]
 
 
 def _swings() -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from form_devices import play
 
 import pulsetrainer as pt
 from pulsetrainer.diagnosis.pinched import pinched_at
@@ -26,14 +27,6 @@ def _memristor(u: np.ndarray, dt_s: float, speed: float = 4.0) -> np.ndarray:
     return out
 
 
-def _play(u: np.ndarray, width: float) -> np.ndarray:
-    out, at = np.empty_like(u), float(u[0])
-    for k, one in enumerate(u.tolist()):
-        at = min(max(at, one - width), one + width)
-        out[k] = at
-    return out
-
-
 @pytest.mark.parametrize("offset", [0.0, 0.2])
 def test_the_point_is_found_wherever_it_is(offset):
     """At no input: in the middle of an even range, beside it where the input is not even."""
@@ -49,10 +42,10 @@ def test_other_loops_are_not_pinched(device):
     _, u = _sines()
     noise = 1e-3 * np.random.default_rng(0).standard_normal(u.size)
     y = {
-        "plays": lambda: _play(u, 0.1) + _play(u, 0.3),
+        "plays": lambda: play(u, np.array([0.1, 0.3])).sum(axis=1),
         "a line": lambda: u + u**3,
         "noise": lambda: u + 10 * noise,
-        "saturated": lambda: np.tanh(6 * _play(u, 0.1)),
+        "saturated": lambda: np.tanh(6 * play(u, np.array([0.1]))[:, 0]),
     }[device]()
     assert pinched_at((u + 1.0) / 2.0, y + noise, 1e-3) is None
 
