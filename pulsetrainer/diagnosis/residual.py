@@ -14,7 +14,7 @@ from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.thresholds import LIMITS, THIRD
 
 # What a record may lack
-RATES, HOLDS, LENGTH = "rates", "holds", "length"
+RATES, HOLDS, LENGTH, TIME = "rates", "holds", "length", "time"
 
 
 @dataclass(frozen=True)
@@ -87,21 +87,33 @@ def spectrum(problem: Problem, residual: FloatArray) -> tuple[FloatArray, FloatA
 
 def excitation_limits(problem: Problem) -> list[str]:
     """What the records lack for causes to be told apart: rates, holds, length; empty when nothing."""
-    speed = np.abs(rates(problem))
-    moving = np.sort(speed[speed > LIMITS.rate_edges[0]])
-    lacks: list[str] = []
-    slow, fast = 1.0, 1.0
-    if moving.size > LIMITS.least_moving:
-        # by the way that was run at them: the same loops take less time at a higher rate
-        way = np.cumsum(moving) / np.sum(moving)
-        slow, fast = moving[np.searchsorted(way, [LIMITS.slow_quantile, LIMITS.fast_quantile])]
-    if fast < LIMITS.one_rate * slow:
-        lacks.append(RATES)
+    lacks = [] if _several_rates(rates(problem)) else [RATES]
     if not any(_holds(record) for record in problem.records):
         lacks.append(HOLDS)
     if problem.bins.time_s.max() < LIMITS.short_s:
         lacks.append(LENGTH)
     return lacks
+
+
+def _several_rates(rate: FloatArray) -> bool:
+    """Whether strokes differ much in how fast they are, by the way that was run in them or by their time.
+
+    The same loops take less time at a higher rate, and run less of the way at a lower one. A stroke has one
+    rate, though a sine has all from zero on.
+    """
+    moving = rate[np.abs(rate) > LIMITS.rate_edges[0]]
+    if moving.size <= LIMITS.least_moving:
+        return False
+    stroke = np.cumsum(np.diff(np.sign(moving), prepend=np.sign(moving[0])) != 0)
+    speed = np.abs(moving)
+    of_stroke = (np.bincount(stroke, speed**2) / np.bincount(stroke, speed))[stroke]
+    order = np.argsort(of_stroke, kind="stable")
+    for weight in (speed[order], np.ones(speed.size)):
+        share = np.cumsum(weight) / np.sum(weight)
+        slow, fast = of_stroke[order[np.searchsorted(share, [LIMITS.slow_quantile, LIMITS.fast_quantile])]]
+        if fast >= LIMITS.one_rate * slow:
+            return True
+    return False
 
 
 def _holds(record: Record) -> bool:

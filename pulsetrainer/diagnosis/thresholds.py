@@ -234,7 +234,7 @@ class Thresholds:
     groups: int = 10  # of level and of time
     largest_at: float = 1.5  # times the least of its groups: below, the residual is the same everywhere
     welch: int = 4096  # averages in one spectrum
-    slow_quantile: float = 0.1  # of the way: at rates up to here it is slow ...
+    slow_quantile: float = 0.1  # of the way, or of the time: strokes up to here are slow ...
     fast_quantile: float = 0.9  # ... and from here on fast
     one_rate: float = 3.0  # fast over slow: below, the record has one single rate
     least_moving: int = 20  # averages in motion: fewer have no rates

@@ -224,12 +224,14 @@ LACKS: Mapping[str, str] = {
     "rates": "nearly all of it was run at one rate",
     "holds": "the {input} never rests for {hold_least} or more",
     "length": "it is shorter than {short}",
+    "time": "its samples have no time",
 }
 # What to record instead
 MISSING: Mapping[str, str] = {
     "rates": "the same loops at {slow}, {middle} and {fast}",
     "holds": "stops of {hold} at each of {levels}",
     "length": "{short} or more in all",
+    "time": "with the time of every sample, at several rates and with rests",
 }
 EXPERIMENTS: Mapping[str, str] = {
     "nested loops": (

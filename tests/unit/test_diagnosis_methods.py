@@ -24,10 +24,12 @@ from pulsetrainer.diagnosis.fitting import _difference, _moved, refit, weights_f
 from pulsetrainer.diagnosis.floor import Floor
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import _log_tail, p_value
 from pulsetrainer.diagnosis.stages import advice
+from pulsetrainer.diagnosis.state import Question
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 
@@ -400,6 +402,28 @@ def test_what_a_record_lacks():
     assert _lacks((0.5, 0.9), 1.0, 24.0) == {"rates"}
     assert _lacks((0.5, 2.0), 0.7, 24.0) == {"holds"}
     assert _lacks((0.5, 2.0), 1.0, 14.0) == {"length"}
+
+
+def test_of_samples_without_time_it_is_time_that_lacks():
+    """Nothing is said about rates and rests that nobody knows."""
+    u = 1.0 - np.cos(0.06 * np.arange(2000.0)) + 0.1 * np.sin(0.31 * np.arange(2000.0))
+    noise = np.random.default_rng(3).standard_normal(u.size)
+    said = diagnose(Question([Record(u, u + 0.01 * noise, dt_s=None)], 0.0, 2.1, np.random.default_rng(0)))
+    assert said.lacks == ("time",)
+    assert [one.names for one in said.evidence if one.kind == "lacks"] == [("time",)]
+    assert "the time of every sample" in wording.advice(said.advice, wording.Bench(said.scale, "A"))
+
+
+def test_a_record_has_several_rates_by_its_way_or_by_its_time():
+    """Few quick strokes run little of the time, slow ones little of the way; a sine has one rate."""
+    assert "rates" not in _lacks((0.4, 1.0, 2.7, 2.7), 0.0, 24.0)  # by time, 43 % is slow, by way 17 %
+    assert "rates" not in _lacks((0.5, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0), 0.0, 24.0)
+    assert "rates" not in _lacks((0.3, 0.3, 0.3, 0.3, 2.0), 0.0, 60.0)  # by way 20 % is fast, by time 4 %
+    dt = 0.01
+    time = np.arange(4000) * dt
+    for shrinks in (np.ones(4000), np.repeat(np.linspace(1.0, 0.4, 40), 100)):
+        u = 0.5 + 0.5 * shrinks * np.sin(2.0 * np.pi * time)
+        assert "rates" in residual.excitation_limits(problem_for([Record(u, u + 0.0, dt_s=dt)], 0.0, 1.0))
 
 
 def test_residuals_are_grouped():

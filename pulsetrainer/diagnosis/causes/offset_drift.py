@@ -12,16 +12,13 @@ from another zero then. The model as given does (`given_drift`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 from pulsetrainer.diagnosis.thresholds import TINY
-
-if TYPE_CHECKING:
-    from pulsetrainer.diagnosis.floor import Floor
 
 _TRIED = 0.01  # of the span over the record
 _MIDDLE = 4.0  # the bend is largest in the middle: a quarter of c T^2
@@ -78,11 +75,6 @@ class OffsetDrift(Cause):
         length = frames[0].time_s[-1] + frames[0].dt_s
         size = _TRIED * frames[0].span
         return [[(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]]
-
-    def is_background(self, sizes: Sequence[float], floor: Floor, frames: Sequence[Frame]) -> bool:
-        """Return whether it is no larger than a noise that is slow itself."""
-        moved = np.concatenate([_drift(tuple(sizes), frame.time_s) for frame in frames])
-        return bool(np.var(moved) <= floor.white**2 - floor.quick.white**2)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         return y + _drift(values, frame.time_s)

@@ -54,7 +54,7 @@ def stage(state: State) -> State:
         said += _not_accepted(state)
     if state.question.quick:
         said.append(Evidence("quick"))
-    if state.lacks:
+    if state.lacks and (state.question.timed or state.question.given is None):  # else `given_model` says it
         said.append(Evidence("lacks", names=state.lacks))
     return replace(state, evidence=(*state.evidence, *said))
 

@@ -18,7 +18,7 @@ from pulsetrainer.diagnosis.forms import base_of
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.pinched import pinched_at
 from pulsetrainer.diagnosis.problem import problem_for
-from pulsetrainer.diagnosis.residual import excitation_limits
+from pulsetrainer.diagnosis.residual import TIME, excitation_limits
 from pulsetrainer.diagnosis.stages.raw_data import Masked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -39,7 +39,7 @@ def stage(masked: Masked) -> State:
     fired = [firing for _, firing in firings]
     floor = floor_of(masked.question.records, fired, problem, masked.scale.span)
     floor = floor.heard(fitted).at(coarse, fitted)
-    lacks = tuple(excitation_limits(problem))
+    lacks = tuple(excitation_limits(problem)) if masked.question.timed else (TIME,)
     held_out = HeldOut(problem)
     # as they were measured: what has no weight, such as all before the memory is known, is filled in by now
     whole = masked.question.records

@@ -120,10 +120,11 @@ def _is_in_step(state: State, term: Term, fall: float) -> bool:
 def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:
     """Whether a cause may be what the model lacks of the device, on records of one rate without rests.
 
-    There all that takes time follows the input, as that does: a fall of the squares must be much larger than
-    what is left, and what is left be noise.
+    There, and where samples have no time, all that takes time follows the input, as that does: a fall of the
+    squares must be much larger than what is left, and what is left be noise.
     """
-    if cause.by_contrast or not {residual.RATES, residual.HOLDS} <= set(state.lacks):
+    several = residual.TIME not in state.lacks and not {residual.RATES, residual.HOLDS} <= set(state.lacks)
+    if cause.by_contrast or several:
         return False
     if not state.is_whole(state.current):
         return cause.lasting or cause.drifts  # a drift or step may be a piece of it as well
