@@ -187,8 +187,15 @@ class State:
         return {
             one.cause.id
             for one in self.findings
-            if one.found and one.cause.is_background(self._sizes(one), self.floor, self.problem.frames)
+            if one.found and (one.cause.is_background(self._sizes(one), self.floor) or self._is_slow(one))
         }
+
+    def _is_slow(self, finding: Finding) -> bool:
+        """Whether it, or what it cannot be told from, is a slow fault, and no larger than noise as slow."""
+        slow = self.floor.white**2 - self.floor.quick.white**2
+        may_be = (library()[name] for name in (finding.cause.id, *finding.confounded_with))
+        accounted = self.rms_of(finding.explains_percent / PERCENT)
+        return accounted**2 <= slow and any(one.drifts and one.corrects for one in may_be)
 
     def _sizes(self, finding: Finding) -> list[float]:
         """Parameters of a finding in the units of the problem."""

@@ -19,6 +19,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 # What evidence says, by its kind: figures in braces, and {input} and {output} for what was measured
 TEXTS: Mapping[str, str] = {
+    "background": "no larger than the slow noise beside it: it is told, but is no verdict",
     "static": (
         "Fitted anew to these recordings, the model without any cause leaves {left:.3f} % of the span (rms "
         "of short averages). Noise and the number of levels alone would leave {floor:.3f} %."

@@ -1827,16 +1827,28 @@ def test_what_settles_speaks_against_a_step_and_wear_against_heat(monkeypatch, s
     assert replace(_finding(sudden, 1.0), doubts=(said,)).in_doubt is (sudden == "step")
 
 
-@pytest.mark.parametrize(("slow", "said"), [(0.9, "offset-drift"), (1.1, "none")])
-def test_a_drift_no_larger_than_slow_noise_takes_no_verdict(slow, said):
-    """Its rms about its mean, against what noise leaves in averages beyond that from sample to sample."""
-    (frame,) = PROBLEM.frames
-    rate = 0.01
-    moved = float(np.std(rate * frame.time_s))
-    found = replace(_finding("offset-drift", 50.0), parameters=(Estimate("rate", rate, "1", 0.0, 1.0),))
+@pytest.mark.parametrize(
+    ("name", "tied", "may_be_slow"),
+    [
+        ("offset-drift", (), True),
+        ("step", (), True),
+        ("thermal-drift", (), False),
+        ("accommodation", ("creep",), False),
+        ("accommodation", ("creep", "step"), True),
+    ],
+)
+@pytest.mark.parametrize("times", [0.98, 1.02])
+def test_a_slow_fault_no_larger_than_slow_noise_takes_no_verdict(times, name, tied, may_be_slow):
+    """By the rms it accounts for, against what noise leaves in averages beyond that from sample to sample."""
+    found = _finding(name, 50.0, confounded_with=tied)
     state = _state(_fit(200.0), findings=(found,))
-    floor = replace(state.floor, white=float(np.hypot(state.floor.quick.white, slow * moved)))
-    assert verdict.stage(replace(state, floor=floor, problem=PROBLEM)).verdict == said
+    accounted = np.sqrt(0.5 * 1000.0 / 100)  # half of what is reducible: 1100 less the floor's 100
+    floor = replace(FLOOR, white=float(np.hypot(FLOOR.quick.white, times * accounted)))
+    floor = replace(floor, count=FLOOR.count, discretisation=0.0)
+    baseline = _fit(floor.squares + 1000.0)
+    state = replace(state, floor=floor, baseline=baseline, current=_fit(floor.squares + 500.0))
+    assert verdict.stage(state).verdict == ("none" if may_be_slow and times > 1.0 else name)
+    assert state.background == ({name} if may_be_slow and times > 1.0 else set())
 
 
 @pytest.mark.parametrize(

@@ -73,11 +73,6 @@ class Frame:
         return self.longest_s or self.input.size * self.dt_s
 
     @property
-    def middle(self) -> FloatArray:
-        """Output (n,) about which the loops lie: a line from one end of the range to the other."""
-        return np.interp(self.input, (self.low, self.low + self.reach), self.ends)
-
-    @property
     def time_s(self) -> FloatArray:
         """Time since the first sample (n,)."""
         return np.asarray(np.arange(self.input.size) * self.dt_s, dtype=np.float64)
@@ -203,16 +198,9 @@ class Cause:
         """Return start values for a refit, nearer to what the residual shows than the grid of ``starts``."""
         return values
 
-    def is_background(self, sizes: Sequence[float], floor: Floor, frames: Sequence[Frame]) -> bool:
-        """Return whether its parameters make it a part of the noise: told, but no verdict.
-
-        A fault of the measurement that is slower than any loop is noise where that is as slow, and as large.
-        """
-        slow = floor.white**2 - floor.quick.white**2
-        if not (self.drifts and self.corrects and slow > 0.0):
-            return False
-        moved = [self.on_output(frame.middle, tuple(sizes), frame) - frame.middle for frame in frames]
-        return bool(np.var(np.concatenate(moved)) <= slow)
+    def is_background(self, sizes: Sequence[float], floor: Floor) -> bool:
+        """Return whether its parameters make it a part of the noise: told, but no verdict."""
+        return False
 
     @property
     def wears_about(self) -> float | None:

@@ -55,7 +55,6 @@ class OffsetDrift(Cause):
             "that the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings hide some of "
             "it"
         ),
-        "background": "a drift no larger than the slow noise beside it: it is told, but is no verdict",
     }
 
     def __init__(self, count: int = _PLAIN) -> None:

@@ -80,7 +80,7 @@ class Periodic(Cause):
         """Return by what a parameter is multiplied when the output is; of later records it has a number."""
         return super().sign(name.partition(" ")[0], polarity)
 
-    def is_background(self, sizes: Sequence[float], floor: Floor, frames: Sequence[Frame]) -> bool:
+    def is_background(self, sizes: Sequence[float], floor: Floor) -> bool:
         """Return whether it is a hum of the noise's size."""
         rms = float(np.hypot(sizes[0], sizes[1])) / np.sqrt(2.0)
         return bool(rms <= min(_FAINT_NOISE * floor.noise, _FAINT))

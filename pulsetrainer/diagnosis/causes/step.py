@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
@@ -45,9 +44,6 @@ class Step(Cause):
     moves_zero = True
     lasting = False
     corrects = True
-    texts: ClassVar[Mapping[str, str]] = {
-        "background": "a step no larger than the slow noise beside it: it is told, but is no verdict",
-    }
 
     def __init__(self, shared: float = _SHARED) -> None:
         self._shared = shared

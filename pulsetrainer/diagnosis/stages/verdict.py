@@ -5,10 +5,10 @@ that a gate saw, since no refit takes away what it leaves; else it is `unknown`,
 Otherwise it is the cause that explains most, then what a gate on the raw data saw; that comes first where all
 others together are below half a per cent of the span. Where nothing was found it is `none`, or `inconclusive`
 if the record could not have shown half a per cent of the span of a common cause. A hum no larger than the
-noise, or a drift no larger than slow noise, is found and told, and takes no verdict; nor does a cause that is
-in doubt (`rivals`, `repetition`). Of a loop whose branches all pass through one point within it, as those of
-a memristor do, more than noise from sample to sample is `unknown`: no Preisach operator has one, and any
-cause explains some of it.
+noise is found and told, and takes no verdict; nor does a drift or step no larger than slow noise, or what may
+be one, nor a cause that is in doubt (`rivals`, `repetition`). Of a loop whose branches all pass through one
+point within it, as those of a memristor do, more than noise from sample to sample is `unknown`: no Preisach
+operator has one, and any cause explains some of it.
 """
 
 from __future__ import annotations
