@@ -434,6 +434,16 @@ def test_keys_change_the_beats_and_stop(tmp_path):
     assert np.diff(beats.start_s).max() > 1.2  # the pause
 
 
+def test_the_screen_of_a_session_is_all_there_is(tmp_path):
+    """How much is over, in beats too, stands in it: a bar beside it drew into it, and never moved."""
+    terminal = Terminal(tmp_path, *SHORT, "--beats", 30, port="bench:")
+    assert terminal.end() == 0
+    shares = [int(share) for share in re.findall(rb" (\d+) % +[\d.]+ s ", terminal.seen)]
+    assert shares[0] < 20
+    assert shares[-1] > 80
+    assert "━".encode() not in terminal.seen
+
+
 def test_nothing_gives_a_question_away(tmp_path):
     """Blind: neither screen, nor file names, nor the files, nor the time tell what is asked."""
     words = ("--pulses", "bifid,parvus-et-tardus", "--quiz", 2, "--seed", 7)
