@@ -206,6 +206,17 @@ def test_a_quiz_by_file(run, tmp_path):
     assert page.count("which has no times") == 1
 
 
+def test_what_a_person_writes_down_is_read(run, tmp_path):
+    """Answers with capitals, and changes as a spreadsheet with decimal commas saves them."""
+    (tmp_path / "a.txt").write_text("Normal\nBIFID\n")
+    words = ("--pulses", "normal,bifid", "--quiz", 2, "--answers", "a.txt")
+    assert run(*SHORT, *words, "--dry-run").code == 0
+    (tmp_path / "c.csv").write_text("t_s;rate;amplitude\n0,5;100;62,5\n")
+    done = run(*SHORT, "--beats", 4, "--changes", "c.csv")
+    assert done.code == 0, done.err
+    assert read(tmp_path / "s.h5", Session).beats.amplitude[-1] == pytest.approx(62.5)
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
