@@ -11,6 +11,7 @@ from pulsetrainer.artefacts.session import Quiz
 from pulsetrainer.core.course import Course
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.errors import DeviceError, Interrupted, PulsetrainerError
 from pulsetrainer.files.provenance import Header
 from pulsetrainer.files.recorder import RunRecorder
@@ -83,7 +84,7 @@ def capture_into(
         if recorder.samples:
             where = recorder.partial if recorder.partial.exists() else out
             error.message += kept_in(where, recorder.samples, "sample")
-            error.hint = error.hint or "go on with the same command and --resume"
+            error.hint = _then(error.hint)
         raise error from stopped.__cause__
     return Captured(
         recorder.samples,
@@ -97,6 +98,15 @@ def capture_into(
         recorder.dropped_samples,
         ending.complete,
     )
+
+
+def _then(remedy: str) -> str:
+    """Return what to do about a capture that broke off, and whether to go on with what there is."""
+    if "`" in remedy:  # it names options: with others it is another capture
+        return remedy
+    if remedy == FORCE_REMEDY:
+        return f"{remedy}; then record again with --overwrite: the force just before this was not true"
+    return (f"{remedy}; then " if remedy else "") + "go on with the same command and --resume"
 
 
 def session_into(

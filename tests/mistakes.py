@@ -261,6 +261,22 @@ TABLES = {
     "bounds.toml": "normal.continuous.mean_err = [1, 2]\n",
 }
 INSIDE = {
+    "a drive as a run": Mistake(
+        ("identify", "drive.h5", "-o", "out.h5"), 3, "got a waveform", "run files beside it: run.h5"
+    ),
+    "a session that is not there": Mistake(
+        ("evaluate", "monday.h5"), 3, "monday.h5 (argument ", "playback or session files here: played.h5"
+    ),
+    "pulses with commas": Mistake(
+        ("invert", "normal,bifid", "--model", "model.h5", "-o", "out.h5"),
+        2,
+        "no pulse",
+        "one pulse at a time",
+    ),
+    "a force in many digits": Mistake(
+        *(("invert", "normal", "--model", "model.h5", "-o", "out.h5", "--force-max", "20"), 3),
+        *("to 20 N is asked for", "--force-max"),
+    ),
     "a run as a signal": Mistake(
         ("capture", "run.h5", "-o", "out.h5"), 3, "run.h5 is not a text file", "pulsetrainer show run.h5"
     ),

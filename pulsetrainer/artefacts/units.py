@@ -63,6 +63,9 @@ _OF_A_PART = re.compile(r"(?P<what>[Vv]|i|I[bcdegsx]?)\((?!t\))(?P<part>[\w:.,]+
 _NO_PART = 4  # letters of a unit: ``counts`` is hardly the name of a node, ``in`` and ``g`` are
 _MARK = re.compile(r"\s*[/,]\s*|\s+in\s+")
 _SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,12})$")
+# as a name without a slash says it, such as one of MATLAB: H_kA_m; V_s and the like may be a product
+_COMPOUND = re.compile(r"^(?P<name>.+?)_(?P<top>[^_\s]+)_(?P<per>per_)?(?P<bottom>[^_\s]+)$")
+_WITHOUT_PER = frozenset(["A/m", "kA/m", "m/s", "mm/s", "cm/s", "km/h", "rad/s", "deg/s", "mV/V"])
 _POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -126,10 +129,9 @@ def split_unit(heading: str) -> tuple[str, str]:
     if unit := _unit_of_a_part(heading):
         return heading, unit
     if (found := _BRACKETED.match(heading)) and found["name"]:
-        return found["name"].strip(), (found["square"] or found["round"] or "").strip()
-    found = _SUFFIXED.match(heading)
-    if found and found["unit"] != "second" and _stands_alone(found["unit"]):
-        return found["name"], found["unit"]
+        return found["name"].rstrip("_ ").lstrip(), (found["square"] or found["round"] or "").strip()
+    if parted := _compound(heading) or _suffixed(heading):
+        return parted
     if len(heading) > 1 and heading.lower() not in _NO_UNIT_ALONE and _stands_alone(heading):
         return heading, heading
     for mark in _MARK.finditer(heading):
@@ -137,6 +139,23 @@ def split_unit(heading: str) -> tuple[str, str]:
         if name and name[-1] not in "/," and unit != "1" and is_unit(symbol_of(unit)):
             return name, unit
     return heading, ""
+
+
+def _suffixed(heading: str) -> tuple[str, str] | None:
+    found = _SUFFIXED.match(heading)
+    told = found and found["unit"] != "second" and _stands_alone(found["unit"])
+    return (found["name"], found["unit"]) if found and told else None
+
+
+def _compound(heading: str) -> tuple[str, str] | None:
+    """Return name and unit where the last two words of a heading make one."""
+    found = _COMPOUND.match(heading)
+    if found is None:
+        return None
+    unit = f"{found['top']}/{found['bottom']}"
+    if unit == "N/m" and not found["per"]:
+        return found["name"], "Nm"  # a torque; a stiffness is not what a sensor reads
+    return (found["name"], unit) if unit in (_BEHIND_A_NAME if found["per"] else _WITHOUT_PER) else None
 
 
 def _unit_of_a_part(heading: str) -> str:

@@ -131,5 +131,5 @@ def _of_options(context: Context, signal: str, played: str, *, own: bool) -> lis
     step_A, level_A = asked["speed_A_per_s"] / asked["rate_Hz"], asked["current_max_A"] / asked["levels"]
     if by_us and step_A > level_A:
         far = f"the current moves {step_A:.3g} A a sample, past a level of {level_A:.3g} A"
-        told.append(f"{far}: lower --speed")
+        told.append(f"{far}: lower --speed, or raise --rate")
     return told

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from pulsetrainer.cli.console import Screen
 from pulsetrainer.cli.live import LETTERS, Live, why_not
@@ -12,7 +11,6 @@ from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import UsageError
 from pulsetrainer.steps.conductor import Decide
-from pulsetrainer.steps.performance import Now
 from pulsetrainer.steps.programme import Programme
 from pulsetrainer.steps.quiz import Blind
 from pulsetrainer.steps.steering import Steering
@@ -24,8 +22,7 @@ class Steered:
 
     decide: Decide
     share: Callable[[float], float] = lambda _s: 0.0  # of the work that is done, at a time in s
-    view: Callable[[Now], None] = lambda _now: None
-    screen: contextlib.AbstractContextManager[None] = field(default_factory=contextlib.nullcontext)
+    live: Live | None = None
     by_key: bool = False  # what comes next may change at any moment
 
 
@@ -62,7 +59,7 @@ class Hands:
         steering = Steering(chosen, [Pulse(shape).own_bpm for shape in shapes])
         live = Live(lambda key, _s: steering.press(key), self.names, blind=False)
         live.status = lambda: "paused" if steering.paused else ""
-        return Steered(steering, chosen.share_at, live, live.on_screen(), by_key=True)
+        return Steered(steering, chosen.share_at, live, by_key=True)
 
     def _asked(self, quiz: Blind) -> Steered:
         """Return a quiz on the screen: a letter answers, Q stops."""
@@ -85,4 +82,4 @@ class Hands:
             + (", answered" if self._answers else "")
             + (f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops" if wrong else "")
         )
-        return Steered(steering, quiz.share_at, live, live.on_screen())
+        return Steered(steering, quiz.share_at, live)

@@ -82,7 +82,7 @@ def identify(
             smoothing=length,
             bootstrap=bootstrap,
             seed=seed,
-            names=[path.stem for path in runs],
+            names=list(map(str, runs)),
             progress=progress,
         )
         job.save(out, model, f"Preisach model of {', '.join(path.stem for path in runs)}")

@@ -20,6 +20,7 @@ from pulsetrainer.files.input_file import check_artefact, check_file
 
 if TYPE_CHECKING:
     from pulsetrainer.artefacts import FloatArray, Model
+    from pulsetrainer.cli.live import Live
     from pulsetrainer.cli.loop_view import LoopView
     from pulsetrainer.device.device import Device
     from pulsetrainer.device.identity import DeviceInfo
@@ -89,7 +90,7 @@ class Job:
         return Limits(self._parameters["limit_current_A"], self._parameters["limit_force_N"])
 
     @contextmanager
-    def working(self, label: str, view: LoopView | None = None) -> Iterator[Any]:
+    def working(self, label: str, view: LoopView | Live | None = None) -> Iterator[Any]:
         """Give a callable that takes the share of the work done, and measure how long it takes.
 
         It moves a bar, or ``view`` where there is one.

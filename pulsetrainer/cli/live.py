@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from pulsetrainer.steps.performance import Now
+    from pulsetrainer.steps.progress import Progress
 
 SMALLEST = (50, 10)  # columns and lines
 _ROWS = 5  # of the trace
@@ -40,7 +41,7 @@ class Live:
         self._press, self._names, self._blind = press, tuple(names), blind
         self._traces: deque[np.ndarray] = deque()
         self._show: Callable[[RenderableType], None] = lambda _text: None
-        self._drawn_s = -1.0
+        self._drawn_s, self._share = -1.0, 0.0
         self.status: Callable[[], str] = lambda: ""
 
     def __call__(self, now: Now) -> None:
@@ -67,7 +68,9 @@ class Live:
         force = np.concatenate(self._traces)
         lines = plotted(force, width, _ROWS)
         beat = now.beat
-        said = f"{now.time_s:7.1f} s  {force[-1]:5.2f} N  {now.current[-1]:5.3f} A"
+        said = (
+            f"{100 * self._share:3.0f} %  {now.time_s:7.1f} s  {force[-1]:5.2f} N  {now.current[-1]:5.3f} A"
+        )
         if now.resting:
             said += "  at rest"
         elif beat is not None:
@@ -76,9 +79,15 @@ class Live:
         keys = "  ".join(f"{'space' if key == ' ' else key} {what}" for key, what in KEYS.items())
         return Text("\n".join([*lines, said, self.status(), keys]), no_wrap=True, overflow="crop")
 
+    def _progress(self, share: float) -> None:
+        self._share = share
+
     @contextlib.contextmanager
-    def on_screen(self) -> Iterator[None]:
-        """Take the terminal: keys come at once and unseen, and are given back in the end."""
+    def on_screen(self, _label: str) -> Iterator[Progress]:
+        """Take the terminal: keys come at once and unseen, and are given back in the end.
+
+        Gives a callable that takes the share of the work done: a bar beside this would draw into it.
+        """
         import termios
         import tty
 
@@ -86,7 +95,7 @@ class Live:
         try:
             tty.setcbreak(sys.stdin)
             with drawing() as self._show:
-                yield
+                yield self._progress
         finally:
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
 

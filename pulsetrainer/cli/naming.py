@@ -25,7 +25,7 @@ _HOLDS = {
     "verify": ("run",),
     "drive": ("waveform",),
     "diagnosis": ("diagnosis",),
-    "inputs": ("playback",),
+    "inputs": ("playback", "session"),
     "evaluations": ("evaluation", "session"),
     "file": (),
 }

@@ -130,4 +130,7 @@ def _after_wrong_kind(problem: WrongKindError) -> str:
     for kind in problem.expected:
         if (kind, problem.found) in _NEXT:
             return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))
+    if near := near_names(problem.path, problem.expected):
+        files = ", ".join(shlex.quote(str(problem.path.with_name(name))) for name in near)
+        return f"{' or '.join(problem.expected)} files beside it: {files}"
     return f"run `{MAKES.get(problem.expected[0], 'pulsetrainer --help')}`"

@@ -86,7 +86,8 @@ def play(
     whole = played.compensated.output.shape[0]
     job.save(out, played, f"{title}, played on {info.serial}", info)
     if stopped is not None:
-        stopped.message += f"; {whole} of {repeats} repeats were kept in {out} (complete=false)"
+        were = "was" if whole == 1 else "were"
+        stopped.message += f"; {whole} of {repeats} repeats {were} kept in {out} (complete=false)"
         stopped.hint = stopped.hint or "evaluate what there is, or play all of it again with --overwrite"
         raise stopped
     if played.dropped_samples:

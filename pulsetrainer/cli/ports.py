@@ -25,6 +25,9 @@ def ports(json: AsJson = False) -> None:
         unknown = ("", "n/a")
         cells = [[getattr(port, name) for name in names] for port in found]
         rows = [[None if cell in unknown else cell for cell in row] for row in cells]
+        for row, port in zip(rows, found, strict=True):
+            if not port.vid_pid:  # a plain serial port tells nothing of what is behind it
+                row[-1] = "not known"
         screen.table("serial ports", [_HEADS.get(name, name) for name in names], rows)
     else:
         screen.note("no serial port; plug the device in, or use the simulated one: --port bench:")

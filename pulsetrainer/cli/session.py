@@ -135,10 +135,11 @@ def session(
         return
     said = "a session that was cut off; its sheet: `pulsetrainer evaluate {left} --html sheet.html`"
     job.left_over(out, pt.Session, said)
-    with job.open_device(loaded) as device, job.working("session") as progress, steered.screen:
+    with job.open_device(loaded) as device, job.working("session", steered.live) as progress:
 
         def watch(now: Now) -> None:
-            steered.view(now)
+            if steered.live is not None:
+                steered.live(now)
             progress(steered.share(now.time_s))
 
         def header() -> Header:

@@ -58,10 +58,7 @@ def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> Us
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
     if kind == "BadParameter" and parameter is not None:
-        must = _must(parameter, error)
-        return UsageError(
-            f"{_named(parameter)} {must}", hint=_as_a_number(parameter, must) or _without(parameter, help_)
-        )
+        return _bad_value(parameter, context, _must(parameter, error), help_)
     option = getattr(error, "param_hint", None)  # of what a command finds out itself
     if kind == "BadParameter" and isinstance(option, str):
         said = f"{option} {str(getattr(error, 'message', error)).rstrip('.')}"
@@ -71,6 +68,17 @@ def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> Us
         if kind == "BadOptionUsage"
         else _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
     )
+
+
+def _bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageError:
+    source = context.get_parameter_source(parameter.name) if context is not None else None
+    if source is not None and source.name == "ENVIRONMENT":  # nobody typed the option
+        return UsageError(
+            f"the variable {parameter.envvar} (for {_named(parameter)}) {must}",
+            hint=f"correct it, or take it away: unset {parameter.envvar}",
+        )
+    hint = _as_a_number(parameter, must) or _without(parameter, help_)
+    return UsageError(f"{_named(parameter)} {must}", hint=hint)
 
 
 def check_apart(words: Sequence[str]) -> None:
@@ -134,8 +142,11 @@ def _columns(table: Path) -> tuple[str, ...]:
     from pulsetrainer.files.input_file import check_file
 
     check_file(table)
-    if table.suffix.lower() in (".npz", ".npy", ".mat", ".wav"):  # told by what reads them
-        return ()
+    if table.suffix.lower() in (".npz", ".npy", ".mat", ".wav"):
+        from pulsetrainer.files.array_files import reader_of
+
+        reads = reader_of(table)
+        return tuple(reads(table).values) if reads else ()
     from pulsetrainer.files.csv_dialect import detect
 
     return detect(table).names

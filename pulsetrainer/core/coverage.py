@@ -41,7 +41,8 @@ class Gap:
         which = f"relays with {' and '.join(parts)}" if parts else "all relays"
         rest = self.uncovered - self.share
         more = f"; {100 * rest:.0f} % more lies elsewhere" if rest >= 0.005 else ""
-        return f"never switched: {which} ({100 * self.share:.0f} % of the plane{more})"
+        share = f"{100 * self.share:.0f}" if self.share < 0.995 or not parts else f"{100 * self.share:.1f}"
+        return f"never switched: {which} ({share} % of the plane{more})"
 
 
 def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:

@@ -197,8 +197,8 @@ class Rehearsal:
 def less_current(than: str) -> str:
     """Say how less is pressed in all that is made from a model: a lower pulse does not do it."""
     return (
-        f"capture with {than}; a drive or a session needs a new model from that (identify, then invert): it "
-        "begins with a stroke over the whole range of its model"
+        f"capture with {than}; then a drive or a session needs a new model from that (identify, invert), "
+        "since it begins with a stroke over the whole range of its model"
     )
 
 

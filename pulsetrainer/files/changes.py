@@ -24,7 +24,9 @@ def read_changes(
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
             lines = [(number, line) for number, line in enumerate(stream, 1) if not line.startswith("#")]
-            rows = csv.DictReader(line for _, line in lines)
+            heading = lines[0][1] if lines else ""
+            mark = next((mark for mark in ";\t" if mark in heading), ",")
+            rows = csv.DictReader((line for _, line in lines), delimiter=mark)
             unknown = set(rows.fieldnames or ()) - set(_COLUMNS)
             if unknown or "t_s" not in (rows.fieldnames or ()):
                 raise DataError(
@@ -60,7 +62,7 @@ def _change(
     said = {name: (value or "").strip() for name, value in row.items() if name in _COLUMNS}
     numbers: list[float | None] = []
     for name in _COLUMNS[:3]:
-        text = said.get(name, "")
+        text = said.get(name, "").replace(",", ".")  # where semicolons part the columns
         try:
             numbers.append(float(text) if text else None)
         except ValueError:
@@ -101,9 +103,10 @@ def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str
     except (OSError, UnicodeError) as error:
         why = "it is not a text file" if isinstance(error, UnicodeError) else error
         raise DataError(f"{path} cannot be read: {why}", hint="give a text file, one name a line") from error
+    written = {choice.casefold(): choice for choice in reversed(choices)}
     answers = [(number, line.strip()) for number, line in enumerate(lines, 1) if line.strip()]
     for number, said in answers:
-        if said not in choices:
+        if said.casefold() not in written:
             raise DataError(
                 f"{path}, line {number}: the answer is {said!r}, expected one of {', '.join(choices)}",
                 hint="write one of these names on each line",
@@ -113,4 +116,4 @@ def read_answers(path: Path, choices: Sequence[str], questions: int) -> list[str
             f"{path} has {len(answers)} answer{'s' * (len(answers) != 1)} to {questions} questions",
             hint="write one pulse name on each line, as many as questions",
         )
-    return [said for _, said in answers]
+    return [said if said in choices else written[said.casefold()] for _, said in answers]

@@ -32,9 +32,11 @@ def pulse_file(name: str) -> Path:
         near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
         hint = f"did you mean {' or '.join(near)}? Or " if near else "name one of them, or "
         hint += "give any CSV file with a time and a value column, such as my-pulse.csv"
-        several = re.split(r"[;|\s]+", name)
+        several = re.split(r"[,;|\s]+", name)
         if len(several) > 1 and set(several) <= set(known):
             hint = f"put commas between the names: {','.join(several)}"
+            if "," in name:  # a session parts them there
+                hint = "one pulse at a time: run it once for each, with an output of its own"
         raise UsageError(f"there is no pulse {name!r}; the library has {', '.join(known)}", hint=hint)
     check_file(path)
     return path

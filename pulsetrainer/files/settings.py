@@ -7,6 +7,7 @@ else the one in the user's own configuration folder; files are not mixed.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,10 +84,20 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         reason = "it is not a text file" if isinstance(error, UnicodeDecodeError) else error
+        line = _line_of(error, path)
+        comma = re.fullmatch(r"\s*(\S+\s*=\s*-?\d+),(\d+)\s*", line)
         raise UsageError(
-            f"the {what} in {path} cannot be read: {reason}",
-            hint=f"write it as TOML, a line each, such as: {_TOML_LINES[what]}",
+            f"the {what} in {path} cannot be read: {reason}" + (f": {line.strip()}" if line else ""),
+            hint=f"write the number with a point: {comma[1]}.{comma[2]}"
+            if comma
+            else f"write it as TOML, a line each, such as: {_TOML_LINES[what]}",
         ) from error
+
+
+def _line_of(error: Exception, path: Path | str) -> str:
+    """Return the line that a reader of TOML stumbled over; empty where it tells of none."""
+    at = re.search(r"\(at line (\d+), ", str(error))
+    return Path(path).read_text(encoding="utf-8").splitlines()[int(at[1]) - 1] if at else ""
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -114,10 +125,11 @@ def _value(path: Path, key: str, value: Any) -> Any:
         import difflib  # noqa: PLC0415 - needed by a mistake only
 
         near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-        raise UsageError(
-            f"{path} sets {key!r}, which is not a setting",
-            hint=f"did you mean {near[0]}?" if near else f"there are: {', '.join(known)}",
-        )
+        hint = f"did you mean {near[0]}?" if near else f"there are: {', '.join(known)}"
+        table, _, name = key.rpartition(".")
+        if name in known:
+            hint = f"put {name} above [{table}]: what stands below that belongs to it"
+        raise UsageError(f"{path} sets {key!r}, which is not a setting", hint=hint)
     setting = known[key]
     number = isinstance(value, int | float) and not isinstance(value, bool)
     if setting.kind is float and number:

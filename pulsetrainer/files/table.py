@@ -130,7 +130,8 @@ class Table:
         )
         k = next((which.index(True) for which in alike if which.count(True) == 1), None)
         if k is None:
-            near = difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
+            near = [own for own in self.names if name.lower() in own.lower()]
+            near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
             raise DataError(
                 f"{self.path} has no column {name!r}; it has {', '.join(self.names)}",
                 hint=f"did you mean {' or '.join(repr(n) for n in near)}?"

@@ -120,12 +120,15 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     raise_if_stopped(trace.fault, trace.remedy, "the check")
     raise_if_lost(trace.samples, trace.dropped_samples, "the check")
     progress(0.9)
-    at = 10 * np.arange(reference.size)  # in ticks; lost samples lie between their neighbours
-    current, force = (np.interp(at, trace.tick, told) for told in (trace.current_A, trace.force_N))
+    # a lost sample counts nowhere; it turned where its reference did, which its neighbours cannot tell
+    told, force = np.searchsorted(10 * np.arange(reference.size), trace.tick), trace.force_N
+    off = np.interp(np.arange(reference.size), told, trace.current_A - reference[told])
+    current = reference + off
     predicted = predict(model, current, 1.0 / RATE_HZ)
+    beside, predicted = _beside(model, current, predicted)[told], predicted[told]
     rest = rest_force(model)
     span = float(np.ptp(predicted))
-    offset, gain, left = _fitted(predicted - rest, _beside(model, current, predicted), force - rest)
+    offset, gain, left = _fitted(predicted - rest, beside, force - rest)
     shape = _shape(left, span)
     temperature, unknown = _temperature(model, device, trace)
     reasons = _reasons(model, offset, gain, shape, temperature)

@@ -176,6 +176,8 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
         one = _of_model(title, model, run, found[0].rms if found else None)
         if model.fit and model.fit.warning:
             notes.append(f"warning: {title}: {model.fit.warning}")
+        if _is_fitted_to(model, run):
+            notes.append(f"{title} was fitted to {name}: how good it is, another run shows")
         if one.outside_percent > 0:
             notes.append(
                 f"{one.outside_percent:.1f} % of the input of {name} is outside the range of {title}, "
@@ -190,6 +192,15 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
                 notes.append(f"{name}: {said}")
         found.append(one)
     return Evaluation(models=tuple(found), model=models[-1], notes=tuple(notes))
+
+
+def _is_fitted_to(model: Model, run: Run) -> bool:
+    """Whether what a model keeps of its own record stands in a run, sample for sample."""
+    fit = model.fit
+    if fit is None or fit.time_s is None or run.time_s is None:
+        return False
+    at = np.searchsorted(run.time_s, fit.time_s).clip(max=run.time_s.size - 1)
+    return np.array_equal(run.time_s[at], fit.time_s) and np.array_equal(run.output[at], fit.output)
 
 
 def _of_model(name: str, model: Model, run: Run, first_rms: float | None) -> ModelEvaluation:

@@ -284,7 +284,7 @@ def _force_range(
     if low < reach[0] - slack or high > reach[1] + slack or not low < high:
         step = 10.0 ** (np.floor(np.log10(max(reach[1] - reach[0], np.finfo(float).tiny))) - 2.0)
         raise DataError(
-            f"{model.output_quantity} from {low:g} to {with_unit(f'{high:g}', unit)} is asked for, but "
+            f"{model.output_quantity} from {low:.4g} to {with_unit(f'{high:.4g}', unit)} is asked for, but "
             f"{name} reaches {reach[0]:.4g} to {with_unit(f'{reach[1]:.4g}', unit)}"
             + (f": {part.limits(model)}" if model.form == "signed" else ""),
             hint=f"choose `force_min` and `force_max` inside, such as "

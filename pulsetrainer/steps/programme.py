@@ -95,7 +95,7 @@ class Programme:
             check_rate(change.rate)
             check_amplitude(change.amplitude)
         self._names = tuple(pulses)
-        self._beats = beats
+        self._beats, self._number = beats, 0  # of the beat that was asked for last
         self._seconds = 60.0 * (USUAL_MINUTES if minutes is None else minutes)
         self._start = Play(0, amplitude / 100.0, rate)
         self._changes = [
@@ -113,12 +113,12 @@ class Programme:
         return number / self._beats if self._beats else time_s / self._seconds
 
     def share_at(self, time_s: float) -> float:
-        """How much of it is over at a time; 0 where beats are counted."""
-        return self._share(0, time_s)
+        """How much of it is over at a time; where beats are counted, by the one that was given out last."""
+        return self._share(self._number, time_s)
 
     def __call__(self, number: int, time_s: float) -> Decision:
         """Return what is played next."""
-        share = self._share(number, time_s)
+        self._number, share = number, self._share(number, time_s)
         if share >= 1.0:
             return None
         play = replace(self._start, pulse=int(share * len(self._names)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import pulsetrainer as pt
@@ -60,6 +61,27 @@ def test_a_stronger_force_is_told_by_how_much(run, calibrated):
     done = run("check", calibrated / "model.h5", "--port", "bench:?condition-gain=0.052")
     assert done.code == 0, done.err
     tells(done.out, "stronger")
+
+
+def test_samples_that_the_wire_lost_count_nowhere(calibrated, monkeypatch):
+    """Every turn of the current is lost, and a tenth of the rest: the shape is that of the whole record."""
+    model = pt.load(calibrated / "model.h5")
+    with pt.open_device("bench:") as device:
+        whole = pt.check(model, device)
+        play = type(device).play
+
+        def lossy(self, reference, *args, **kwargs):
+            trace = play(self, reference, *args, **kwargs)
+            turns = np.flatnonzero(np.diff(np.sign(np.diff(reference))))
+            away = np.abs(trace.tick[:, None] / 10 - turns).min(axis=1) > 25
+            kept = away & (trace.tick // 250 % 10 > 0)
+            names = ("tick", "reference_A", "current_A", "force_N", "duty")
+            return replace(trace, **{name: getattr(trace, name)[kept] for name in names})
+
+        monkeypatch.setattr(type(device), "play", lossy)
+        thinned = pt.check(model, device)
+    assert (whole.verdict, thinned.verdict) == ("true", "true")
+    assert thinned.shape_percent.value == pytest.approx(whole.shape_percent.value, abs=0.02)
 
 
 def test_another_device_is_not_updated(run, calibrated, tmp_path):

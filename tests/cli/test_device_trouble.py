@@ -181,7 +181,19 @@ def test_what_breaks_in_mid_capture_is_told_and_the_part_kept(folder, what):
     """The device's first cause is the message; two seconds are in the file."""
     wave = np.column_stack([[0, 1, 2, 3, 4, 5], [0, 1.5, 0, 1.5, 0, 1.5]])
     np.savetxt(folder / "wave.csv", wave, delimiter=",", header="t_s,current_A", comments="")
-    refusal(pulsetrainer(folder, *capture(f"bench:?break={what}@2", "--json")), 4, what)
+    done = pulsetrainer(folder, *capture(f"bench:?break={what}@2", "--json"))
+    refusal(done, 4, what)
+    # what a broken force sensor told would stay in the record
+    then = {
+        "force-frozen": "--overwrite",
+        "current-rail": "--resume",
+        "reset": "--resume",
+        "hang": "--resume",
+    }
+    assert then.get(what, "") in done.json["error"]["hint"]
+    assert ("--resume" in done.json["error"]["hint"]) == (
+        what in ("current-rail", "tick-overrun", "reset", "hang")
+    )
     assert 1900 < kept(folder, 1900) < 4600
 
 

@@ -87,6 +87,8 @@ def test_a_column_that_is_not_there_offers_the_nearest(run, tmp_path):
     assert done.code == 3
     assert "did you mean 'current_A'" in done.err
     assert not (tmp_path / "run.h5").exists()
+    done = run("import", "a.csv", "--input", "CURR", "--output", "force_N", "-o", "run.h5")
+    assert "did you mean 'current_A'" in done.err
 
 
 def test_a_column_like_none_gets_no_suggestion(run, tmp_path):
@@ -349,3 +351,8 @@ def test_a_column_that_is_not_named_is_offered(run, tmp_path):
     """The headings of the table stand in the error, and how two of them are named."""
     (tmp_path / "piezo.csv").write_text("Time (ms);Drive (V);Stroke (um)\n0;0,1;0,2\n1;0,3;0,4\n")
     refusal(run("import", "piezo.csv", "-o", "p.h5"), 2, "column not named", has="Drive (V), Stroke (um)")
+    np.savez(tmp_path / "steel.npz", t=np.arange(9.0), H_kA_m=np.arange(9.0), B_mT=np.arange(9.0))
+    done = run("import", "steel.npz", "-o", "p.h5")
+    assert done.code == 2
+    assert "steel.npz has t, H_kA_m, B_mT" in done.err
+    assert "--input H_kA_m --output B_mT" in done.err

@@ -206,6 +206,17 @@ def test_a_quiz_by_file(run, tmp_path):
     assert page.count("which has no times") == 1
 
 
+def test_what_a_person_writes_down_is_read(run, tmp_path):
+    """Answers with capitals, and changes as a spreadsheet with decimal commas saves them."""
+    (tmp_path / "a.txt").write_text("Normal\nBIFID\n")
+    words = ("--pulses", "normal,bifid", "--quiz", 2, "--answers", "a.txt")
+    assert run(*SHORT, *words, "--dry-run").code == 0
+    (tmp_path / "c.csv").write_text("t_s;rate;amplitude\n0,5;100;62,5\n")
+    done = run(*SHORT, "--beats", 4, "--changes", "c.csv")
+    assert done.code == 0, done.err
+    assert read(tmp_path / "s.h5", Session).beats.amplitude[-1] == pytest.approx(62.5)
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
@@ -432,6 +443,16 @@ def test_keys_change_the_beats_and_stop(tmp_path):
     assert beats.amplitude[-1] == pytest.approx(90)
     assert (beats.pulse[0], beats.pulse[-1]) == (0, 1)
     assert np.diff(beats.start_s).max() > 1.2  # the pause
+
+
+def test_the_screen_of_a_session_is_all_there_is(tmp_path):
+    """How much is over, in beats too, stands in it: a bar beside it drew into it, and never moved."""
+    terminal = Terminal(tmp_path, *SHORT, "--beats", 30, port="bench:")
+    assert terminal.end() == 0
+    shares = [int(share) for share in re.findall(rb" (\d+) % +[\d.]+ s ", terminal.seen)]
+    assert shares[0] < 20
+    assert shares[-1] > 80
+    assert "━".encode() not in terminal.seen
 
 
 def test_nothing_gives_a_question_away(tmp_path):

@@ -57,6 +57,30 @@ def test_a_wrong_setting_is_refused(run, tmp_path, text, name, names):
     assert run("capture", "--help").code == 0  # help does not need the file
 
 
+@pytest.mark.parametrize(
+    ("text", "then"),
+    [
+        ("current_max_A = 1,2\n", "with a point: current_max_A = 1.2"),
+        ('[limits]\nport = "bench:"\n', "put port above [limits]"),
+    ],
+)
+def test_a_slip_in_the_file_is_told_with_its_remedy(run, tmp_path, text, then):
+    """A decimal comma, and a setting below the heading of a table; the line is shown."""
+    (tmp_path / "pulsetrainer.toml").write_text(text)
+    done = run(*PLAN)
+    assert done.code == 2
+    assert then in done.err.partition("  try: ")[2]
+    assert "," not in text or text.strip() in done.err
+
+
+def test_a_wrong_variable_is_named(run):
+    """Nobody typed --levels."""
+    done = run(*PLAN, env={"PULSETRAINER_LEVELS": "many"})
+    assert done.code == 2
+    assert "the variable PULSETRAINER_LEVELS (for --levels) must be a whole number" in done.err
+    assert "unset PULSETRAINER_LEVELS" in done.err
+
+
 def test_effective_values_are_in_the_provenance(run, tmp_path):
     """Those of the file too: what was in force can be read off the artefact."""
     (tmp_path / "pulsetrainer.toml").write_text(
@@ -113,7 +137,7 @@ def test_a_signal_that_skips_levels_is_told(run, speed, noted):
     """1.5 A over 48 levels at 1000 samples a second: a level is 0.03125 A."""
     done = run("capture", "identification", "--speed", speed, "--dry-run", "-o", "out.h5")
     assert done.code == 0
-    assert ("past a level of 0.0312 A: lower --speed" in done.err) == noted
+    assert ("past a level of 0.0312 A: lower --speed, or raise --rate" in done.err) == noted
 
 
 def test_dry_run_of_a_play_is_what_the_play_does(run, tmp_path):

@@ -294,6 +294,8 @@ def test_full_coverage_has_no_gap():
     """Down from the top to every level and back switches every relay."""
     plane = Plane.uniform(-1.0, 1.0, 12)
     assert largest_gap(plane, coverage(plane, [curves(2000, 12)])) is None
+    almost = Gap(-1.0, 1.0, -1.0, 0.9, 0.997, 0.997)
+    assert almost.words(plane, "T") == "never switched: relays with beta below 0.9 T (99.7 % of the plane)"
     nothing = largest_gap(plane, np.zeros(plane.n_q, dtype=bool))
     assert nothing is not None
     assert nothing.words(plane, "T") == "never switched: all relays (100 % of the plane)"

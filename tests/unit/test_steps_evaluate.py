@@ -19,6 +19,7 @@ from pulsetrainer.files.store import read
 from pulsetrainer.report.text import tables_of
 from pulsetrainer.steps.compare import compare
 from pulsetrainer.steps.evaluate import breaches, evaluate
+from pulsetrainer.steps.identify import identify
 
 FOLDER = Path(__file__).parents[1] / "data/files-0.1"
 MODEL = examples.model(6)
@@ -47,6 +48,16 @@ def test_prediction_errors_are_what_they_are_called():
     np.testing.assert_array_equal(found.output, run.output)
     np.testing.assert_allclose(found.predicted, run.output - WAVE)
     np.testing.assert_array_equal(found.time_s, run.time_s)
+
+
+def test_a_run_that_the_model_was_fitted_to_is_no_test_of_it():
+    """It is said; of another run of the same input it is not."""
+    rng = np.random.default_rng(3)
+    runs = [_run(0.01 * rng.standard_normal(U.size)) for _ in range(2)]
+    model = identify(runs[0], levels=6)
+    notes = [evaluate(run, model, names=["a"], model_names=["m"]).notes for run in runs]
+    assert notes[0] == ("m was fitted to a: how good it is, another run shows",)
+    assert notes[1] == ()
 
 
 def test_a_second_model_gains_on_the_first():

@@ -115,6 +115,24 @@ def test_a_heading_is_a_quantity_and_a_unit_however_they_are_parted(name, writte
 
 @pytest.mark.parametrize(
     ("heading", "name", "unit"),
+    [
+        ("H_kA_m", "H", "kA/m"),
+        ("tip_speed_mm_s", "tip_speed", "mm/s"),
+        ("H_A_per_m", "H", "A/m"),
+        ("U_V_per_s", "U", "V/s"),
+        ("torque_N_m", "torque", "Nm"),
+        ("flux_V_s", "flux_V", "s"),
+        ("kA_m", "kA", "m"),
+        ("Tip_Angle_[deg]", "Tip_Angle", "deg"),
+    ],
+)
+def test_a_name_of_a_program_says_a_unit_without_a_slash(heading, name, unit):
+    """``H_kA_m`` was a length; of V and s nobody can tell whether they are multiplied."""
+    assert split_unit(heading) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
     [(one, one, "V") for one in ("V(in)", "V(n001)", "v(out)", "V(g)", "V(a,b)", "V(x1:m3)", "V(1)")]
     + [(one, one, "A") for one in ("I(L1)", "I(V1)", "i(l1)", "Ic(Q1)", "Ix(u1:IN)", "I(min)")]
     + [("V(mV)", "V", "mV"), ("V(V)", "V", "V"), ("I(A)", "I", "A"), ("I(kA)", "I", "kA"), ("T(K)", "T", "K")]
