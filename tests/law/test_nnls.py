@@ -149,7 +149,7 @@ def test_cells_that_cannot_be_told_apart_share_their_mass(rounding):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_twins_are_not_exchanged_for_one_another_by_rounding(seed):
-    """Each column twice: a twin of a positive one descends by rounding alone, and the first exchanges end it."""
+    """Each column twice: a twin of a positive one descends by rounding alone. A few exchanges end it."""
     rng = np.random.default_rng(seed)
     matrix = np.tile(rng.random((60, 20)), 2)
     right = matrix @ np.maximum(rng.normal(size=40), 0.0) + 0.01 * rng.normal(size=60)

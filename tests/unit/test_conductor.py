@@ -329,7 +329,7 @@ class _Losing:
     heat, longest_play_s = 0.0, 6.0
 
     def stream(self, take, rate_Hz, *, lead_s, decimation, on_block, should_stop) -> Trace:
-        """Hand over what it kept, a hundred samples at a time; the second and the last block came short."""
+        """Hand over what it kept, a hundred samples at a time; the second and the last are short."""
         pieces = []
         while (piece := take()) is not None:
             pieces.append(piece)

@@ -53,8 +53,8 @@ def test_prediction_errors_are_what_they_are_called():
 def test_errors_of_a_playback_are_what_they_are_called():
     """Mean, largest and rms error, noise and spread of the repeats, lag of the current, width of the loop.
 
-    Four beats of 3 - 2 cos, pressed late by 0.1 rad and off by another force in each repeat; the lead-in, where
-    both drives are far off, does not count.
+    Four beats of 3 - 2 cos, pressed late by 0.1 rad and off by another force in each repeat. The lead-in, far
+    off, does not count.
     """
     count, lead, late = 1200, 200, 0.1
     phase = 2.0 * np.pi * (np.arange(count) - lead) / 250.0

@@ -67,7 +67,7 @@ def test_a_pulse_too_fast_for_the_device_is_told_to_be_slower():
 
 @pytest.mark.parametrize(("periods", "polarity"), [(3, 1), (1, -1)])
 def test_a_drive_is_a_loop_a_ramp_the_beats_and_a_ramp_back(periods, polarity):
-    """The scaled drive is the target between the currents of the compensated one; beats after the first count."""
+    """The scaled drive is the target between the currents of the other one; beats after the first count."""
     drive = pt.invert(_pulse(1.0), replace(_model(), polarity=polarity), periods=periods)
     counted = np.flatnonzero(drive.scored)
     assert np.all(np.diff(counted) == 1)
