@@ -340,10 +340,16 @@ class _Losing:
         for block in np.array_split(np.arange(current.size), current.size // 100):
             kept = block[came[block]]
             on_block(Block(decimation * kept, *columns[:, kept]))
+        nothing = np.empty((4, 0))
         return Trace(
-            np.zeros(0, dtype=np.int64), *np.empty((4, 0)), self.info.tick_rate_Hz, 60, complete=True, fault="",
+            np.zeros(0, dtype=np.int64),
+            *nothing,
+            self.info.tick_rate_Hz,
+            60,
+            complete=True,
+            fault="",
             samples=current.size - 60,
-        )  # fmt: skip
+        )
 
 
 def test_lost_samples_are_counted_while_they_are_lost(model):
