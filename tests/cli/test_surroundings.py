@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
 from test_screen import on_terminal
 
-from program import cold
+from program import PROGRAM, cold
 
 NOWHERE = "/proc/nowhere"  # cannot be made, by root neither
 SURROUNDINGS = {
@@ -71,3 +72,14 @@ def test_a_terminal_of_twenty_columns(there):
     evaluated = on_terminal(there, "evaluate", "played.h5", COLUMNS="20", TERM="dumb").decode()
     assert max(len(line.rstrip("\r")) for line in evaluated.splitlines()) <= 20
     assert "mean error, compensated" in " ".join(evaluated.split())
+
+
+def test_a_full_disk_behind_the_results_is_no_bug():
+    """They are lost; what to mend is said."""
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*PROGRAM, "ports"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 3, done.stderr
+    assert "bug" not in done.stderr
+    assert "try: " in done.stderr

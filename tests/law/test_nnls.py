@@ -147,6 +147,17 @@ def test_cells_that_cannot_be_told_apart_share_their_mass(rounding):
     assert nnls.solve_signed(gram, np.array([2.0, 2.0, 0.0])) == pytest.approx([0.25, 0.25, 0.0], abs=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_twins_are_not_exchanged_for_one_another_by_rounding(seed):
+    """Each column twice: a twin of a positive one descends by rounding alone. A few exchanges end it."""
+    rng = np.random.default_rng(seed)
+    matrix = np.tile(rng.random((60, 20)), 2)
+    right = matrix @ np.maximum(rng.normal(size=40), 0.0) + 0.01 * rng.normal(size=60)
+    found = nnls.solve(matrix.T @ matrix, matrix.T @ right)
+    print(f"seed {seed}: {found.iterations} systems")
+    assert found.iterations <= 5
+
+
 @pytest.mark.parametrize(("seed", "systems"), [(10250, 13), (10417, 9), (10505, 9)])
 def test_where_nothing_settles_a_ridge_ends_it(monkeypatch, seed, systems):
     """The same kind of columns and an empty one: near the minimum, after fewer systems."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,13 +13,16 @@ import pytest
 import pulsetrainer as pt
 from pulsetrainer.core.heartbeat import Pulse
 from pulsetrainer.core.rhythm import Rhythm
+from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.pulses import read_pulse
 from pulsetrainer.steps.beat_errors import Ledger
 from pulsetrainer.steps.conductor import COOL, HOT, RATE_HZ, SLEW_A_PER_S, Conductor, Play, Rest
 from pulsetrainer.steps.invertible import major_loop
+from pulsetrainer.steps.performance import Performance
 from pulsetrainer.steps.programme import Change, Programme
+from pulsetrainer.steps.recording import PAUSE_S
 from pulsetrainer.steps.session import check_model, reach_of
 from pulsetrainer.steps.steering import AMPLITUDE_STEP, RATE_STEP_BPM, Steering
 
@@ -102,14 +106,17 @@ def test_no_change_is_a_step(model, seed):
     assert low - 1e-9 <= target.min() <= target.max() <= high + 1e-9
 
 
-def test_beats_follow_each_other_without_a_gap(model):
+@pytest.mark.parametrize("rhythm", [Rhythm(), Rhythm(0.1, 0.1, 0.2, seed=3)])
+def test_beats_follow_each_other_without_a_gap(model, rhythm):
     """Sample by sample, and to the rounding of the clock; every interval is the one asked for."""
-    _, given, _ = _conducted(model, Programme(NAMES[:1], rate=83.0, beats=15))
+    _, given, _ = _conducted(model, Programme(NAMES[:1], rate=83.0, beats=15), rhythm=rhythm)
     beats = [g.beat for g in given if g.beat]
     assert len(beats) == 15
-    for before, after in itertools.pairwise(beats):
+    for number, (before, after) in enumerate(itertools.pairwise(beats)):
+        timing = rhythm.timing(number, before.start_s)
+        assert before.strength == timing.strength
         assert before.first + before.count == after.first
-        assert after.start_s - before.start_s == pytest.approx(60.0 / 83.0, abs=1e-9)
+        assert after.start_s - before.start_s == pytest.approx(timing.interval * 60.0 / 83.0, abs=1e-9)
         assert 0 <= after.first / RATE_HZ - after.start_s < 1 / RATE_HZ + 1e-9
 
 
@@ -310,3 +317,56 @@ def test_a_model_of_another_device_is_refused():
     ):
         with pytest.raises(DataError):
             check_model(bad)
+
+
+@dataclass
+class _Losing:
+    """A device that is its model, stays on for 6 s, and loses 60 samples a part on the way."""
+
+    model: pt.Model
+
+    info = SimpleNamespace(tick_rate_Hz=10.0 * RATE_HZ)
+    heat, longest_play_s = 0.0, 6.0
+
+    def stream(self, take, rate_Hz, *, lead_s, decimation, on_block, should_stop) -> Trace:
+        """Hand over what it kept, a hundred samples at a time; the second and the last are short."""
+        pieces = []
+        while (piece := take()) is not None:
+            pieces.append(piece)
+        current = np.concatenate(pieces)
+        columns = np.stack((current, current, self.model.predict(current, 1.0 / rate_Hz), 0.0 * current))
+        came = np.ones(current.size, dtype=bool)
+        came[110:160] = came[-10:] = False
+        for block in np.array_split(np.arange(current.size), current.size // 100):
+            kept = block[came[block]]
+            on_block(Block(decimation * kept, *columns[:, kept]))
+        nothing = np.empty((4, 0))
+        return Trace(
+            np.zeros(0, dtype=np.int64),
+            *nothing,
+            self.info.tick_rate_Hz,
+            60,
+            complete=True,
+            fault="",
+            samples=current.size - 60,
+        )
+
+
+def test_lost_samples_are_counted_while_they_are_lost(model):
+    """What is kept of a session that breaks off knows them; of two parts each, those at its end too."""
+    told, times = [], []
+    sink = SimpleNamespace(
+        append=lambda time_s, *_: times.append(time_s),
+        judge=lambda fields: told.append(fields["dropped_samples"]),
+    )
+    reach = reach_of(model, PULSES[:1], (75.0,))
+    programme = Programme(NAMES[:1], rate=75.0, beats=5)
+    session = Performance(
+        model, _Losing(model), PULSES[:1], Rhythm(), programme, sink, reach, lambda _now: None
+    )
+    found = session.run(0.1)
+    assert (found.parts, found.fault, found.dropped_samples) == (2, "", 120)
+    assert sorted(set(told)) == [0, 50, 110]
+    time_s = np.concatenate(times)
+    gaps = np.diff(np.round(time_s * RATE_HZ)).astype(int)
+    assert gaps[gaps > 1].tolist() == [51, 11 + round(PAUSE_S * RATE_HZ), 51]

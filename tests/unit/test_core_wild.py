@@ -199,6 +199,15 @@ def _far_one_by_one(values, motion, usual):
     return [apart[k] > max(tail + motion[k], 0.01 * body) for k in range(n)]
 
 
+@pytest.mark.parametrize(("outermost", "least"), [(15, 0.02), (8, 0.0)])
+def test_a_hundredth_of_the_samples_at_either_end_does_not_tell_the_span(outermost, least):
+    """Of 1000 samples some rest at -1, as many at 1, all others at 0: from a hundredth on these count."""
+    values = np.repeat([-1.0, 0.0, 1.0], [outermost, 1000 - 2 * outermost, outermost])
+    for off, found in ((0.99 * least, False), (1.01 * least + 1e-9, True)):
+        values[500] = off
+        assert wild._far(values, np.zeros(1000))[500] == found
+
+
 def _exceptions_one_by_one(found):
     """Runs of up to three, unless they are more than a tenth of all."""
     runs = [(flag, len(list(run))) for flag, run in groupby(found.tolist())]

@@ -421,3 +421,26 @@ def test_the_model_as_given_begins_where_evaluate_says(polarity):
     model = pt.identify(run, levels=24, smoothing=0.0)
     told = pt.diagnose(other, model, quick=True)
     assert told.rms_percent == pytest.approx(pt.evaluate(other, model).models[0].rms_percent, rel=0.02)
+
+
+def test_figures_of_a_diagnosis_are_in_percent_of_the_span_as_measured():
+    """Noise as it was added; error, series and cause in the units of the run, whatever they are."""
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=100.0).value
+    clean = _operator()(u)
+    noise = 0.2 * np.random.default_rng(5).standard_normal(u.size)
+    span = float(np.ptp(clean + noise))
+    for unit, polarity in ((1.0, 1), (1e-3, -1)):
+        run = pt.Run(np.arange(u.size) / 100.0, u, 7.0 * unit + polarity * unit * (clean + noise))
+        model = pt.identify(run, levels=24, smoothing=0.02)
+        found = pt.diagnose(run, replace(model, offset=model.offset + 0.3 * unit), quick=True)
+        assert found.noise_percent == pytest.approx(100.0 * 0.2 / span, rel=0.1)
+        assert found.rms == pytest.approx(np.hypot(0.3, 0.2) * unit, rel=0.01)
+        assert found.rms_percent == pytest.approx(100.0 * found.rms / (unit * span), rel=1e-6)
+        assert found.output.min() >= run.output.min()
+        assert np.ptp(found.output) == pytest.approx(unit * span, rel=0.05)
+        assert np.corrcoef(found.output, np.interp(found.time_s, run.time_s, run.output))[0, 1] > 0.99
+        for fitted in (found.before, found.after):
+            assert np.std(found.output - fitted) < 0.2 * unit
+        assert found.floor_percent <= 100.0 * 0.2 / span * 1.1
+        assert 0.0 < found.extended_percent <= found.static_percent * (1.0 + 1e-9) < 200.0 * 0.2 / span
+        assert (found.input.min(), found.input.max()) == pytest.approx((0.0, 1.5), abs=0.02)

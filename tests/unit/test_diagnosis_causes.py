@@ -386,6 +386,7 @@ def test_the_first_and_the_last_stroke_are_no_step():
         (np.sin, 2.09, True),  # a tenth is what ten seconds tell apart
         (np.sin, 2.11, False),
         (np.sin, 0.5, False),
+        (lambda at: 3.0 + np.sin(at), 2.0, True),  # about any level
         (lambda at: np.exp(-0.03 * at) * np.sin(at), 7.0, True),
         (lambda at: np.sin(at) + np.sin(1.7 * at), 2.0, False),  # no one frequency
         (np.zeros_like, 2.0, False),

@@ -800,6 +800,20 @@ def test_what_a_record_lacks_is_asked_for_in_numbers():
     assert "33.3 min" in evidence
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-1.0, 3.0), (0.3, 0.6)])
+def test_the_ends_of_the_output_are_means_near_those_of_the_input(low, high):
+    """Of the range, or of the record where it does not come so far; samples without weight do not count."""
+    u = np.random.default_rng(1).permutation(np.linspace(0.0, 1.0, 2001))
+    y = np.exp(u)
+    counts = (u > 0.002) & (u < 0.998)
+    record = Record(u, np.where(counts, y, 99.0), 1.0 * counts, dt_s=0.01)
+    near = LIMITS.near_end * (high - low)
+    bottom, top = max(low, 0.0025), min(high, 0.9975)
+    (frame,) = problem_for([record], low, high).frames
+    expected = y[counts & (u <= bottom + near)].mean(), y[counts & (u >= top - near)].mean()
+    assert frame.ends == pytest.approx(expected, rel=1e-12)
+
+
 def test_where_an_error_is_largest_is_told_with_its_quantity():
     """A speed, a level with its unit, a direction in words, a time."""
     words = {"input": "voltage", "in_u": " V"}

@@ -1246,7 +1246,7 @@ def test_the_account_says_what_is_left_before_and_after(monkeypatch):
 
 @pytest.mark.parametrize(
     ("left", "squares", "said"),
-    [((1.0, 1.51), 101.0, True), ((1.0, 1.5), 101.0, False), ((1.0, 1.51), 100.0, False)],
+    [((2.0, 3.02), 101.0, True), ((2.0, 3.0), 101.0, False), ((2.0, 3.02), 100.0, False)],
 )
 @pytest.mark.parametrize("name", ["none", "unknown"])
 def test_where_the_rest_is_largest_is_said_if_it_stands_out(monkeypatch, left, squares, said, name):

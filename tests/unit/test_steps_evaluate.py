@@ -60,6 +60,74 @@ def test_a_run_that_the_model_was_fitted_to_is_no_test_of_it():
     assert notes[1] == ()
 
 
+def test_errors_of_a_playback_are_what_they_are_called():
+    """Mean, largest and rms error, noise and spread of the repeats, lag of the current, width of the loop.
+
+    Four beats of 3 - 2 cos, pressed late by 0.1 rad and off by another force in each repeat. The lead-in, far
+    off, does not count.
+    """
+    count, lead, late = 1200, 200, 0.1
+    phase = 2.0 * np.pi * (np.arange(count) - lead) / 250.0
+    scored = np.arange(count) >= lead
+    wave, still = 3.0 - 2.0 * np.cos(phase), np.zeros((3, count))
+    off = np.array([[0.0], [0.02], [0.07]])
+    pressed = np.where(scored, 3.0 - 2.0 * np.cos(phase - late), 40.0)
+    merely = np.where(scored, wave + 0.5 * np.sin(3.0 * phase), 40.0)
+    played = read(FOLDER / "played.h5", Playback)
+    drive = replace(
+        played.waveform, time_s=np.arange(count) / 1e3, target=wave, scored=scored,
+        compensated=wave, scaled=wave, predicted=wave,
+    )  # fmt: skip
+    compensated, scaled = (
+        replace(
+            played.compensated,
+            reference=still,
+            input=still + lag * (phase > 9.0),
+            output=output + times * off,
+        )
+        for output, lag, times in ((pressed, -0.03, 1.0), (merely, 0.02, -8.0))
+    )
+    (found,) = evaluate(
+        replace(
+            played,
+            time_s=drive.time_s,
+            waveform=drive,
+            input_range=1.5,
+            compensated=compensated,
+            scaled=scaled,
+        )
+    ).waveforms
+    spreads = []
+    for one, given, lag in ((found.compensated, compensated, 2.0), (found.scaled, scaled, 4.0 / 3.0)):
+        error = 100.0 * np.abs(given.output - wave)[:, scored] / 5.0
+        assert one.mean_abs_error_percent == pytest.approx(error.mean())
+        assert one.max_abs_error_percent == pytest.approx(error.max())
+        assert one.rms_error_percent == pytest.approx(np.sqrt(np.mean(error**2)))
+        assert one.current_tracking_max_percent == pytest.approx(lag)
+        np.testing.assert_allclose(one.output, given.output[:, scored].mean(axis=0))
+        spreads.append(np.std(error.mean(axis=1), ddof=1))
+    assert found.error_spread_percent == pytest.approx(max(spreads)) != pytest.approx(min(spreads), rel=0.5)
+    assert found.noise_percent == pytest.approx(100.0 * np.std(off, ddof=1) / 5.0)
+    assert found.compensated.hysteresis_percent == pytest.approx(
+        100.0 * np.pi * 2.0**2 * np.sin(late) / 5.0**2, rel=1e-3
+    )
+    reduced = 1.0 - found.compensated.mean_abs_error_percent / found.scaled.mean_abs_error_percent
+    assert found.mean_error_reduction_percent == pytest.approx(100.0 * reduced)
+
+
+def test_figures_of_a_fit_are_those_of_an_evaluation_on_its_record():
+    """Over samples that count alike; how many they are, and what it says of the plane."""
+    run = _run(0.01 * WAVE)
+    model = identify(run, levels=6, smoothing=0.02)
+    fit, found = model.fit, evaluate(run, model).models[0]
+    assert (fit.rms, fit.rms_percent) == pytest.approx((found.rms, found.rms_percent))
+    assert fit.max_percent == pytest.approx(found.max_percent)
+    assert fit.max_abs == pytest.approx(found.max_percent / 100.0 * np.ptp(run.output))
+    np.testing.assert_allclose(fit.predicted, found.predicted)
+    assert (fit.samples, fit.draws, fit.smoothing) == (run.input.size, 0, 0.02)
+    assert fit.coverage_percent == 100.0 * np.mean(model.covered)
+
+
 def test_a_second_model_gains_on_the_first():
     """Its rms against that of the first, in percent."""
     worse = replace(MODEL, offset=MODEL.offset + 1.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import form_devices as devices
 import numpy as np
 import pytest
@@ -61,6 +63,30 @@ def test_a_pulse_too_fast_for_the_device_is_told_to_be_slower():
     """Where the lag leaves no output that every beat reaches, a faster pulse would be worse."""
     with raises(DataError, "no output in reach", other="slower"):
         pt.invert(_pulse(0.2), _model(lag_s=5.0))
+
+
+@pytest.mark.parametrize(("periods", "polarity"), [(3, 1), (1, -1)])
+def test_a_drive_is_a_loop_a_ramp_the_beats_and_a_ramp_back(periods, polarity):
+    """The scaled drive is the target between the currents of the other one; beats after the first count."""
+    drive = pt.invert(_pulse(1.0), replace(_model(), polarity=polarity), periods=periods)
+    counted = np.flatnonzero(drive.scored)
+    assert np.all(np.diff(counted) == 1)
+    end, begin = counted[-1] + 1, counted[0] - (1000 if periods > 1 else 0)
+    assert end - begin == 1000 * periods
+    before, beats, after = slice(begin - 400), slice(begin, end), slice(end + 401, None)
+    share = (drive.target - drive.target[beats].min()) / np.ptp(drive.target[beats])
+    low, high = drive.compensated[beats].min(), drive.compensated[beats].max()
+    straight = low + (high - low) * (share if polarity > 0 else 1.0 - share)
+    np.testing.assert_allclose(drive.scaled[beats], straight[beats], atol=1e-9)
+    for part in (before, after):
+        np.testing.assert_array_equal(drive.scaled[part], drive.compensated[part])
+    assert (drive.scaled[before].min(), drive.scaled[before].max()) == (0.0, 1.5)
+    for values in (drive.scaled, drive.target):
+        up, down = np.append(values[begin - 400 : begin], values[begin]), values[end : end + 401]
+        assert up[0] == pytest.approx(values[begin - 401]) == pytest.approx(down[-1])
+        assert up[-1] == pytest.approx(down[0], abs=1e-3)
+        for ramp in (up, down):
+            np.testing.assert_allclose(ramp, np.linspace(ramp[0], ramp[-1], 401), atol=1e-9)
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-4, 1e4])

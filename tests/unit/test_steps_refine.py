@@ -15,7 +15,7 @@ import pulsetrainer as pt
 from pulsetrainer.core import excitations
 from pulsetrainer.errors import DeviceError, PulsetrainerError
 from pulsetrainer.steps.invertible import invertible
-from pulsetrainer.steps.refine import refine
+from pulsetrainer.steps.refine import _repeats, refine
 
 SLEW = 30.0
 AWAY = 0.1  # of the reach, from both ends: a current at the end of its range can learn nothing
@@ -79,6 +79,16 @@ def test_more_noise_asks_for_more_repeats():
     assert {one.repeats for one in quiet.passes} == {2}
     assert loud.passes[0].repeats == 2
     assert max(one.repeats for one in loud.passes) > 2
+
+
+@pytest.mark.parametrize(
+    ("noise", "error", "repeats"),
+    [(0.0, 1.0, 2), (1.0, 0.0, 5), (0.43, 1.0, 3), (0.51, 1.0, 5), (0.49, 1.0, 4), (9.0, 1.0, 5)],
+)
+def test_repeats_leave_a_quarter_of_the_error_as_noise(noise, error, repeats):
+    """Their mean has noise over the root of them; two at least, five at most, and where there is no error."""
+    for unit in (1e-3, 1.0, 1e3):
+        assert _repeats(unit * noise, unit * error) == repeats
 
 
 @pytest.mark.parametrize("dead", [0.0, 7.0])
