@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from inspect import signature
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +29,10 @@ from pulsetrainer.steps.one_beat import shape_of
 from pulsetrainer.steps.session import session as _session
 from pulsetrainer.steps.tune import Tuned
 from pulsetrainer.steps.tune import tune as _tune
+
+F = TypeVar("F", bound=Callable[..., Any])
+# a name in the library, a table, a drive, or times (s) and values
+Pulse = str | Path | Waveform | Shape | tuple[ArrayLike, ArrayLike]
 
 
 def load(path: Path | str) -> Any:
@@ -141,89 +146,35 @@ def _gains(path: Path | str | None, entry: dict[str, Any]) -> Gains:
         raise UsageError(f"{path}: {error.message}", hint=error.hint) from error
 
 
-def tune(
-    device: Device,
-    *,
-    pulses: Sequence[str | Waveform | Shape | tuple[ArrayLike, ArrayLike]] = ("normal", "bifid"),
-    **options: Any,
-) -> Tuned:
-    """Measure the coil, set the gains of the current loop by a rule, and verify them on pulses.
+def _as(verb: Callable[..., Any]) -> Callable[[F], F]:
+    """Give a function the docstring of the verb that it calls, and its parameters for ``**options``."""
 
-    ``pulses`` are names, tables, or drives, which are followed as they will be played. Everything else is as
-    in ``steps.tune.tune``, which this calls. The gains stay set until the device is closed.
+    def told(function: F) -> F:
+        own = signature(function)
+        both = [own.parameters.get(name, one) for name, one in signature(verb).parameters.items()]
+        documented: Any = function
+        documented.__doc__, documented.__signature__ = verb.__doc__, own.replace(parameters=both)
+        return function
 
-    Raises
-    ------
-    DeviceError
-        No coil, a shorted one, one that the supply cannot drive over the pulses, or a force at rest.
+    return told
 
-    Examples
-    --------
-    >>> import pulsetrainer as pt
-    >>> with pt.open_device("bench:") as device:
-    ...     tuned = pt.tune(device, pulses=["normal"])
-    >>> round(tuned.resistance_ohm, 1), tuned.tracking_percent.after < 1.0
-    (5.0, True)
-    """
+
+@_as(_tune)
+def tune(device: Device, *, pulses: Sequence[Pulse] = ("normal", "bifid"), **options: Any) -> Tuned:  # noqa: D103
     return _tune(
         device, pulses=[one if isinstance(one, Waveform) else _shape(one) for one in pulses], **options
     )
 
 
-def invert(
-    pulse: str | Waveform | Shape | tuple[ArrayLike, ArrayLike], model: Model, **options: Any
-) -> Waveform:
-    """Find the drive for a pulse: its name in the library, a table, a drive, or times (s) and values.
-
-    Everything else is as in ``steps.invert.invert``, which this calls.
-
-    Raises
-    ------
-    UsageError
-        There is no pulse of that name, or the method does not suit the model.
-    DataError
-        The table cannot be used, or the force range is beyond the model's reach.
-
-    Examples
-    --------
-    >>> import pulsetrainer as pt
-    >>> drive = pt.invert("bifid", pt.load("tests/data/files-0.1/model.h5"), periods=2)
-    >>> drive.name, drive.inversion
-    ('bifid', 'continuous')
-    """
+@_as(_invert)
+def invert(pulse: Pulse, model: Model, **options: Any) -> Waveform:  # noqa: D103
     return _invert(_shape(pulse), model, **options)
 
 
-def session(
-    model: Model,
-    device: Device,
-    *,
-    pulses: str | Shape | Sequence[str | Waveform | Shape | tuple[ArrayLike, ArrayLike]] = "normal",
-    **options: Any,
+@_as(_session)
+def session(  # noqa: D103
+    model: Model, device: Device, *, pulses: str | Shape | Sequence[Pulse] = "normal", **options: Any
 ) -> Session:
-    """Press pulses for minutes, beat by beat: names in the library, tables, drives, or times and values.
-
-    Everything else is as in ``steps.session.session``, which this calls: ``minutes`` or ``beats``, ``rate``,
-    ``amplitude``, ``variability``, ``quiz``; or ``decide``, which is asked for every beat.
-
-    Raises
-    ------
-    UsageError
-        There is no pulse of that name, or a rate or an amplitude cannot be played.
-    DataError
-        The model is of another device, or an answer names what is not asked.
-    DeviceError, Interrupted
-        The device or the user stopped it; what was recorded is in the error's ``kept``.
-
-    Examples
-    --------
-    >>> import pulsetrainer as pt
-    >>> with pt.open_device("bench:") as device:
-    ...     run = pt.capture("identification", device, levels=16)
-    ...     pressed = pt.session(pt.identify(run, levels=16), device, pulses=["normal", "bifid"], beats=4)
-    >>> pressed.beats.start_s.size, pressed.underruns
-    (4, 0)
-    """
     several = [pulses] if isinstance(pulses, str | Shape) else pulses
     return _session(model, device, pulses=[_shape(one) for one in several], **options)
 
@@ -260,7 +211,7 @@ def read_table(
     return import_parts(parts, resample=resample).run
 
 
-def _shape(pulse: str | Waveform | Shape | tuple[ArrayLike, ArrayLike]) -> Shape:
+def _shape(pulse: Pulse) -> Shape:
     if isinstance(pulse, Shape):
         return pulse
     if isinstance(pulse, Waveform):

@@ -63,7 +63,8 @@ def invert(
     Parameters
     ----------
     pulse
-        One period of any height; or a recording of several beats together with ``beat``.
+        One period of any height; or a recording of several beats together with ``beat``. ``pt.invert`` takes
+        its name in the library, a table, a drive, or times (s) and values.
     method
         "continuous", "closest-match" as in the paper, or "extended". None: what suits the model.
     force_min, force_max
@@ -86,11 +87,12 @@ def invert(
     Raises
     ------
     UsageError
-        The method does not suit the model, ``beat`` is none, or the force range is empty.
+        There is no pulse of that name, the method does not suit the model, ``beat`` is none, or the force
+        range is empty.
     DataError
-        The force range is beyond the model's reach or, of a signed model, beyond the range in which it has an
-        inverse; the recording holds no such beat; a period has too few samples; or the model does not
-        describe its own record.
+        The table cannot be used; the force range is beyond the model's reach or, of a signed model, beyond
+        the range in which it has an inverse; the recording holds no such beat; a period has too few samples;
+        or the model does not describe its own record.
 
     Source: Tan, Venkataraman, Krishnaprasad 2001 (closest match); docs/theory.md (the other inverses).
 

@@ -232,12 +232,13 @@ def session(
     track_heat: bool | None = None,
     progress: Progress = silent,
 ) -> Session:
-    """Press pulses for as long as wanted and return everything, every beat judged.
+    """Press pulses for as long as wanted, beat by beat, and return everything, every beat judged.
 
     Parameters
     ----------
     pulses
-        Each is pressed for an equal share of the time.
+        Each is pressed for an equal share of the time. ``pt.session`` takes names in the library, tables,
+        drives, or times (s) and values.
     rate
         Beats a minute, 20 to 240; None: each pulse's own.
     amplitude
@@ -258,11 +259,20 @@ def session(
     Raises
     ------
     UsageError
-        A rate, an amplitude or a pulse cannot be played.
+        There is no pulse of that name, or a rate, an amplitude or a pulse cannot be played.
     DataError
         The model is of another device, or an answer names what is not asked.
     DeviceError, Interrupted
         The device or the user stopped it; what was recorded is in the error's ``kept``.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> with pt.open_device("bench:") as device:
+    ...     run = pt.capture("identification", device, levels=16)
+    ...     pressed = pt.session(pt.identify(run, levels=16), device, pulses=["normal", "bifid"], beats=4)
+    >>> pressed.beats.start_s.size, pressed.underruns
+    (4, 0)
     """
     chosen, rates = programme(
         [shape.name for shape in pulses],

@@ -78,7 +78,7 @@ def tune(
     ----------
     pulses
         What the current must be able to follow: shapes, over the whole range, and the compensated currents of
-        drives, which rise faster than the pulses that they press.
+        drives, which rise faster than the pulses that they press. ``pt.tune`` takes names and tables too.
     supply_V
         Voltage of the supply where it has been measured: ohms and henries are then by it. None: by the
         drop of the free-wheeling diode, 0.6 V. The gains need neither.
@@ -93,6 +93,14 @@ def tune(
         from before.
     Interrupted
         Ctrl-C: the output was stopped first.
+
+    Examples
+    --------
+    >>> import pulsetrainer as pt
+    >>> with pt.open_device("bench:") as device:
+    ...     tuned = pt.tune(device, pulses=["normal"])
+    >>> round(tuned.resistance_ohm, 1), tuned.tracking_percent.after < 1.0
+    (5.0, True)
     """
     _check(pulses, supply_V, device.info.current_limit_A)
     device.needs_duty("tuning")

@@ -36,6 +36,12 @@ def test_the_names_are_those_of_the_contract():
         _ = pt.identfy
 
 
+@pytest.mark.parametrize("name", sorted(VERBS))
+def test_every_option_has_its_name(name):
+    """In the help of an editor none hides behind ``**options``."""
+    assert "options" not in inspect.signature(getattr(pt, name)).parameters
+
+
 def test_the_import_loads_nothing():
     """Neither numpy nor any module of the package but the version."""
     job = "import sys, pulsetrainer; print(*sorted(m for m in sys.modules if m[:5] in ('numpy', 'pulse')))"
