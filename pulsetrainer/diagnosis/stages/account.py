@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.diagnosis import residual
+from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.residual import LENGTH
@@ -68,7 +69,8 @@ def _of(state: State, finding: Finding, *, beyond: bool) -> Evidence:
         return finding.seen
     assert finding.p_value is not None
     figures = {"p": finding.p_value, "explains": finding.explains_percent}
-    lacks = tuple(one for one in state.lacks if one != LENGTH) if finding.cause.lasting else ()
+    listed = finding.cause.lasting and finding.cause.id != Unlisted.id  # a curve was seen in any case
+    lacks = tuple(one for one in state.lacks if one != LENGTH) if listed else ()
     return Evidence("tested" if beyond else "tested, small", finding.cause.id, figures, lacks)
 
 

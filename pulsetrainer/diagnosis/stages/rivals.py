@@ -45,8 +45,9 @@ MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, IN_STEP = "spans zero", "may be wear", "se
 def stage(state: State) -> State:
     """Return the state with a finding for every cause that was tried."""
     found = [_finding(state, term) for term in state.current.terms]
+    beyond = state.baseline.squares > state.floor.squares  # else there is nothing to be explained
     rest = [
-        Finding(score.cause, False, score.p_value, state.explains(score.gain))
+        Finding(score.cause, False, score.p_value, state.explains(score.gain) if beyond else 0.0)
         for score in state.scores.scores
         if score.cause.id not in state.current.names
     ]

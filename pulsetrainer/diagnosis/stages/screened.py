@@ -9,6 +9,7 @@ on with p of at most 0.01.
 From the same null follows how small an effect of each cause would have shown: large enough that the test
 finds it in nine of ten records, that what the weights leave of it matters, and that neither is undone by what
 looks like the cause already. Of a cause that is in the model by now it is asked against the noise of today.
+Of one that the weights hold almost whole it is not told: what they leave of it is how finely they are drawn.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.screening import screen
 from pulsetrainer.diagnosis.state import State
 
@@ -33,6 +35,8 @@ def stage(state: State) -> State:
     known = {name: replace(one, noise=one.noise * quieter) for name, one in state.sights.items()}
     sights = {**known, **seen}
     limits = {
-        name: one.least(state.floor.relevant, gains.get(name, 0.0)) / norm for name, one in sights.items()
+        name: one.least(state.floor.relevant, gains.get(name, 0.0)) / norm
+        for name, one in sights.items()
+        if not library()[name].by_contrast
     }
     return replace(state, scores=scores, sights=sights, limits=limits)
