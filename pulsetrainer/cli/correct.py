@@ -31,8 +31,6 @@ def correct(
 
     Example: pulsetrainer correct drifting.h5 --diagnosis drift.h5 -o corrected.h5
     """
-    from pulsetrainer.files.store import read_header
-
     job = Job(context, inputs=(run, diagnosis), outputs=(out,))
     with job.working("correcting"):
         found = job.load(diagnosis, pt.Diagnosis)
@@ -40,6 +38,8 @@ def correct(
         try:
             corrected = pt.correct(measured, found, delay_s=delay, names=(str(run), str(diagnosis)))
         except DataError as error:
+            from pulsetrainer.files.store import read_header
+
             made = read_header(diagnosis).provenance.parameters
             model = shlex.quote(str(made.get("model", "model.h5")))
             error.hint = error.hint.replace("--model model.h5", f"--model {model}")
