@@ -86,7 +86,7 @@ def parameters(several: Sequence[Parameter]) -> dict[str, str]:
     """Return parameters by name, each with unit, interval and meaning; the values of a curve in one line."""
     said: dict[str, str] = {}
     # what was chosen, such as how many time constants there are, comes after what was measured
-    for one in sorted(several, key=lambda one: one.lower == one.upper):
+    for one in sorted(several, key=lambda one: one.chosen):
         if of_a_curve(one):
             continue
         number = len([name for name in said if name.split(" ")[0] == one.name]) + 1
