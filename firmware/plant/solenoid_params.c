@@ -23,7 +23,7 @@ const struct plant_parameter plant_parameters[] = {
     {"coil", "1", 0, 16777215, SETTING, AT(coil),
      "another coil and adapter, drawn: 2 to 10 ohm, 5 to 100 mH, 9 to 24 V (0: as set)"},
     {"ambient", "K", -60, 80, EFFECT, AT(ambient),
-     "how much warmer it is than at calibration: 0.39 % of the copper's resistance and half of that of the force a kelvin"},
+     "temperature of the room above that at calibration: 0.39 % of the copper's resistance and half of that of the force a kelvin"},
     {"noise", "1", 0, 0.1, EFFECT, AT(noise), "force noise per sample, rms over the 15 N range"},
     {"current-noise", "A", 0, 0.1, EFFECT, AT(current_noise), "current noise per sample, rms"},
 

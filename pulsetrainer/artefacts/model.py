@@ -83,6 +83,11 @@ class Parameter:
     upper: float
     meaning: str = ""  # of what it is, in words; empty in files of 0.1
 
+    @property
+    def chosen(self) -> bool:
+        """Whether it was chosen from a few, such as how many time constants there are: it has no interval."""
+        return self.lower == self.upper
+
 
 @dataclass(frozen=True, slots=True)
 class Extension:

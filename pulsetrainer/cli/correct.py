@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ from typer import Argument, Context, Option
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
+from pulsetrainer.errors import DataError
 
 
 def correct(
@@ -33,7 +35,15 @@ def correct(
     with job.working("correcting"):
         found = job.load(diagnosis, pt.Diagnosis)
         measured = job.load(run, pt.Run)
-        corrected = pt.correct(measured, found, delay_s=delay, names=(str(run), str(diagnosis)))
+        try:
+            corrected = pt.correct(measured, found, delay_s=delay, names=(str(run), str(diagnosis)))
+        except DataError as error:
+            from pulsetrainer.files.store import read_header
+
+            made = read_header(diagnosis).provenance.parameters
+            model = shlex.quote(str(made.get("model", "model.h5")))
+            error.hint = error.hint.replace("--model model.h5", f"--model {model}")
+            raise
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
     from pulsetrainer.artefacts.units import with_unit
 

@@ -68,7 +68,8 @@ def diagnosis_of(state: State) -> Diagnosis:
         quick=state.question.quick,
         rms=rms,
         rms_percent=rms * of_samples / scale.span,
-        noise_percent=_noise_of(state) * of_samples,
+        # slow noise, told of averages, may come out larger; no more than all that is left is noise
+        noise_percent=min(_noise_of(state), rms / scale.span) * of_samples,
         static_percent=state.baseline.rms * percent,
         extended_percent=extended.rms * percent,
         floor_percent=state.floor_rms * percent,

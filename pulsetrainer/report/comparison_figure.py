@@ -38,7 +38,7 @@ def draw(labels: Sequence[str], values: Mapping[str, Sequence[float | None]]) ->
             known = np.asarray([np.nan if v is None else v for v in row], dtype=np.float64)
             look = {"color": next(colours), "linestyle": line, "marker": marker, "markersize": 4}
             if learners:  # between two learners there is nothing: points, no line
-                look["linestyle"] = "none"
+                look |= {"linestyle": "none", "clip_on": False}  # the axis would halve a point at 0 %
                 ends = [f"{stem}.{metric.replace('_percent', f'_{end}_percent')}" for end in ("from", "to")]
                 if all(end in values for end in ends):
                     interval = np.asarray([values[end] for end in ends], dtype=np.float64)

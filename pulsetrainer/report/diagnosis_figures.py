@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from pulsetrainer.artefacts import Dependence, Diagnosis, FloatArray, Profile
+from pulsetrainer.core.plane import BoolArray
 from pulsetrainer.report import panels
 from pulsetrainer.report.diagnosis_text import answer, explains
 from pulsetrainer.report.style import (
@@ -30,6 +31,7 @@ SEEN = 0.05  # % that a cause explains: less reads 0.0
 _WHOLE = 100.0 + 1e-9  # %
 _SHADES = {"yes": BLUE, "in doubt": GREEN, "no": MUTED}
 _MANY = 1.5  # decades: over fewer, an even scale shows more
+_REST = 1e-9  # of the highest speed: less is the rounding of a rest
 _LABEL = 40  # letters that fit below such a figure
 _SMALL_IN = 0.68 * COLUMN_IN  # three of them stand side by side
 
@@ -78,7 +80,7 @@ def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
     if extended:
         axes.plot(one.at[known], one.after[known], "s-", color=BLUE, markersize=3, label="with them")
     if one.name == "frequency" or (one.name == "rate" and _decades(one.at) > _MANY):
-        moving = float(np.abs(one.at[one.at != 0]).min(initial=np.inf))
+        moving = float(np.abs(one.at[_moves(one.at)]).min(initial=np.inf))
         axes.set_xscale("log") if one.name == "frequency" else axes.set_xscale("symlog", linthresh=moving)
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))  # powers of ten would need mathtext
         axes.xaxis.set_minor_formatter(NullFormatter())
@@ -94,8 +96,13 @@ def profile(one: Profile, input_quantity: str, *, extended: bool) -> Figure:
 
 def _decades(at: FloatArray) -> float:
     """Return over how many decades values other than zero are spread."""
-    sizes = np.abs(at[at != 0])
+    sizes = np.abs(at[_moves(at)])
     return float(np.log10(sizes.max() / sizes.min())) if sizes.size else 0.0
+
+
+def _moves(at: FloatArray) -> BoolArray:
+    """Tell which speeds (n,) are more than rounding of a rest."""
+    return np.abs(at) > _REST * np.nanmax(np.abs(at), initial=0.0)
 
 
 def _folded(text: str) -> str:

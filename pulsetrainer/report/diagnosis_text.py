@@ -85,7 +85,8 @@ def answer(one: Cause, found: Diagnosis) -> str:
 def parameters(several: Sequence[Parameter]) -> dict[str, str]:
     """Return parameters by name, each with unit, interval and meaning; the values of a curve in one line."""
     said: dict[str, str] = {}
-    for one in several:
+    # what was chosen, such as how many time constants there are, comes after what was measured
+    for one in sorted(several, key=lambda one: one.chosen):
         if of_a_curve(one):
             continue
         number = len([name for name in said if name.split(" ")[0] == one.name]) + 1
@@ -122,10 +123,15 @@ def _said(one: Cause) -> dict[str, str]:
 
 
 def explains(one: Cause, found: Diagnosis) -> float:
-    """Return the share of the error that a cause explains; NaN where none is beyond noise."""
+    """Return the share of the error that a cause explains.
+
+    NaN where none is beyond noise, and of a cause that could be instead of another: beside that one it
+    explains nothing.
+    """
     beyond = not found.static_percent <= found.floor_percent
     untested = one.found and one.p_value is None  # of the model as given, or read off the raw data
-    return one.explains_percent if beyond or untested else math.nan
+    instead = not one.found and any(one.cause in other.confounded_with for other in found.found)
+    return one.explains_percent if (beyond or untested) and not instead else math.nan
 
 
 def tells_shares(found: Diagnosis) -> bool:

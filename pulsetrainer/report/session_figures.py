@@ -59,8 +59,8 @@ def course(session: Session) -> Figure:
 def confusion(quiz: Quiz) -> Figure:
     """Return the confusion matrix: what was asked downwards, what was answered across."""
     size = len(quiz.choices)
-    side = min(2.2 + 0.4 * size, COLUMN_IN)
-    figure = Figure(figsize=(COLUMN_IN, side), layout="constrained")
+    width = 0.75 * COLUMN_IN  # beside a table on paper, where its letters must still be read
+    figure = Figure(figsize=(width, min(1.8 + 0.3 * size, width)), layout="constrained")
     axes = figure.subplots()
     count = np.asarray([list(row.values()) for row in quiz.confusion.values()])
     share = count / np.maximum(count.sum(axis=1, keepdims=True), 1)

@@ -88,6 +88,18 @@ def test_what_cannot_be_corrected_is_refused_and_nothing_is_written(folder, run,
     assert not list(folder.glob("no.h5*"))
 
 
+def test_the_advice_names_the_model_that_was_diagnosed(folder):
+    """Copied, it ended with: model.h5 does not exist."""
+    for words in (
+        ("identify", "other.h5", "--levels", 12, "-o", "mine.h5"),
+        ("diagnose", "other.h5", "--model", "mine.h5", "--quick", "-o", "quick.h5"),
+    ):
+        assert pulsetrainer(folder, *words).code == 0
+    done = pulsetrainer(folder, "correct", "other.h5", "--diagnosis", "quick.h5", "-o", "no.h5", "--json")
+    assert done.code == 3
+    assert "--model mine.h5" in done.json["error"]["hint"]
+
+
 def test_extend_points_at_correct(folder):
     """Where only the measurement is at fault."""
     model = pt.identify(pt.load(folder / "other.h5"), levels=12)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy import signal
 
+from pulsetrainer.artefacts import Run
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.outliers import _beyond_the_tail
 from pulsetrainer.diagnosis.design import bins_of
 from pulsetrainer.diagnosis.noise import Noise, burstiness, noise_in, quiet_square
+from pulsetrainer.steps.diagnose import diagnose
+from pulsetrainer.steps.identify import identify
 
 COUNT = 8000
 LEVEL = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(COUNT) / 500)
@@ -155,3 +162,18 @@ def test_what_comes_and_goes_has_heavier_tails(slow):
     on = np.searchsorted(np.sort(rng.uniform(0, COUNT, 32)), t) % 4 == 1
     there = on * (np.sin(0.3 * t) if slow == "bursts" else 1.0)
     assert burstiness(3.0 * there + 0.3 * rng.standard_normal(COUNT), _bins(), LEVEL) > 5.0
+
+
+def test_noise_is_no_more_than_all_that_is_left():
+    """Steps of a device's own relays are slow: of single samples, such noise was larger than the error."""
+    plane = Plane.uniform(0.0, 1.0, 39)
+    device = Preisach(plane, np.full(plane.n_q, 1.0 / plane.areas.sum()), reading="relay")
+    loops = [corner for k in range(8) for corner in (1 - 0.053 * k, 0.053 * k)]
+    corners = [0, 1, 0, *loops, 0, 0.5, 0.13, 0.8, 0.27, 1, 0]
+    u = np.concatenate(
+        [np.linspace(a, b, max(2, int(abs(b - a) * 100)), endpoint=False) for a, b in pairwise(corners)]
+    )
+    noise = 0.0025 * np.random.default_rng(2).standard_normal(u.size)
+    run = Run(0.5 * np.arange(u.size), u, device(u) + noise)
+    found = diagnose(run, identify(run), quick=True)
+    assert 0.2 < found.noise_percent <= found.rms_percent

@@ -63,6 +63,25 @@ def test_a_parameter_is_told_with_unit_interval_and_meaning():
     assert narrow["f"] == "7 Hz (95 %: ± 0.0003)"  # "7 to 7" told nothing
 
 
+def test_what_was_measured_comes_before_what_was_chosen():
+    """Amplitude and time constant of a creep, then how many time constants it has."""
+    chosen, tau = Parameter("middle", 1.0, "1", 1.0, 1.0), Parameter("tau", 1.5, "s", 1.25, 1.75)
+    assert list(parameters([chosen, Parameter("amplitude", 0.1, "1", 0.05, 0.15), tau])) == [
+        *("amplitude", "tau", "middle")
+    ]
+
+
+def test_a_cause_that_could_be_instead_has_no_share_of_its_own():
+    """It explains nothing beside the cause that was found: 0.1 % stood beside "could equally be"."""
+    found = replace(
+        _cause(0.001, found=True), cause="delay", confounded_with=("creep",), explains_percent=90.0
+    )
+    other = replace(_cause(0.5), explains_percent=0.1)
+    told = replace(store_examples.diagnosis(), causes=(found, other), static_percent=2.0, floor_percent=1.0)
+    assert explains(found, told) == 90.0
+    assert math.isnan(explains(other, told))
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_learned_curve_is_told_by_its_ends_and_not_value_by_value(count):
     """Its values are of the output, zero at the first knot; several time constants are counted."""

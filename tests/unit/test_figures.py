@@ -414,6 +414,7 @@ def test_learners_are_points_with_their_intervals():
     drawn = [segment.tolist() for segment in axes.collections[0].get_segments()]
     assert drawn == [[[0.0, 20.0], [0.0, 80.0]], [[1.0, 21.0], [1.0, 81.0]]]
     assert axes.get_ylim()[1] > 81.0
+    assert not axes.lines[0].get_clip_on()  # a point at 0 % was cut in half
 
 
 def test_each_line_of_a_comparison_looks_unlike_the_others():
@@ -515,3 +516,13 @@ def test_a_diagnosis_without_time_draws_none():
     assert [shown.name for shown in diagnosis_figures.profiles(timeless)] == ["level"]
     said = [diagnosis_figures.course(found).axes[1].get_xlabel() for found in (timed, timeless)]
     assert said == ["time [s]", "sample number"]
+
+
+def test_the_rounding_of_a_rest_is_no_speed():
+    """A table of four decimals rests at 1e-15 ranges a second: fifteen labels stood on one another."""
+    for slowest, scale in ((0.2, "linear"), (0.002, "symlog")):
+        at = np.array([1e-15, slowest, 0.5, 1.0])
+        group = Profile("rate", "1/s", at, at, at)
+        axes = diagnosis_figures.profile(group, "voltage", extended=False).axes[0]
+        assert axes.get_xscale() == scale
+        assert np.count_nonzero(axes.get_xticks() > 0) < 8
