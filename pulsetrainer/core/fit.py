@@ -17,11 +17,10 @@ import numpy as np
 from pulsetrainer.core.dual import Dual, exchanged
 from pulsetrainer.core.dual_fit import in_output
 from pulsetrainer.core.edges import plane_for
-from pulsetrainer.core.forms import BETTER, Form, Signals, Static, asked_forms
+from pulsetrainer.core.forms import BETTER, Form, Kept, Signals, Static, asked_forms, records_of
 from pulsetrainer.core.identification import Identified, Method, Smoothing, identify, offsets_between
-from pulsetrainer.core.initial_state import record_of
 from pulsetrainer.core.metrics import root_mean_square
-from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, Reading
+from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.core.record import Record
 
 CROWDED_MISFIT = 0.02  # of the span, rms: above it, what looks steep is nothing that the operator can follow
@@ -84,7 +83,7 @@ def fit(
     method: Method = "joint",
     smoothing: Smoothing = "auto",
     form: Form | Literal["auto"] = "direct",
-    kept: Sequence[BoolArray] | None = None,
+    kept: Kept = None,
 ) -> Fitted:
     """Fit one operator with ``n_h`` levels on [low, high] to measured inputs and outputs, pairs of (n,).
 
@@ -100,19 +99,19 @@ def fit(
     ArgumentError, ConvergenceError
         As ``identification.identify``; or relays, or the alternating method, with another form than direct.
     """
-    forms = asked_forms(form, signals, low, high, plain=reading == "continuous" and method == "joint")
+    forms = asked_forms(form, signals, low, high, kept, plain=reading == "continuous" and method == "joint")
     if "direct" not in forms:
         fits = [
             (_dual if one == "dual" else _signed)(signals, low, high, n_h, smoothing, kept) for one in forms
         ]
         return fits[-1] if fits[-1].misfit < BETTER * fits[0].misfit else fits[0]
-    records = _records(signals, low, high, kept)
+    records = records_of(signals, low, high, kept)
     even = Plane.uniform(low, high, n_h)
     plane = even if reading == "relay" else plane_for(records, low, high, n_h)
     offsets = offsets_between(records, plane, reading)
     if np.any(offsets):
         moved = [(u, y - shift) for (u, y), shift in zip(signals, offsets, strict=True)]
-        records = _records(moved, low, high, kept)
+        records = records_of(moved, low, high, kept)
 
     def on(levels: Plane) -> Fitted:
         found = identify(records, levels, reading=reading, method=method, smoothing=smoothing)
@@ -124,24 +123,16 @@ def fit(
     return fitted
 
 
-def _records(signals: Signals, low: float, high: float, kept: Sequence[BoolArray] | None) -> list[Record]:
-    """Records of the signals, of which only the samples that are kept count."""
-    records = [record_of(u, y, low, high) for u, y in signals]
-    if kept is None:
-        return records
-    return [replace(r, sample_weight=r.sample_weight * k) for r, k in zip(records, kept, strict=True)]
-
-
 def _signed(
     signals: Signals,
     low: float,
     high: float,
     n_h: int,
     smoothing: Smoothing,
-    kept: Sequence[BoolArray] | None,
+    kept: Kept,
 ) -> Fitted:
     """Fit weights of either sign."""
-    records = _records(signals, low, high, kept)
+    records = records_of(signals, low, high, kept)
     found = identify(records, plane_for(records, low, high, n_h), smoothing=smoothing, signed=True)
     return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
 
@@ -152,13 +143,13 @@ def _dual(
     high: float,
     n_h: int,
     smoothing: Smoothing,
-    kept: Sequence[BoolArray] | None,
+    kept: Kept,
 ) -> Fitted:
     """Fit the operator from output to input: first to the input, then where the noise is."""
     swapped = exchanged(signals)
     bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
     found = fit(swapped, bottom, top, n_h, smoothing=smoothing, kept=kept).identified
-    records = tuple(_records(signals, low, high, kept))
+    records = tuple(records_of(signals, low, high, kept))
     if not found.stiffness:  # else it describes the record poorly, in whatever variable
         found = replace(found, operator=in_output(found.operator, records, found.smoothing))
     return Fitted(found, records, np.zeros(len(records)), "dual")

@@ -14,7 +14,7 @@ where it leaves far less, and where it is not a lag in time that it imitates.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 from typing import Literal
@@ -31,7 +31,7 @@ from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.operator import Preisach
-from pulsetrainer.core.plane import FloatArray, IntArray, Plane
+from pulsetrainer.core.plane import BoolArray, FloatArray, IntArray, Plane
 from pulsetrainer.core.record import Record, levelled
 from pulsetrainer.core.smoothing import FOLDS, blocks, smoothed
 from pulsetrainer.errors import ArgumentError
@@ -40,6 +40,7 @@ Form = Literal["direct", "dual", "signed"]
 FORMS: tuple[Form, ...] = ("direct", "dual", "signed")
 Signals = Sequence[tuple[FloatArray, FloatArray]]
 Static = Preisach | Dual
+Kept = Sequence[BoolArray] | None
 
 # Above this multiple of what looks like white noise in its residual, a fit leaves more than noise.
 STRUCTURED = 1.3
@@ -66,7 +67,13 @@ class Tried:
 
 
 def asked_forms(
-    form: Form | Literal["auto"], signals: Signals, low: float, high: float, *, plain: bool
+    form: Form | Literal["auto"],
+    signals: Signals,
+    low: float,
+    high: float,
+    kept: Kept = None,
+    *,
+    plain: bool,
 ) -> tuple[Form, ...]:
     """Return the form to fit: the one asked for, or with "auto" the one that the records ask for.
 
@@ -75,6 +82,8 @@ def asked_forms(
 
     Parameters
     ----------
+    kept
+        For each record which samples (n,) count. None: all.
     plain
         Weights are fitted jointly in the continuous reading; else there is only the direct form.
 
@@ -87,7 +96,7 @@ def asked_forms(
         raise ArgumentError(f"form must be auto, {', '.join(FORMS)}, got {form!r}", hint="use auto")
     if form == "auto":
         enough = sum(u.size for u, _ in signals) >= _FEWEST and any(np.ptp(y) > 0 for _, y in signals)
-        return try_all(signals, low, high).to_fit if plain and enough else ("direct",)
+        return try_all(signals, low, high, kept).to_fit if plain and enough else ("direct",)
     if form != "direct" and not plain:
         raise ArgumentError(
             f"the {form} form is fitted jointly, in the continuous reading",
@@ -102,12 +111,12 @@ def leaves_more_than_noise(residuals: Sequence[FloatArray], span: float) -> bool
     return left > max(SMALLEST * span, STRUCTURED * max(white(r) for r in residuals))
 
 
-def try_all(signals: Signals, low: float, high: float) -> Tried:
+def try_all(signals: Signals, low: float, high: float, kept: Kept = None) -> Tried:
     """Fit every form to blocks of the records, pairs of input and output (n,), and judge it by the others.
 
-    ConvergenceError where a fit did not settle.
+    Samples that are not ``kept`` do not count, as in a fit. ConvergenceError where a fit did not settle.
     """
-    records = [record_of(u, y, low, high) for u, y in signals]
+    records = records_of(signals, low, high, kept)
     folds = [np.where(r.counts, blocks(r.input, low, high) % FOLDS, -1) for r in records]
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
     if len({number for fold in folds for number in np.unique(fold).tolist()} - {-1}) < 2:
@@ -120,13 +129,21 @@ def try_all(signals: Signals, low: float, high: float) -> Tried:
         return Tried(left, "direct", ("direct",))
     if _is_late(records, folds, plane):
         return Tried(left, "direct", ("direct",))
-    left = {"direct": direct.best(), "signed": signed.best(), "dual": _held_out_dual(signals, folds)}
+    left = {"direct": direct.best(), "signed": signed.best(), "dual": _held_out_dual(signals, folds, kept)}
     form: Form = "direct"
     for other in ("dual", "signed"):
         if left[other] < min(BETTER * left[form], DESCRIBES * span):
             form = other
     in_doubt = form == "signed" and left["dual"] < DESCRIBES * span
     return Tried(left, form, ("dual", "signed") if in_doubt else (form,))
+
+
+def records_of(signals: Signals, low: float, high: float, kept: Kept = None) -> list[Record]:
+    """Return signals, pairs of input and output (n,), as records of which only what is kept counts."""
+    records = [record_of(u, y, low, high) for u, y in signals]
+    if kept is None:
+        return records
+    return [replace(r, sample_weight=r.sample_weight * k) for r, k in zip(records, kept, strict=True)]
 
 
 def _is_late(records: Sequence[Record], folds: Sequence[IntArray], plane: Plane) -> bool:
@@ -183,11 +200,11 @@ def _each_out(
     return {k: (part, whole - part) for k, part in held.items()}
 
 
-def _held_out_dual(signals: Signals, folds: Sequence[IntArray]) -> float:
+def _held_out_dual(signals: Signals, folds: Sequence[IntArray], kept: Kept) -> float:
     """Rms error on held-out blocks of the form with the roles exchanged, in the output's unit."""
     swapped = exchanged(signals)
     low, high = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
-    records = [record_of(y, u, low, high) for y, u in swapped]
+    records = records_of(swapped, low, high, kept)
     plane = thinned(plane_for(records, low, high, 2 * _LEVELS), _LEVELS)
     sign = polarity_of(records, plane)
     turned, zero = levelled(records, sign)

@@ -77,6 +77,17 @@ def test_a_direct_device_that_is_late_is_still_called_direct(count):
     assert found == ["direct"] * count
 
 
+def test_what_is_left_out_does_not_decide_the_form():
+    """Outputs filled in, where they were clipped: weights of either sign follow them, and were taken for it."""
+    _, u, y, _, _ = measured(devices.DIRECT[0], 1000)
+    rail = y.min() + 0.6 * np.ptp(y)
+    lost = y > rail
+    run = replace(run_of(u, np.where(lost, rail, y)), masked=lost)
+    assert pt.identify(run, levels=24).form == "direct"
+    assert try_all([(u, run.output)], u.min(), u.max()).form == "signed"
+    assert try_all([(u, run.output)], u.min(), u.max(), [~lost]).form == "direct"
+
+
 @pytest.mark.slow
 def test_none_of_200_direct_devices_is_called_anything_else():
     """The same, 200 of them."""
