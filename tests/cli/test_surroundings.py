@@ -77,7 +77,9 @@ def test_a_terminal_of_twenty_columns(there):
 def test_a_full_disk_behind_the_results_is_no_bug():
     """They are lost; what to mend is said."""
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run([*PROGRAM, "ports"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(
+            [*PROGRAM, "ports"], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
     assert done.returncode == 3, done.stderr
     assert "bug" not in done.stderr
     assert "try: " in done.stderr
