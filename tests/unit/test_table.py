@@ -774,7 +774,7 @@ def test_rows_that_count_are_no_time_where_some_are_left_out(table):
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.sampled_from(["row", "row", "row", "bad", "", "# remark"]), max_size=40))
 def test_rows_that_stay_know_their_lines(tmp_path_factory, kinds):
-    """Whatever lies between them: blank lines, remarks, and rows that were left out. Each row holds its line."""
+    """Whatever lies between them: blank lines, remarks, rows that were left out. A row holds its line."""
     text = {"row": "{},1", "bad": "{},"}
     lines = [text.get(kind, kind).format(number) for number, kind in enumerate(["row", "row", *kinds], 2)]
     path = tmp_path_factory.getbasetemp() / "lines.csv"
