@@ -49,7 +49,7 @@ def test_a_healthy_force_is_never_doubted(seed):
 
 
 def test_the_branches_are_those_of_a_major_loop():
-    """Of the bench as built: its lowest and highest forces from each current on are theirs, within a fifth or 0.9 N."""
+    """The lowest and highest force of the bench as built from each current on: within a fifth, or 0.9 N."""
     current = excitations.through([0.0, 1.5, 0.0], 1.0, 1000.0)
     with open_device("bench:") as device:
         force = device.play(current, 1000).force_N
