@@ -16,6 +16,7 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import floor, intervals, question, repeats, residual, screening, velocity, wording
 from pulsetrainer.diagnosis.causes import library, stick_slip
 from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.dependence import Bank
 from pulsetrainer.diagnosis.design import bins_of
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term, chain
@@ -248,6 +249,24 @@ def test_a_chain_is_run_the_same_whatever_was_run_before():
         terms[2] = Term(CAUSE["creep"], (terms[2].values[0] * 1.1, 0.7))
         fitted.simulator(terms)
     np.testing.assert_array_equal(fitted.simulator(chains[1]), kept[1])
+
+
+def test_a_state_is_of_the_output_at_its_place_in_the_chain():
+    """Causes before it have been at work on that output, those after it have not."""
+    u = _loops()
+    problem = problem_for([Record(u, 3.0 * u, dt_s=0.01)], 0.0, 1.5)
+    terms = tuple(
+        Term(CAUSE[name], values) for name, values in (("output-lag", (0.03,)), ("creep", (0.1, 0.7)))
+    )
+    fitted = weights_for(problem, terms, None)
+    (inner,), frame = fitted.simulator.inner(fitted.terms), fitted.simulator.frames[0]
+    orders = [term.cause.order for term in terms]
+    for order, before in ((min(orders), 0), (max(orders), 1), (max(orders) + 1, 2)):
+        expected = inner
+        for term in sorted(terms, key=lambda one: one.cause.order)[:before]:
+            expected = term.cause.on_output(expected, term.values, frame)
+        (found,) = Bank(fitted, HeldOut(problem), order).outputs
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_a_refit_far_from_its_goal_is_given_up():
