@@ -50,6 +50,8 @@ def test_what_is_left_on_a_foreign_plant_is_noise(plant, pulse):
     noise = refined.passes[refined.kept - 1].noise_percent
     print(plant, pulse, mean, noise)
     assert len(mean) <= 5
+    # of 0.04 N, whose mean size is sqrt(2 / pi) of that
+    assert noise == pytest.approx(100.0 * 0.04 * np.sqrt(2.0 / np.pi) / refined.full_force, rel=0.05)
     assert min(mean) == mean[refined.kept - 1] <= 1.2 * noise
     assert all(after <= before + noise for before, after in pairwise(mean))
     truth = PLANTS[plant](refined.compensated)[refined.scored]
