@@ -139,6 +139,16 @@ def test_keys_before_the_first_beat(keys, pulse, bpm, amplitude):
     assert (play.pulse, play.bpm, play.amplitude) == (pulse, bpm, pytest.approx(amplitude))
 
 
+def test_a_falling_device_reaches_as_far_as_its_mirror_image():
+    """Pressed by pulses that are turned over; also where the input begins elsewhere than at zero."""
+    rising = pt.load(KEPT / "model.h5")
+    there = reach_of(rising, PULSES[:2], (75.0, 140.0))
+    for away in (0.0, 5.0):
+        falling = replace(rising, polarity=-1, edges=rising.edges + away)
+        here = reach_of(falling, PULSES[:2], (75.0, 140.0))
+        assert (here.low, here.high) == pytest.approx((there.low, there.high), abs=1e-3)
+
+
 def test_a_key_is_in_the_force_of_the_next_beat(model):
     """Whatever is pressed while a beat is given out: the beat after it has it."""
     steering = Steering(Programme(NAMES, rate=75.0, beats=12), [p.own_bpm for p in PULSES])
