@@ -13,7 +13,17 @@ from scipy import sparse, stats
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import floor, intervals, question, repeats, residual, screening, velocity, wording
+from pulsetrainer.diagnosis import (
+    experiment,
+    floor,
+    intervals,
+    question,
+    repeats,
+    residual,
+    screening,
+    velocity,
+    wording,
+)
 from pulsetrainer.diagnosis.causes import library, stick_slip
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.dependence import Bank
@@ -831,6 +841,27 @@ def test_the_ends_of_the_output_are_means_near_those_of_the_input(low, high):
     (frame,) = problem_for([record], low, high).frames
     expected = y[counts & (u <= bottom + near)].mean(), y[counts & (u >= top - near)].mean()
     assert frame.ends == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "way", "seconds", "rest", "fastest"),
+    [
+        ("nested loops", 4 * 5.6, 5.6 / 0.5 + 5.6 / 4.0 + 5.6 / 1.5 + 5.6 / 8.0, 0.0, 8.0),
+        ("steps and holds", 2.6, 15.0 + 2.6 / 8.0, 15.0, 8.0),
+        ("equal minor loops", 16.0, 16.0, 0.0, 1.0),
+        ("equal cycles", 2 * 24.4, 24.4 / 1.5 + 24.4 / 4.0, 0.0, 4.0),
+        ("heating", 8.0, 68.0, 60.0, 1.0),
+    ],
+)
+def test_an_experiment_is_what_it_says(name, way, seconds, rest, fastest):
+    """Begun and ended at the bottom: how far it goes, how long, how long at rest, how fast at most."""
+    u, steps = experiment._experiments()[name], np.diff(experiment._experiments()[name])
+    assert (u[0], u[-1], u.min(), u.max() <= 1.0) == (0.0, 0.0, 0.0, True)
+    assert np.abs(steps).sum() == pytest.approx(way)
+    assert experiment.length_s(name) == pytest.approx(seconds, abs=0.05)
+    assert np.count_nonzero(steps == 0) / LIMITS.experiment_Hz == pytest.approx(rest, abs=0.05)
+    steady = np.abs(steps[1:][np.isclose(np.abs(steps[1:]), np.abs(steps[:-1]))])
+    assert steady.max() * LIMITS.experiment_Hz == pytest.approx(fastest)
 
 
 def test_where_an_error_is_largest_is_told_with_its_quantity():
