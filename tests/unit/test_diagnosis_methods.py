@@ -588,17 +588,23 @@ def test_another_rate_is_no_gap_but_missing_samples_are():
 
 
 def test_a_fast_record_is_averaged_down():
-    """To a thousand samples a second of its own, but not below 20 000; a slower record is left alone."""
+    """To a thousand samples a second of its own, but not below 20 000; a slower record is left alone.
+
+    An average counts where all of its samples do.
+    """
     scale = Scale(second=2.0)
 
     def shrunk(count: int, dt: float) -> Record:
-        return scale.shrunk(Record(np.arange(float(count)), np.arange(float(count)), dt_s=dt))
+        counts = np.arange(count) != 1007
+        return scale.shrunk(Record(np.arange(float(count)), np.arange(float(count)), 1.0 * counts, dt_s=dt))
 
     assert shrunk(200_000, 4e-4).dt_s == pytest.approx(1e-3)
     assert shrunk(20_000, 4e-4).dt_s == pytest.approx(2e-4)
     fast = shrunk(200_000, 4e-4)
     assert fast.input.size == 40_000
     assert fast.input[100] == 502.0
+    assert np.flatnonzero(fast.sample_weight != 1.0).tolist() == [201]
+    assert fast.sample_weight[201] == 0.0
 
 
 @pytest.mark.parametrize(("samples", "fits"), [(100, True), (99, False)])
