@@ -63,7 +63,7 @@ class Beats:
         """Return the mean of all beats, each stretched to the median length."""
         singles = [self.single(k + 1) for k in range(self.count)]
         period = float(np.median(self.periods_s))
-        count = max(round(period / float(np.median(np.diff(self.record.time_s)))), 4)
+        count = round(period / float(np.median(np.diff(self.record.time_s))))
         phase = np.arange(count) / count
         total = np.zeros(count)
         for beat, length in zip(singles, self.periods_s.tolist(), strict=True):

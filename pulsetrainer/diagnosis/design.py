@@ -57,7 +57,8 @@ class Bins:
         """For each record its samples with weight (None: all), where a bin begins in them, and its bins."""
         found = []
         for number in self.number:
-            inside = None if np.all(number >= 0) else np.flatnonzero(number >= 0)
+            counts = number >= 0
+            inside = None if np.all(counts) else np.flatnonzero(counts)
             used = number if inside is None else number[inside]
             first = np.flatnonzero(np.diff(used, prepend=-1))
             found.append((inside, first, used[first]))

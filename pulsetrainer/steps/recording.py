@@ -175,7 +175,7 @@ def record(
     tally: Tally,
     *,
     at: int = 0,
-    condition_first: bool = True,
+    condition_first: bool,
     progress: Progress = silent,
     watch: Watch | None = None,
 ) -> Ending:

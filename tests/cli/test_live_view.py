@@ -16,6 +16,7 @@ import pytest
 from program import PROGRAM, pulsetrainer
 from pulsetrainer import load
 from pulsetrainer.cli.loop_view import LoopView
+from pulsetrainer.report.characters import Dots
 
 pty = pytest.importorskip("pty")
 DRIVE = Path(__file__).parents[1] / "data/files-0.1/drive.h5"
@@ -89,3 +90,18 @@ def test_every_sample_is_a_dot_where_it_belongs():
     loop = [line[1:] for line in view.text().plain.splitlines() if line.startswith("│")]
     dots = {(row, column) for row, line in enumerate(loop) for column, c in enumerate(line) if c != "\u2800"}
     assert dots == {(len(loop) - 1, 0), (0, len(loop[0]) - 1)}
+
+
+@pytest.mark.parametrize(
+    ("across", "up", "shown"),
+    [(0.0, 1.0, "⠁⠀⠀⠀"), (1.0, 0.0, "⠀⠀⠀⢀"), (0.5, 0.6, "⠠⠀⠀⠀"), (7.0, 7.0, "⠀⠈⠀⠀")],
+)
+def test_a_point_is_a_dot(across, up, shown):
+    """The one that it falls on, of four by eight; beyond the edge it is at the edge; what was set stays."""
+    dots = Dots(2, 2)
+    for _ in range(2):
+        dots.add(np.array([across]), np.array([up]))
+        assert "".join(dots.lines()) == shown
+    even = np.linspace(0.0, 1.0, 50)
+    dots.add(np.tile(even, 50), np.repeat(even, 50))
+    assert dots.lines() == ["⣿⣿", "⣿⣿"]

@@ -9,6 +9,7 @@ import pytest
 
 import pulsetrainer as pt
 from pulsetrainer.device.limits import Limits
+from pulsetrainer.files.tuning import write_tuned
 from wording import refusal
 
 KEYS = {"resistance_ohm", "inductance_H", "gains", "tracking_percent", "settle_ms", "overshoot_percent"}
@@ -157,3 +158,16 @@ def test_what_went_wrong_writes_nothing(run, tmp_path, device, said):
     assert (done.code, done.json["error"]["kind"]) == (4, "device")
     assert said in done.json["error"]["message"]
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "before", ["", "\n# mine\n[identify]\n\nlevels = 12  # few\n", "[tuned.B]\nohm = 2.0\n"]
+)
+@pytest.mark.parametrize("blank", ["", "\n\n"])
+def test_an_entry_takes_the_place_of_the_one_before_it(tmp_path, before, blank):
+    """One blank line above it, however many there were; everything else stays, to the letter."""
+    path = tmp_path / "own.toml"
+    path.write_text(before + blank)
+    for ohm in (5.0, 6.25):
+        write_tuned(path, "A", {"ohm": ohm, "henry": 0.02}, overwrite=True)
+        assert path.read_text() == before + "\n" * bool(before) + f'[tuned."A"]\nohm = {ohm}\nhenry = 0.02\n'

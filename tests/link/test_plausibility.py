@@ -10,9 +10,19 @@ import pytest
 from healthy_plays import SIGNALS, WAVEFORMS, beats, signal, stopped
 
 from pulsetrainer import load
+from pulsetrainer.core import excitations
 from pulsetrainer.device.limits import Limits
 from pulsetrainer.device.opening import open_device
-from pulsetrainer.device.plausibility import ForceWatch, _swings, judge_against, judge_force, judge_repeat
+from pulsetrainer.device.plausibility import (
+    _CURRENT_A,
+    _FALLING_N,
+    _RISING_N,
+    ForceWatch,
+    _swings,
+    judge_against,
+    judge_force,
+    judge_repeat,
+)
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.steps.play import DRIVES, play
 
@@ -36,6 +46,16 @@ def test_a_healthy_force_is_never_doubted(seed):
         with open_device(f"bench:?seed={seed}&noise={noise}") as device:
             trace = device.play(reference, 1000)
         assert trace.complete, trace.fault
+
+
+def test_the_branches_are_those_of_a_major_loop():
+    """The lowest and highest force of the bench as built from each current on: within a fifth, or 0.9 N."""
+    current = excitations.through([0.0, 1.5, 0.0], 1.0, 1000.0)
+    with open_device("bench:") as device:
+        force = device.play(current, 1000).force_N
+    for at, low, high in zip(_CURRENT_A, _RISING_N, _FALLING_N, strict=True):
+        assert force[current >= at].min() == pytest.approx(low, rel=0.2, abs=0.9)
+        assert force[current <= at].max() == pytest.approx(high, rel=0.2, abs=0.9)
 
 
 @pytest.mark.slow

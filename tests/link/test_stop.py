@@ -76,6 +76,7 @@ def test_an_answer_that_never_comes_ends_in_stop():
         silent = script.started_s + 0.5
         assert any(at > silent for at in script.when(m.Stop))
     assert "did not answer" in trace.fault
+    assert (trace.samples, trace.dropped_samples) == (0, 0)
 
 
 def test_a_refused_arm_is_no_complete_play():

@@ -157,3 +157,13 @@ def test_a_feed_lets_go_of_what_was_taken():
         assert feed.piece(100 * k, 61) == np.full(61, k, dtype="<i2").tobytes()
     assert feed.size == 100_000
     assert len(feed._held) < 1000
+
+
+@pytest.mark.parametrize(("produced", "dropped"), [(12, 12), (0, 0)])
+def test_what_the_device_made_and_nobody_received_is_lost(produced, dropped):
+    """By the device's own count, where it can be asked: here no telemetry came at all."""
+    script = ScriptedDevice()
+    script.status = {"produced": produced}
+    with script.open() as device:
+        trace = device.play(np.zeros(120), 1000)
+    assert (trace.samples, trace.dropped_samples) == (0, dropped)

@@ -54,7 +54,8 @@ PACKAGES = {  # the tests that answer for a package
         *(f"{UNIT}{one}.py" for one in ("steps_transfer", "temperature")),
     ),
     "diagnosis": (
-        *(f"{UNIT}{one}.py" for one in ("congruency", "conductor", "scale", "sticking", "unlisted")),
+        *(f"{UNIT}{one}*.py" for one in ("coarse_input", "congruency", "conductor", "falling", "heat")),
+        *(f"{UNIT}{one}*.py" for one in ("pinched", "scale", "slow_noise", "sticking", "unlisted")),
         f"{UNIT}diagnosis*.py",
         f"{UNIT}steps_correct.py",
         "tests/law/test_piecewise.py",
@@ -63,7 +64,7 @@ PACKAGES = {  # the tests that answer for a package
         "tests/api",
     ),
     "files": (
-        *(f"{UNIT}{one}*.py" for one in ("file", "provenance", "recorder", "series", "session_recorder")),
+        *(f"{UNIT}{one}*.py" for one in ("drawn", "file", "provenance", "recorder", "series", "session")),
         *(f"{UNIT}{one}*.py" for one in ("short_records", "signal", "store", "table", "units", "waveform")),
         *(f"tests/cli/test_{one}*.py" for one in ("foreign", "import", "long_capture", "recorded_pulse")),
         *(f"tests/cli/test_{one}*.py" for one in ("session", "settings", "tune", "units_of", "untidy")),
@@ -71,7 +72,7 @@ PACKAGES = {  # the tests that answer for a package
     "device": ("tests/link", f"{UNIT}coil.py"),
     "simulation": ("tests/link", "tests/blind/test_p*.py"),
     "report": (
-        *(f"{UNIT}{one}*.py" for one in ("core_wild", "diagnosis_text", "figures", "html")),
+        *(f"{UNIT}{one}*.py" for one in ("core_wild", "diagnosis_text", "figures", "html", "names")),
         "tests/api",
         "tests/cli",
     ),
@@ -81,7 +82,8 @@ PACKAGES = {  # the tests that answer for a package
         "tests/api",
     ),
     "steps": (
-        *(f"{UNIT}{one}*.py" for one in ("coil", "conductor", "core_wild", "quiz", "short_records", "steps")),
+        *(f"{UNIT}{one}*.py" for one in ("coil", "conductor", "core_wild", "extend_notes", "first_stroke")),
+        *(f"{UNIT}{one}*.py" for one in ("quiz", "short_records", "steps", "unseen_turns")),
         *(f"tests/link/test_{one}.py" for one in ("dry_run", "heat", "plausibility", "true", "tune")),
         "tests/api",
         "tests/cli",

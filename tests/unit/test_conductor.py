@@ -139,6 +139,16 @@ def test_keys_before_the_first_beat(keys, pulse, bpm, amplitude):
     assert (play.pulse, play.bpm, play.amplitude) == (pulse, bpm, pytest.approx(amplitude))
 
 
+def test_a_falling_device_reaches_as_far_as_its_mirror_image():
+    """Pressed by pulses that are turned over; also where the input begins elsewhere than at zero."""
+    rising = pt.load(KEPT / "model.h5")
+    there = reach_of(rising, PULSES[:2], (75.0, 140.0))
+    for away in (0.0, 5.0):
+        falling = replace(rising, polarity=-1, edges=rising.edges + away)
+        here = reach_of(falling, PULSES[:2], (75.0, 140.0))
+        assert (here.low, here.high) == pytest.approx((there.low, there.high), abs=1e-3)
+
+
 def test_a_key_is_in_the_force_of_the_next_beat(model):
     """Whatever is pressed while a beat is given out: the beat after it has it."""
     steering = Steering(Programme(NAMES, rate=75.0, beats=12), [p.own_bpm for p in PULSES])
@@ -254,6 +264,40 @@ def test_the_ledger_finds_what_was_done_to_a_force():
     assert figures["mean_abs_error_percent"] == pytest.approx(100 * error.mean() / full, rel=1e-9)
     assert figures["max_abs_error_percent"] == pytest.approx(100 * error.max() / full, rel=1e-9)
     assert figures["augmentation_index_error_percent"] < 3.0
+
+
+def test_figures_of_a_session_are_what_they_are_called():
+    """Beats that are weak and late by turns; after a rest all are later, which is no change of the rate."""
+
+    def decide(number, time_s):
+        return None if time_s > 12.0 else Rest() if 5.0 < time_s < 6.5 else Play(0)
+
+    _, given, _ = _conducted(pt.load(KEPT / "model.h5"), decide)
+    ledger = Ledger(NAMES[:1])
+    target = np.concatenate([g.target for g in given])
+    force, time, rested = target.copy(), np.arange(target.size), False
+    for number, piece in enumerate(given):
+        ledger.give(piece)
+        rested = rested or (piece.beat is None and piece.first > 4.0 * RATE_HZ)
+        own = slice(piece.first, piece.first + piece.input.size)
+        late = 20.0 * rested + 3.0 * (number % 2)
+        force[own] = (1.0 - 0.02 * (number % 3)) * np.interp(time[own] - late, time, target)
+    ledger.measure(time, force)
+    figures, beats = ledger.figures(), ledger.beats("N")
+    asked = np.concatenate([target[g.first : g.first + g.input.size] for g in given if g.beat])
+    error = np.concatenate([(force - target)[g.first : g.first + g.input.size] for g in given if g.beat])
+    assert figures["nrmse"] == pytest.approx(np.sqrt(np.mean(error**2)) / np.ptp(asked))
+    assert (ledger.full_force, ledger.mean_force) == pytest.approx((asked.max(), asked.mean()))
+    first = np.array([g.beat.start_s for g in given if g.beat])
+    after = int(np.argmax(np.diff(first))) + 1  # the rest
+    assert 3 < after < beats.start_s.size - 3
+    gap = beats.late[after:].mean() - beats.late[:after].mean()
+    assert gap == pytest.approx(0.02, abs=0.003)
+    runs = slice(after), slice(after, None)
+    rate = np.concatenate([1.0 / (np.diff(first[k]) + np.diff(beats.late[k])) for k in runs])
+    assert figures["rate_cv_percent"] == pytest.approx(100.0 * np.std(rate) / np.mean(rate), rel=0.02)
+    assert figures["amplitude_cv_percent"] == pytest.approx(100.0 * np.std(beats.gain) / beats.gain.mean())
+    assert figures["beat_timing_max_ms"] == pytest.approx(1e3 * np.abs(beats.late).max())
 
 
 def test_lost_samples_are_left_out():

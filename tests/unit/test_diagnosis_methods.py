@@ -13,9 +13,20 @@ from scipy import sparse, stats
 
 from pulsetrainer.artefacts import Model, Run
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis import floor, intervals, question, repeats, residual, screening, velocity, wording
+from pulsetrainer.diagnosis import (
+    experiment,
+    floor,
+    intervals,
+    question,
+    repeats,
+    residual,
+    screening,
+    velocity,
+    wording,
+)
 from pulsetrainer.diagnosis.causes import library, stick_slip
 from pulsetrainer.diagnosis.causes.base import Frame
+from pulsetrainer.diagnosis.dependence import Bank
 from pulsetrainer.diagnosis.design import bins_of
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term, chain
@@ -248,6 +259,24 @@ def test_a_chain_is_run_the_same_whatever_was_run_before():
         terms[2] = Term(CAUSE["creep"], (terms[2].values[0] * 1.1, 0.7))
         fitted.simulator(terms)
     np.testing.assert_array_equal(fitted.simulator(chains[1]), kept[1])
+
+
+def test_a_state_is_of_the_output_at_its_place_in_the_chain():
+    """Causes before it have been at work on that output, those after it have not."""
+    u = _loops()
+    problem = problem_for([Record(u, 3.0 * u, dt_s=0.01)], 0.0, 1.5)
+    terms = tuple(
+        Term(CAUSE[name], values) for name, values in (("output-lag", (0.03,)), ("creep", (0.1, 0.7)))
+    )
+    fitted = weights_for(problem, terms, None)
+    (inner,), frame = fitted.simulator.inner(fitted.terms), fitted.simulator.frames[0]
+    orders = [term.cause.order for term in terms]
+    for order, before in ((min(orders), 0), (max(orders), 1), (max(orders) + 1, 2)):
+        expected = inner
+        for term in sorted(terms, key=lambda one: one.cause.order)[:before]:
+            expected = term.cause.on_output(expected, term.values, frame)
+        (found,) = Bank(fitted, HeldOut(problem), order).outputs
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_a_refit_far_from_its_goal_is_given_up():
@@ -559,17 +588,23 @@ def test_another_rate_is_no_gap_but_missing_samples_are():
 
 
 def test_a_fast_record_is_averaged_down():
-    """To a thousand samples a second of its own, but not below 20 000; a slower record is left alone."""
+    """To a thousand samples a second of its own, but not below 20 000; a slower record is left alone.
+
+    An average counts where all of its samples do.
+    """
     scale = Scale(second=2.0)
 
     def shrunk(count: int, dt: float) -> Record:
-        return scale.shrunk(Record(np.arange(float(count)), np.arange(float(count)), dt_s=dt))
+        counts = np.arange(count) != 1007
+        return scale.shrunk(Record(np.arange(float(count)), np.arange(float(count)), 1.0 * counts, dt_s=dt))
 
     assert shrunk(200_000, 4e-4).dt_s == pytest.approx(1e-3)
     assert shrunk(20_000, 4e-4).dt_s == pytest.approx(2e-4)
     fast = shrunk(200_000, 4e-4)
     assert fast.input.size == 40_000
     assert fast.input[100] == 502.0
+    assert np.flatnonzero(fast.sample_weight != 1.0).tolist() == [201]
+    assert fast.sample_weight[201] == 0.0
 
 
 @pytest.mark.parametrize(("samples", "fits"), [(100, True), (99, False)])
@@ -812,6 +847,27 @@ def test_the_ends_of_the_output_are_means_near_those_of_the_input(low, high):
     (frame,) = problem_for([record], low, high).frames
     expected = y[counts & (u <= bottom + near)].mean(), y[counts & (u >= top - near)].mean()
     assert frame.ends == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "way", "seconds", "rest", "fastest"),
+    [
+        ("nested loops", 4 * 5.6, 5.6 / 0.5 + 5.6 / 4.0 + 5.6 / 1.5 + 5.6 / 8.0, 0.0, 8.0),
+        ("steps and holds", 2.6, 15.0 + 2.6 / 8.0, 15.0, 8.0),
+        ("equal minor loops", 16.0, 16.0, 0.0, 1.0),
+        ("equal cycles", 2 * 24.4, 24.4 / 1.5 + 24.4 / 4.0, 0.0, 4.0),
+        ("heating", 8.0, 68.0, 60.0, 1.0),
+    ],
+)
+def test_an_experiment_is_what_it_says(name, way, seconds, rest, fastest):
+    """Begun and ended at the bottom: how far it goes, how long, how long at rest, how fast at most."""
+    u, steps = experiment._experiments()[name], np.diff(experiment._experiments()[name])
+    assert (u[0], u[-1], u.min(), u.max() <= 1.0) == (0.0, 0.0, 0.0, True)
+    assert np.abs(steps).sum() == pytest.approx(way)
+    assert experiment.length_s(name) == pytest.approx(seconds, abs=0.05)
+    assert np.count_nonzero(steps == 0) / LIMITS.experiment_Hz == pytest.approx(rest, abs=0.05)
+    steady = np.abs(steps[1:][np.isclose(np.abs(steps[1:]), np.abs(steps[:-1]))])
+    assert steady.max() * LIMITS.experiment_Hz == pytest.approx(fastest)
 
 
 def test_where_an_error_is_largest_is_told_with_its_quantity():

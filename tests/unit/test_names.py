@@ -6,13 +6,18 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import report_examples as examples
+import store_examples
 
+import pulsetrainer as pt
 from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.session import FIGURES
+from pulsetrainer.artefacts.waveform import RefinePass
 from pulsetrainer.report import figures, html
+from pulsetrainer.report.facts import facts
 from pulsetrainer.report.names import FORCE, NAMES, headed, split
 from pulsetrainer.report.tables import label, text
 from pulsetrainer.report.text import tables_of
@@ -107,3 +112,28 @@ def test_a_small_figure_reads_the_same_wherever_it_is_shown():
     ]
     assert set(shown) == {"0.00553"}
     assert len(shown) >= 4
+
+
+def test_what_is_shown_of_a_file_is_what_it_holds():
+    """Each fact by the name of a field is that field; the others by their definition."""
+    passes = tuple(RefinePass(repeats, 9.0 / repeats, 10.0 / repeats, 0.1) for repeats in (2, 5, 3))
+    drive = replace(examples.waveform(), passes=passes, kept=2)
+    gap = np.append(np.arange(50.0), 60.0 + np.arange(50.0)) / 50.0
+    run = pt.Run(5.0 + gap, np.abs(np.arange(100) % 40 - 20.0), np.arange(100.0))
+    played, session = examples.playback(repeats=3), store_examples.session()
+    others = (
+        (run, {"samples": 100, "seconds": gap[-1], "rate_Hz": 50.0, "gaps": 1, "reversals": 4}),
+        (drive, {"samples": drive.target.size, "mean_abs_error_percent": 1.8, "max_abs_error_percent": 2.0}),
+        (played, {"samples": drive.target.size, "seconds": drive.time_s[-1], "repeats": 3}),
+        (session, {"beats": session.beats.start_s.size, "seconds": np.ptp(session.time_s)}),
+        (examples.model(), {"cells": 48 * 49 // 2}),
+        (store_examples.diagnosis(), {}),
+    )
+    for artefact, expected in others:
+        shown = facts(artefact)
+        for name, value in expected.items():
+            assert shown[name] == pytest.approx(value), name
+        fields = {name for name in shown if isinstance(getattr(artefact, name, None), str | int | float)}
+        fields -= {"offset"}  # in words, with its unit
+        assert fields
+        assert {name: shown[name] for name in fields} == {name: getattr(artefact, name) for name in fields}

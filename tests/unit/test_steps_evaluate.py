@@ -131,7 +131,9 @@ def test_figures_of_a_fit_are_those_of_an_evaluation_on_its_record():
 def test_a_second_model_gains_on_the_first():
     """Its rms against that of the first, in percent."""
     worse = replace(MODEL, offset=MODEL.offset + 1.0)
-    first, second = evaluate(_run(), [worse, MODEL]).models
+    found = evaluate(_run(), [worse, MODEL])
+    first, second = found.models
+    assert found.model is MODEL  # the last one
     assert second.gain_percent == pytest.approx(100.0 * (1.0 - second.rms / first.rms))
     assert second.gain_percent > 0
 

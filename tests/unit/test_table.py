@@ -15,7 +15,7 @@ from pulsetrainer.errors import AbsentError, ArgumentError, DataError, ExistsErr
 from pulsetrainer.files.csv_dialect import detect
 from pulsetrainer.files.csv_rows import PIECE, parse
 from pulsetrainer.files.input_file import check_file
-from pulsetrainer.files.run_from_table import run_from_table
+from pulsetrainer.files.run_from_table import _without_bad_rows, run_from_table
 from pulsetrainer.files.table import read_table, write_table
 from wording import raises, tells
 
@@ -769,6 +769,18 @@ def test_rows_that_count_are_no_time_where_some_are_left_out(table):
     rows = [f"{k},{k % 5},{k % 3}" for k in range(20)]
     read = table("\n".join(["n,u,y", *rows[:7], "7,,1", *rows[8:]]))
     assert read_run(read.path, **COLUMNS, skip_bad_rows=True).time_s is None
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.sampled_from(["row", "row", "row", "bad", "", "# remark"]), max_size=40))
+def test_rows_that_stay_know_their_lines(tmp_path_factory, kinds):
+    """Whatever lies between them: blank lines, remarks, rows that were left out. A row holds its line."""
+    text = {"row": "{},1", "bad": "{},"}
+    lines = [text.get(kind, kind).format(number) for number, kind in enumerate(["row", "row", *kinds], 2)]
+    path = tmp_path_factory.getbasetemp() / "lines.csv"
+    path.write_text("\n".join(["u,y", *lines, ""]))
+    left, _ = _without_bad_rows(read_table(path), counted=False)
+    assert [left.line_of(k) for k in range(left.rows)] == left.columns["u"].tolist()
 
 
 def test_time_that_does_not_increase_names_the_line(table):

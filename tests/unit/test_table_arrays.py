@@ -45,6 +45,14 @@ def test_npz_with_a_rate(tmp_path):
     _same(tmp_path / "r.npz", "data1", "data2")
 
 
+def test_a_picture_gives_no_columns(tmp_path):
+    """A matrix gives up to 64, whichever way it lies."""
+    matrices = {"most": np.ones((N, 64)), "more": np.ones((N, 65)), "flat": np.ones((64, N))}
+    np.savez(tmp_path / "r.npz", **matrices, t=T)
+    expected = {f"{name}{k + 1}" for name in ("most", "flat") for k in range(64)} | {"t"}
+    assert set(read_table(tmp_path / "r.npz").columns) == expected
+
+
 def test_npz_with_objects(tmp_path):
     """What numpy would only load by running code is left alone; the numbers beside it are read."""
     np.savez(tmp_path / "r.npz", who=np.array([{}], dtype=object), t=T, u=U, y=Y)
