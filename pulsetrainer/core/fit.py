@@ -88,17 +88,11 @@ def fit(
 ) -> Fitted:
     """Fit one operator with ``n_h`` levels on [low, high] to measured inputs and outputs, pairs of (n,).
 
-    For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output.
+    For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output. ``kept``
+    tells for each record which samples (n,) count; None: all.
 
-    Parameters
-    ----------
-    kept
-        For each record which samples (n,) count; the others are left out of the fit. None: all.
-
-    Raises
-    ------
-    ArgumentError, ConvergenceError
-        As ``identification.identify``; or relays, or the alternating method, with another form than direct.
+    Errors are those of ``identification.identify``; ArgumentError also for relays, or the alternating method,
+    with another form than direct.
     """
     forms = asked_forms(form, signals, low, high, plain=reading == "continuous" and method == "joint")
     if "direct" not in forms:

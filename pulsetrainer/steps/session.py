@@ -109,18 +109,10 @@ def perform(
 ) -> Performed:
     """Press what ``decide`` decides until it decides the end, and judge every beat.
 
-    Parameters
-    ----------
-    rates
-        Between the slowest and the fastest of these every pulse reaches its full amplitude, beats a minute;
-        None: its own.
-    lead_s
-        How long before its time a beat is decided and made.
-    track_heat
-        Tell the coil's temperature from the duty, before and all the time, and make up for the force that it
-        costs; None: where the model has a thermal term and knows the coil.
-    watch
-        Called with each piece of telemetry.
+    Between the slowest and the fastest of the ``rates`` (beats a minute; None: its own) every pulse reaches
+    its full amplitude. A beat is decided and made ``lead_s`` before its time. ``track_heat`` tells the
+    coil's temperature from the duty, before and all the time, and makes up for the force that it costs;
+    None: where the model has a thermal term and knows the coil. ``watch`` gets each piece of telemetry.
 
     DataError where the model cannot be used; DeviceError where the device cannot be talked to, or its
     firmware knows no open-ended waves.
