@@ -24,6 +24,8 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import BoolArray, FloatArray, Plane, Reading
 from pulsetrainer.core.record import Record
 
+Kept = Sequence[BoolArray] | None  # for each record which samples (n,) count; None: all
+
 CROWDED_MISFIT = 0.02  # of the span, rms: above it, what looks steep is nothing that the operator can follow
 
 
@@ -84,12 +86,11 @@ def fit(
     method: Method = "joint",
     smoothing: Smoothing = "auto",
     form: Form | Literal["auto"] = "direct",
-    kept: Sequence[BoolArray] | None = None,
+    kept: Kept = None,
 ) -> Fitted:
     """Fit one operator with ``n_h`` levels on [low, high] to measured inputs and outputs, pairs of (n,).
 
-    For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output. ``kept``
-    tells for each record which samples (n,) count; None: all.
+    For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output.
 
     Errors are those of ``identification.identify``; ArgumentError also for relays, or the alternating method,
     with another form than direct.
@@ -118,7 +119,7 @@ def fit(
     return fitted
 
 
-def _records(signals: Signals, low: float, high: float, kept: Sequence[BoolArray] | None) -> list[Record]:
+def _records(signals: Signals, low: float, high: float, kept: Kept) -> list[Record]:
     """Records of the signals, of which only the samples that are kept count."""
     records = [record_of(u, y, low, high) for u, y in signals]
     if kept is None:
@@ -126,28 +127,14 @@ def _records(signals: Signals, low: float, high: float, kept: Sequence[BoolArray
     return [replace(r, sample_weight=r.sample_weight * k) for r, k in zip(records, kept, strict=True)]
 
 
-def _signed(
-    signals: Signals,
-    low: float,
-    high: float,
-    n_h: int,
-    smoothing: Smoothing,
-    kept: Sequence[BoolArray] | None,
-) -> Fitted:
+def _signed(signals: Signals, low: float, high: float, n_h: int, smoothing: Smoothing, kept: Kept) -> Fitted:
     """Fit weights of either sign."""
     records = _records(signals, low, high, kept)
     found = identify(records, plane_for(records, low, high, n_h), smoothing=smoothing, signed=True)
     return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
 
 
-def _dual(
-    signals: Signals,
-    low: float,
-    high: float,
-    n_h: int,
-    smoothing: Smoothing,
-    kept: Sequence[BoolArray] | None,
-) -> Fitted:
+def _dual(signals: Signals, low: float, high: float, n_h: int, smoothing: Smoothing, kept: Kept) -> Fitted:
     """Fit the operator from output to input: first to the input, then where the noise is."""
     swapped = exchanged(signals)
     bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)
