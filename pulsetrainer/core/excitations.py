@@ -37,10 +37,7 @@ class Signal:
 
 
 def check_size(times: int, samples: float, most: int = MOST_SAMPLES) -> None:
-    """Refuse so many ``samples`` so many ``times`` where that is more than ``most``.
-
-    ArgumentError where it is more.
-    """
+    """Raise ArgumentError where so many ``samples`` so many ``times`` are more than ``most``."""
     if times > most or not times * samples <= most:  # either may be beyond every float
         raise ArgumentError(
             f"{str(times)[:20]} times {samples:.6g} samples are more than {most:.0e}", hint="fewer of them"
