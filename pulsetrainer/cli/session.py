@@ -86,29 +86,31 @@ def session(
     from pulsetrainer.files.pulses import read_pulse
     from pulsetrainer.recorded import session_into
     from pulsetrainer.report.planned import to_be_pressed
-    from pulsetrainer.steps.programme import Change
+    from pulsetrainer.steps.programme import Change, Programme
     from pulsetrainer.steps.quiz import Blind
-    from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, programme
+    from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, with_quiz
 
     loaded = job.load(model, pt.Model)
     check_model(loaded)
     if seed is None:  # in a quiz one that nobody can look up; the file tells it when all is answered
         seed = secrets.randbelow(_MOST_SEED) if quiz else 0
     hands = Hands([Path(name).stem if name.lower().endswith(".csv") else name for name in names])
-    chosen, rates = programme(
-        hands.names,
-        rate=rate,
-        amplitude=amplitude,
-        minutes=minutes,
-        beats=beats,
-        changes=[Change(*row) for row in read_changes(changes, hands.names)] if changes else (),
-        quiz=quiz,
-        answers=read_answers(answers, hands.names, quiz)
+    chosen, rates = with_quiz(
+        Programme(
+            hands.names,
+            rate=rate,
+            amplitude=amplitude,
+            beats=beats,
+            minutes=minutes,
+            changes=[Change(*row) for row in read_changes(changes, hands.names)] if changes else (),
+        ),
+        quiz,
+        read_answers(answers, hands.names, quiz)
         if answers
         else (lambda _: (hands.names[0], 0.0))  # at once, since nobody knows when
         if dry_run
         else hands.answer,
-        seed=seed,
+        seed,
     )
     if amplitude < 1.0:
         job.notes([f"an amplitude of {amplitude:g} % is hardly felt: 40 % is --amplitude 40"])

@@ -42,10 +42,7 @@ class Beats:
         return np.diff(self.record.time_s[self.feet])
 
     def single(self, number: int) -> Shape:
-        """Return one beat, the first is 1.
-
-        DataError where there is no such beat.
-        """
+        """Return one beat, the first is 1; DataError where there is no such beat."""
         if not 1 <= number <= self.count:
             held = f"{self.count} whole beat{'s' if self.count != 1 else ''}"
             raise DataError(

@@ -25,14 +25,8 @@ def missed(
 ) -> FloatArray:
     """Return what a model misses of effects in a record of now, shape (n, k), output unit.
 
-    Parameters
-    ----------
-    plane
-        On which P works; few levels do.
-    input_then, then
-        Input (m,) of the calibration, and the effects there (m, k).
-    input_now, now
-        Input (n,) of the other record, and the effects there (n, k).
+    ``plane`` is where P works; few levels do. ``input_then`` (m,) is the input of the calibration, ``then``
+    (m, k) the effects there; ``input_now`` (n,) and ``now`` (n, k) are those of the other record.
     """
     design, here = _rows(plane, input_then), _rows(plane, input_now)
     gram = (design.T @ design).toarray()

@@ -74,14 +74,8 @@ class Course:
     def lead_in(self, count: int, *, speed: float, rest_s: float) -> FloatArray:
         """Samples that bring the memory back as it was after ``count`` samples, from the negative saturation.
 
-        Parameters
-        ----------
-        count
-            How many samples of the course have been played.
-        speed
-            Input units per second.
-        rest_s
-            How long the input then rests where it was. Nothing at all is needed where that is the low end.
+        The input moves at ``speed`` (input units a second) and then rests for ``rest_s`` where it was.
+        Nothing at all is needed where that is the low end.
         """
         extremes = np.asarray(self.memory(count).extremes)
         if extremes.size == 1:

@@ -43,19 +43,8 @@ _FLAT = 0.05  # of the median slope of P: flatter, the output may be anywhere
 def in_output(inner: Preisach, records: Sequence[Record], smoothing: float) -> Preisach:
     """Return P of the dual form, moved from ``inner`` until the error in the output is least.
 
-    Parameters
-    ----------
-    inner
-        P from output to input, of weights fitted to the input.
-    records
-        From input to output; samples of weight 0 do not count.
-    smoothing
-        s, share of the output's range.
-
-    Raises
-    ------
-    ConvergenceError
-        A fit did not settle.
+    ``inner`` goes from output to input, of weights fitted to the input; the ``records`` go from input to
+    output. ``smoothing`` is s, a share of the output's range. ConvergenceError if a fit did not settle.
     """
     counted = sum(int(np.count_nonzero(r.counts)) for r in records)
     every = max(1, counted // _MOST)

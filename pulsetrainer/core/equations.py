@@ -155,19 +155,8 @@ def _part_sums(
 def node_sums(plane: Plane, records: Sequence[Record], reading: Reading) -> NodeSums:
     """Sums over all samples of all records in node space: S = sum v r r' (n_q, n_q), sparse, and its like.
 
-    Parameters
-    ----------
-    plane
-        The cells; inputs outside its range are clipped.
-    records
-        Each is followed from its own start; a sample counts as much as its sample weight v says.
-    reading
-        "continuous" or "relay".
-
-    Raises
-    ------
-    ArgumentError
-        The reading is unknown.
+    Each record is followed from its own start, inputs beyond the plane are clipped, and a sample counts as
+    much as its sample weight v says. ArgumentError if the reading is unknown.
     """
     every = [np.zeros(record.input.size, dtype=np.int64) for record in records]
     return parted_sums(plane, records, reading, every, 1)[0]

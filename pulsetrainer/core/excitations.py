@@ -37,10 +37,7 @@ class Signal:
 
 
 def check_size(times: int, samples: float, most: int = MOST_SAMPLES) -> None:
-    """Refuse so many ``samples`` so many ``times`` where that is more than ``most``.
-
-    ArgumentError where it is more.
-    """
+    """Raise ArgumentError where so many ``samples`` so many ``times`` are more than ``most``."""
     if times > most or not times * samples <= most:  # either may be beyond every float
         raise ArgumentError(
             f"{str(times)[:20]} times {samples:.6g} samples are more than {most:.0e}", hint="fewer of them"
@@ -85,24 +82,11 @@ def identification(low: float, high: float, *, n_h: int, speed: float, rate_Hz: 
 
     low -> high -> L_n-1 -> high -> L_n-2 -> ... -> L_0: every relay of the plane is switched on and off,
     each by a curve of its own, which fixes the Everett function at every node (Mayergoyz 2003, section
-    1.3). The signal has 2 n_h reversals and visits the finest loops first.
+    1.3). The signal has 2 n_h reversals, visits the finest loops first, and begins and ends at ``low``.
+    ``speed`` is in input units a second: slow against the actuator's own dynamics.
 
-    Parameters
-    ----------
-    low, high
-        Range of the input; the signal begins and ends at ``low``.
-    n_h
-        Number of levels.
-    speed
-        Input units per second: slow against the actuator's own dynamics.
-    rate_Hz
-        Sample rate of the reference.
-
-    Raises
-    ------
-    ArgumentError
-        An empty range, fewer than 2 levels, a speed or rate that is not positive, or a step from one
-        sample to the next that is wider than the range.
+    ArgumentError if the range is empty, for fewer than 2 levels, a speed or rate that is not positive, or a
+    step from one sample to the next that is wider than the range.
     """
     edges = Plane.uniform(low, high, n_h).edges
     _check_step(speed / rate_Hz if rate_Hz > 0 else 0.0, high - low)
@@ -171,17 +155,8 @@ def diagnostic(low: float, high: float, *, rate_Hz: float) -> Signal:
     rates. Two late holds are a heating at the top and a rest at the bottom. Parts of reversal curves
     between all these fill the plane, so that the weights can be fitted together with a cause.
 
-    Parameters
-    ----------
-    low, high
-        Range of the input; the signal begins and ends at ``low``.
-    rate_Hz
-        Sample rate of the reference.
-
-    Raises
-    ------
-    ArgumentError
-        An empty range, or a rate that is not positive, or so low that a stroke has no sample.
+    The signal begins and ends at ``low``. ArgumentError if the range is empty, or the rate is not positive,
+    or so low that a stroke has no sample.
     """
     ascending(low, high)
     positive(rate=rate_Hz)

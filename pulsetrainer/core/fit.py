@@ -89,15 +89,8 @@ def fit(
 
     For relays the levels lie evenly, as in the paper. The levels of the dual form lie on the output.
 
-    Parameters
-    ----------
-    kept
-        For each record which samples (n,) count; the others are left out of the fit. None: all.
-
-    Raises
-    ------
-    ArgumentError, ConvergenceError
-        As ``identification.identify``; or relays, or the alternating method, with another form than direct.
+    Errors are those of ``identification.identify``; ArgumentError also for relays, or the alternating method,
+    with another form than direct.
     """
     forms = asked_forms(form, signals, low, high, kept, plain=reading == "continuous" and method == "joint")
     if "direct" not in forms:
@@ -123,28 +116,14 @@ def fit(
     return fitted
 
 
-def _signed(
-    signals: Signals,
-    low: float,
-    high: float,
-    n_h: int,
-    smoothing: Smoothing,
-    kept: Kept,
-) -> Fitted:
+def _signed(signals: Signals, low: float, high: float, n_h: int, smoothing: Smoothing, kept: Kept) -> Fitted:
     """Fit weights of either sign."""
     records = records_of(signals, low, high, kept)
     found = identify(records, plane_for(records, low, high, n_h), smoothing=smoothing, signed=True)
     return Fitted(found, tuple(records), np.zeros(len(records)), "signed")
 
 
-def _dual(
-    signals: Signals,
-    low: float,
-    high: float,
-    n_h: int,
-    smoothing: Smoothing,
-    kept: Kept,
-) -> Fitted:
+def _dual(signals: Signals, low: float, high: float, n_h: int, smoothing: Smoothing, kept: Kept) -> Fitted:
     """Fit the operator from output to input: first to the input, then where the noise is."""
     swapped = exchanged(signals)
     bottom, top = min(float(y.min()) for y, _ in swapped), max(float(y.max()) for y, _ in swapped)

@@ -80,17 +80,9 @@ def asked_forms(
     Two, the simpler one first, where a coarse plane does not tell: there weights of either sign follow sharp
     corners of a loop that leads better than the dual form does. Both are then fitted in full, and compared.
 
-    Parameters
-    ----------
-    kept
-        For each record which samples (n,) count. None: all.
-    plain
-        Weights are fitted jointly in the continuous reading; else there is only the direct form.
-
-    Raises
-    ------
-    ArgumentError
-        An unknown form, or dual or signed where only the direct one exists.
+    Only where weights are fitted jointly in the continuous reading (``plain``) is there more than the direct
+    form. Of each record only the samples that are ``kept`` count. ArgumentError for an unknown form, or for
+    dual or signed where only the direct one exists.
     """
     if form not in ("auto", *FORMS):
         raise ArgumentError(f"form must be auto, {', '.join(FORMS)}, got {form!r}", hint="use auto")

@@ -110,28 +110,16 @@ def identify(
     Planes whose dense matrices would take more than ``DENSE_BYTES`` (above 82 levels) are solved by
     ``large.solve``, which needs none.
 
-    Parameters
-    ----------
-    records
-        Measured inputs and outputs; all share one set of weights and one offset.
-    plane
-        Where the weights live; inputs outside its range are clipped.
-    polarity
-        1, -1, or None to detect it.
-    smoothing
-        Length s, share of the input's range, below which features of the density are smoothed away; 0 for
-        none; "auto" to choose it by held-out blocks (see ``core.smoothing``).
-    signed
-        Weights may be of either sign: plain regularised least squares, at least ``LEAST_SIGNED`` smooth.
+    All ``records`` share one set of weights and one offset; inputs outside the range of the ``plane`` are
+    clipped. ``polarity`` is 1, -1, or None to detect it. ``smoothing`` is the length s, share of the input's
+    range, below which features of the density are smoothed away; 0 for none; "auto" to choose it by held-out
+    blocks (see ``core.smoothing``). ``signed`` weights may be of either sign: plain regularised least
+    squares, at least ``LEAST_SIGNED`` smooth.
 
-    Raises
-    ------
-    ArgumentError
-        No records, no sample that counts, an input or an output that does not vary, fewer samples than
-        levels, an unknown method, a smoothing out of range, or ``method="alternating"`` on a plane too
-        large for it; signed weights of relays, on a plane too large for dense matrices, or not "joint".
-    ConvergenceError
-        The fit did not settle.
+    ArgumentError for no records, no sample that counts, an input or an output that does not vary, fewer
+    samples than levels, an unknown method, a smoothing out of range, or ``method="alternating"`` on a plane
+    too large for it; signed weights of relays, on a plane too large for dense matrices, or not "joint".
+    ConvergenceError if the fit did not settle.
     """
     samples = _check(records, plane, method, smoothing)
     if signed:

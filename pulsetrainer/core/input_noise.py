@@ -104,15 +104,8 @@ def real_turns(values: FloatArray, band: float) -> IntArray:
 def clean(values: ArrayLike, sigma: float | None = None) -> Cleaned:
     """Return the input (n,) without reversals that are smaller than its own noise.
 
-    Parameters
-    ----------
-    sigma
-        Standard deviation of the noise, input unit; None to read it off the record.
-
-    Raises
-    ------
-    ArgumentError
-        The input is no finite vector.
+    ``sigma`` is the standard deviation of the noise, input unit; None to read it off the record.
+    ArgumentError if the input is no finite vector.
     """
     u = finite_vector("input", values)
     noise = estimate(u) if sigma is None else sigma
@@ -131,15 +124,9 @@ def clean(values: ArrayLike, sigma: float | None = None) -> Cleaned:
 def monotone_between(u: FloatArray, turns: IntArray, sigma: float) -> FloatArray:
     """Replace each piece between turns by a smooth monotone path; a turn gets the mean of its two sides.
 
-    Parameters
-    ----------
-    u
-        Noisy values (n,), of a standard deviation ``sigma``; where that is zero or NaN nothing is smoothed.
-    turns
-        Places (k,) of the turns, rising.
-
-    Pieces are filtered one by one, so that a turn is never rounded off: at its end a piece is continued by
-    the polynomial of its own last samples.
+    ``turns`` (k,) are their places, rising. Where ``sigma``, the standard deviation of the noise of ``u``
+    (n,), is zero or NaN nothing is smoothed. Pieces are filtered one by one, so that a turn is never rounded
+    off: at its end a piece is continued by the polynomial of its own last samples.
     """
     total, count = np.zeros(u.size), np.zeros(u.size)
     ends = np.unique(np.concatenate(([0], turns, [u.size - 1]))).tolist()

@@ -128,20 +128,11 @@ def invert(
     cells have no weight the output does not answer: the input stays where it was until the target moves on,
     then crosses at once.
 
-    Parameters
-    ----------
-    target
-        Outputs (n,), output unit; the result's ``input`` is (n,) in the input unit.
-    start
-        The memory before the first target; default: negative saturation.
-    monotone
-        Weights of either sign are allowed: the caller knows that all branches are monotone.
+    ``start`` is the memory before the first target; default: negative saturation. With ``monotone`` weights
+    of either sign are allowed: the caller knows that all branches are monotone.
 
-    Raises
-    ------
-    ArgumentError
-        The target is not a finite vector, the operator uses the relay reading (its output is a
-        staircase: use ``closest_match``), all its weights are zero, or some are negative.
+    ArgumentError if the target is not a finite vector, the operator uses the relay reading (its output is a
+    staircase: use ``closest_match``), all its weights are zero, or some are negative.
 
     Source: own; the memory that it rests on is that of Mayergoyz 2003, chapter 1 (wiping out).
     """

@@ -72,21 +72,13 @@ def passes(
 ) -> Iterator[Pass]:
     """Give one pass after the other, without end; each asks for what the one before it missed as well.
 
-    Parameters
-    ----------
-    target
-        Wanted output (n,), output unit.
-    inverse
-        From a wanted output (n,) to the input that gives it, nearly.
-    respond
-        From an input (n,) to the output (n,) that it gives.
-    smooth
-        The low-pass F.
-    start
-        What the first pass asks for (n,); None: the target itself.
-    careful
-        Halve the step where an error swings from one side to the other: there the slope is more than twice
-        that of the inverse, as small loops of a device can be. Noise then also counts less from pass to pass.
+    ``inverse`` leads from a wanted output (n,) to the input that gives it, nearly, ``respond`` from an input
+    to the output that it gives; ``smooth`` is the low-pass F. The first pass asks for ``start`` (n,); None:
+    for the ``target`` (n,) itself, output unit.
+
+    ``careful`` halves the step where an error swings from one side to the other: there the slope is more
+    than twice that of the inverse, as small loops of a device can be. Noise then also counts less from pass
+    to pass.
     """
     wanted, number = target if start is None else start, 0
     step, before = np.full(target.size, STEP), np.zeros(target.size)

@@ -20,12 +20,8 @@ def loop_of(operator: Preisach | Dual, doubt: float = 0.0) -> Loop:
     """Return the direction of the major loop, of a falling output that of its mirror image.
 
     Counterclockwise: the output lags, it is higher on the way down. Clockwise: the output leads. Butterfly:
-    both, the loop crosses itself.
-
-    Parameters
-    ----------
-    doubt
-        Rms error of the fit, output unit: a loop that is nowhere wider than this is none.
+    both, the loop crosses itself. A loop that is nowhere wider than ``doubt``, the rms error of the fit in
+    the output unit, is none.
     """
     up = np.linspace(operator.low, operator.high, _POINTS)
     y = operator(np.concatenate((up, up[::-1])))

@@ -27,16 +27,9 @@ class Range(NamedTuple):
 def invertible_range(whole: Preisach, tolerance: float) -> Range:
     """Return the range of the input over which the output moves most, all branches in it monotone.
 
-    Parameters
-    ----------
-    tolerance
-        How far a branch may turn back and still count as monotone, output unit: the error of the fit. There
-        the inverse stays where it is until the branch goes on.
-
-    Raises
-    ------
-    ArgumentError
-        There is none.
+    A branch may turn back by ``tolerance``, the error of the fit in the output unit, and still counts as
+    monotone: there the inverse stays where it is until the branch goes on. ArgumentError if there is no
+    range.
     """
     best, size = None, 0.0
     for sign in (1, -1):

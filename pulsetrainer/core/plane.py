@@ -64,10 +64,7 @@ def finite_vector(name: str, values: ArrayLike, *, at_least: int = 1) -> FloatAr
 
 
 def positive(**named: float) -> None:
-    """Let pass numbers that are positive and finite.
-
-    ArgumentError where one of them is not, with its name.
-    """
+    """Let pass numbers that are positive and finite; ArgumentError, with its name, where one is not."""
     for name, number in named.items():
         if not (number > 0 and np.isfinite(number)):
             raise ArgumentError(

@@ -136,19 +136,10 @@ def _rows(
 
 
 def penalty(plane: Plane, diagonal: FloatArray, smoothing: float) -> scipy.sparse.csr_array:
-    """Return s^8 g B as a matrix (n_q, n_q) on the masses.
+    """Return s^8 g B as a matrix (n_q, n_q) on the masses; s is a share of the input's range.
 
-    Parameters
-    ----------
-    diagonal
-        Diagonal (n_q,) of the centred Gram matrix; cells where it is zero are left alone.
-    smoothing
-        s, share of the input's range.
-
-    Raises
-    ------
-    ArgumentError
-        ``smoothing`` is negative, not finite, or more than 1.
+    Cells where ``diagonal`` (n_q,), that of the centred Gram matrix, is zero are left alone. ArgumentError if
+    ``smoothing`` is negative, not finite, or more than 1.
     """
     if not 0 <= smoothing <= 1:
         raise ArgumentError(
@@ -355,10 +346,7 @@ def _between(length: FloatArray, squares: FloatArray) -> float:
 def _longest_alike(tried: Sequence[tuple[float, float]], squares: Callable[[float], FloatArray]) -> float:
     """Largest length whose error is the least but for chance, between those tried; see ``choose``.
 
-    Parameters
-    ----------
-    squares
-        Returns the sum of squared errors of each block at a length.
+    ``squares`` returns the sum of squared errors of each block at a length.
     """
     length, error = np.asarray(tried).T
     best = int(np.argmin(error))

@@ -34,14 +34,9 @@ _LEVELS = 32  # on which t is chosen
 
 
 def stiffness_penalty(plane: Plane, diagonal: FloatArray, strength: float) -> scipy.sparse.csr_array:
-    """Return t g D'D (n_q, n_q) on the masses.
+    """Return t g D'D (n_q, n_q) on the masses; t, the ``strength``, has no unit.
 
-    Parameters
-    ----------
-    diagonal
-        Diagonal (n_q,) of the centred Gram matrix; cells where it is zero are left alone.
-    strength
-        t, no unit.
+    Cells where ``diagonal`` (n_q,), that of the centred Gram matrix, is zero are left alone.
     """
     i, _ = plane.cell_indices
     here = np.flatnonzero(i + 1 < plane.n_h)

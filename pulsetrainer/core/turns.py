@@ -31,17 +31,8 @@ def reached(values: ArrayLike, time_s: FloatArray | None = None) -> FloatArray:
 
     with t between the two samples a and b = a + 1, r_a the rate up to the first and r_b that from the second
     on. The extreme sample gets the value u* where the rates before and after change by less than a fifth in
-    one step, so that rounded turns stay as they are.
-
-    Parameters
-    ----------
-    time_s
-        Times of the samples (n,); None: even steps.
-
-    Raises
-    ------
-    ArgumentError
-        The input is no finite vector.
+    one step, so that rounded turns stay as they are. Without ``time_s`` (n,) the steps are even.
+    ArgumentError if the input is no finite vector.
     """
     u = finite_vector("input", values)
     t = np.arange(float(u.size)) if time_s is None else time_s
@@ -77,14 +68,8 @@ def at_their_tips(
     A device that is driven sample by sample never sees tips between samples: then the turns at an end of the
     record agree better as they were measured, and the inputs as they were measured leave less of the outputs.
 
-    Parameters
-    ----------
-    signals
-        Input and output of each record, both (n,).
-    times
-        Of the samples (n,); None: the record knows none, and stays as it is.
-    kept
-        Samples (n,) whose output counts.
+    ``signals`` are input and output of each record, both (n,); a record without ``times`` (n,) stays as it
+    is. Outputs count in the ``kept`` samples (n,).
     """
     measured = [u for u, _ in signals]
     tips = [u if t is None else reached(u, t) for u, t in zip(measured, times, strict=True)]

@@ -106,18 +106,9 @@ def bootstrap(
 ) -> Ensemble:
     """Refit ``draws`` resamples of blocks of the records.
 
-    Parameters
-    ----------
-    records, fit
-        What was fitted, and the result; its stiffness and polarity are kept, its smoothing is shortened.
-    block
-        Samples a block; None to read it off the residuals.
-
-    Raises
-    ------
-    ArgumentError
-        Fewer than 2 draws, a block length below 1, fewer than 2 blocks, or a plane too large for dense
-        matrices.
+    Stiffness and polarity of the ``fit`` are kept, its smoothing is shortened. ``block`` is in samples; None
+    to read it off the residuals. ArgumentError for fewer than 2 draws, a block length below 1, fewer than 2
+    blocks, or a plane too large for dense matrices.
     """
     operator = fit.operator
     plane, sign = operator.plane, operator.polarity

@@ -86,16 +86,10 @@ def off(
 ) -> list[BoolArray]:
     """Tell for each sample of each record whether what a fit leaves there is far from what it leaves near by.
 
-    Parameters
-    ----------
-    outputs, predicted
-        Of each record (n,). Where the prediction jumps from sample to sample it may be off by as much.
-    span
-        Of the output; nothing closer than a hundredth of it is wild. A fit that leaves more than a twentieth
-        of it throughout tells nothing of single samples.
-    doubtful
-        Samples (n,) of each record that may be wild: they do not count for what is usual, and where the fit
-        tells nothing they are returned. None: no sample.
+    Where ``predicted`` jumps from sample to sample it may be off by as much. Nothing closer than a hundredth
+    of ``span``, that of the output, is wild; a fit that leaves more than a twentieth of it throughout tells
+    nothing of single samples. ``doubtful`` samples (n,) may be wild: they do not count for what is usual,
+    and where the fit tells nothing they are returned.
     """
     unsure = [np.zeros(y.size, dtype=bool) for y in outputs] if doubtful is None else doubtful
     found = []
@@ -210,12 +204,8 @@ def repaired_where_off(
 ) -> FloatArray:
     """Return a signal (n,) with those suspect samples mended that are off the path of their neighbours.
 
-    A residual does not tell whether input or output was wild. The one that was not is kept.
-
-    Parameters
-    ----------
-    instead
-        What is put there (n,), such as what a fit predicts; None: the path of the neighbours.
+    A residual does not tell whether input or output was wild. The one that was not is kept. ``instead`` (n,)
+    is put there, such as what a fit predicts; None: the path of the neighbours.
     """
     path = through_turns(values, suspect)
     _, moving = _motion(path)
@@ -258,10 +248,8 @@ def fits_better(
 ) -> bool:
     """Tell whether other ``inputs`` (n,) leave less than those of the ``signals``, of weights of either sign.
 
-    Parameters
-    ----------
-    found
-        For each record which samples (n,) are wild in the input, and in the output: the latter do not count.
+    ``found`` tells for each record which samples (n,) are wild in the input, and in the output: the latter do
+    not count.
     """
     lost = [in_output & ~in_input for in_input, in_output in found]
     others = [(u, y) for u, (_, y) in zip(inputs, signals, strict=True)]
@@ -271,12 +259,8 @@ def fits_better(
 def left_by_a_quick_fit(signals: Sequence[tuple[FloatArray, FloatArray]], lost: Sequence[BoolArray]) -> float:
     """Return the rms that a coarse fit of weights of either sign leaves of the outputs, output unit.
 
-    Parameters
-    ----------
-    signals
-        Input and output of each record, both (n,). Infinity where no input moves.
-    lost
-        Samples (n,) of each record whose output does not count.
+    ``signals`` are input and output of each record, both (n,); infinity where no input moves. The output does
+    not count in the samples that are ``lost`` (n,).
     """
     # one input that is far off would leave all others in one cell of a common plane
     low, high = min(float(u.min()) for u, _ in signals), max(float(u.max()) for u, _ in signals)

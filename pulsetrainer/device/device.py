@@ -234,12 +234,8 @@ class Device:
         output first; what was recorded until then is returned with ``complete=False``. The device ends
         disarmed.
 
-        Raises
-        ------
-        ArgumentError
-            if the reference cannot be played; nothing has been armed then.
-        DeviceError
-            if the device cannot be talked to before it starts.
+        ArgumentError if the reference cannot be played: nothing has been armed then. DeviceError if the
+        device cannot be talked to before it starts.
         """
         step = ticks_per_sample(rate_Hz, self.info.tick_rate_Hz)
         wire = checked_wire(
@@ -274,12 +270,8 @@ class Device:
         pieces of telemetry, as soon as less than ``lead_s`` is left to play: that is how late a change takes
         effect, and how long ``more`` may take. The rest is as in ``play``; memory stays flat.
 
-        Raises
-        ------
-        ArgumentError
-            There is no sample at all, or one that the device cannot play: the output is stopped first.
-        DeviceError
-            The device's firmware knows no open-ended waves, or it cannot be talked to before it starts.
+        ArgumentError if there is no sample at all, or one that the device cannot play: the output is stopped
+        first. DeviceError if the firmware knows no open-ended waves, or as in ``play``.
         """
         if (self._hello.major, self._hello.minor) < _STREAMS_SINCE:
             raise DeviceError(

@@ -143,10 +143,7 @@ class Bins:
 
 
 def bins_of(records: Sequence[Record]) -> Bins:
-    """Bins over the samples with weight.
-
-    DataError where hardly any sample has weight.
-    """
+    """Bins over the samples with weight; DataError where hardly any sample has weight."""
     duration = sum(r.input.size * r.step for r in records)
     width = max(min(LIMITS.bin_s, duration / LIMITS.enough_rows), duration / LIMITS.most_rows)
     numbers, record, time, widths, count = [], [], [], [], 0

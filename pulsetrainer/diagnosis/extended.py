@@ -102,10 +102,7 @@ class Extended:
 
     @classmethod
     def of(cls, static: Preisach | Dual, extensions: Sequence[tuple[str, Values]]) -> Extended:
-        """Build from stored names and values.
-
-        DataError where a cause is unknown.
-        """
+        """Build from stored names and values; DataError where a cause is unknown."""
         terms = in_order([Term(*cause_named(name).restored(values)) for name, values in extensions])
         return cls(_upright(static), terms, static.polarity)
 

@@ -97,18 +97,23 @@ def _scale(left: FloatArray, bins: Bins, level: FloatArray) -> FloatArray:
     """Local size (count,) of noise by the level of the output, from differences of neighbours."""
     apart = np.append(np.diff(left), 0.0) ** 2
     apart[np.append(np.diff(bins.record), 1) != 0] = np.nan
-    low, high = float(level.min()), float(level.max())
-    group = np.clip((level - low) / max(high - low, TINY) * LIMITS.groups, 0, LIMITS.groups - 1).astype(int)
-    middles, sizes = [], []
-    for k in range(LIMITS.groups):
-        own = apart[(group == k) & np.isfinite(apart)]
-        if own.size >= LIMITS.least_rows:
-            middles.append(low + (k + 0.5) / LIMITS.groups * (high - low))
-            sizes.append(float(np.median(own)) / CHI_SQUARE_MEDIAN)
+    middles, medians = _by_level(level, np.isfinite(apart), lambda own: float(np.median(apart[own])))
+    sizes = [median / CHI_SQUARE_MEDIAN for median in medians]
     if not sizes or max(sizes) <= 0.0:
         return np.ones(left.size)
     square = np.interp(level, middles, np.maximum(sizes, LIMITS.least_left * max(sizes)))
     return np.asarray(np.sqrt(square / square.mean()))
+
+
+def _by_level(
+    level: FloatArray, counts: NDArray[np.bool_], size: Callable[[NDArray[np.bool_]], float]
+) -> tuple[list[float], list[float]]:
+    """Middles of groups of levels, and the size of what counts there; groups of few rows are left out."""
+    low, high = float(level.min()), float(level.max())
+    group = np.clip((level - low) / max(high - low, TINY) * LIMITS.groups, 0, LIMITS.groups - 1).astype(int)
+    found = [(k, counts & (group == k)) for k in range(LIMITS.groups)]
+    full = [(k, own) for k, own in found if np.count_nonzero(own) >= LIMITS.least_rows]
+    return [low + (k + 0.5) / LIMITS.groups * (high - low) for k, _ in full], [size(own) for _, own in full]
 
 
 def _lines(columns: FloatArray, bins: Bins) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -204,14 +209,7 @@ def _octaves(residual: FloatArray, bins: Bins) -> tuple[list[FloatArray], FloatA
 
 def _square(band: FloatArray, quiet: NDArray[np.bool_], level: FloatArray, trimmed: float) -> float:
     """Mean square of a band by its medians where it is quiet, at each level of the output."""
-    low, high = float(level.min()), float(level.max())
-    group = np.clip((level - low) / max(high - low, TINY) * LIMITS.groups, 0, LIMITS.groups - 1).astype(int)
-    middles, squares = [], []
-    for k in range(LIMITS.groups):
-        own = quiet & (group == k)
-        if np.count_nonzero(own) >= LIMITS.least_rows:
-            middles.append(low + (k + 0.5) / LIMITS.groups * (high - low))
-            squares.append(_trimmed(band[own], trimmed))
+    middles, squares = _by_level(level, quiet, lambda own: _trimmed(band[own], trimmed))
     if not squares:
         return _trimmed(band, trimmed)
     return float(np.interp(level, middles, squares).mean())

@@ -16,12 +16,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 def pinched_at(level: FloatArray, output: FloatArray, noise: float) -> float | None:
     """Return the input through which all branches pass at one output, None where there is none.
 
-    Parameters
-    ----------
-    level, output
-        Input, in units of its range, and output (n,).
-    noise
-        Of single samples of the output, rms.
+    ``level`` (n,) is the input in units of its range, ``noise`` the rms noise of the output's samples.
     """
     number = np.clip((level * LIMITS.pinch_groups).astype(np.int64), 0, LIMITS.pinch_groups - 1)
     width = np.zeros(LIMITS.pinch_groups)

@@ -13,6 +13,7 @@ import csv
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +38,14 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
 
 _Line = tuple[int, str]  # its number, from 1, and its text
+
+
+class _Row(NamedTuple):
+    """A line that is no remark: a row of the table, a heading, or what stands above it."""
+
+    number: int  # of the line, from 1
+    text: str
+    cells: list[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,23 +139,22 @@ def detect(path: Path) -> Dialect:
     """
     encoding = _encoding(path)
     declared, lines, above = _first_lines(path, encoding)
-    remarked = {count for count, _ in above}
     comments = [(count, _remark(text)) for count, text in above if len(lines) < 3 or count < lines[2][0]]
-    if not lines:
-        raise DataError(f"{path} is empty", hint="export the recording again")
     delimiter = declared or _delimiter([line for _, line in lines])
     remarks = _REMARKS if delimiter == ";" else (*_REMARKS, ";")
     comments += [(count, _remark(line)) for count, line in lines if line.startswith(remarks)]
-    lines = [(count, line) for count, line in lines if not line.startswith(remarks)]
-    if not lines:
+    rows = [
+        _Row(count, line, split(line, delimiter)) for count, line in lines if not line.startswith(remarks)
+    ]
+    if not rows:
         raise DataError(f"{path} is empty", hint="export the recording again")
-    aside = _below_the_units([split(line, delimiter) for _, line in lines])
-    comments += [(lines[k][0], lines[k][1].strip()) for k in aside]
-    lines = [line for k, line in enumerate(lines) if k not in aside]
-    parted = [count - 1 in remarked for count, _ in lines]
-    start = _above([split(line, delimiter) for _, line in lines], parted)
-    comments += [(count, line.strip()) for count, line in lines[:start]]
-    dialect = _with_header(path, encoding, delimiter, lines[start:], sorted(comments))
+    aside = _below_the_units([row.cells for row in rows])
+    comments += [(rows[k].number, rows[k].text.strip()) for k in aside]
+    rows = [row for k, row in enumerate(rows) if k not in aside]
+    remarked = {count for count, _ in above}
+    start = _above([row.cells for row in rows], [row.number - 1 in remarked for row in rows])
+    comments += [(row.number, row.text.strip()) for row in rows[:start]]
+    dialect = _with_header(path, encoding, delimiter, rows[start:], sorted(comments))
     return replace(dialect, remarks=remarks)
 
 
@@ -210,7 +218,7 @@ def _delimiter(lines: list[str]) -> str | None:
 
     def share(delimiter: str | None) -> float:
         rows = [split(line, delimiter) for line in body]
-        if max(map(len, rows)) < 2:
+        if max(map(len, rows), default=0) < 2:
             return -1.0
         cells = [cell for row in rows for cell in row if cell]
         # a blank between thousands may be the delimiter instead
@@ -310,26 +318,26 @@ def _numbers(names: list[str], below: list[str]) -> bool:
 
 
 def _with_header(
-    path: Path, encoding: str, delimiter: str | None, lines: list[_Line], commented: list[_Line]
+    path: Path, encoding: str, delimiter: str | None, lines: list[_Row], commented: list[_Line]
 ) -> Dialect:
     """Return the dialect, with what the lines above the first row say."""
-    rows = [split(line, delimiter) for _, line in lines]
+    rows = [line.cells for line in lines]
     decimal_comma = any(_COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row)
     rate = _cut_settings(rows)
     text = [[_is_text(cell) for cell in row] for row in rows]
     heads = _heading_lines(text, rows)
     if heads == len(rows):
         raise DataError(f"{path} has no rows below its header", hint="export the recording again")
-    body = rows[heads:]
+    begin, body = lines[heads], rows[heads:]
     first = _usual_row(rows[0], body) if heads else body[0]
-    comments = tuple(comment for count, comment in commented if count < lines[heads][0])
+    comments = tuple(comment for count, comment in commented if count < begin.number)
     names = rows[0] if heads else _commented_names(comments, delimiter, len(first))
     names, first = _without_end(names, first)
     unremarked = len(names) == len(first) + 1 and names[-1].lower() in _REMARK_HEADINGS
     if len(names) != len(first) and not unremarked:
         raise DataError(
             f"{path} has {len(names)} column name{'s' * (len(names) != 1)}, but {len(first)} columns in line "
-            f"{lines[heads][0]}",
+            f"{begin.number}",
             hint="correct the header; decimal commas need another delimiter, such as a semicolon",
         )
     columns = [_filled(k, body) for k in range(len(names))]
@@ -339,22 +347,22 @@ def _with_header(
         of_text |= {len(first)}
     if len(of_text) == len(names):
         raise DataError(
-            f"{path} has no column of numbers: line {lines[heads][0]} is {lines[heads][1][:60]!r}",
+            f"{path} has no column of numbers: line {begin.number} is {begin.text[:60]!r}",
             hint="export the recording as CSV, one column per quantity",
         )
     units = [cell.strip("()[] ") for cell in rows[1]] if heads == 2 else []
     return Dialect(
-        encoding,
-        delimiter,
-        decimal_comma,
-        tuple(name or f"column{k + 1}" for k, name in enumerate(names)),
-        tuple(units) if len(units) == len(names) else ("",) * len(names),
-        comments,
-        lines[heads][0],
-        of_text,
-        frozenset(k for k, cells in enumerate(columns) if _is_stamped(cells)),
+        encoding=encoding,
+        delimiter=delimiter,
+        decimal_comma=decimal_comma,
+        names=tuple(name or f"column{k + 1}" for k, name in enumerate(names)),
+        units=tuple(units) if len(units) == len(names) else ("",) * len(names),
+        comments=comments,
+        first_line=begin.number,
+        text_columns=of_text,
+        stamped=frozenset(k for k, cells in enumerate(columns) if _is_stamped(cells)),
         rate_Hz=stated[0] if stated else rate,
-        day_first=stamps.day_first(_columns(rows[heads:], delimiter, _last_lines(path, encoding))),
+        day_first=stamps.day_first(_columns(body, delimiter, _last_lines(path, encoding))),
     )
 
 

@@ -65,14 +65,10 @@ def run_from_table(
     ``skip_bad_rows`` leaves out rows in which a number is missing, not finite or text, or that have too few
     or too many cells; the notes say how many, and where the first ones are.
 
-    Raises
-    ------
-    UsageError
-        More than one of a time column, a rate and ``no_time`` is given, the rate is not positive, or one
-        column is given two meanings.
-    DataError
-        The file is no table, a column is missing or not finite, nearly all rows would be left out, a unit is
-        not known, there are fewer than two rows, or time does not increase (the line is named).
+    UsageError if more than one of a time column, a rate and ``no_time`` is given, the rate is not positive,
+    or one column is given two meanings. DataError if the file is no table, a column is missing or not
+    finite, nearly all rows would be left out, a unit is not known, there are fewer than two rows, or time
+    does not increase (the line is named).
     """
     check_timing(time, rate_Hz, no_time=no_time)
     wanted = [name for name in (input, output, reference) if name is not None]

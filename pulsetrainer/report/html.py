@@ -159,19 +159,8 @@ def environment() -> Environment:
     made.filters |= {"unbroken": unbroken, "unit": shown, "digits": format, "rounded": digits}
     made.tests["of_a_curve"] = of_a_curve
     made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS, "Number": Number}
-    for tool in (
-        number,
-        known,
-        offset,
-        count,
-        metric,
-        picture,
-        reach,
-        densest,
-        label,
-        panels.titled,
-        panels.scale,
-    ):
+    tools = number, known, offset, count, metric, picture, reach, densest, label, panels.titled, panels.scale
+    for tool in tools:
         made.globals[tool.__name__] = tool
     for drawing in (figures, heat_figures, diagnosis_figures, session_figures, panels):
         made.globals[drawing.__name__.rpartition(".")[2]] = drawing

@@ -128,29 +128,26 @@ def parse_bench(port: str) -> BenchOptions:
             f"`port`: {port!r} is not a bench port",
             hint='like this: `port` "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
-    ideal, speed, serial = False, "max", ""
-    wire = GOOD_WIRE
-    settings: list[tuple[str, str]] = []
-    breaks: list[str] = []
+    asked = BenchOptions()
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
         if name == "ideal":
-            ideal = _switch(value)
+            asked = replace(asked, ideal=_switch(value))
         elif name == "speed":
             if value not in _SPEEDS:
                 raise UsageError(
                     f"`port`: the bench speed is max or real, not {value!r}",
                     hint='`port` "bench:?speed=real"',
                 )
-            speed = value
+            asked = replace(asked, speed=value)
         elif name == "break":
-            breaks.append(value)
+            asked = replace(asked, breaks=(*asked.breaks, value))
         elif name in ("wire", "wire-seed"):
-            wire = wire.told("bench", name, value)
+            asked = replace(asked, wire=asked.wire.told("bench", name, value))
         elif name == "serial":
-            serial = _number_of_device(value)
+            asked = replace(asked, serial=_number_of_device(value))
         else:
-            settings.append((name, value))
-    return BenchOptions(ideal, speed, tuple(settings), tuple(breaks), wire, serial)
+            asked = replace(asked, settings=(*asked.settings, (name, value)))
+    return asked
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,23 +166,21 @@ def parse_qemu(port: str) -> QemuOptions:
         raise UsageError(
             f"`port`: {port!r} is not a port", hint='`port` "qemu:" alone, or "qemu:?break=reset@1"'
         )
-    breaks: list[tuple[int, float]] = []
-    wire = GOOD_WIRE
-    settings: list[tuple[str, float]] = []
+    asked = QemuOptions()
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
         if name in QEMU_SETTINGS:
-            settings.append((name, _setting(name, value)))
+            asked = replace(asked, settings=(*asked.settings, (name, _setting(name, value))))
         elif name == "break":
-            breaks.append(parse_break(value))
+            asked = replace(asked, breaks=(*asked.breaks, parse_break(value)))
         elif name in ("wire", "wire-seed"):
-            wire = wire.told("qemu", name, value)
+            asked = replace(asked, wire=asked.wire.told("qemu", name, value))
         else:
             raise UsageError(
                 f"`port`: the emulated device (qemu:) has no parameter {name!r}",
                 hint=f"it takes break, wire, wire-seed, {', '.join(QEMU_SETTINGS)}; the bench takes more: "
                 '`port` "bench:?seed=3&creep=0.05"',
             )
-    return QemuOptions(tuple(breaks), wire, tuple(settings))
+    return asked
 
 
 def _setting(name: str, text: str) -> float:

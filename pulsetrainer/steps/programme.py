@@ -94,10 +94,10 @@ class Programme:
         for change in changes:
             check_rate(change.rate)
             check_amplitude(change.amplitude)
-        self._names = tuple(pulses)
+        self.names = tuple(pulses)
         self._beats, self._number = beats, 0  # of the beat that was asked for last
         self._seconds = 60.0 * (USUAL_MINUTES if minutes is None else minutes)
-        self._start = Play(0, amplitude / 100.0, rate)
+        self.start = Play(0, amplitude / 100.0, rate)
         self._changes = [
             (change, None if change.pulse is None else number_of(change.pulse, pulses))
             for change in sorted(changes, key=lambda one: one.time_s)
@@ -105,8 +105,8 @@ class Programme:
 
     @property
     def rates(self) -> tuple[float | None, ...]:
-        """Every rate that is asked for."""
-        return (self._start.bpm, *(change.rate for change, _ in self._changes if change.rate is not None))
+        """Every rate that is asked for, that of the start first."""
+        return (self.start.bpm, *(change.rate for change, _ in self._changes if change.rate is not None))
 
     def _share(self, number: int, time_s: float) -> float:
         """How much of it is over."""
@@ -121,7 +121,7 @@ class Programme:
         self._number, share = number, self._share(number, time_s)
         if share >= 1.0:
             return None
-        play = replace(self._start, pulse=int(share * len(self._names)))
+        play = replace(self.start, pulse=int(share * len(self.names)))
         for change, pulse in self._changes:
             if change.time_s > time_s:
                 break

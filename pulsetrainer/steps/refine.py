@@ -168,13 +168,7 @@ def plan(drive: Waveform, *, passes: int = 5, limits: Limits | None = None) -> P
 
 
 def check(drive: Waveform, passes: int) -> Model:
-    """Return the model of a drive; refuse what cannot be refined, before any device is opened.
-
-    Raises
-    ------
-    ArgumentError, DataError
-        As ``refine``.
-    """
+    """Return the model of a drive; refuse what ``refine`` cannot take, before any device is opened."""
     if passes < 1:
         raise ArgumentError(f"passes must be at least 1, got {passes}", hint="5 is usual")
     check_current(drive)

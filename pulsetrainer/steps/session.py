@@ -18,7 +18,7 @@ from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, che
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.arguments import check_asked_for
-from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Pause, Play, Reach
+from pulsetrainer.steps.conductor import RATE_HZ, Conductor, Decide, Given, Pause, Reach
 from pulsetrainer.steps.heat import coil_of, rest_force, thermometer_of
 from pulsetrainer.steps.invertible import major_loop
 from pulsetrainer.steps.one_thread import one_thread
@@ -109,18 +109,10 @@ def perform(
 ) -> Performed:
     """Press what ``decide`` decides until it decides the end, and judge every beat.
 
-    Parameters
-    ----------
-    rates
-        Between the slowest and the fastest of these every pulse reaches its full amplitude, beats a minute;
-        None: its own.
-    lead_s
-        How long before its time a beat is decided and made.
-    track_heat
-        Tell the coil's temperature from the duty, before and all the time, and make up for the force that it
-        costs; None: where the model has a thermal term and knows the coil.
-    watch
-        Called with each piece of telemetry.
+    Between the slowest and the fastest of the ``rates`` (beats a minute; None: its own) every pulse reaches
+    its full amplitude. A beat is decided and made ``lead_s`` before its time. ``track_heat`` tells the
+    coil's temperature from the duty, before and all the time, and makes up for the force that it costs;
+    None: where the model has a thermal term and knows the coil. ``watch`` gets each piece of telemetry.
 
     DataError where the model cannot be used; DeviceError where the device cannot be talked to, or its
     firmware knows no open-ended waves.
@@ -274,17 +266,11 @@ def session(
     >>> pressed.beats.start_s.size, pressed.underruns
     (4, 0)
     """
-    chosen, rates = programme(
-        [shape.name for shape in pulses],
-        rate=rate,
-        amplitude=amplitude,
-        minutes=minutes,
-        beats=beats,
-        changes=changes,
-        quiz=quiz,
-        answers=answers,
-        seed=seed,
+    names = [shape.name for shape in pulses]
+    programme = Programme(
+        names, rate=rate, amplitude=amplitude, beats=beats, minutes=minutes, changes=changes
     )
+    chosen, rates = with_quiz(programme, quiz, answers, seed)
     sink, rhythm = InMemory(), Rhythm(variability / 100.0, respiration / 100.0, ectopic / 100.0, seed)
 
     def watch(now: Now) -> None:
@@ -310,31 +296,20 @@ def session(
     return kept
 
 
-def programme(
-    names: Sequence[str],
-    *,
-    rate: float | None,
-    amplitude: float,
-    minutes: float | None,
-    beats: int | None,
-    changes: Sequence[Change],
-    quiz: int,
-    answers: Sequence[str] | Answer,
-    seed: int,
+def with_quiz(
+    programme: Programme, quiz: int, answers: Sequence[str] | Answer, seed: int
 ) -> tuple[Programme | Blind, tuple[float | None, ...]]:
     """Return who decides, and between which rates every pulse shall reach its full amplitude.
 
-    Raises as ``session``.
+    A quiz asks for the pulses as the programme begins them. Raises as ``session``.
     """
+    names = programme.names
     check_asked_for(None if callable(answers) else answers, quiz, names)
-    programme = Programme(
-        names, rate=rate, amplitude=amplitude, beats=beats, minutes=minutes, changes=changes
-    )
     if not quiz:
         return programme, programme.rates
     asked = order(len(names), quiz, seed)
     answer = answers if callable(answers) else from_list(answers, names, quiz)
-    return Blind(names, asked, answer, Play(0, amplitude / 100.0, rate)), (rate,)
+    return Blind(names, asked, answer, programme.start), programme.rates[:1]
 
 
 def _session(sink: InMemory, done: Performed, asked: Quiz | None) -> Session | None:
