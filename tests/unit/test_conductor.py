@@ -249,6 +249,18 @@ def test_the_ledger_finds_what_was_done_to_a_force():
     assert figures["augmentation_index_error_percent"] < 3.0
 
 
+def test_a_beat_after_which_nothing_is_given_out_yet_is_no_rest():
+    """As on a busy computer: "at rest" was shown between two beats, and taken for the pause."""
+    _, given, _ = _conducted(pt.load(KEPT / "model.h5"), Programme(NAMES[:1], beats=2))
+    ledger = Ledger(NAMES[:1])
+    assert not ledger.is_beating
+    for piece in given:
+        ledger.give(piece)
+        samples = piece.first + np.arange(piece.input.size)
+        ledger.measure(samples, piece.target)
+        assert ledger.is_beating == (piece.beat is not None)
+
+
 def test_lost_samples_are_left_out():
     """A beat with a gap is judged on what came; one with little left is not judged."""
     static = pt.load(KEPT / "model.h5")
