@@ -300,6 +300,18 @@ def test_figures_of_a_session_are_what_they_are_called():
     assert figures["beat_timing_max_ms"] == pytest.approx(1e3 * np.abs(beats.late).max())
 
 
+def test_a_beat_after_which_nothing_is_given_out_yet_is_no_rest():
+    """As on a busy computer: "at rest" was shown between two beats, and taken for the pause."""
+    _, given, _ = _conducted(pt.load(KEPT / "model.h5"), Programme(NAMES[:1], beats=2))
+    ledger = Ledger(NAMES[:1])
+    assert not ledger.is_beating
+    for piece in given:
+        ledger.give(piece)
+        samples = piece.first + np.arange(piece.input.size)
+        ledger.measure(samples, piece.target)
+        assert ledger.is_beating == (piece.beat is not None)
+
+
 def test_lost_samples_are_left_out():
     """A beat with a gap is judged on what came; one with little left is not judged."""
     static = pt.load(KEPT / "model.h5")
