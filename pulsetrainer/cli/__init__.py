@@ -1,1 +1,1 @@
-"""The typer commands: parse, call one flow, print."""
+"""The typer commands: parse, call one step, print."""

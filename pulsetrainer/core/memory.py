@@ -41,11 +41,6 @@ class State:
                 hint="start from a state that this package returned",
             )
 
-    @property
-    def present(self) -> float:
-        """The input now."""
-        return self.extremes[-1]
-
 
 def negative_saturation(low: float) -> State:
     """Return the state in which every relay is down and the input is ``low``, input unit.

@@ -1,1 +1,1 @@
-"""Frames, messages, transport, session, device and the virtual bench."""
+"""The device: bytes, frames, messages and commands; plays, their heat, and the limits of both."""

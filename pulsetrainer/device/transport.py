@@ -12,7 +12,7 @@ from pulsetrainer.device.ports import cannot_open
 from pulsetrainer.errors import DeviceError
 
 BAUD = 921_600  # U1BRG = 18 on the real device: 0.04 % off
-_SLICE_S = 0.01  # longest single wait; short enough for every deadline of the session
+_SLICE_S = 0.01  # longest single wait; short enough for every deadline of ``exchange``
 
 
 class PortLostError(DeviceError):
@@ -20,7 +20,7 @@ class PortLostError(DeviceError):
 
 
 class Transport(Protocol):
-    """What the session needs of a port."""
+    """What ``exchange`` needs of a port."""
 
     def read(self) -> bytes:
         """Return what has arrived, waiting a few milliseconds for the first byte."""

@@ -112,8 +112,8 @@ def test_final_state_gives_the_last_target(drawn):
     """From the final state, resting at its present input, the output stays at the last target."""
     world, target = drawn
     found = invert(world.operator, target, world.start)
-    assert found.final.present == found.input[-1]
-    there = world.operator([found.final.present], found.final)[0]
+    assert found.final.extremes[-1] == found.input[-1]
+    there = world.operator([found.final.extremes[-1]], found.final)[0]
     assert there == pytest.approx(np.clip(target[-1], *sorted(world.operator.saturation)), abs=world.slack)
 
 

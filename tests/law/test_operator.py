@@ -240,7 +240,7 @@ def test_a_state_from_a_wider_plane_is_clipped(world):
     over = plane.high - plane.low
     path = np.array([*world.past, plane.high + over, *world.past])
     wider = negative_saturation(plane.low - over)
-    wide = trace(path, wider, wider.present, plane.high + over).final
+    wide = trace(path, wider, wider.extremes[-1], plane.high + over).final
     played = world.operator([*path, *world.input])
     close(world.operator(world.input, wide), played[-world.input.size :], world.slack)
 
