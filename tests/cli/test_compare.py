@@ -55,8 +55,10 @@ def test_as_text(folder):
     """A row for each figure, and the word for the change."""
     done = folder()
     assert done.code == 0
-    assert "normal: reduction" in done.out
-    assert "better" in done.out
+    changed = {one["name"]: one["change"] for one in folder("--json").json["metrics"]}
+    (row,) = (line for line in done.out.splitlines() if "normal: reduction" in line)
+    assert f"{changed['normal.mean_error_reduction_percent']:+.2f}" in row.split()
+    assert row.split()[-1] == "better"
     assert "worse" not in done.out
 
 

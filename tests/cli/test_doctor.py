@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,8 @@ def test_an_absent_port_is_a_problem_with_a_fix(run):
     assert "PROBLEM  device" in done.out
     assert "fix: " in done.out
     assert "link" not in done.out
+    found = [re.match(r"\S+ +\S.*?  +", line) for line in done.out.splitlines() if line[:1].isalpha()]
+    assert len({one.end() for one in found if one}) == 1  # below one another
 
 
 def test_without_a_compiler_the_fix_is_named(run, tmp_path):

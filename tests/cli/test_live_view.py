@@ -82,6 +82,27 @@ def test_a_terminal_that_cannot_show_it_is_told(tmp_path, more):
     assert (tmp_path / "out.h5").exists()
 
 
+@pytest.mark.parametrize(
+    ("columns", "lines", "width", "height", "fits"),
+    [
+        (50, 14, 49, 13, True),
+        (40, 12, 39, 11, True),
+        (39, 12, 38, 11, False),
+        (40, 11, 39, 10, False),
+        (300, 100, 73, 19, True),
+    ],
+)
+def test_a_loop_is_as_large_as_the_terminal_allows(monkeypatch, columns, lines, width, height, fits):
+    """A column and a line are left, so that nothing scrolls; on a large one it stays a picture."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setenv("LINES", str(lines))
+    view = LoopView(1.0)
+    view.figures = "mean 1 %"
+    drawn = view.text().plain.splitlines()
+    assert (max(len(line) for line in drawn if line[0] in "│└"), len(drawn)) == (width, height)
+    assert view.fits is fits
+
+
 def test_every_sample_is_a_dot_where_it_belongs():
     """The corners, what lies beyond them, and what was lost."""
     view = LoopView(2.0, 10.0)

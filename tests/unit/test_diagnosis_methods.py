@@ -240,6 +240,18 @@ def test_a_drift_that_relaxes_is_told_to_its_begin():
         assert np.abs(left - left.mean()).max() < 0.002 * 0.5
 
 
+def test_a_residual_at_the_full_rate_averages_to_the_one_that_was_fitted():
+    """It is zero where samples do not count, whatever was read there."""
+    u = _loops()
+    counts = (np.arange(u.size) // 100) % 4 != 2
+    y = np.where(counts, 3.0 * u + 0.1 * np.sin(np.arange(u.size) / 9.0), 99.0)
+    problem = problem_for([Record(u, y, 1.0 * counts, dt_s=0.01)], 0.0, 1.5)
+    fitted = weights_for(problem, (), None)
+    (left,) = screening._at_full_rate(problem, fitted)
+    assert np.all(left[~counts] == 0.0)
+    np.testing.assert_allclose(problem.bins.average([left]), fitted.residual, atol=1e-9)
+
+
 def test_a_chain_is_run_the_same_whatever_was_run_before():
     """What chains begin with is kept: each is still the chain run alone."""
     u = _loops()

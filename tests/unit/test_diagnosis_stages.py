@@ -333,12 +333,12 @@ def test_the_first_that_is_not_promising_ends_the_trials(monkeypatch):
 
 @pytest.mark.parametrize(("inside", "taken"), [(None, False), (0, True), (1, True)])
 def test_a_cause_whose_parameters_all_run_into_their_bounds_is_refused(monkeypatch, inside, taken):
-    """An amplitude of all of the output over the longest path is no accommodation."""
+    """An amplitude of all of the output over the longest path is no accommodation, whatever is beside it."""
     cause, state = CAUSE["accommodation"], _state(_fit(500.0), held_out=HeldOut(0.9))
     bounds = cause.quantities(state.problem.frames[0])
     values = tuple(0.5 * q.high if k == inside else q.high for k, q in enumerate(bounds))
-    trial = Fit(100.0, (Term(cause, values),))
-    _refitting(monkeypatch, acceptance, squares={frozenset({"accommodation"}): 99.0})
+    trial = Fit(100.0, (Term(CAUSE["creep"], (0.1, 1.0)), Term(cause, values)))
+    _refitting(monkeypatch, acceptance, squares={frozenset({"accommodation", "creep"}): 99.0})
     found = acceptance.stage(replace(state, trials=((trial, _score("accommodation", 1.0, 0.001)),)))
     assert bool(found.current.terms) is taken
 

@@ -53,8 +53,20 @@ ARTEFACTS = {
 
 @pytest.mark.parametrize("make", ARTEFACTS.values(), ids=ARTEFACTS.keys())
 def test_draw_gives_every_kind_a_figure_with_units(make):
-    """Each axis that is labelled names a unit in brackets, or says that it counts samples."""
+    """Each axis that is labelled names a unit in brackets, or says that it counts samples.
+
+    The axes fill the figure, and nothing that is drawn lies beyond them.
+    """
     figure = figures.draw(make())
+    extents = np.array([axes.get_window_extent().extents for axes in figure.axes]) / np.tile(
+        figure.bbox.max, 2
+    )
+    assert np.all(extents[:, :2].min(axis=0) < 0.15)
+    assert np.all(extents[:, 2:].max(axis=0) > 0.85)
+    for axes in figure.axes:
+        shown, drawn = axes.viewLim, axes.dataLim
+        assert np.all(drawn.min >= shown.min - 1e-9 * shown.size)
+        assert np.all(drawn.max <= shown.max + 1e-9 * shown.size)
     labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel()) if text]
     assert len(labels) >= 2
     for text in labels:
@@ -63,6 +75,14 @@ def test_draw_gives_every_kind_a_figure_with_units(make):
         # a shared time axis is labelled once, at the bottom
         assert axes.get_ylabel()
     assert encode(figure, "png").startswith(b"\x89PNG")
+
+
+def test_the_cells_of_a_plane_lie_within_its_outline():
+    """The triangle above the diagonal, over the range of the model."""
+    model = examples.model(n_h=6)
+    (outline,) = figures.preisach_density(model).axes[0].patches
+    low, high = model.edges[[0, -1]].tolist()
+    assert set(map(tuple, outline.get_xy().tolist())) == {(low, low), (low, high), (high, high)}
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ from pulsetrainer.errors import DataError, ExistsError, NotAnArtefactError, Usag
 from pulsetrainer.files import atomic_write, store
 from pulsetrainer.files.atomic_write import cannot_write, check_output
 from pulsetrainer.files.checksum import CHECKSUM_LENGTH
+from pulsetrainer.files.input_file import is_sound
 from pulsetrainer.files.store import read, read_any, read_header, write
 from wording import raises
 
@@ -229,6 +230,18 @@ def test_broken_header(run_file):
     with raises(DataError, "no provenance", file="run.h5"):
         read_header(run_file)
     assert examples.equal(read_any(run_file), examples.run())
+
+
+@pytest.mark.parametrize(("libver", "version"), [("earliest", 0), ("v108", 2), ("latest", 3)])
+def test_a_file_that_was_cut_is_not_offered(tmp_path, libver, version):
+    """Whatever form of HDF5 another program wrote: its first bytes say how long it is."""
+    path = tmp_path / "other.h5"
+    with h5py.File(path, "w", libver=libver) as file:
+        file["numbers"] = np.arange(1000.0)
+    content = path.read_bytes()
+    assert (content[8], is_sound(path)) == (version, True)
+    path.write_bytes(content[:-1])
+    assert not is_sound(path)
 
 
 def test_truncated_anywhere(run_file):

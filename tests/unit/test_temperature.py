@@ -128,7 +128,10 @@ def test_without_a_clear_rise_half_is_taken():
     vague = CoilRecord(0.397, 0.0476, 0.0016, 0.012, 0.004, 20.0)
     assert Thermometer(vague, TERM).share == 0.5
     assert Thermometer(COLD, Thermal(0.0072, 20.0)).share == pytest.approx(0.6)
-    assert Thermometer(COLD).share == 0.5
+    without = Thermometer(COLD)
+    without.add(*telemetry(10.0, 10.0)[:4])
+    assert without.share == 0.5
+    assert without.extra == without.loss == pytest.approx(0.5 * COPPER_PER_K * without.temperature_K)
 
 
 def test_no_window_goes_across_two_parts():
