@@ -174,13 +174,17 @@ ADVICE: Mapping[str, str] = {
     ),
     "correct, extend": (
         "The measurement is at fault, and the device does something that the model lacks. First take {names} "
-        "out of the recording (pulsetrainer correct), and identify the model from what that gives; then "
-        "diagnose the corrected recording with that model, and extend it."
+        "out of the recording (pulsetrainer correct). If the model was identified from it, identify it again "
+        "from the corrected one. Then diagnose the corrected recording, and extend the model."
     ),
     "conditions": (
         "The recordings were made in different conditions, such as load, zero or gain: the evidence says "
         "which of them the model as given predicts. Put the others right, or identify a model for each "
         "condition."
+    ),
+    "out of range": (
+        "The model knows nothing of the {input} beyond {low} and {high}: identify the device again from a "
+        "run over the whole range that it is used in, and diagnose with the new model."
     ),
     "repair": "No model can hold this: put right what was found, and record again.",
     "other model": (

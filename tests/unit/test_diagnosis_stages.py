@@ -1295,7 +1295,8 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
         ({"verdict": "unknown"}, "unknown"),
         ({"verdict": "creep", "extended": "a model"}, "extend"),
         ({"verdict": "creep"}, "again"),
-        ({"verdict": "out-of-range"}, "repair"),
+        ({"verdict": "current-tracking"}, "repair"),
+        ({"verdict": "out-of-range", "lacks": ("rates",)}, "out of range"),
         ({"verdict": "step", "findings": (_finding("step", 20.0),)}, "correct"),
         (
             {"verdict": "step", "findings": (_finding("step", 20.0), _finding("creep", 9.0))},
@@ -1716,6 +1717,14 @@ def test_a_learned_curve_is_known_but_for_a_constant(monkeypatch, name, changed)
     found = (Finding(cause, found=True),)
     told = _given(monkeypatch, RAMP + 5.0, refitted=0.1, current=current, findings=found)
     assert (told.verdict == "condition-change") is changed
+
+
+@pytest.mark.parametrize("gate", ["outliers", "out-of-range"])
+def test_what_lay_outside_the_range_stays_in_the_memory_and_is_no_other_condition(monkeypatch, gate):
+    """The model as given is off by a constant since then."""
+    firing = Firing(gate, "gate", 1.0, "{u}", {}, None)
+    after = _given(monkeypatch, RAMP + 1.0, firings=((0, firing),), verdict="none", findings=())
+    assert (after.verdict == "condition-change") is (gate == "outliers")
 
 
 def test_what_needs_no_time_is_named_where_there_is_none(monkeypatch):

@@ -14,6 +14,7 @@ import numpy as np
 
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
+from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import best_experiment
 from pulsetrainer.diagnosis.state import State
@@ -27,6 +28,7 @@ _ANOTHER_MODEL = {
     "changed": "identify anew",
     "reversed": "identify anew",
 }
+_TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 
 
 def stage(state: State) -> State:
@@ -65,10 +67,10 @@ def _after_verdict(state: State) -> Evidence:
     if state.verdict in state.correctable:
         device = any(one.found and one.cause.lasting for one in state.findings)
         return Evidence("correct, extend" if device else "correct", names=tuple(state.correctable))
-    if state.lacks:
+    if state.lacks and state.verdict != OutOfRange.id:  # no recording in the model's range would show more
         return Evidence("lacks", names=state.lacks)
     if not library()[state.verdict].lasting and state.extended is None:
-        return Evidence("conditions" if state.verdict == ConditionChange.id else "repair")
+        return Evidence(_TO_REPAIR.get(state.verdict, "repair"))
     if state.extended is not None and state.correctable:
         return Evidence("extend, correct", names=tuple(state.correctable))
     return Evidence("extend" if state.extended is not None or state.question.quick else "again")

@@ -16,7 +16,8 @@ records.
   that is all but a thousandth of the squared error, other causes would only repair the rest of it, and are
   withdrawn. It is none where the causes found, added to what the model as given says, bring it near; nor
   where refitted weights are far off too on blocks that were left out: then no Preisach model describes the
-  device, and that is `unknown`.
+  device, and that is `unknown`. It is not asked where the input left the model's range: what it did there
+  stays in the memory, and looks like another zero.
 
 What the raw data show stays, and so does what equal loops show, unless the model is of the wrong kind.
 """
@@ -38,6 +39,7 @@ from pulsetrainer.diagnosis.causes.condition_change import (
     is_near,
     left_by,
 )
+from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.finding import Estimate, Finding
@@ -70,10 +72,11 @@ def stage(state: State) -> State:
     elif _is_as_good(state, judged):
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
-        if state.verdict == "none" and _unexplained(state, judged):
-            state = replace(state, verdict="unknown")
+        if state.verdict == "none" and (_unexplained(state, judged) or state.blind):
+            state = replace(state, verdict="unknown" if _unexplained(state, judged) else "inconclusive")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
-    if changed is not None and not _brought_near(state, judged, noise):
+    beyond = any(one.cause == OutOfRange.id for _, one in state.firings)
+    if changed is not None and not beyond and not _brought_near(state, judged, noise):
         state, more = _drifted(state, judged, changed, noise) or _far_off(state, judged, changed, noise)
         said += more
     if any(one.found and one.seen is None for one in state.findings if one.cause.id == _CHANGED):
