@@ -11,15 +11,15 @@ from pulsetrainer.core.plane import FloatArray, finite_vector, float_array
 from pulsetrainer.errors import ArgumentError
 
 
-class Tracking(NamedTuple):
+class TargetError(NamedTuple):
     """Errors of a measured output against its target, in percent of ``full``."""
 
-    mean_abs_percent: float
-    max_abs_percent: float
-    rms_percent: float
+    mean_abs_error_percent: float
+    max_abs_error_percent: float
+    rms_error_percent: float
 
 
-def tracking(target: ArrayLike, measured: ArrayLike, full: float) -> Tracking:
+def tracking(target: ArrayLike, measured: ArrayLike, full: float) -> TargetError:
     """Errors of every finite sample of ``measured`` (..., n) against ``target`` (n,).
 
     ArgumentError where nothing was measured, the shapes do not fit, or ``full`` is not positive.
@@ -37,7 +37,7 @@ def tracking(target: ArrayLike, measured: ArrayLike, full: float) -> Tracking:
             hint="play the waveform again",
         )
     size = np.abs(error) * (100.0 / full)
-    return Tracking(float(size.mean()), float(size.max()), root_mean_square(size))
+    return TargetError(float(size.mean()), float(size.max()), root_mean_square(size))
 
 
 def root_mean_square(values: FloatArray) -> float:

@@ -150,9 +150,7 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
     mean_output = metrics.mean_over_repeats(output)
     tracking = np.abs(drive.input - drive.reference)
     return DriveError(
-        mean_abs_error_percent=errors.mean_abs_percent,
-        max_abs_error_percent=errors.max_abs_percent,
-        rms_error_percent=errors.rms_percent,
+        **errors._asdict(),
         hysteresis_percent=100.0 * metrics.loop_area(target, mean_output) / (full**2 * metrics.beats(target)),
         current_tracking_max_percent=100.0 * float(np.nanmax(tracking)) / playback.input_range,
         output=mean_output,

@@ -224,8 +224,8 @@ def _press(
         _repeats(metrics.repeat_spread(in_band), error),
         RefinePass(
             repeats=repeats,
-            mean_abs_error_percent=errors.mean_abs_percent,
-            max_abs_error_percent=errors.max_abs_percent,
+            mean_abs_error_percent=errors.mean_abs_error_percent,
+            max_abs_error_percent=errors.max_abs_error_percent,
             noise_percent=100.0 * spread / drive.full_force,
         ),
     )

@@ -13,9 +13,9 @@ T = np.linspace(0.0, 2.0 * np.pi, 2001)[:-1]
 def test_tracking_by_hand():
     """Two repeats of three samples, one of them lost, in percent of a full force of 4."""
     found = metrics.tracking([1.0, 2.0, 3.0], [[1.0, 2.4, 3.0], [0.2, np.nan, 3.0]], 4.0)
-    assert found.mean_abs_percent == pytest.approx(100 * (0.4 + 0.8) / 5 / 4)
-    assert found.max_abs_percent == pytest.approx(20.0)
-    assert found.rms_percent == pytest.approx(100 * np.sqrt((0.4**2 + 0.8**2) / 5) / 4)
+    assert found.mean_abs_error_percent == pytest.approx(100 * (0.4 + 0.8) / 5 / 4)
+    assert found.max_abs_error_percent == pytest.approx(20.0)
+    assert found.rms_error_percent == pytest.approx(100 * np.sqrt((0.4**2 + 0.8**2) / 5) / 4)
 
 
 def test_prediction_by_hand():
