@@ -2,14 +2,15 @@
 
 A resistor with a memory, y = G(w) u with a state w of its own, has no output where it has no input, whatever
 its state. The loops of a Preisach operator are widest within: its weights close them at an end of the input's
-range only, or where they leave a gap of no hysteresis at all (and then they describe the record).
+range only, or where they leave a gap of no hysteresis at all (and then they describe the record). A butterfly
+crosses itself too, but there one branch rises where the other falls.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
@@ -30,4 +31,17 @@ def pinched_at(level: FloatArray, output: FloatArray, noise: float) -> float | N
     wide = told & (beside > LIMITS.pinch_beside * float(np.ptp(output)))
     ratio = np.where(wide, width / np.maximum(beside, LIMITS.rounding), 1.0)
     k = int(np.argmin(ratio))
-    return (k + 0.5) / LIMITS.pinch_groups if ratio[k] < LIMITS.pinch else None
+    if ratio[k] >= LIMITS.pinch or _crosses(level, output, np.abs(number - k) <= 1):
+        return None
+    return (k + 0.5) / LIMITS.pinch_groups
+
+
+def _crosses(level: FloatArray, output: FloatArray, near: BoolArray) -> bool:
+    """Whether the output rises with the input on one of its ways past some samples, and falls on the other."""
+    way = np.gradient(level)
+    slopes = [
+        float(np.cov(level[own], output[own])[0, 1])
+        for own in (near & (way > 0), near & (way < 0))
+        if np.count_nonzero(own) >= LIMITS.least_moving
+    ]
+    return min(slopes, default=0.0) < 0.0 < max(slopes, default=0.0)
