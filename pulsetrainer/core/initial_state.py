@@ -88,10 +88,23 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
         _apart_at_the_far_end(first + later, reach) > _MET * apart
     ):  # a step, heat, creep: no memory lasts so long
         return 0
+    return _second_stroke(away, back, reach)
+
+
+def second_stroke(inputs: FloatArray, low: float, high: float) -> int:
+    """First sample (n,) at an end of [low, high] again, of a record that begins at one; 0 for none."""
+    away, back, reach = inputs - low, high - inputs, high - low
+    if min(away[0], back[0]) > NEAR * reach:
+        return 0
+    return _second_stroke(away, back, reach) if away[0] < back[0] else _second_stroke(back, away, reach)
+
+
+def _second_stroke(away: FloatArray, back: FloatArray, reach: float) -> int:
+    """Where the second stroke begins at the latest; 0 where there is none."""
     at_end = _at_end(away, NEAR * reach)
-    left = int(np.flatnonzero(at_end[:-1] & ~at_end[1:])[0])
-    ends = np.flatnonzero((at_end | (back <= NEAR * reach))[left + 1 :])
-    return left + 1 + int(ends[0])  # where the second stroke begins at the latest
+    left = np.flatnonzero(at_end[:-1] & ~at_end[1:])
+    ends = np.flatnonzero((at_end | (back <= NEAR * reach))[left[0] + 1 :]) if left.size else left
+    return int(left[0]) + 1 + int(ends[0]) if ends.size else 0
 
 
 def _apart_at_the_far_end(strokes: Sequence[tuple[FloatArray, FloatArray]], reach: float) -> float:

@@ -37,7 +37,7 @@ def pinched_at(level: FloatArray, output: FloatArray, noise: float) -> float | N
 
 
 def _crosses(level: FloatArray, output: FloatArray, near: BoolArray) -> bool:
-    """Whether the output rises with the input on one of its ways past some samples, and falls on the other."""
+    """Whether the output rises with the input on one of its ways past some samples, not on the other."""
     way = np.gradient(level)
     slopes = [
         float(np.cov(level[own], output[own])[0, 1])

@@ -242,6 +242,7 @@ class Thresholds:
     hold_within: float = 0.02  # ... in which the input stays within this share of its range ...
     hold_noise: float = 10.0  # ... or within so many standard deviations of its noise
     short_s: float = 20.0  # a shorter record is called short
+    given_worse: float = 2.5  # times what refitted weights leave: more is told of the model as given
     first_stroke_most: float = 0.25  # of a record: more is no first stroke, and is not given up for one
 
     # Words

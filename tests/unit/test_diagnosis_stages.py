@@ -1719,6 +1719,26 @@ def test_a_learned_curve_is_known_but_for_a_constant(monkeypatch, name, changed)
     assert (told.verdict == "condition-change") is changed
 
 
+@pytest.mark.parametrize("verdict", ["none", "unknown", "inconclusive", "creep"])
+@pytest.mark.parametrize("times", [2.45, 2.55])
+def test_a_model_that_does_not_carry_over_is_told_where_nothing_else_is(monkeypatch, verdict, times):
+    """What it leaves against what refitted weights leave, below what makes another condition."""
+    error = times * 0.01 * (-1.0) ** np.arange(RAMP.size)
+    after = _given(monkeypatch, RAMP + error, left=0.001, verdict=verdict)
+    told = [one.figures for one in after.evidence if one.kind == "given worse"]
+    if times < 2.5 or verdict == "creep":
+        assert told == []
+    else:
+        assert told == [{"given": pytest.approx(10.0 * times * 0.01), "refitted": pytest.approx(0.1)}]
+
+
+@pytest.mark.parametrize(("left", "kind"), [(0.49, "shifted"), (0.51, "changed")])
+def test_a_shape_that_changes_more_than_the_zero_is_not_unchanged(left, kind):
+    """Though it is within a hundredth of the span."""
+    found = condition_change.Change(0.0, 0.0, 1.0, 0.0, 0.5, left, -0.5, 100.0)
+    assert found.kind == kind
+
+
 @pytest.mark.parametrize("gate", ["outliers", "out-of-range"])
 def test_what_lay_outside_the_range_stays_in_the_memory_and_is_no_other_condition(monkeypatch, gate):
     """The model as given is off by a constant since then."""

@@ -99,10 +99,11 @@ class Change:
 
     @property
     def kind(self) -> str:
-        """Which text says it: gain and shape within 1 % of the span are unchanged."""
+        """Which text says it: gain and shape are unchanged within 1 % of the span, and less than the zero."""
         if self.gain < -1.0:
             return "reversed"
-        return "shifted" if abs(self.gain) <= _GAIN and self.left <= _FAR * self.span else "changed"
+        least = min(_FAR * self.span, abs(self.shift))
+        return "shifted" if abs(self.gain) <= _GAIN and self.left <= least else "changed"
 
 
 def left_by(measured: FloatArray, predicted: FloatArray | float, noise_rms: float) -> float:

@@ -3,48 +3,61 @@
 The first stroke of a device that was not cycled before is unlike all later ones, and is left out before
 anything is fitted. Where the device creeps, rings or runs in, the later ones differ as well, and hide it.
 So it is looked for once more in the output less what the causes add; where it stands apart there, it is left
-out, and the search begins anew.
+out, and the search begins anew. Where more than noise is left, it may have kept the causes from being found:
+then the search is tried without it, and that counts if it leaves noise only.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.core.initial_state import first_stroke_words, known_from
-from pulsetrainer.core.record import Record
+from pulsetrainer.core.initial_state import known_from, second_stroke
 from pulsetrainer.diagnosis.stages import baseline, elimination, exchange, raw_data, restart, search
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
-    """Return the state of a search without first strokes that only the causes found let show."""
+    """Return the state of a search without first strokes that are unlike the later ones."""
     simulator = state.current.simulator
     pairs = zip(simulator.full(state.current.terms), simulator.inner(()), strict=True)
-    records, notes = list(state.question.records), []
-    for k, (even, (full, plain)) in enumerate(zip(state.problem.records, pairs, strict=True)):
-        static = even.output - (full - plain)
-        until = known_from(even.input, 0.0, 1.0, static)
-        if known_from(even.input, 0.0, 1.0) < until <= LIMITS.first_stroke_most * even.input.size:
-            count = int(np.ceil(until / even.input.size * records[k].input.size))
-            if records[k].sample_weight[:count].any():
-                records[k] = _without(records[k], count)
-                where = f"record {k + 1}: " if len(records) > 1 else ""
-                words = first_stroke_words(even.input, static, 0.0, 1.0)
-                notes.append(f"{where}less what was found, {words}")
-    if not notes:
+    static = [
+        even.output - (full - plain) for even, (full, plain) in zip(state.problem.records, pairs, strict=True)
+    ]
+    inputs = [even.input for even in state.problem.records]
+    apart = [known_from(u, 0.0, 1.0, y) for u, y in zip(inputs, static, strict=True)]
+    known = [known_from(u, 0.0, 1.0) for u in inputs]
+    again = _without(state, [a if a > k else 0 for a, k in zip(apart, known, strict=True)])
+    if again is not None:
+        return again
+    if state.is_whole(state.current) or state.jagged:
         return state
+    again = _without(state, [second_stroke(u, 0.0, 1.0) for u in inputs])
+    return again if again is not None and again.current.terms and again.is_whole(again.current) else state
+
+
+def _without(state: State, counts: Sequence[int]) -> State | None:
+    """Search again without so many samples at the begin of each record; None where no more is left out."""
+    records, notes = list(state.question.records), []
+    for k, (count, even) in enumerate(zip(counts, state.problem.records, strict=True)):
+        weight = records[k].sample_weight.copy()
+        own = int(np.ceil(count / even.input.size * weight.size))
+        if count > LIMITS.first_stroke_most * even.input.size or not weight[:own].any():
+            continue
+        weight[:own] = 0.0
+        records[k] = replace(records[k], sample_weight=weight)
+        where = f"record {k + 1}: " if len(records) > 1 else ""
+        notes.append(
+            f"{where}less what was found, the first stroke is unlike all later ones, as of a device that was "
+            f"not cycled before; its {own} samples are not counted"
+        )
+    if not notes:
+        return None
     question = replace(state.question, records=records, notes=(*state.question.notes, *notes))
     again = baseline.stage(raw_data.stage(question))
     for one in (search, restart, exchange, elimination):
         again = one.stage(again)
     return again
-
-
-def _without(record: Record, count: int) -> Record:
-    """Return the record without weight in its first samples."""
-    weight = record.sample_weight.copy()
-    weight[:count] = 0.0
-    return replace(record, sample_weight=weight)

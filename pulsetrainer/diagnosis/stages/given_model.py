@@ -48,6 +48,7 @@ from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 _CHANGED, _SPEED = "condition-change", "viscous"
+_NOTHING = ("none", "inconclusive", "unknown")
 
 
 def stage(state: State) -> State:
@@ -79,9 +80,20 @@ def stage(state: State) -> State:
     if changed is not None and not beyond and not _brought_near(state, judged, noise):
         state, more = _drifted(state, judged, changed, noise) or _far_off(state, judged, changed, noise)
         said += more
+    said += _not_carried(state, judged) if changed is None else []
     if any(one.found and one.seen is None for one in state.findings if one.cause.id == _CHANGED):
         said += _each_against(judged)
     return replace(state, evidence=(*said, *state.evidence))
+
+
+def _not_carried(state: State, judged: Judged) -> list[Evidence]:
+    """Say where nothing was found that the model as given leaves much more than refitted weights do."""
+    refitted = state.scale.span * state.baseline.rms
+    if state.verdict not in _NOTHING or _left_by_given(state, judged) <= LIMITS.given_worse * refitted:
+        return []
+    left = {"given": root_mean_square(judged.measured - judged.predicted), "refitted": refitted}
+    percent = PERCENT / float(np.ptp(judged.measured))
+    return [Evidence("given worse", figures={name: percent * size for name, size in left.items()})]
 
 
 def _each_against(judged: Judged) -> Iterator[Evidence]:
