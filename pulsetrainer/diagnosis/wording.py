@@ -85,8 +85,8 @@ TEXTS: Mapping[str, str] = {
     ),
     "given worse": (
         "The model as given leaves {given:.2f} % of the span (rms of single samples), and weights refitted "
-        "to these recordings {refitted:.2f} %. It does not carry over: the device, its zero or its sensor was "
-        "not the same when it was identified, or the device is none that such a model describes"
+        "to these recordings {refitted:.2f} %. It does not carry over: the device, its zero or its sensor "
+        "was not the same when it was identified, or the device is none that such a model describes"
     ),
     "given better": (
         "The model as given predicts these recordings better than any extension that was tried, so none is "
