@@ -11,10 +11,11 @@ import report_examples
 import store_examples as examples
 from core_jobs import curves
 
+import pulsetrainer as pt
 from pulsetrainer.artefacts import Evaluation, Extension, Parameter, Playback, Run
 from pulsetrainer.core.memory import positive_saturation
 from pulsetrainer.diagnosis.prediction import operator_of
-from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.errors import ArgumentError, DataError, UsageError
 from pulsetrainer.files.store import read
 from pulsetrainer.report.text import tables_of
 from pulsetrainer.steps.compare import compare
@@ -58,6 +59,21 @@ def test_a_run_that_the_model_was_fitted_to_is_no_test_of_it():
     notes = [evaluate(run, model, names=["a"], model_names=["m"]).notes for run in runs]
     assert notes[0] == ("m was fitted to a: how good it is, another run shows",)
     assert notes[1] == ()
+
+
+def test_the_name_of_a_file_is_none_of_its_contents():
+    """As in a notebook: which function gives what was meant; it was an AttributeError of a text."""
+    model, drive = pt.load(FOLDER / "model.h5"), pt.load(FOLDER / "drive.h5")
+    for verb, given in (
+        (pt.identify, ("run.h5",)),
+        (pt.diagnose, (_run(), "model.h5")),
+        (pt.evaluate, (_run(), "model.h5")),
+        (pt.invert, ("normal", "model.h5")),
+        (pt.invert, (model, "normal")),
+        (pt.play, (drive, "bench:")),
+    ):
+        with pytest.raises(ArgumentError, match="expected a"):
+            verb(*given)
 
 
 def test_a_second_model_gains_on_the_first():
