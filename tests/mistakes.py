@@ -34,6 +34,7 @@ def lay_out(folder: Path) -> None:
     (folder / "bare").mkdir()
     (folder / "bare.toml").write_text("")
     (folder / "pulse.toml").write_text("normal = 3\n")
+    (folder / "round.toml").write_text('"normal.continuous.mean_error_reduction_percent" = [98, 90]\n')
     (folder / "one.toml").write_text('"normal.continuous.mean_error_reduction_percent" = 90\n')
 
 
@@ -220,6 +221,9 @@ _WORDS_OF_A_TIRED_HAND = {
         *("import x.csv x.csv --input u --output y -o out.h5", 2, "x.csv is named twice", "each file once"),
     ),
     "bounds of nothing": ("evaluate played.h5 --bounds bare.toml", 2, "holds no bound", "= [90, 100]"),
+    "a bound the wrong way round": (
+        *("evaluate played.h5 --bounds round.toml", 2, "got [98, 90]", "percent = [90.0, 98.0]"),
+    ),
     "a bound of one number": (
         *("evaluate played.h5 --bounds one.toml", 2, "a pair [low, high], got 90", "lowest and the highest"),
     ),

@@ -84,6 +84,8 @@ def _show(job: Job, model: Path, out: Path | None, found: Checked, serial: str, 
         )
     elif found.verdict == "shifted" and updatable:
         rows["next"] = f"pulsetrainer check {shlex.quote(str(model))} --update -o updated.h5"
+        if job.port:
+            rows["next"] += f" --port {shlex.quote(job.port)}"
     elif found.verdict == "changed" or (found.verdict == "shifted" and not updatable):
         rows["next"] = "identify again: pulsetrainer capture identification, then pulsetrainer identify"
     job.show(plain(found) | {"output": out}, f"{model} on {serial}: {_VERDICTS[found.verdict]}", rows)

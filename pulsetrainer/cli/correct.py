@@ -42,7 +42,7 @@ def correct(
 
             made = read_header(diagnosis).provenance.parameters
             model = shlex.quote(str(made.get("model", "model.h5")))
-            error.hint = error.hint.replace("--model model.h5", f"--model {model}")
+            error.hint = error.hint.replace("MODEL.h5", model)
             raise
         job.save(out, corrected, f"Run corrected for {', '.join(corrected.corrected)}")
     from pulsetrainer.artefacts.units import with_unit

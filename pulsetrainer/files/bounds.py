@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 from pulsetrainer.errors import UsageError
@@ -24,9 +25,13 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
                 bounds[name] = float(low), float(high)
             case _:
                 of, _, figure = name.rpartition(".")
+                usual = [0.5, 1.5]
+                with contextlib.suppress(TypeError, ValueError):  # the wrong way round, or in quotes
+                    low, high = sorted(map(float, pair))
+                    usual = [low, high]
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=f"write {figure} = [0.5, 1.5], the lowest and the highest" if of else _HOW,
+                    hint=f"write {figure} = {usual}, the lowest and the highest" if of else _HOW,
                 )
     if not bounds:
         raise UsageError(f"{path} holds no bound, so nothing would be checked", hint=_HOW)

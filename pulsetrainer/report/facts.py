@@ -92,9 +92,9 @@ def loop_words(model: Model) -> str:
 
 
 def warmth_words(kelvin: Sequence[float] | FloatArray) -> str:
-    """How the coil's temperature went against that of calibration, K (n,)."""
-    first, last = (round(float(k), 1) + 0.0 for k in (kelvin[0], kelvin[-1]))  # no -0.0
-    return f"{first:+.1f} to {last:+.1f} K against calibration, made up for"
+    """Between which temperatures the coil was, against that of calibration, K (n,)."""
+    low, high = (round(float(k), 1) + 0.0 for k in (min(kelvin), max(kelvin)))  # no -0.0
+    return f"{low:+.1f} to {high:+.1f} K against calibration, made up for"
 
 
 def minor_words(percent: float, switched_percent: float) -> str:

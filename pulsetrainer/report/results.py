@@ -61,7 +61,7 @@ def identified(out: Path, model: Model, seconds: float) -> Said:
         "cells switched": f"{fit.coverage_percent:.1f} %",
         "told apart by minor loops": minor_words(fit.minor_percent, fit.coverage_percent)
         + f", on the plane of the {model.edges_quantity}" * (model.form == "dual"),
-        "smoothing": f"{share:.3g} of the range of the {model.input_quantity}" if share else "none",
+        "smoothing": f"{share:.3g} of the range of the {model.edges_quantity}" if share else "none",
         "loop": loop_words(model),
         "form": model.form,
         **({"output known within": with_unit(f"{band:.2g}", unit) + " (90 % band)"} if band else {}),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from pulsetrainer.errors import ArgumentError, UsageError
 
@@ -55,6 +56,24 @@ def check_quiz(choices: int, questions: int) -> None:
             f"a quiz of {questions} question{'s' * (questions != 1)} cannot ask each of {choices} pulses",
             hint=f"ask at least {choices}",
         )
+
+
+def check_is(kind: type, *given: object) -> None:
+    """Raise ArgumentError for what is of another kind, such as the name of the file that it is in."""
+    for one in given:
+        if not isinstance(one, kind):
+            name = str(one) if isinstance(one, str) or hasattr(one, "__fspath__") else ""
+            raise ArgumentError(
+                f"expected a {kind.__name__}, got {repr(name) if name else f'a {type(one).__name__}'}",
+                hint=f"pt.load({name!r}) gives it" if name else "see its help",
+            )
+
+
+def several(kind: type, given: Any) -> list[Any]:
+    """Return what was given, one or many, as a list; raises as ``check_is``."""
+    whole = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+    check_is(kind, *whole)
+    return whole
 
 
 def named(names: Sequence[str], usual: Sequence[str], *, argument: str = "names") -> Sequence[str]:

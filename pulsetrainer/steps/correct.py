@@ -61,7 +61,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
         raise DataError(
             f"{diagnosis_name} is not a diagnosis of {run_name}: none of the records in it has these samples",
             hint="give the run that was diagnosed, which pulsetrainer show DIAGNOSIS.h5 tells, or diagnose "
-            "this one: pulsetrainer diagnose RUN.h5 --model model.h5 -o new-diagnosis.h5",
+            "this one: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o new-diagnosis.h5",
         )
     if delay_s and run.dt_s is None:
         raise DataError(
@@ -143,7 +143,7 @@ def _nothing(diagnosis: Diagnosis, name: str) -> str:
 
 def _instead(diagnosis: Diagnosis) -> str:
     if diagnosis.extended is not None:
-        return "extend the model: pulsetrainer extend DIAGNOSIS.h5 --model model.h5 -o extended.h5"
+        return "extend the model: pulsetrainer extend DIAGNOSIS.h5 --model MODEL.h5 -o extended.h5"
     if diagnosis.quick:
-        return "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model model.h5 -o full.h5"
+        return "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o full.h5"
     return "use the run as it is"

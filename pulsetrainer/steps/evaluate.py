@@ -26,7 +26,7 @@ from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.steps.arguments import named
+from pulsetrainer.steps.arguments import named, several
 from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES, to_their_tips
 from pulsetrainer.steps.one_thread import one_thread
 
@@ -71,7 +71,7 @@ def evaluate(
     True
     """
     given = [measured] if isinstance(measured, Playback | Run) else list(measured)
-    tested = [models] if isinstance(models, Model) else list(models)
+    tested = several(Model, models)
     titles = named(names, [f"{one.kind} {number}" for number, one in enumerate(given, 1)])
     called = named(model_names, [f"model {n}" for n in range(1, len(tested) + 1)], argument="model_names")
     played = [one for one in given if isinstance(one, Playback)]

@@ -88,7 +88,7 @@ def _nothing_in(diagnosis: Diagnosis, name: str) -> DataError:
     if diagnosis.correctable:
         hint = "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis DIAGNOSIS.h5 -o corrected.h5"
     elif diagnosis.quick:
-        hint = "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model model.h5 -o full.h5"
+        hint = "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o full.h5"
     elif diagnosis.verdict == "none" or not diagnosis.next_experiment:
         hint = "use the model as it is"
     else:

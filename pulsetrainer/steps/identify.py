@@ -22,7 +22,7 @@ from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps import fit_notes
-from pulsetrainer.steps.arguments import EXCITATIONS, named
+from pulsetrainer.steps.arguments import EXCITATIONS, named, several
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -98,7 +98,7 @@ def identify(
     >>> model.fit.coverage_percent
     100.0
     """
-    whole = [runs] if isinstance(runs, Run) else list(runs)
+    whole = several(Run, runs)
     titles = named(names, [f"run {number}" for number in range(1, len(whole) + 1)])
     _check_runs(titles, whole)
     notes = [

@@ -56,6 +56,14 @@ def test_it_is_said_which_model_to_use_after_an_update(run, calibrated, offset, 
     assert row.split()[row.split().index("use" if offset else "with") + 1].strip(":,").endswith(better)
 
 
+def test_the_update_is_for_the_device_that_was_checked(run, calibrated):
+    """Copied, the command went to the usual port."""
+    port = "bench:?condition-offset=0.3&noise-seed=4"
+    done = run("check", calibrated / "model.h5", "--port", port)
+    (row,) = (line for line in done.out.splitlines() if line.startswith("  next "))
+    assert row.endswith(f"--update -o updated.h5 --port '{port}'")
+
+
 def test_a_stronger_force_is_told_by_how_much(run, calibrated):
     """By which share it moved, and what the limit is."""
     done = run("check", calibrated / "model.h5", "--port", "bench:?condition-gain=0.052")

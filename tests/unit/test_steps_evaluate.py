@@ -11,10 +11,11 @@ import report_examples
 import store_examples as examples
 from core_jobs import curves
 
+import pulsetrainer as pt
 from pulsetrainer.artefacts import Evaluation, Extension, Parameter, Playback, Run
 from pulsetrainer.core.memory import positive_saturation
 from pulsetrainer.diagnosis.prediction import operator_of
-from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.errors import ArgumentError, DataError, UsageError
 from pulsetrainer.files.store import read
 from pulsetrainer.report.text import tables_of
 from pulsetrainer.steps.compare import compare
@@ -126,6 +127,21 @@ def test_figures_of_a_fit_are_those_of_an_evaluation_on_its_record():
     np.testing.assert_allclose(fit.predicted, found.predicted)
     assert (fit.samples, fit.draws, fit.smoothing) == (run.input.size, 0, 0.02)
     assert fit.coverage_percent == 100.0 * np.mean(model.covered)
+
+
+def test_the_name_of_a_file_is_none_of_its_contents():
+    """As in a notebook: which function gives what was meant; it was an AttributeError of a text."""
+    model, drive = pt.load(FOLDER / "model.h5"), pt.load(FOLDER / "drive.h5")
+    for verb, given in (
+        (pt.identify, ("run.h5",)),
+        (pt.diagnose, (_run(), "model.h5")),
+        (pt.evaluate, (_run(), "model.h5")),
+        (pt.invert, ("normal", "model.h5")),
+        (pt.invert, (model, "normal")),
+        (pt.play, (drive, "bench:")),
+    ):
+        with pytest.raises(ArgumentError, match="expected a"):
+            verb(*given)
 
 
 def test_a_second_model_gains_on_the_first():
