@@ -210,7 +210,7 @@ def invert(edges, masses, targets, past=()):
     past = [edges[0], *past]
     inputs = []
     for target in targets:
-        present = past[-1]
+        present = min(max(past[-1], edges[0]), edges[-1])  # beyond the plane nothing answers
         output = continuous_output(edges, masses, [present], past)[0]
         near, far = present, edges[-1] if target > output else edges[0]
         for _ in range(80):
