@@ -26,7 +26,7 @@ _BARE_SYMBOLS = """
 # of two letters and more, may be all of it
 _SUFFIXES = """
     s ms us µs ns min h A mA uA nA pA kA V mV uV kV N mN uN nN cN kN Nm mNm T mT m cm mm um µm nm Pa kPa MPa
-    GPa bar mbar mmHg Oe kOe emu uC nC ohm Ohm kOhm
+    GPa bar mbar mmHg Oe kOe emu uC nC pF nF uF ohm Ohm kOhm
     deg rad C °C degC K Hz kHz W g kg % percent
     A/m kA/m m/s mm/s cm/s km/h rad/s deg/s N/A N/m N/mm kN/mm V/s A/s N/s mV/V
 """
@@ -61,7 +61,7 @@ _BRACKETED = re.compile(r"^(?P<name>.*?)\s*/?\s*(?:\[(?P<square>[^\[\]]*)\]|\((?
 # as circuit simulators write a voltage of a node or between two, and a current of an element or its pin
 _OF_A_PART = re.compile(r"(?P<what>[Vv]|i|I[bcdegsx]?)\((?!t\))(?P<part>[\w:.,]+)\)")
 _NO_PART = 4  # letters of a unit: ``counts`` is hardly the name of a node, ``in`` and ``g`` are
-_MARK = re.compile(r"\s*[/,]\s*|\s+in\s+")
+_MARK = re.compile(r"\s*[/,]\s*|\s+in\s+|\s+(?=[%‰°]\w?$)")
 _SUFFIXED = re.compile(r"^(?P<name>.+)_(?P<unit>[^_\s]{1,12})$")
 # as a name without a slash says it, such as one of MATLAB: H_kA_m; V_s and the like may be a product
 _COMPOUND = re.compile(r"^(?P<name>.+?)_(?P<top>[^_\s]+)_(?P<per>per_)?(?P<bottom>[^_\s]+)$")

@@ -228,7 +228,9 @@ def refit(
     not reached.
     """
     known = near.names if near is not None else ()
-    rebuild = rebuild or any(t.cause.in_rows and t.cause.id not in known for t in terms)
+    new = {t.cause for t in terms if t.cause.id not in known}
+    # a lag before the hysteresis moves every switch: too much to be subtracted
+    rebuild = rebuild or any(cause.in_rows or cause.stage == "input" for cause in new)
     fitted = weights_for(problem, in_order(terms), near, rebuild=rebuild)
     damping = 0.0
     for _ in range(rounds):

@@ -167,6 +167,10 @@ def spacing_of(y: FloatArray) -> float:
 
 
 def coarse_step(y: FloatArray) -> float:
-    """Step of the output where it is coarse against its noise, else 0: its error does not average out."""
+    """Step of the output where it is coarse against its noise, else 0: its error does not average out.
+
+    Nor are the few states of a device that switches steps of a converter.
+    """
     step = spacing_of(y)
-    return step if step > LIMITS.coarse_noise * noise_of(y) else 0.0
+    coarse = LIMITS.coarse_noise * noise_of(y) < step < LIMITS.state * float(np.ptp(y))
+    return step if coarse else 0.0

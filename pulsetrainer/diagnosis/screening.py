@@ -26,7 +26,7 @@ from scipy import linalg, special, stats
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
-from pulsetrainer.diagnosis.causes.base import Cause, Frame, Values
+from pulsetrainer.diagnosis.causes.base import Cause, Frame, Late, Values
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.noise import Noise, noise_in
@@ -326,3 +326,13 @@ def _start(block: _Block, residual: FloatArray, frame: Frame) -> Values:
             one = min(max(one, LIMITS.start_falls * tried), LIMITS.start_rises * tried)
         values[j] = min(max(one, quantity.low), quantity.high)
     return tuple(float(v) for v in values)
+
+
+def in_place(term: Term, score: Score) -> Term:
+    """Return the cause of a score in the place of another, and as late where both are late."""
+    return Term(score.cause, term.values if both_late(score, term) else score.start)
+
+
+def both_late(score: Score, term: Term) -> bool:
+    """Whether both have one parameter, which says how late they make the output."""
+    return isinstance(score.cause, Late) and isinstance(term.cause, Late)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pulsetrainer.artefacts.units import with_seconds, with_unit
+from pulsetrainer.artefacts.units import shown, with_seconds, with_unit
 from pulsetrainer.diagnosis import experiment
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.evidence import Evidence
@@ -116,10 +116,10 @@ SIGNATURES: Mapping[bool, str] = {
 # Where an error is largest, by the quantity that it was sorted by
 PLACES: Mapping[str, str] = {
     "rest": "while the {input} rests",
-    "rate": "where the {input} moves at {at:.3g}{in_u} per {second}",
-    "level": "where the {input} is about {at:.3g}{in_u}",
+    "rate": "where the {input} moves at {at}{in_u} per {second}",
+    "level": "where the {input} is about {at}{in_u}",
     "direction": "while the {input} {way}",
-    "time": "about {at:.3g} {seconds} after the start",
+    "time": "about {at} {seconds} after the start",
 }
 WAYS = {-1.0: "falls", 0.0: "rests", 1.0: "rises"}
 # where nothing better is known
@@ -322,7 +322,7 @@ class Bench:
         if not self.timed:
             times = ranges / min(experiment.RATES)
             return "one rate" if times == 1 else f"{times:.3g} times that rate"
-        per_second = "1/s" if self.unit == "1" else f"{self.unit}/s"
+        per_second = f"{shown(self.unit) or '1'}/s"
         return with_unit(figure(ranges * self.scale.reach / self.scale.second), per_second)
 
     def _time(self, seconds: float) -> str:
@@ -352,12 +352,12 @@ def text(one: Evidence, words: Mapping[str, str] | None = None) -> str:
         **known,
         **one.figures,
         "names": _listed(one.names, known),
-        "limits": _joined([f"{name} {size:.2g}" for name, size in sorted(one.figures.items())]),
+        "limits": _joined([f"{name} {figure(size, 2)}" for name, size in sorted(one.figures.items())]),
         "signature": SIGNATURES[bool(one.names)].format(mark=cause.signature) if cause else "",
     }
     if one.kind == "largest":
         figures["way"] = WAYS.get(one.figures["at"], "")
-        figures["place"] = PLACES[one.names[0]].format(**figures)
+        figures["place"] = PLACES[one.names[0]].format(**{**figures, "at": figure(one.figures["at"])})
     where = f"record {one.record + 1}: " if one.record is not None else ""
     return where + (TEXTS[one.kind] if own is None else own).format(**figures)
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pulsetrainer.artefacts.units import is_unit, symbol_of
+from pulsetrainer.artefacts.units import is_unit, split_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import time_stamps as stamps
 
@@ -449,9 +449,15 @@ def _without_end(names: list[str], first: list[str]) -> tuple[list[str], list[st
 
 
 def _commented_names(comments: tuple[str, ...], delimiter: str | None, count: int) -> list[str]:
-    """Return names from the last comment, if it is a header (numpy writes it so), or numbers."""
+    """Return names from the last comment, if it is a header (numpy writes it so), or numbers.
+
+    Its mark may be the name of the first column, that of the row's number: ``#,time,current,force``.
+    """
     if comments:
         cells = split(comments[-1], delimiter)
+        shown = cells[1:] if not cells[0] else cells
+        if len(shown) == count - 1 and any(split_unit(cell)[1] for cell in shown):
+            cells = ["#", *shown]
         if len(cells) == count and all(number(cell) is None for cell in cells):
             return cells
     return [f"column{k + 1}" for k in range(count)]

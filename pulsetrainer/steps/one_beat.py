@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pulsetrainer.artefacts import Waveform
+from pulsetrainer.artefacts.units import with_seconds
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
@@ -51,5 +52,5 @@ def _say_if_several(recording: Shape, notes: list[str]) -> None:
     if count > 1:
         notes.append(
             f"{recording.name} holds {count} whole beats, and all of it is played as one period of "
-            f"{recording.period_s:.3g} s: give `beat` from 1 to {count}, or mean, to play a single one"
+            f"{with_seconds(recording.period_s)}: give `beat` from 1 to {count}, or mean, to play a single one"
         )

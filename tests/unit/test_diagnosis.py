@@ -201,6 +201,7 @@ def test_gates_fire_on_what_they_are_for_and_not_otherwise():
     assert set(fired) == {"outliers"}
     assert 15 <= np.count_nonzero(fired["outliers"].mask) <= 20
     assert set(_fired(_record(np.round(clean / 0.2) * 0.2, u))) == {"quantisation"}
+    assert "quantisation" not in _fired(_record(np.round(clean / 4.0) * 4.0, u))  # a device of a few states
     assert set(_fired(_record(clean, u, u - 0.1 * (u > 1)))) == {"current-tracking"}
     assert set(_fired(_record(clean, 1.1 * u))) == {"out-of-range"}
     held, stuck = [], 0.0

@@ -144,6 +144,9 @@ def test_write_and_read(tmp_path):
         ("Strain (ppt)", "Strain", "ppt"),
         ("(N)", "(N)", ""),
         ("x", "x", ""),
+        ("RH %", "RH", "%"),
+        ("T °C", "T", "°C"),
+        ("C_pF", "C", "pF"),
         ("Temperatur °C (°C)", "Temperatur °C", "°C"),
     ],
 )
@@ -512,6 +515,14 @@ def test_comments_are_those_above_the_first_row(table):
     read = table("# source: here\n0,1\n# a,b\n1,2\n")
     assert read.comments == ("source: here",)
     assert read.names == ("column1", "column2")
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
+def test_the_mark_of_a_remark_may_name_the_column_of_numbers(table, delimiter):
+    """The first column of a heading is often called ``#``: its line was taken for a comment, and no name read."""
+    rows = [["#", "t(s)", "phi(deg)"], *([str(k), str(0.1 * k), str(k * k)] for k in range(20))]
+    read = table("# made by X500\n" + "\n".join(map(delimiter.join, rows)))
+    assert read.names == ("#", "t(s)", "phi(deg)")
 
 
 def test_letters_of_old_programs(table):

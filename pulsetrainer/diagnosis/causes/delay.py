@@ -27,11 +27,16 @@ class Delay(Late):
     source = "Ljung, System Identification, 1999, section 4.2"
     stage = "output"
     order = 45
+    in_rows = True
     parameters = (Quantity("delay", "s", 0.0, 0.2, 0.0005, "by which the {output} is late"),)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         before = remembered(frame.past, self.id, y[:0])
         whole = np.concatenate((before, y))
-        t = frame.dt_s * (np.arange(whole.size) - before.size)
-        remember(frame.past, self.id, whole[-math.ceil(values[0] / frame.dt_s) - 1 :])
-        return np.interp(t[before.size :] - values[0], t, whole)
+        steps = values[0] / frame.dt_s
+        remember(frame.past, self.id, whole[-math.ceil(steps) - 1 :])
+        at = np.maximum(np.arange(len(before), len(whole)) - steps, 0.0)
+        first = at.astype(np.int64)
+        then = np.minimum(first + 1, len(whole) - 1)
+        share = (at - first).reshape(-1, *[1] * (y.ndim - 1))
+        return np.asarray((1.0 - share) * whole[first] + share * whole[then])

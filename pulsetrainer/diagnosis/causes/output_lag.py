@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Frame, Late, Quantity, Values, low_pass
 
@@ -19,7 +21,8 @@ class OutputLag(Late):
     source = "Ljung, System Identification, 1999, section 4.2"
     stage = "output"
     order = 100
+    in_rows = True
     parameters = (Quantity("tau", "s", 0.0, 0.5, 0.0005, "time constant of the smoothing"),)
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
-        return low_pass(y, values[0], frame.dt_s, frame.past, self.id)
+        return np.apply_along_axis(low_pass, 0, y, values[0], frame.dt_s, frame.past, self.id)

@@ -14,7 +14,7 @@ from pulsetrainer.core.initial_state import known_from
 from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
 from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of, values_of
-from pulsetrainer.diagnosis.thresholds import PERCENT
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 _COARSE = 0.004  # of the span: finer steps hurt no fit
 _USED = 2  # times that each value comes, on average: in a short record all may differ, far apart as they are
@@ -48,7 +48,8 @@ class Quantisation(Cause):
         y = raw.record.output
         step, span = spacing_of(y), float(np.ptp(y))
         values = values_of(y)
-        if span == 0 or step < _COARSE * span or _USED * values.size > y.size:
+        coarse = _COARSE * span <= step < LIMITS.state * span
+        if not coarse or _USED * values.size > y.size:
             return None
         figures = {"step": step, "percent": PERCENT * step / span}
         spread = 0.5 * float(np.ptp(np.quantile(np.diff(values), _MOST)))

@@ -16,7 +16,7 @@ from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import refit
-from pulsetrainer.diagnosis.screening import ranked
+from pulsetrainer.diagnosis.screening import in_place, ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -57,7 +57,7 @@ def _exchanged(state: State, cause: Cause) -> State:
     without = current.without(term)
     others = [Term(kind, term.values) for kind in kinds]
     if kin:
-        others += [Term(s.cause, s.start) for s in ranked(without, current) if s.cause.id in kin]
+        others += [in_place(term, s) for s in ranked(without, current) if s.cause.id in kin]
     trials = [refit(problem, (*without.terms, one), without, goal=current.squares) for one in others]
     best = min((current, *trials), key=lambda fitted: fitted.squares)
     if best is current:

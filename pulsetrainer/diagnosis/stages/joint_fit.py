@@ -2,11 +2,12 @@
 
 The weights have swallowed most of any effect, so that its fit to their residual comes out too small. The
 best three candidates are therefore fitted jointly: parameters of all causes and all weights at once. One
-whose refit lowers nothing (a lag where the output leads) leaves its turn to the next. A
-candidate must be significant, and its linearised score half of what is relevant, since the score shows less
-than a refit does. Of a family that is in the model already none is tried: what a cause of its own kind
-leaves is its imperfect formula, not a second cause. The best fit comes first; but one with fewer parameters
-comes before it, if noise or what happens between two samples could make the difference.
+whose refit lowers nothing (a lag where the output leads) leaves its turn to the next. Beside a lag the other
+lags are tried too, begun as late as that: linearised from afar they are hardly told apart. A candidate must
+be significant, and its linearised score half of what is relevant, since the score shows less than a refit
+does. Of a family that is in the model already none is tried: what a cause of its own kind leaves is its
+imperfect formula, not a second cause. The best fit comes first; but one with fewer parameters comes before
+it, if noise or what happens between two samples could make the difference.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pulsetrainer.diagnosis.causes.base import Cause, Values
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
-from pulsetrainer.diagnosis.screening import Score
+from pulsetrainer.diagnosis.screening import Score, both_late
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -32,6 +33,7 @@ def stage(state: State) -> State:
             break
         if score.cause.family not in state.families:
             trials.append((_of_best_kind(state, score), score))
+    trials += _as_late(state, trials)
     trials.sort(key=lambda pair: pair[0].squares)
     if trials:
         best = trials[0][0]
@@ -45,6 +47,22 @@ def _of_best_kind(state: State, score: Score) -> Fitted:
     values = best.terms[best.names.index(score.cause.id)].values
     others = [one for one in library()[score.cause.id].kinds() if one is not score.cause]
     return min([best, *(_with(state, kind, values) for kind in others)], key=lambda fitted: fitted.squares)
+
+
+def _as_late(state: State, trials: list[tuple[Fitted, Score]]) -> list[tuple[Fitted, Score]]:
+    """Return refits of the lags that were not tried, begun where the best of those ended that were."""
+    terms = [
+        term
+        for trial, score in sorted(trials, key=lambda pair: pair[0].squares)
+        for term in trial.terms
+        if both_late(score, term)
+    ]
+    known = {score.cause for _, score in trials}
+    return [
+        (_with(state, score.cause, terms[0].values), score)
+        for score in state.scores.scores
+        if terms and both_late(score, terms[0]) and score.cause not in known and promising(state, score)
+    ]
 
 
 def _with(state: State, cause: Cause, values: Values) -> Fitted:

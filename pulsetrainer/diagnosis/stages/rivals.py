@@ -33,7 +33,7 @@ from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.fitting import refit
-from pulsetrainer.diagnosis.screening import ranked
+from pulsetrainer.diagnosis.screening import both_late, in_place, ranked
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -159,10 +159,11 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     )
     found = []
     others = [score for score in ranked(without, fitted) if score.cause.id not in fitted.names]
-    for score in others[: LIMITS.closest]:
-        if score.gain < LIMITS.rival_screened * gain:
-            continue
-        terms = (*without.terms, Term(score.cause, score.start))
+    close = [score for score in others[: LIMITS.closest] if score.gain >= LIMITS.rival_screened * gain]
+    # linearised from afar, a lag of another kind may score nothing
+    close += [score for score in others if both_late(score, term) and score not in close]
+    for score in close:
+        terms = (*without.terms, in_place(term, score))
         trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds, goal=fitted.squares + margin)
         if trial.squares - fitted.squares < max(margin, doubt(fitted, trial, state.scores.noise)):
             found.append(score.cause.id)
