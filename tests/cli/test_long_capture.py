@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -129,6 +130,9 @@ def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
     for samples in (1, 1000):  # of a recording that stopped with no way down
         cut_off = run.parts()[0].cut(slice(samples))
         assert samples_played(cut_off, Course(one, 1)) == samples
+    away = np.where(np.arange(1000) < 700, 0.0, 0.01)  # and of one with it
+    cut_off = replace(cut_off, reference=cut_off.reference - away)
+    assert samples_played(cut_off, Course(one, 1)) == 700
 
 
 @pytest.mark.realtime

@@ -10,6 +10,7 @@ import pytest
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts.model import Extension, Parameter
+from pulsetrainer.core.temperature import COPPER_PER_K
 from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, DeviceError, Interrupted
@@ -58,13 +59,20 @@ def test_what_moved_is_told(model, moved, verdict, offset, gain, kelvin):
     """Zero within 0.05 N, gain within 0.5 %, temperature within 2 K; an updated model is true again."""
     with pt.open_device(f"bench:?seed=1&noise-seed=3{moved}") as device:
         found = pt.check(model, device)
-        again = pt.check(updated(model, found), device)
+        mended = updated(model, found)
+        again = pt.check(mended, device)
     assert found.verdict == verdict, found
     assert found.offset.value == pytest.approx(offset, abs=0.05)
     assert found.gain.value == pytest.approx(gain, abs=0.005)
     assert found.temperature_K.value == pytest.approx(kelvin, abs=2.0)
     for one in (found.offset, found.gain, found.shape_percent, found.temperature_K):
         assert one.interval[0] <= one.value <= one.interval[1]
+    # the coil counts from the heat of now: what it needs is more, and what it rises by is as much as before
+    warmer = 1.0 + COPPER_PER_K * found.temperature_K.value
+    assert mended.coil.duty_per_A == pytest.approx(model.coil.duty_per_A * warmer)
+    assert mended.coil.duty_per_A * mended.coil.rise_per_A2 == pytest.approx(
+        model.coil.duty_per_A * model.coil.rise_per_A2
+    )
     assert found.seconds <= 12
     assert again.verdict == "true", again
     assert again.error_percent.before == pytest.approx(found.error_percent.after, abs=0.1)

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 import oracle
 from pulsetrainer.core.beats import find_beats
 from pulsetrainer.core.pulses import Shape
-from pulsetrainer.errors import DataError
+from pulsetrainer.errors import DataError, UsageError
+from pulsetrainer.steps.arguments import check_beat
 from wording import raises
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -124,6 +125,15 @@ def test_a_beat_that_is_not_there(number):
     """The message says how many there are."""
     with raises(DataError, "no beat of that number", count=6):
         find_beats(_recorded("fingerbp_AAC3_3")).single(number)
+
+
+@pytest.mark.parametrize("number", [0, "0", -1, "-1", "1.0", "first", ""])
+def test_what_can_be_no_beat_is_refused_before_any_file_is_read(number):
+    """The first one is 1; the mean, or none, may be asked for."""
+    for good in (1, "12", "mean", None):
+        check_beat(good)
+    with pytest.raises(UsageError):
+        check_beat(number)
 
 
 def test_no_beat_at_all():

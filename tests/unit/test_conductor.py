@@ -380,6 +380,7 @@ class _Losing:
     """A device that is its model, stays on for 6 s, and loses 60 samples a part on the way."""
 
     model: pt.Model
+    sound: int = 9  # parts before one that ends with a fault
 
     info = SimpleNamespace(tick_rate_Hz=10.0 * RATE_HZ)
     heat, longest_play_s = 0.0, 6.0
@@ -396,14 +397,15 @@ class _Losing:
         for block in np.array_split(np.arange(current.size), current.size // 100):
             kept = block[came[block]]
             on_block(Block(decimation * kept, *columns[:, kept]))
+        self.sound -= 1
         nothing = np.empty((4, 0))
         return Trace(
             np.zeros(0, dtype=np.int64),
             *nothing,
             self.info.tick_rate_Hz,
             60,
-            complete=True,
-            fault="",
+            complete=self.sound >= 0,
+            fault="" if self.sound >= 0 else "force trip",
             samples=current.size - 60,
         )
 
@@ -426,3 +428,19 @@ def test_lost_samples_are_counted_while_they_are_lost(model):
     time_s = np.concatenate(times)
     gaps = np.diff(np.round(time_s * RATE_HZ)).astype(int)
     assert gaps[gaps > 1].tolist() == [51, 11 + round(PAUSE_S * RATE_HZ), 51]
+
+
+def test_a_fault_says_when_the_part_began_in_which_it_came(model):
+    """In the time of the samples, with the pauses between parts; nothing is pressed after it."""
+    times = []
+    sink = SimpleNamespace(append=lambda time_s, *_: times.append(time_s), judge=lambda _fields: None)
+    reach, programme = reach_of(model, PULSES[:1], (75.0,)), Programme(NAMES[:1], rate=75.0, beats=30)
+    device = _Losing(model, sound=2)
+    found = Performance(model, device, PULSES[:1], Rhythm(), programme, sink, reach, lambda _now: None).run(
+        0.1
+    )
+    time_s = np.concatenate(times)
+    begun_s = time_s[1:][np.diff(time_s) > PAUSE_S][-1]
+    assert found.parts == 3
+    assert found.fault.startswith("force trip")
+    assert f" {begun_s:.1f} s" in found.fault

@@ -158,3 +158,12 @@ def test_the_seen_input_stays_in_its_range(k, rise, x, z):
     seen = LOAD.on_input(u, y, (k,), frame)
     assert seen[[0, 2]] == pytest.approx([0.2, 0.2 + HIGH])
     assert 0.2 - 1e-9 <= LOAD.on_input(u, 1.0 + rise * (u - 0.2) / HIGH, (k,), frame)[1] <= 0.2 + HIGH + 1e-9
+
+
+def test_the_mean_of_each_kind_is_taken_off():
+    """Also where a kind has no loop: nothing is divided by none."""
+    rows = np.random.default_rng(1).normal(size=(5, 3))
+    kind = np.array([0, 2, 2, 0, 3])
+    expected = [row - rows[kind == own].mean(axis=0) for row, own in zip(rows, kind, strict=True)]
+    with np.errstate(all="raise"):
+        np.testing.assert_allclose(congruency._less_means(rows, kind), expected, atol=1e-12)

@@ -16,8 +16,9 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import causes, wording
-from pulsetrainer.diagnosis.causes import condition_change, library, rate_widening
+from pulsetrainer.diagnosis.causes import condition_change, library, outliers, rate_widening
 from pulsetrainer.diagnosis.causes.base import Frame, low_pass, settled
+from pulsetrainer.diagnosis.causes.step import _split
 from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.raw import Raw, coarse_step, noise_beside_hum, noise_of, spacing_of
 from pulsetrainer.diagnosis.state import Question
@@ -698,3 +699,19 @@ def test_a_widening_solves_its_equation(seed, k, begin, rest):
         )
         seen.append(found.y[0, -1])
     np.testing.assert_allclose(rate_widening._excess(u, begin, k, DT), seen[1:], atol=1e-7)
+
+
+@pytest.mark.parametrize("at", [70, 120, 220])
+@pytest.mark.parametrize("size", [0.3, -2.0])
+def test_a_window_is_split_where_the_means_on_both_sides_differ_most(at, size):
+    """Up or down; what lies before and after the window does not count."""
+    residual = np.where(np.arange(400) < at, 0.0, size)
+    residual[:50], residual[250:] = 99.0, -99.0
+    assert _split(residual, 50, 250) == at
+
+
+def test_an_input_hurries_as_far_from_a_jump_as_five_samples():
+    """On both sides of a short ramp between rests; a steady one does not hurry."""
+    u = np.repeat([0.0, 1.0], 100)
+    assert np.flatnonzero(outliers._hurries(u)).tolist() == list(range(95, 106))
+    assert not outliers._hurries(np.arange(200.0)).any()

@@ -189,10 +189,18 @@ def test_the_state_before_a_record_is_the_one_that_was_predicted_from():
 
 
 def test_samples_outside_the_model_are_counted():
-    """A little noise beyond the range is none; at both ends."""
+    """A little noise beyond the range is none; at both ends; it is said of one sample in a thousand."""
     u = U.copy()
     u[200:210], u[300:320], u[400] = 1.02, -0.02, 1.004
     assert evaluate(_run(0.0 * WAVE, u), MODEL).models[0].outside_percent == pytest.approx(3.0)
+    said = []
+    for most in (1.004, 1.011):
+        u = U.copy()
+        u[500] = most
+        said.append(
+            [note for note in evaluate(_run(0.0 * WAVE, u), MODEL).notes if "outside the range" in note]
+        )
+    assert [len(one) for one in said] == [0, 1]
 
 
 def test_a_long_prediction_is_thinned_for_the_figures():
