@@ -82,6 +82,11 @@ TEXTS: Mapping[str, str] = {
         "Preisach model has no such loop, so the model does not describe this record, and what is left is "
         "taken for no noise. A resistor with a memory (a memristor) has one: use a model y = G(w) u"
     ),
+    "crossed": (
+        "All branches of the loop cross in one point, where the {input} is about {at:.3g}{in_u}, as those of "
+        "a butterfly do. Weights of either sign leave more of it than noise, so the device is of another "
+        "kind than any Preisach model"
+    ),
     "given better": (
         "The model as given predicts these recordings better than any extension that was tried, so none is "
         "proposed."

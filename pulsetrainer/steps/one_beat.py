@@ -52,5 +52,6 @@ def _say_if_several(recording: Shape, notes: list[str]) -> None:
     if count > 1:
         notes.append(
             f"{recording.name} holds {count} whole beats, and all of it is played as one period of "
-            f"{with_seconds(recording.period_s)}: give `beat` from 1 to {count}, or mean, to play a single one"
+            f"{with_seconds(recording.period_s)}: give `beat` from 1 to {count}, or mean, to play a single "
+            "one"
         )

@@ -78,7 +78,7 @@ def test_a_direct_device_that_is_late_is_still_called_direct(count):
 
 
 def test_what_is_left_out_does_not_decide_the_form():
-    """Outputs filled in, where they were clipped: weights of either sign follow them, and were taken for it."""
+    """Outputs filled in where they were clipped: weights of either sign follow them best."""
     _, u, y, _, _ = measured(devices.DIRECT[0], 1000)
     rail = y.min() + 0.6 * np.ptp(y)
     lost = y > rail

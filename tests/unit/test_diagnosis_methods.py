@@ -266,7 +266,7 @@ def test_a_refit_far_from_its_goal_is_given_up():
 
 @pytest.mark.parametrize("name", ["field-lag", "output-lag", "delay"])
 def test_a_strong_lag_is_fitted_as_exactly_as_a_weak_one(name):
-    """A fifth of a stroke late: too much to be subtracted from rows that do not know it, whose fit got stuck."""
+    """Far too late to be subtracted from rows that do not know it: that fit got stuck."""
     u = np.tile(_loops(), 4)
     model = Preisach(Plane.uniform(0.0, 1.5, 16), np.ones(136), 0.0)
     dt_s, values = 0.01, (0.06,)
