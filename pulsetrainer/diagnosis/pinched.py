@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pulsetrainer.core.plane import BoolArray, FloatArray
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
@@ -31,14 +31,14 @@ def pinched_at(level: FloatArray, output: FloatArray, noise: float) -> float | N
     wide = told & (beside > LIMITS.pinch_beside * float(np.ptp(output)))
     ratio = np.where(wide, width / np.maximum(beside, LIMITS.rounding), 1.0)
     k = int(np.argmin(ratio))
-    if ratio[k] >= LIMITS.pinch or _crosses(level, output, np.abs(number - k) <= 1):
-        return None
-    return (k + 0.5) / LIMITS.pinch_groups
+    return (k + 0.5) / LIMITS.pinch_groups if ratio[k] < LIMITS.pinch else None
 
 
-def _crosses(level: FloatArray, output: FloatArray, near: BoolArray) -> bool:
-    """Whether the output rises with the input on one of its ways past some samples, not on the other."""
-    way = np.gradient(level)
+def crosses(level: FloatArray, output: FloatArray, at: float | None) -> bool:
+    """Whether near an input the output (n,) rises with it one way and falls the other, as a butterfly."""
+    if at is None:
+        return False
+    near, way = np.abs(level - at) < 1.5 / LIMITS.pinch_groups, np.gradient(level)
     slopes = [
         float(np.cov(level[own], output[own])[0, 1])
         for own in (near & (way > 0), near & (way < 0))

@@ -92,6 +92,7 @@ class State:
     repeated: Fitted | None = None  # the model with the causes that repeat, once that was asked
     repeated_estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)  # as ``estimates``
     pinched_at: float | None = None  # input, of its range, at which all branches of the loop meet
+    butterfly: bool = False  # there one branch rises, and the other falls
     extends: bool = True  # False: what was found is no fault of the model as given
 
     @property

@@ -88,6 +88,11 @@ TEXTS: Mapping[str, str] = {
         "to these recordings {refitted:.2f} %. It does not carry over: the device, its zero or its sensor "
         "was not the same when it was identified, or the device is none that such a model describes"
     ),
+    "crossed": (
+        "All branches of the loop cross in one point, where the {input} is about {at:.3g}{in_u}, as those of "
+        "a butterfly do. Weights of either sign leave more of it than noise, so the device is of another "
+        "kind than any Preisach model"
+    ),
     "given better": (
         "The model as given predicts these recordings better than any extension that was tried, so none is "
         "proposed."

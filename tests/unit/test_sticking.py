@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import pulsetrainer as pt
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, Plane
@@ -77,3 +78,24 @@ def test_other_errors_are_no_sawtooth():
         y + 0.25 * np.sin(2 * np.pi * 11 * t + 3 * np.sin(4.4 * t)) * (np.sin(t / 2.7) > 0.3),
     ):
         assert _sawtooth(wrong)[0] is None
+
+
+def test_sticking_in_coarse_steps_at_one_rate_is_told_before_the_steps():
+    """A valve: no slow motion to see single jumps in, and what it leaves was taken for noise."""
+    turns = np.repeat(np.random.default_rng(7).uniform(0.1, 0.9, 60), 2)
+    along = np.append(0.0, np.cumsum(np.abs(np.diff(turns))))
+    u = np.interp(np.linspace(0.0, along[-1], 3600), along, turns)
+    held, path = float(u[0]), []
+    for wanted in u.tolist():
+        if abs(wanted - held) > 0.04:
+            held = wanted + 0.01 * np.sign(wanted - held)
+        path.append(held)
+    y = np.asarray(path) + 1e-3 * np.random.default_rng(8).standard_normal(u.size)
+    time = 1.0 * np.arange(u.size)
+    for step, found in ((0.004, ["stick-slip", "quantisation"]), (1e-6, ["stick-slip"])):
+        run = pt.Run(time_s=time, input=u, output=step * np.round(y / step), input_unit="%", output_unit="%")
+        answer = pt.diagnose(run, pt.identify(run, levels=32))
+        assert answer.verdict == "stick-slip"
+        assert [one.cause for one in answer.causes if one.found] == found
+        size = next(one for one in answer.causes if one.cause == "stick-slip").parameters[0].value
+        assert size == pytest.approx(0.05, rel=0.1)

@@ -519,7 +519,7 @@ def test_comments_are_those_above_the_first_row(table):
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
 def test_the_mark_of_a_remark_may_name_the_column_of_numbers(table, delimiter):
-    """The first column of a heading is often called ``#``: its line was taken for a comment, unread."""
+    """A first column is often called ``#``: its line was taken for a comment, and no name was read."""
     rows = [["#", "t(s)", "phi(deg)"], *([str(k), str(0.1 * k), str(k * k)] for k in range(20))]
     read = table("# made by X500\n" + "\n".join(map(delimiter.join, rows)))
     assert read.names == ("#", "t(s)", "phi(deg)")

@@ -50,7 +50,7 @@ def stage(state: State) -> State:
         said.append(Evidence("bursts" if state.in_bursts else "slow noise", figures=figures))
     if state.verdict == "unknown" and state.pinched_at is not None:
         at = state.scale.low + state.pinched_at * state.scale.reach
-        said.append(Evidence("pinched", figures={"at": at}))
+        said.append(Evidence("crossed" if state.butterfly else "pinched", figures={"at": at}))
     if state.verdict in ("none", "inconclusive") and not state.question.quick:
         said += _not_accepted(state)
     if state.question.quick:

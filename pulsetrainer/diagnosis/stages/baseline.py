@@ -16,7 +16,7 @@ from pulsetrainer.diagnosis.fitting import weights_for
 from pulsetrainer.diagnosis.floor import floor_of
 from pulsetrainer.diagnosis.forms import base_of
 from pulsetrainer.diagnosis.held_out import HeldOut
-from pulsetrainer.diagnosis.pinched import pinched_at
+from pulsetrainer.diagnosis.pinched import crosses, pinched_at
 from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.residual import TIME, excitation_limits
 from pulsetrainer.diagnosis.stages.raw_data import Masked
@@ -46,4 +46,5 @@ def stage(masked: Masked) -> State:
     u, y = (np.concatenate(one) for one in ([r.input for r in whole], [r.output for r in whole]))
     level = (u - masked.scale.low) / masked.scale.reach
     known = (masked.question, firings, masked.scale, problem, coarse, fitted, floor, held_out, lacks, fitted)
-    return State(*known, pinched_at=pinched_at(level, y, floor.single * masked.scale.span))
+    at = pinched_at(level, y, floor.single * masked.scale.span)
+    return State(*known, pinched_at=at, butterfly=crosses(level, y, at))

@@ -2,9 +2,10 @@
 
 A hum also jumps between flat runs. So a gate that other causes can set off as well is asked once more about
 the output less what the causes found add to it, and its finding is dropped if it no longer fires. The other
-way round, sticking smaller than the noise shows only in what the model leaves: where that is relevant, and
-nothing jagged was found, the residual is searched for it (decision 044). What was taken out of a record is
-not asked about, nor what is left of that: coarse steps that were smoothed still have flat runs.
+way round, sticking smaller than the noise, or all at one rate, shows only in what the model leaves: where
+that is relevant beside noise from sample to sample, the residual is searched for it (decision 044). Jumps
+that are not far larger than coarse steps of the output are those steps. What was taken out of a record is not
+asked about, nor what is left of that: coarse steps that were smoothed still have flat runs.
 """
 
 from __future__ import annotations
@@ -15,19 +16,29 @@ from pulsetrainer.diagnosis.causes import library, taken_out
 from pulsetrainer.diagnosis.raw import Firing, Raw
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 
 def stage(state: State) -> State:
     """Return the state with firings withdrawn and added."""
     kept = tuple((k, firing) for k, firing in state.firings if not _explained(state, k, firing))
     state = replace(state, firings=kept)
-    if state.current.squares - state.floor.squares <= state.floor.relevant or state.jagged:
+    floor = state.floor.quick  # jumps are heard as slow noise
+    if state.current.squares - floor.squares <= floor.relevant:
         return state
     out = taken_out(name for one in state.question.corrected for name in one)
+    out |= {firing.cause for _, firing in kept}
     asked = [one for one in library().values() if one.stage == "record" and one.id not in out]
     left = [cause.gate_left(state.current) for cause in asked]
     seen = [(0, _in_its_unit(firing, state.scale)) for firing in left if firing is not None]
-    return replace(state, firings=(*kept, *seen))
+    steps = LIMITS.steps_apart * max((f.value for _, f in kept if f.cause == "quantisation"), default=0.0)
+    larger = [one for one in seen if one[1].value > steps]
+    return replace(state, firings=tuple(sorted((*kept, *larger), key=_order)))
+
+
+def _order(firing: tuple[int, Firing]) -> int:
+    """Place of a firing among others: coarse steps are told last, all else as it was found."""
+    return int(firing[1].cause == "quantisation")
 
 
 def _in_its_unit(firing: Firing, scale: Scale) -> Firing:
