@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -25,6 +26,7 @@ from pulsetrainer.report.directions import directions, turns
 from pulsetrainer.report.facts import run_facts, warmth_words
 from pulsetrainer.report.fewer_points import MOST_POINTS, extremes, path
 from pulsetrainer.report.render import encode, inline_svg
+from pulsetrainer.report.results import identified
 from pulsetrainer.report.style import THEME, VERMILION, label
 from pulsetrainer.report.text import tables_of
 from wording import raises
@@ -459,10 +461,11 @@ def test_a_long_name_of_the_input_fits_below_its_figure():
 
 
 def test_the_main_figures_of_a_run_and_its_heat():
-    """By hand: how long, how fast, how many reversals; the temperature from the first to the last."""
+    """By hand: how long, how fast, how many reversals; the temperature from the lowest to the highest."""
     found = run_facts(Run(np.arange(6) / 2.0, np.array([0.0, 1.0, 2.0, 0.5, 1.0, 1.0]), np.zeros(6)))
     assert (found["samples"], found["seconds"], found["rate_Hz"], found["reversals"]) == (6, 2.5, 2.0, 2)
     assert warmth_words([-0.04, 3.0, 5.06]).startswith("+0.0 to +5.1 K")
+    assert warmth_words([0.6, 0.5]).startswith("+0.5 to +0.6 K")  # no range upside down
 
 
 def test_stamps_with_a_date_are_counted_from_the_first_sample():
@@ -526,3 +529,12 @@ def test_the_rounding_of_a_rest_is_no_speed():
         axes = diagnosis_figures.profile(group, "voltage", extended=False).axes[0]
         assert axes.get_xscale() == scale
         assert np.count_nonzero(axes.get_xticks() > 0) < 8
+
+
+@pytest.mark.parametrize(("form", "of"), [("direct", "current"), ("dual", "force")])
+def test_smoothing_is_a_share_of_the_range_of_the_plane(form, of):
+    """The plane of a dual model is that of the output; its smoothing was told of the input."""
+    model = examples.model(6)
+    model = replace(model, form=form, fit=replace(model.fit, smoothing=0.1))
+    rows = identified(Path("m.h5"), model, 1.0)[2]
+    assert rows["smoothing"] == f"0.1 of the range of the {of}"
