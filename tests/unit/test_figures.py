@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Evaluation, Profile, Recorded, Run, units
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import comparison_figure, diagnosis_figures, figures
+from pulsetrainer.report import comparison_figure, diagnosis_figures, figures, panels
 from pulsetrainer.report.directions import directions, turns
 from pulsetrainer.report.facts import run_facts, warmth_words
 from pulsetrainer.report.fewer_points import MOST_POINTS, extremes, path
@@ -538,3 +538,21 @@ def test_smoothing_is_a_share_of_the_range_of_the_plane(form, of):
     model = replace(model, form=form, fit=replace(model.fit, smoothing=0.1))
     rows = identified(Path("m.h5"), model, 1.0)[2]
     assert rows["smoothing"] == f"0.1 of the range of the {of}"
+
+
+def test_the_title_of_a_loop_stays_within_its_figure():
+    """Of a pulse with a long name it was cut: "one bea"."""
+    played = examples.waveform_evaluation("premature-atrial", "closest-match", 1.0, 0)
+    figure = Figure(figsize=(3.4, 3.0), layout="constrained")
+    panels.loops(figure, [played])
+    FigureCanvasAgg(figure).draw()
+    assert figure.axes[0].title.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_the_legend_of_the_coil_lies_above_its_line():
+    """In the low panel of a session it lay on it."""
+    warm = replace(stored.session(), temperature_s=np.arange(30.0), temperature_K=np.full(30, 15.0))
+    figure = figures.draw(warm)
+    FigureCanvasAgg(figure).draw()
+    (axes,) = (one for one in figure.axes if "[K]" in one.get_ylabel())
+    assert axes.get_legend().get_window_extent().y0 > axes.transData.transform((0.0, 15.0))[1]
