@@ -14,14 +14,14 @@ from pulsetrainer.report.style import COLUMN_IN, COMPENSATED, GUIDE, styled
 def temperature(axes: Axes, time_s: FloatArray, told_K: FloatArray) -> None:
     """Draw how much warmer the copper was than at calibration, arrays (w,) in s and K."""
     panels.trace(axes, time_s, told_K, **COMPENSATED, label="told by the duty")
-    _finish(axes)
+    _finish(axes, 0.4)  # a low panel, of which a legend is a large part
     axes.set_xlabel("time [s]")
 
 
 def temperature_of_repeats(axes: Axes, told_K: FloatArray) -> None:
     """Draw how much warmer the copper was before each repeat (r,), K."""
     axes.plot(range(1, told_K.size + 1), told_K, marker="o", **COMPENSATED, label="told by the duty")
-    _finish(axes)
+    _finish(axes, 0.16)
     axes.set_xlabel("repeat [number]")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
@@ -36,7 +36,7 @@ def of_playback(told_K: FloatArray) -> Figure:
     return figure
 
 
-def _finish(axes: Axes) -> None:
+def _finish(axes: Axes, share: float) -> None:
     axes.axhline(0.0, **GUIDE)
     axes.set_ylabel("coil, against\ncalibration [K]")
-    panels.headroom(axes)
+    panels.headroom(axes, share)

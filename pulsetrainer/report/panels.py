@@ -324,7 +324,7 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation], among: Sequen
     axes.set_aspect("equal")
     axes.set_xlabel(label("target", first.output_unit))
     axes.set_ylabel(label("force", first.output_unit))
-    axes.set_title(f"{first.name if several else titled(first)}: one beat")
+    axes.set_title(f"{first.name if several else titled(first)}: one beat", wrap=True)
     # outside, since inside a loop would run through
     panel.legend(loc="outside lower center")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -20,11 +21,12 @@ from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Evaluation, Profile, Recorded, Run, units
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import comparison_figure, diagnosis_figures, figures
+from pulsetrainer.report import comparison_figure, diagnosis_figures, figures, panels
 from pulsetrainer.report.directions import directions, turns
 from pulsetrainer.report.facts import run_facts, warmth_words
 from pulsetrainer.report.fewer_points import MOST_POINTS, extremes, path
 from pulsetrainer.report.render import encode, inline_svg
+from pulsetrainer.report.results import identified
 from pulsetrainer.report.style import THEME, VERMILION, label
 from pulsetrainer.report.text import tables_of
 from wording import raises
@@ -479,10 +481,11 @@ def test_a_long_name_of_the_input_fits_below_its_figure():
 
 
 def test_the_main_figures_of_a_run_and_its_heat():
-    """By hand: how long, how fast, how many reversals; the temperature from the first to the last."""
+    """By hand: how long, how fast, how many reversals; the temperature from the lowest to the highest."""
     found = run_facts(Run(np.arange(6) / 2.0, np.array([0.0, 1.0, 2.0, 0.5, 1.0, 1.0]), np.zeros(6)))
     assert (found["samples"], found["seconds"], found["rate_Hz"], found["reversals"]) == (6, 2.5, 2.0, 2)
     assert warmth_words([-0.04, 3.0, 5.06]).startswith("+0.0 to +5.1 K")
+    assert warmth_words([0.6, 0.5]).startswith("+0.5 to +0.6 K")  # no range upside down
 
 
 def test_stamps_with_a_date_are_counted_from_the_first_sample():
@@ -546,3 +549,30 @@ def test_the_rounding_of_a_rest_is_no_speed():
         axes = diagnosis_figures.profile(group, "voltage", extended=False).axes[0]
         assert axes.get_xscale() == scale
         assert np.count_nonzero(axes.get_xticks() > 0) < 8
+
+
+@pytest.mark.parametrize(("form", "of"), [("direct", "current"), ("dual", "force")])
+def test_smoothing_is_a_share_of_the_range_of_the_plane(form, of):
+    """The plane of a dual model is that of the output; its smoothing was told of the input."""
+    model = examples.model(6)
+    model = replace(model, form=form, fit=replace(model.fit, smoothing=0.1))
+    rows = identified(Path("m.h5"), model, 1.0)[2]
+    assert rows["smoothing"] == f"0.1 of the range of the {of}"
+
+
+def test_the_title_of_a_loop_stays_within_its_figure():
+    """Of a pulse with a long name it was cut: "one bea"."""
+    played = examples.waveform_evaluation("premature-atrial", "closest-match", 1.0, 0)
+    figure = Figure(figsize=(3.4, 3.0), layout="constrained")
+    panels.loops(figure, [played])
+    FigureCanvasAgg(figure).draw()
+    assert figure.axes[0].title.get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_the_legend_of_the_coil_lies_above_its_line():
+    """In the low panel of a session it lay on it."""
+    warm = replace(stored.session(), temperature_s=np.arange(30.0), temperature_K=np.full(30, 15.0))
+    figure = figures.draw(warm)
+    FigureCanvasAgg(figure).draw()
+    (axes,) = (one for one in figure.axes if "[K]" in one.get_ylabel())
+    assert axes.get_legend().get_window_extent().y0 > axes.transData.transform((0.0, 15.0))[1]
