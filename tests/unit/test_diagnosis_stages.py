@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pulsetrainer.diagnosis import design, fitting, residual, velocity, wear, wording
+from pulsetrainer.diagnosis import answered, design, fitting, residual, velocity, wear, wording
 from pulsetrainer.diagnosis import state as state_module
 from pulsetrainer.diagnosis.causes import condition_change, library
 from pulsetrainer.diagnosis.causes.base import Frame
@@ -1550,7 +1550,7 @@ def _given(
         question=replace(state.question, given="given"),
         findings=findings,
         verdict="creep",
-        evidence=(Evidence("static"), Evidence("tested", "creep"), Evidence("extended")),
+        evidence=(Evidence("static"), Evidence("tested", "creep"), *map(Evidence, ("extended", "not whole"))),
         current=SimpleNamespace(rms=left, terms=(), squares=np.inf),
         baseline=SimpleNamespace(rms=refitted, squares=100.0 * (1.0 + left_out**2)),  # beside the noise
         floor=replace(state.floor, noise=0.0, single=single),
@@ -1569,7 +1569,7 @@ def test_a_good_model_changes_nothing(monkeypatch):
     after = _given(monkeypatch, RAMP + 0.05)
     assert _found(after) == ["creep", "load-dependence", "outliers"]
     assert (after.verdict, after.extends) == ("creep", True)
-    assert [one.kind for one in after.evidence] == ["static", "tested", "extended"]
+    assert [one.kind for one in after.evidence] == ["static", "tested", "extended", "not whole"]
 
 
 @pytest.mark.parametrize(("error", "withdrawn"), [(0.0099, True), (0.0101, False)])
@@ -1859,3 +1859,11 @@ def test_a_slow_cause_is_doubted_where_what_is_left_wanders(monkeypatch, share, 
     state = replace(state, problem=problem, estimates={name: ()})
     doubts = set(rivals._doubts(state, state.current.terms[0], 1.0, times * share / 0.3))
     assert ("wanders" in doubts) is (said and name == "step")
+
+
+def test_what_the_model_says_of_its_record_is_told_once():
+    """The same sentence stood above itself where the diagnosis came to it too."""
+    model = SimpleNamespace(fit=SimpleNamespace(warning="F follows the velocity"))
+    assert answered._said(model, ["F follows the velocity.", "more."]) == ("F follows the velocity.", "more.")
+    assert answered._said(model, ["more."]) == ("Of the model as given: F follows the velocity.", "more.")
+    assert answered._said(SimpleNamespace(fit=None), ["more."]) == ("more.",)
