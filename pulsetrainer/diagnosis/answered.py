@@ -111,7 +111,7 @@ def diagnosis_of(state: State) -> Diagnosis:
 
 
 def _said(model: Model, evidence: Sequence[str]) -> tuple[str, ...]:
-    """Return the evidence, and first what the model says of the record it was identified on, if that is new."""
+    """Return the evidence, and first what the model says of its own record, if that is new."""
     warning = f"{model.fit.warning}." if model.fit and model.fit.warning else ""
     known = warning in ("", *evidence)
     return tuple(evidence) if known else (f"Of the model as given: {warning}", *evidence)
