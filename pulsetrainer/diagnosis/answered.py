@@ -76,7 +76,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         causes=tuple(
             one for finding in state.findings for one in _causes(state, finding, words, dependences)
         ),
-        evidence=(*_warned(model), *(wording.sentence(one, words) for one in state.evidence)),
+        evidence=_said(model, [wording.sentence(one, words) for one in state.evidence]),
         next_experiment=wording.advice(state.advice, bench),
         profiles=_profiles(state, words),
         time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
@@ -111,9 +111,11 @@ def diagnosis_of(state: State) -> Diagnosis:
     )
 
 
-def _warned(model: Model) -> list[str]:
-    """Return what the model says of the record that it was identified on; nothing where all is well."""
-    return [f"Of the model as given: {model.fit.warning}."] if model.fit and model.fit.warning else []
+def _said(model: Model, evidence: Sequence[str]) -> tuple[str, ...]:
+    """Return the evidence, and first what the model says of its own record, if that is new."""
+    warning = f"{model.fit.warning}." if model.fit and model.fit.warning else ""
+    known = warning in ("", *evidence)
+    return tuple(evidence) if known else (f"Of the model as given: {warning}", *evidence)
 
 
 def _held_out_gain(state: State) -> float:

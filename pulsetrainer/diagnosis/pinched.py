@@ -38,7 +38,7 @@ def crosses(level: FloatArray, output: FloatArray, at: float | None) -> bool:
     """Whether near an input the output (n,) rises with it one way and falls the other, as a butterfly."""
     if at is None:
         return False
-    near, way = np.abs(level - at) < 1.5 / LIMITS.pinch_groups, np.gradient(level)
+    near, way = np.abs(level - at) < LIMITS.pinch_near / LIMITS.pinch_groups, np.gradient(level)
     slopes = [
         float(np.cov(level[own], output[own])[0, 1])
         for own in (near & (way > 0), near & (way < 0))

@@ -220,6 +220,7 @@ class Thresholds:
     # A pinched loop
     pinch_groups: int = 51  # of the input's range, in each of which the branches are as far apart as they are
     pinch: float = 0.15  # of their distance on both sides: drawn memristors have up to 0.09, others from 0.45
+    pinch_near: float = 1.5  # of those groups: on either side of the point, whether branches cross there
     pinch_beside: float = 0.02  # of the span, rms: what is narrower on both sides is no loop
 
     # The model as given

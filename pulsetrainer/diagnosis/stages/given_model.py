@@ -191,7 +191,8 @@ def withdrawn(state: State, told: Collection[str] = ()) -> State:
         for one in state.findings
     )
     gone = {one.cause.id for one in findings if not one.found}
-    evidence = tuple(one for one in state.evidence if one.cause not in gone and one.kind != "extended")
+    of_all = ("extended", "not whole")
+    evidence = tuple(one for one in state.evidence if one.cause not in gone and one.kind not in of_all)
     verdict = next((one.cause.id for one in findings if one.found), "none")
     return replace(state, findings=findings, verdict=verdict, evidence=evidence, extends=False)
 
