@@ -476,7 +476,7 @@ def test_of_samples_without_time_it_is_time_that_lacks():
     """Nothing is said about rates and rests that nobody knows."""
     u = 1.0 - np.cos(0.06 * np.arange(2000.0)) + 0.1 * np.sin(0.31 * np.arange(2000.0))
     noise = np.random.default_rng(3).standard_normal(u.size)
-    said = diagnose(Question([Record(u, u + 0.01 * noise, dt_s=None)], 0.0, 2.1, np.random.default_rng(0)))
+    said = diagnose(Question([Record(u, u + 0.01 * noise, dt_s=None)], -0.2, 2.3, np.random.default_rng(0)))
     assert said.lacks == ("time",)
     assert [one.names for one in said.evidence if one.kind == "lacks"] == [("time",)]
     assert "the time of every sample" in wording.advice(said.advice, wording.Bench(said.scale, "A"))

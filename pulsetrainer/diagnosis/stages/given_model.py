@@ -73,7 +73,8 @@ def stage(state: State) -> State:
     elif _is_as_good(state, judged):
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
-        if state.verdict == "none" and (_unexplained(state, judged) or state.blind):
+        blind = state.blind and not state.question.quick
+        if state.verdict == "none" and (_unexplained(state, judged) or blind):
             state = replace(state, verdict="unknown" if _unexplained(state, judged) else "inconclusive")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
     beyond = any(one.cause == OutOfRange.id for _, one in state.firings)
