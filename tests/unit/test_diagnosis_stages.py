@@ -1749,12 +1749,17 @@ def test_a_shape_that_changes_more_than_the_zero_is_not_unchanged(left, kind):
     assert found.kind == kind
 
 
-@pytest.mark.parametrize("gate", ["outliers", "out-of-range"])
-def test_what_lay_outside_the_range_stays_in_the_memory_and_is_no_other_condition(monkeypatch, gate):
-    """The model as given is off by a constant since then."""
+@pytest.mark.parametrize(
+    ("gate", "gain", "changed"),
+    [("outliers", 1.0, True), ("out-of-range", 1.2, True), ("out-of-range", 1.0, False)],
+)
+def test_what_lay_outside_the_range_stays_in_the_memory_and_looks_like_another_zero(
+    monkeypatch, gate, gain, changed
+):
+    """The model as given is off by a constant since then; another gain is another condition."""
     firing = Firing(gate, "gate", 1.0, "{u}", {}, None)
-    after = _given(monkeypatch, RAMP + 1.0, firings=((0, firing),), verdict="none", findings=())
-    assert (after.verdict == "condition-change") is (gate == "outliers")
+    after = _given(monkeypatch, gain * RAMP + 1.0, firings=((0, firing),), verdict="none", findings=())
+    assert (after.verdict == "condition-change") is changed
 
 
 def test_what_needs_no_time_is_named_where_there_is_none(monkeypatch):

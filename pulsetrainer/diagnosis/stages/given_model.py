@@ -16,8 +16,8 @@ records.
   that is all but a thousandth of the squared error, other causes would only repair the rest of it, and are
   withdrawn. It is none where the causes found, added to what the model as given says, bring it near; nor
   where refitted weights are far off too on blocks that were left out: then no Preisach model describes the
-  device, and that is `unknown`. It is not asked where the input left the model's range: what it did there
-  stays in the memory, and looks like another zero.
+  device, and that is `unknown`. A mere shift is none where the input left the model's range: what was
+  switched there stays so, and looks like another zero.
 
 What the raw data show stays, and so does what equal loops show, unless the model is of the wrong kind.
 """
@@ -77,14 +77,19 @@ def stage(state: State) -> State:
         if state.verdict == "none" and (_unexplained(state, judged) or blind):
             state = replace(state, verdict="unknown" if _unexplained(state, judged) else "inconclusive")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
-    beyond = any(one.cause == OutOfRange.id for _, one in state.firings)
-    if changed is not None and not beyond and not _brought_near(state, judged, noise):
+    changed = None if changed is not None and _is_memory(state, changed) else changed
+    if changed is not None and not _brought_near(state, judged, noise):
         state, more = _drifted(state, judged, changed, noise) or _far_off(state, judged, changed, noise)
         said += more
     said += _not_carried(state, judged) if changed is None else []
     if any(one.found and one.seen is None for one in state.findings if one.cause.id == _CHANGED):
         said += _each_against(judged)
     return replace(state, evidence=(*said, *state.evidence))
+
+
+def _is_memory(state: State, changed: Change) -> bool:
+    """Whether what lay outside the range, and stays switched, looks like this change."""
+    return changed.kind == "shifted" and any(one.cause == OutOfRange.id for _, one in state.firings)
 
 
 def _not_carried(state: State, judged: Judged) -> list[Evidence]:
