@@ -191,7 +191,7 @@ MESSAGES = {
     "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),
     "stopped with nothing": Message("stopped by you", "run the command again", got="nothing was written"),
     "stopped with repeats": Message(
-        "stopped by you", "--overwrite", got="1 of 5 repeats were kept in run.h5"
+        "stopped by you", "--overwrite", got="1 of 5 repeats was kept in run.h5"
     ),
     "stopped before a repeat": Message(
         "stopped by you", "run the command again", got="run.h5 was not written"
