@@ -190,9 +190,7 @@ MESSAGES = {
     "port is gone": Message("is gone", "cable", "/dev/", got=KEPT),
     "host was silent": Message("heard nothing from the host", "keep it from sleeping", got=KEPT),
     "stopped with nothing": Message("stopped by you", "run the command again", got="nothing was written"),
-    "stopped with repeats": Message(
-        "stopped by you", "--overwrite", got="1 of 5 repeats was kept in run.h5"
-    ),
+    "stopped with repeats": Message("stopped by you", "--overwrite", got="1 of 5 repeats was kept in run.h5"),
     "stopped before a repeat": Message(
         "stopped by you", "run the command again", got="run.h5 was not written"
     ),

@@ -9,7 +9,8 @@ records.
   sought on top of it are withdrawn. If the speed matters and not only the direction, the force is `viscous`;
   else the cause is `unknown`.
 - If the model as given leaves less than the search's best, the search found faults of its own coarser levels
-  only: they are withdrawn. What the given one leaves may still be more than noise, and is then `unknown`.
+  only: they are withdrawn. What the given one leaves may still be more than noise, and is then `unknown`;
+  else it is `none`, whatever the coarser levels could have shown.
 - If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), and a
   drift of the zero brings it near, that is the finding: refitted weights hide a drift that is over soon.
 - If it is far off without that, the device is in another condition: `condition-change` comes first. Where
@@ -73,9 +74,8 @@ def stage(state: State) -> State:
     elif _is_as_good(state, judged):
         said.append(Evidence("given better"))
         state = withdrawn(state, state.by_contrast)
-        blind = state.blind and not state.question.quick
-        if state.verdict == "none" and (_unexplained(state, judged) or blind):
-            state = replace(state, verdict="unknown" if _unexplained(state, judged) else "inconclusive")
+        if state.verdict == "none" and _unexplained(state, judged):
+            state = replace(state, verdict="unknown")
     changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
     changed = None if changed is not None and _is_memory(state, changed) else changed
     if changed is not None and not _brought_near(state, judged, noise):
