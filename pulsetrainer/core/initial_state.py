@@ -53,11 +53,14 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
 def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> str:
     """Say what of a record (n,) is left out as it lies apart from all later strokes; empty: nothing."""
     left = known_from(inputs, low, high, outputs) - known_from(inputs, low, high)
-    if left <= 0:
-        return ""
+    return left_out_words(left) if left > 0 else ""
+
+
+def left_out_words(samples: int) -> str:
+    """Say that a first stroke of so many samples is left out."""
     return (
         "the first stroke is unlike all later ones from the same end, as of a device that was not cycled "
-        f"before; its {left} samples are not counted, so the result does not suffer"
+        f"before; its {samples} samples are not counted, so the result does not suffer"
     )
 
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.core.initial_state import known_from, second_stroke
+from pulsetrainer.core.initial_state import known_from, left_out_words, second_stroke
 from pulsetrainer.diagnosis.stages import baseline, elimination, exchange, raw_data, restart, search
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -50,10 +50,7 @@ def _without(state: State, counts: Sequence[int]) -> State | None:
         weight[:own] = 0.0
         records[k] = replace(records[k], sample_weight=weight)
         where = f"record {k + 1}: " if len(records) > 1 else ""
-        notes.append(
-            f"{where}less what was found, the first stroke is unlike all later ones, as of a device that was "
-            f"not cycled before; its {own} samples are not counted"
-        )
+        notes.append(f"{where}less what was found, {left_out_words(own)}")
     if not notes:
         return None
     question = replace(state.question, records=records, notes=(*state.question.notes, *notes))
