@@ -1485,18 +1485,20 @@ def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, la
         return found
 
     monkeypatch.setattr(begin, "refit", from_rest)
-    known, again = Estimate("tau", 3.0, "1", 2.0, 4.0), Estimate("tau", 5.0, "1", 4.5, 5.5)
-    only = Estimate("amplitude", 1.0, "1", 0.9, 1.1)  # not in the other fit
-    monkeypatch.setattr(begin, "estimates_of", lambda *_: {"creep": (again,)})
-    rows = {"creep": (known, only)}
-    finding = Finding(library()["creep"], found=True, parameters=rows["creep"])
-    state = _state(kept, repeated=kept, problem=problem, estimates=rows, findings=(finding,))
+    known = (Estimate("tau", 3.0, "1", 2.0, 4.0), Estimate("tau", 9.0, "1", 8.0, 9.5))
+    again = (Estimate("tau", 5.0, "1", 4.5, 5.5), Estimate("tau", 7.0, "1", 6.0, 9.0))
+    monkeypatch.setattr(begin, "estimates_of", lambda *_: {"creep": again})
+    finding = Finding(library()["creep"], found=True, parameters=known)
+    state = _state(kept, repeated=kept, problem=problem, estimates={"creep": known}, findings=(finding,))
     found = begin.stage(state)
     assert (found.repeated is not kept) is at_rest
     # both are told with one interval, that holds what either of them says
-    wide = {"lower": 2.0, "upper": 5.5}
-    assert found.repeated_estimates == ({"creep": (replace(again, **wide),)} if at_rest else rows)
-    assert found.findings[0].parameters == ((replace(known, **wide), only) if at_rest else rows["creep"])
+    wide = [{"lower": 2.0, "upper": 5.5}, {"lower": 6.0, "upper": 9.5}]
+    rows, told = ([replace(one, **w) for one, w in zip(r, wide, strict=True)] for r in (again, known))
+    assert found.repeated_estimates["creep"] == (tuple(rows) if at_rest else known)
+    assert found.findings[0].parameters == (tuple(told) if at_rest else known)
+    fewer = begin.stage(replace(state, estimates={"creep": known[:1]}))  # of another number of curves
+    assert fewer.repeated_estimates["creep"] == (again if at_rest else known[:1])
 
 
 @pytest.mark.parametrize(("after", "better"), [(9.81, True), (9.82, False), (10.01, False)])

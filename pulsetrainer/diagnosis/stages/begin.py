@@ -45,12 +45,11 @@ def stage(state: State) -> State:
 
 def _hull(rows: tuple[Estimate, ...], others: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
     """Return parameters with intervals that hold those of another fit to the same records too."""
-    of = {one.name: one for one in others}
+    if [one.name for one in rows] != [one.name for one in others]:  # another number of curves
+        return rows
     return tuple(
-        replace(one, lower=min(one.lower, of[one.name].lower), upper=max(one.upper, of[one.name].upper))
-        if one.name in of
-        else one
-        for one in rows
+        replace(one, lower=min(one.lower, other.lower), upper=max(one.upper, other.upper))
+        for one, other in zip(rows, others, strict=True)
     )
 
 
