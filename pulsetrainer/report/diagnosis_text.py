@@ -131,13 +131,14 @@ def _said(one: Cause) -> dict[str, str]:
 def explains(one: Cause, found: Diagnosis) -> float:
     """Return the share of the error that a cause explains.
 
-    NaN where none is beyond noise, and of a cause that could be instead of another: beside that one it
-    explains nothing.
+    NaN where none is beyond noise, of a cause that could be instead of another, since beside that one it
+    explains nothing, and of one that was read off the raw data, whose samples are left out.
     """
     beyond = not found.static_percent <= found.floor_percent
     untested = one.found and one.p_value is None  # of the model as given, or read off the raw data
     instead = not one.found and any(one.cause in other.confounded_with for other in found.found)
-    return one.explains_percent if (beyond or untested) and not instead else math.nan
+    unknown = instead or (untested and one.explains_percent == 0.0)
+    return one.explains_percent if (beyond or untested) and not unknown else math.nan
 
 
 def tells_shares(found: Diagnosis) -> bool:

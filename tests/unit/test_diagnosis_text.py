@@ -122,6 +122,8 @@ def test_where_nothing_is_left_no_cause_explains_a_share_of_it():
     small = replace(found, static_percent=0.9, floor_percent=1.0)
     assert math.isnan(explains(replace(one, found=True), small))
     assert explains(replace(one, found=True, p_value=None), small) == 100.0  # a change of condition
+    gate = replace(one, found=True, p_value=None, explains_percent=0.0)
+    assert math.isnan(explains(gate, small))
 
 
 def test_its_tables_fit_a_terminal_of_eighty_columns():

@@ -16,7 +16,7 @@ from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
 from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw, noise_of, spacing_of
-from pulsetrainer.diagnosis.thresholds import UNIFORM
+from pulsetrainer.diagnosis.thresholds import LIMITS, UNIFORM
 
 _LEAST = 20  # samples at the rail: fewer may be chance
 _PILE = 1.2  # times the samples just inside: noise makes a tail at the end of a distribution, a rail a pile
@@ -116,10 +116,11 @@ def _held_at(sign: float, said: FloatArray, raw: Raw) -> Firing | None:
     error = root_mean_square((y - model)[below]) if below.any() else np.inf
     if np.polyfit(goes, held, 1)[0] > _FOLLOWS or error > _BELOW * root_mean_square((y - model)[counts]):
         return None
-    back = sign * raw.polarity
-    figures = {"count": float(held.size), "rail": back * rail, "said": back * float(goes.max())}
     mask = _near(y, rail, noise) | (model > rail - _NEAR * noise)
-    return Firing("saturation", "held", back * rail, "{y}", figures, mask, spread=noise / np.sqrt(held.size))
+    rail, back = float(held.mean()), sign * raw.polarity
+    figures = {"count": float(held.size), "rail": back * rail, "said": back * float(goes.max())}
+    sure = LIMITS.normal * noise / np.sqrt(held.size)
+    return Firing("saturation", "held", back * rail, "{y}", figures, mask, spread=sure)
 
 
 def _near(y: FloatArray, rail: float, noise: float) -> BoolArray:
