@@ -1402,6 +1402,23 @@ def test_what_may_be_a_fault_of_the_measurement_is_not_added(monkeypatch, rival,
 
 
 @pytest.mark.parametrize(
+    ("explains", "doubts", "added"),
+    [(49.9, (rivals.AT_BOUND,), False), (50.1, (rivals.AT_BOUND,), True), (49.9, (), True)],
+)
+def test_what_ends_where_the_search_did_is_added_if_it_takes_away_more_than_it_leaves(
+    monkeypatch, explains, doubts, added
+):
+    """A creep without rests, on a device of another kind, made the next record 2.3 times worse."""
+    monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    findings = (_finding("creep", explains, doubts=doubts),)  # of 1000; the fit leaves 500
+    after = repetition.stage(_state(_fit(500.0, "creep"), findings=findings))
+    assert after.repeated.names == (("creep",) if added else ())
+    assert (repetition.NOT_ADDED in after.findings[0].doubts) is not added
+    assert not after.findings[0].in_doubt
+
+
+@pytest.mark.parametrize(
     ("explains", "beside", "found"), [(9.9, (), False), (10.1, (), True), (9.9, (rivals.WORSE,), False)]
 )
 def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, beside, found):
