@@ -1572,9 +1572,11 @@ def _given(
     direction=1.0,
     polarity=1,
     single=0.0,
+    warning="",
     **more,
 ):
     """Judge a model that predicts this of a ramp from 0 to 10; the search leaves ``left``."""
+    fit = SimpleNamespace(warning=warning)
     speed = velocity.Comparison(1.0, 0.5 if wrong is None else wrong, 100.0 if wrong is None else 10.0)
     judged = given_model.Judged([1], [RAMP - predicted], RAMP, predicted, speed, polarity)
     monkeypatch.setattr(given_model, "judge", lambda state, given: judged)
@@ -1584,7 +1586,7 @@ def _given(
     state = _state(_fit(1.0))
     state = replace(
         state,
-        question=replace(state.question, given="given"),
+        question=replace(state.question, given=Given(SimpleNamespace(fit=fit))),
         findings=findings,
         verdict="creep",
         evidence=(Evidence("static"), Evidence("tested", "creep"), *map(Evidence, ("extended", "not whole"))),
@@ -1785,6 +1787,15 @@ def test_what_lay_outside_the_range_stays_in_the_memory_and_looks_like_another_z
     """The model as given is off by a constant since then; another gain is another condition."""
     firing = Firing(gate, "gate", 1.0, "{u}", {}, None)
     after = _given(monkeypatch, gain * RAMP + 1.0, firings=((0, firing),), verdict="none", findings=())
+    assert (after.verdict == "condition-change") is changed
+
+
+@pytest.mark.parametrize(
+    ("warning", "wrong", "changed"), [("", None, True), ("no form", None, False), ("", 0.4, False)]
+)
+def test_a_model_of_the_wrong_kind_tells_of_no_change(monkeypatch, warning, wrong, changed):
+    """By its own record or by these: a battery that no Preisach model describes was in another condition."""
+    after = _given(monkeypatch, RAMP + 1.0, warning=warning, wrong=wrong, verdict="none", findings=())
     assert (after.verdict == "condition-change") is changed
 
 
