@@ -64,7 +64,8 @@ def evaluate(
     failed = None
     if broken:
         listed = "; ".join(f"{b.metric} = {b.value:.4g} is outside [{b.low:g}, {b.high:g}]" for b in broken)
-        problem = f"{len(broken)} of {len(limits)} bounds of {bounds} are broken: {listed}"
+        are = "is" if len(broken) == 1 else "are"
+        problem = f"{len(broken)} of {len(limits)} bounds of {bounds} {are} broken: {listed}"
         hint = "look at what changed; if the new figure is right, change the bound knowingly"
         failed = QualityError(problem, hint=hint)
     job.alike(model)

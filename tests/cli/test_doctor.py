@@ -84,6 +84,15 @@ def test_an_absent_port_is_a_problem_with_a_fix(run):
     assert len({one.end() for one in found if one}) == 1  # below one another
 
 
+def test_a_parameter_of_another_port_is_told_as_it_is_typed(run):
+    """The option is --port here, though in Python it is an argument."""
+    done = run("doctor", "--port", "qemu:?seed=3")
+    assert done.code == 1
+    assert "--port: the emulated device (qemu:) has no parameter 'seed'" in done.out
+    assert '--port "bench:?seed=3' in done.out
+    assert "`port`" not in done.out
+
+
 def test_without_a_compiler_the_fix_is_named(run, tmp_path):
     """An empty PATH: no compiler, no emulator."""
     done = run(
