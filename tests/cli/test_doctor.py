@@ -46,6 +46,16 @@ def test_troubles_of_the_device_are_found(run, setting, name, state):
     assert done.code == (1 if state == "problem" else 0)
 
 
+def test_lost_samples_are_no_noise_of_the_current(run):
+    """What comes behind them is later than its place in the list: the way down was taken for noise."""
+    lossy, whole = (
+        _named(run("doctor", "--port", f"bench:?{wire}", "--json"))["current noise"]
+        for wire in ("wire=0.0001", "wire=0")
+    )
+    said = [float(one["found"].split()[0]) for one in (lossy, whole)]
+    assert said[0] == pytest.approx(said[1], rel=0.1)
+
+
 def test_the_gains_of_tune_are_in_force(run):
     """A coil on which the delivered gains ring is followed, and it is said which gains are in force."""
     coil = "bench:?resistance=3&inductance=0.008&supply=24"
