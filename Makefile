@@ -38,7 +38,7 @@ $(VENV)/installed: pyproject.toml
 	@echo "done; now: . $(BIN)/activate"
 
 $(VENV)/installed-test: $(VENV)/installed
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test]'
+	$(BIN)/pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[test]'
 	@touch $@
 
 install: $(VENV)/installed  ## the program into .venv

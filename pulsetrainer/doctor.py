@@ -230,7 +230,9 @@ def _short_capture(device: Device) -> Iterator[Finding]:
     else:
         yield _finding("link", f"{recording.tick.size} samples, none lost")
     range_A, span_N = device.info.current_limit_A, float(np.ptp(recording.force_N))
-    still_A, still_N = recording.current_A[held], recording.force_N[held]
+    at = recording.tick * _RATE_HZ / device.info.tick_rate_Hz  # a lost sample moves those behind it
+    still = (held.start <= at) & (at < held.stop)
+    still_A, still_N = recording.current_A[still], recording.force_N[still]
     shunt, sensor = (
         "check the shunt's wiring and its ground",
         "keep the sensor's cable off the coil; check its screws",

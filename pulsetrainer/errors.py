@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import ClassVar
 
 
 class PulsetrainerError(Exception):
@@ -44,10 +45,10 @@ class UsageError(PulsetrainerError):
 class ExistsError(UsageError):
     """The output is there already, and nobody said that it may be overwritten."""
 
-    def __init__(self, path: Path | str, message: str = "") -> None:
-        super().__init__(
-            message or f"the output {path} already exists", hint="allow overwriting, or name another file"
-        )
+    usual: ClassVar[str] = "allow overwriting, or name another file"
+
+    def __init__(self, path: Path | str, message: str = "", *, hint: str = usual) -> None:
+        super().__init__(message or f"the output {path} already exists", hint=hint)
         self.path = Path(path)
 
 

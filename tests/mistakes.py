@@ -340,6 +340,10 @@ INSIDE = {
     "a bench without its colon": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench"), 4, "no port bench", "--port bench:?"
     ),
+    "a bench with parameters but without its colon": Mistake(
+        ("capture", "identification", "-o", "out.h5", "--port", "bench?seed=3&creep=0"),
+        *(4, "no port bench?seed=3", "--port 'bench:?seed=3&creep=0'?"),
+    ),
     "too many levels for the coil": Mistake(
         ("capture", "identification", "-o", "out.h5", "--levels", "2000"),
         *(3, "heats the coil", "fewer --levels"),

@@ -61,7 +61,8 @@ class Fit:
     wild_output: Annotated[FloatArray | None, Data("@output_unit", "output of wild samples", "wild")] = None
     # of the cells within the range, told apart by minor loops, and not by the major loop only; NaN: unknown
     minor_percent: float = nan
-    loop: str = ""  # "counterclockwise" | "clockwise" | "butterfly" | "none"; empty in files of 0.1
+    # "counterclockwise" | "clockwise" | "butterfly" | "none", of a falling output once it is turned to rise;
+    loop: str = ""  # empty in files of 0.1
     notes: tuple[str, ...] = ()  # what a person should know about the fit
 
     @property

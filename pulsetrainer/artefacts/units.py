@@ -11,6 +11,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Sequence
+from typing import Protocol
 
 from pulsetrainer.errors import DataError
 
@@ -217,6 +218,24 @@ def with_seconds(seconds: float) -> str:
             size = seconds / one
             return f"{size:.0f} {unit}" if abs(size) >= _WHOLE else f"{size:.3g} {unit}"
     return f"{seconds:.3g} s"
+
+
+class Measured(Protocol):
+    """What has an input and an output, such as a run or a model."""
+
+    @property
+    def input_unit(self) -> str:
+        """Unit of the input."""
+
+    @property
+    def output_unit(self) -> str:
+        """Unit of the output."""
+
+
+def units_of(measured: Measured) -> str:
+    """Return the units of an input and an output in words: ``A and N``; ``no units`` where there are none."""
+    units = [shown(unit) for unit in (measured.input_unit, measured.output_unit)]
+    return " and ".join(unit or "no unit" for unit in units) if any(units) else "no units"
 
 
 def with_unit(number: str, unit: str) -> str:

@@ -38,6 +38,7 @@ def compare(
     from pulsetrainer.files import store
     from pulsetrainer.report import names
     from pulsetrainer.report.results import as_csv, labels_of
+    from pulsetrainer.steps.compare import differing_quizzes
 
     labels = labels_of(evaluations)
     with job.working("comparing"):
@@ -52,6 +53,7 @@ def compare(
 
             job.write(out, render.encode(comparison_figure.draw(labels, values), form))
     job.alike(evaluations)
+    job.notes(differing_quizzes(loaded, list(map(str, evaluations))))
     sources = [
         {"file": path, **picked(header, "title", "created")}
         for path, header in zip(evaluations, headers, strict=True)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import Annotated
 
 from typer import Context, Option
 
 from pulsetrainer.cli.console import Screen, plain
+from pulsetrainer.cli.next_step import as_options
 from pulsetrainer.cli.options import AsJson, LimitCurrent, LimitForce, Port
 from pulsetrainer.files import settings
 from pulsetrainer.report.tables import folded
@@ -44,6 +46,8 @@ def doctor(
     with screen.bar("looking") as progress:
         held = Limits(limit_current_A, limit_force_N)
         result = examine(port, capture=capture, limits=held, settings=words, tuned=file, progress=progress)
+    typed = [replace(f, found=as_options(f.found), fix=as_options(f.fix)) for f in result.findings]
+    result = replace(result, findings=tuple(typed))
     stand = "stands" if result.problems == 1 else "stand"
     problem = f"{result.problems} of {len(result.findings)} findings {stand} in the way"
     failed = QualityError(problem, hint="follow the fixes, from the top") if result.problems else None

@@ -36,6 +36,7 @@ def evaluate(
     """
     check_once(inputs)
     job = Job(context, inputs=(*inputs, *model), outputs=(out, html))
+    from pulsetrainer.files import store
     from pulsetrainer.files.bounds import read_bounds
 
     limits = read_bounds(bounds) if bounds else {}
@@ -64,11 +65,16 @@ def evaluate(
     failed = None
     if broken:
         listed = "; ".join(f"{b.metric} = {b.value:.4g} is outside [{b.low:g}, {b.high:g}]" for b in broken)
-        problem = f"{len(broken)} of {len(limits)} bounds of {bounds} are broken: {listed}"
+        are = "is" if len(broken) == 1 else "are"
+        problem = f"{len(broken)} of {len(limits)} bounds of {bounds} {are} broken: {listed}"
         hint = "look at what changed; if the new figure is right, change the bound knowingly"
         failed = QualityError(problem, hint=hint)
     job.alike(model)
     job.notes(evaluation.notes)
+    for path, one in zip(model, models, strict=True):
+        # a static model holds the record that it was fitted to; of an extended one the history tells
+        if one.extensions and store.is_made_from(path, inputs[0]):
+            job.notes([f"{path} was made with {inputs[0]}: how good it is, another run shows"])
     job.screen.result(
         evaluated(evaluation)
         | {"output": out, "html": html, "bounds_checked": len(limits), "breaches": plain(broken)},

@@ -6,6 +6,7 @@ import contextlib
 import errno
 import io
 import json
+import logging
 import os
 import signal
 import sys
@@ -76,8 +77,11 @@ def _run(program: Callable[..., Any], words: Sequence[str]) -> Any:
 
 
 def hush_libraries(argv: Sequence[str]) -> None:
-    """Keep what libraries warn of, such as an overflow, for those who asked for details."""
-    if not sys.warnoptions and not {"--verbose", "--debug"} & set(argv):
+    """Keep what libraries warn of, such as an overflow or a home without a cache, for those who ask."""
+    if {"--verbose", "--debug"} & set(argv):
+        return
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+    if not sys.warnoptions:
         warnings.simplefilter("ignore")
 
 
@@ -104,8 +108,6 @@ def speak_any_encoding() -> None:
 
 def _be_verbose() -> None:
     """Let the package's log lines through to stderr, each with its time."""
-    import logging
-
     logging.basicConfig(
         stream=sys.stderr, format="%(asctime)s.%(msecs)03d %(name)s: %(message)s", datefmt="%H:%M:%S"
     )
@@ -141,6 +143,8 @@ def _problem_of(error: Exception) -> PulsetrainerError:
         return DataError(
             f"the name {name[:20]}... has {len(name)} characters: {error.strerror}", hint="shorten it"
         )
+    if isinstance(error, PermissionError) and error.filename:
+        return DataError(f"{error.filename}: {error.strerror}", hint="change its permissions")
     if isinstance(error, OSError) and error.filename is None and error.errno in _NOWHERE:
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left would fail again

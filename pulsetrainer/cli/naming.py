@@ -12,7 +12,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperOption
 
-from pulsetrainer.cli.next_step import to_make, with_files
+from pulsetrainer.cli.next_step import next_step, to_make, with_files
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError
 from pulsetrainer.files.input_file import is_sound, near_names
 from pulsetrainer.files.pulses import library
@@ -130,6 +130,8 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         near = difflib.get_close_matches(error.path.name, tables, n=1, cutoff=_NEAR)
         error.hint = (f"did you mean {error.path.with_name(near[0])}? " if near else "") + _TABLES[name]
         return
+    if isinstance(error, ExistsError) and command == "capture":
+        error.hint = f"{next_step(error)}; an interrupted recording goes on with --resume"
     if isinstance(error, ExistsError) or kinds is None or not folder.is_dir():
         return
     if hint := _several(error.path, given, option) or _cut_off(error.path):

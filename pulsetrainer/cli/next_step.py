@@ -57,7 +57,7 @@ _NEXT = {
 
 def next_step(problem: PulsetrainerError) -> str:
     """Return what to do about an error: a command or an option where there is one, else its own hint."""
-    if isinstance(problem, ExistsError):
+    if isinstance(problem, ExistsError) and problem.hint == ExistsError.usual:
         other = shlex.quote(str(_free(problem.path)))
         return f"name another file, such as {other}, or give --overwrite to replace it"
     if isinstance(problem, WrongKindError):

@@ -77,6 +77,7 @@ def say_pressed(
     rows = pressed(done.figures, payload["beats"], done.parts, payload["force_range_N"], kelvins)
     rows["underruns"] = done.underruns
     job.show(payload, f"{out}: a session on {info.serial}", rows | right)
+    job.wrote(html)
 
 
 def _quizzed(quiz: Quiz | None) -> tuple[dict[str, Any], dict[str, str]]:

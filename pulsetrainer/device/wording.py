@@ -20,6 +20,8 @@ _REMEDY: dict[int, str] = {
     codes.Fault.NO_CURRENT: "check the supply, its plug, and the wires of the coil and of the current sensor",
     codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
     codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
+    codes.Fault.TICK_OVERRUN: "the emulated device (qemu:) must keep pace with the clock: close other "
+    "programs, or use bench:, which has time; on a real device the firmware is too slow",
     codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",
     codes.Fault.ON_TIME: "play it in several pieces",
     codes.Fault.WAVE_CRC: "check the cable, then run the command again",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Model, Run
-from pulsetrainer.artefacts.units import same_units
+from pulsetrainer.artefacts.units import same_units, units_of
 from pulsetrainer.core.initial_state import first_stroke_words, known_from
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
@@ -63,8 +63,7 @@ def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:
     """Raise DataError unless run and model can be of one device."""
     if not same_units((run.input_unit, run.output_unit), (model.input_unit, model.output_unit)):
         raise DataError(
-            f"{name} is in {run.input_unit} and {run.output_unit}, but {model_name} was identified in "
-            f"{model.input_unit} and {model.output_unit}",
+            f"{name} is in {units_of(run)}, but {model_name} was identified in {units_of(model)}",
             hint="use a model of the same device; in other units, convert the columns and import again",
         )
     if model.reading != "continuous":

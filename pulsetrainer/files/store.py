@@ -125,6 +125,11 @@ def read_any(path: Path | str) -> Any:
     return read_one_of(path, *KINDS.values())
 
 
+def is_made_from(path: Path | str, source: Path | str) -> bool:
+    """Tell whether the command that made ``source`` is one of those that led to ``path``."""
+    return set(read_header(source).history[-1:]) <= set(read_header(path).history)
+
+
 def read_header(path: Path | str) -> Header:
     """Read what an artefact says about itself; raises as ``read_any``."""
     if recording := _recording(path):

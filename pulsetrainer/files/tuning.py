@@ -48,7 +48,8 @@ def check_tuned(path: Path, serial: str, *, overwrite: bool) -> None:
     """Raise UsageError where a file cannot take a device's entry, before the work that would be lost."""
     check_output(path, overwrite=True)
     if path.exists() and serial in read_tuned(path) and not overwrite:
-        raise ExistsError(path, f"{path} already has the gains of the device {serial}")
+        hint = "give `overwrite` to replace these gains: the rest of the file stays as it is"
+        raise ExistsError(path, f"{path} already has the gains of the device {serial}", hint=hint)
 
 
 def write_tuned(path: Path, serial: str, found: Found, *, overwrite: bool) -> None:

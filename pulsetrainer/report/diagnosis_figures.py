@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
-from pulsetrainer.artefacts import Dependence, Diagnosis, FloatArray, Profile
+from pulsetrainer.artefacts import Cause, Dependence, Diagnosis, FloatArray, Profile
 from pulsetrainer.core.plane import BoolArray
 from pulsetrainer.report import panels
 from pulsetrainer.report.diagnosis_text import answer, explains
@@ -44,8 +44,9 @@ def course(found: Diagnosis) -> Figure:
     panels.trace(above, found.time_s, found.output, **GROUND, label="measured")
     panels.trace(above, found.time_s, found.before, **MODEL, label="model, fitted anew")
     above.set_ylabel(label(found.output_quantity or panels.quantity_of(found.output_unit), found.output_unit))
-    causes = ", ".join(one.cause for one in found.found) or found.verdict
-    above.set_title(f"verdict: {causes}{' (quick screen)' if found.quick else ''}", wrap=True)
+    causes = [one.cause for one in found.found]
+    verdict = ", ".join(causes) if found.verdict in causes else found.verdict
+    above.set_title(f"verdict: {verdict}{' (quick screen)' if found.quick else ''}", wrap=True)
     panels.headroom(above)
     panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="left without causes")
     if found.extended_percent < found.static_percent:
@@ -142,10 +143,16 @@ def dependence(one: Dependence, output_quantity: str = "") -> Figure:
     return figure
 
 
+def ranked(found: Diagnosis) -> list[Cause]:
+    """Return the causes that have a share to draw: each that was found, and others that explain something."""
+    shares = [(explains(one, found), one) for one in found.causes]
+    return [one for share, one in shares if share >= (0.0 if one.found else SEEN)][:_MOST_BARS]
+
+
 @styled
 def ranking(found: Diagnosis) -> Figure:
     """Return how much of the error beyond noise each cause explains, whether it was found, and why not."""
-    shown = [one for one in found.causes if one.found or explains(one, found) > SEEN][:_MOST_BARS][::-1]
+    shown = ranked(found)[::-1]
     figure = Figure(figsize=(COLUMN_IN, 1.0 + 0.34 * max(len(shown), 1)), layout="constrained")
     axes = figure.add_subplot()
     share = [max(one.explains_percent, 1e-3) for one in shown]

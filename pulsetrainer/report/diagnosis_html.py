@@ -7,8 +7,8 @@ from typing import Any
 
 from pulsetrainer.artefacts import Diagnosis
 from pulsetrainer.report import diagnosis_text
-from pulsetrainer.report.diagnosis_figures import SEEN
-from pulsetrainer.report.diagnosis_text import explains, in_doubt
+from pulsetrainer.report.diagnosis_figures import ranked
+from pulsetrainer.report.diagnosis_text import in_doubt
 from pulsetrainer.report.html import page
 
 
@@ -23,7 +23,7 @@ def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header
         commands=commands,
         headline=headline(found),
         shown=shown,
-        ranked=any(one.found or explains(one, found) > SEEN for one in shown),
+        ranked=bool(ranked(found)),
     )
 
 

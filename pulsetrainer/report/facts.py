@@ -75,17 +75,24 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
 _HARDLY = 50.0  # % of the cells: with fewer a person should know what the coverage does not say
 _ALL = 99.95  # % of the cells: what is printed as 100.0
 _LOOPS = {
-    "counterclockwise": "counterclockwise, the output lags",
-    "clockwise": "clockwise, the output leads",
-    "butterfly": "a butterfly, it crosses itself",
+    "counterclockwise": "{}, the output lags",
+    "clockwise": "{}, the output leads",
+    "butterfly": "a {}, it crosses itself",
     "none": "no loop, the output follows the input",
 }
+_MIRRORED = {"counterclockwise": "clockwise", "clockwise": "counterclockwise"}
+
+
+def loop_drawn(model: Model) -> str:
+    """Return which way the loop runs in a drawing; the model has that of a rising output."""
+    loop = model.fit.loop if model.fit else ""
+    return _MIRRORED.get(loop, loop) if model.polarity < 0 else loop
 
 
 def loop_words(model: Model) -> str:
     """Say which way the loop of a model runs: "rising, counterclockwise, the output lags"."""
     trend = "falling" if model.polarity < 0 else "rising"
-    turns = _LOOPS.get(model.fit.loop, "") if model.fit else ""
+    turns = _LOOPS.get(model.fit.loop, "").format(loop_drawn(model)) if model.fit else ""
     if model.form == "signed":  # no loop of one direction fits
         return f"mostly {turns}" if turns[:1] == "c" else turns or "of either direction"
     return f"{trend}, {turns}" if turns else trend
@@ -113,7 +120,7 @@ def _model(model: Model) -> dict[str, Any]:
         "reading": model.reading,
         "polarity": model.polarity,
         "form": model.form,
-        "loop": fit.loop or None if fit else None,
+        "loop": loop_drawn(model) or None,
         f"{'output' if model.form == 'dual' else 'input'} ({model.edges_quantity})": span_words(
             model.edges, model.edges_unit
         ),

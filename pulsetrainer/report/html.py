@@ -27,6 +27,7 @@ from pulsetrainer.artefacts.evaluation import METRICS, PUBLISHED
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.report import diagnosis_figures, figures, heat_figures, panels, session_figures
 from pulsetrainer.report.diagnosis_text import of_a_curve
+from pulsetrainer.report.facts import loop_drawn
 from pulsetrainer.report.names import NAMES, OVERVIEW, beyond_rounding, digits
 from pulsetrainer.report.render import inline_svg
 from pulsetrainer.report.style import label
@@ -159,7 +160,20 @@ def environment() -> Environment:
     made.filters |= {"unbroken": unbroken, "unit": shown, "digits": format, "rounded": digits}
     made.tests["of_a_curve"] = of_a_curve
     made.globals |= {"NAMES": NAMES, "OVERVIEW": OVERVIEW, "METRICS": METRICS, "Number": Number}
-    tools = number, known, offset, count, metric, picture, reach, densest, label, panels.titled, panels.scale
+    tools = (
+        number,
+        known,
+        offset,
+        count,
+        metric,
+        picture,
+        reach,
+        densest,
+        label,
+        panels.titled,
+        panels.scale,
+        loop_drawn,
+    )
     for tool in tools:
         made.globals[tool.__name__] = tool
     for drawing in (figures, heat_figures, diagnosis_figures, session_figures, panels):

@@ -11,12 +11,15 @@ from matplotlib.figure import Figure
 from pulsetrainer.report import figures, render, text
 from pulsetrainer.report.tables import ESCAPE
 
+_WIDTH = 100  # characters of a line: sentences are folded there, a table stays whole and is scrolled
+_WHOLE = "white-space: pre; overflow-x: auto"  # notebooks and sites break lines at the column's edge
+
 
 def html(artefact: Any) -> str:
     """Return the text of an artefact, and its figure as SVG below it; no file, nothing fetched."""
-    words = ESCAPE.sub("", text.of(artefact))  # a notebook passes for a terminal
+    words = ESCAPE.sub("", text.of(artefact, _WIDTH))  # a notebook passes for a terminal
     picture = render.encode(figures.draw(artefact), "svg").decode()
-    return f"<pre>{escape(words)}</pre>{picture[picture.index('<svg') :]}"
+    return f'<pre style="{_WHOLE}">{escape(words)}</pre>{picture[picture.index("<svg") :]}'
 
 
 def plot(artefact: Any) -> Axes:

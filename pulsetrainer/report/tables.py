@@ -115,8 +115,9 @@ def label(name: str) -> str:
         return (f"{owner}: " if owner else "") + ", ".join(filter(None, named))
     for ending, unit in (("_percent", "%"), ("_Hz", "Hz")):
         if name.endswith(ending):
-            name = f"{name.removesuffix(ending)}, {unit}"
-    return name.replace("_", " ")
+            return f"{name.removesuffix(ending).replace('_', ' ')}, {unit}"
+    # the heading of a column of somebody's table stays as it is: U_a, input (Spannung U_a)
+    return name.replace("_", " ") if name.islower() and "(" not in name else name
 
 
 def text(value: Any) -> str:

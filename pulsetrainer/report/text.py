@@ -37,8 +37,8 @@ def title(artefact: Any) -> str:
     return f"<{artefact.kind}: {tables.text(said)}{' cells' if artefact.kind == 'model' else ''}>"
 
 
-def of(artefact: Any) -> str:
-    """Return an artefact as text: its main figures, a line each, or its tables."""
+def of(artefact: Any, width: int | None = None) -> str:
+    """Return an artefact as text: its main figures, a line each, or its tables; folded where it is wider."""
     parts: Iterable[Facts | Table]
     if isinstance(artefact, Evaluation):
         parts = tables_of(artefact)
@@ -48,7 +48,7 @@ def of(artefact: Any) -> str:
         known = {name: value for name, value in facts(artefact).items() if value is not None}
         parts = [Facts(artefact.kind, known)]
     # below a table a line is left free
-    lines = (tables.rendered(part) + "\n" * isinstance(part, Table) for part in parts)
+    lines = (tables.rendered(part, width) + "\n" * isinstance(part, Table) for part in parts)
     return "".join(lines).rstrip("\n")
 
 

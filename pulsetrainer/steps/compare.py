@@ -89,6 +89,23 @@ def compare(
     return metrics
 
 
+def differing_quizzes(compared: Sequence[Evaluation | Session], names: Sequence[str]) -> list[str]:
+    """Say that learners were not asked the same, so that their shares right tell little of each other."""
+    quizzes = {
+        name: one.quiz
+        for name, one in zip(names, compared, strict=True)
+        if isinstance(one, Session) and one.quiz is not None
+    }
+    if len({(len(quiz.asked), *sorted(quiz.choices)) for quiz in quizzes.values()}) < 2:
+        return []
+    said = [
+        f"{name} has {len(quiz.asked)} questions on {len(quiz.choices)} pulses "
+        f"({100 * score(quiz).chance:.0f} % by guessing)"
+        for name, quiz in quizzes.items()
+    ]
+    return [f"the quizzes are not alike: {', '.join(said)}"]
+
+
 def _spreads(one: Evaluation) -> dict[str, float]:
     """How far each figure goes from one repeat to the next, by its name; of none that is not known."""
     found = {}

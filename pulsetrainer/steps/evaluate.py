@@ -19,7 +19,7 @@ from pulsetrainer.artefacts import (
     Run,
     WaveformEvaluation,
 )
-from pulsetrainer.artefacts.units import same_units
+from pulsetrainer.artefacts.units import same_units, units_of
 from pulsetrainer.core import metrics
 from pulsetrainer.core.initial_state import estimated_start, first_stroke_words, known_from
 from pulsetrainer.core.plane import BoolArray, FloatArray
@@ -167,8 +167,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
     for title, model in zip(model_names, models, strict=True):
         if not same_units((model.input_unit, model.output_unit), (run.input_unit, run.output_unit)):
             raise DataError(
-                f"{title} was identified in {model.input_unit} and {model.output_unit}, "
-                f"but {name} is in {run.input_unit} and {run.output_unit}",
+                f"{title} was identified in {units_of(model)}, but {name} is in {units_of(run)}",
                 hint="use a model of the same device; in other units, convert the columns and import again",
             )
         one = _of_model(title, model, run, found[0].rms if found else None)

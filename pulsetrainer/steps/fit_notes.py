@@ -30,7 +30,8 @@ def of_form(fitted: Fitted, run: Run, asked: str) -> list[str]:
     output, given = run.output_quantity, run.input_quantity
     if fitted.form == "dual":
         how = f"fitted with the roles exchanged, {given} over {output} (dual form)"
-        why = f"the {output} leads the {given}, its loop runs clockwise"
+        way = "clockwise" if fitted.operator.polarity > 0 else "counterclockwise"
+        why = f"the {output} leads the {given}, its loop runs {way}"
     elif fitted.form == "signed":
         how = "fitted with weights of either sign (signed form)"
         why = "no loop that runs one way fits this record"

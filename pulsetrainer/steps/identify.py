@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
-from pulsetrainer.artefacts.units import same_units, shown, with_unit
+from pulsetrainer.artefacts.units import same_units, shown, units_of, with_unit
 from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
 from pulsetrainer.core.dual import exchanged
@@ -238,8 +238,7 @@ def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
     for name, run in zip(names, runs, strict=True):
         if not same_units((run.input_unit, run.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
-                f"{name} is in {run.input_unit} and {run.output_unit}, "
-                f"but {names[0]} is in {first.input_unit} and {first.output_unit}",
+                f"{name} is in {units_of(run)}, but {names[0]} is in {units_of(first)}",
                 hint="import the runs again with the same --input-unit and --output-unit",
             )
     for what in ("input", "output"):

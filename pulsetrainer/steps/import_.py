@@ -11,7 +11,7 @@ import numpy as np
 from pulsetrainer.artefacts import FloatArray, Run
 from pulsetrainer.artefacts.run import seam_of
 from pulsetrainer.artefacts.time_steps import GAP, gaps_of, steps_of
-from pulsetrainer.artefacts.units import same_units, with_seconds, with_unit
+from pulsetrainer.artefacts.units import same_units, units_of, with_seconds, with_unit
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.coverage import coverage, minor_coverage
 from pulsetrainer.core.excitations import MOST_SAMPLES
@@ -189,8 +189,7 @@ def joined(parts: Sequence[Run]) -> tuple[Run, tuple[str, ...]]:
     for part in parts[1:]:
         if not same_units((part.input_unit, part.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
-                f"{part.signal} is in {part.input_unit} and {part.output_unit}, but {first.signal} is in "
-                f"{first.input_unit} and {first.output_unit}",
+                f"{part.signal} is in {units_of(part)}, but {first.signal} is in {units_of(first)}",
                 hint="give `input_unit` and `output_unit`, or import them one by one",
             )
         for name in ("time_s", "reference"):

@@ -92,6 +92,7 @@ def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     _write(bench, "fresh", fresh, _device(fresh))
     models = ["--model", "model.h5", "--model", "extended.h5"]
     done = pulsetrainer(bench, "evaluate", "fresh.h5", *models, "--json")
+    assert "was made with" not in done.err
     plain, extended = done.json["models"]
     assert plain["gain_percent"] == 0.0
     assert extended["gain_percent"] > 50.0
@@ -103,6 +104,9 @@ def test_a_slow_sensor_is_named_extended_and_gains_on_a_run_never_fitted(bench):
     assert "identified from" not in done.err
     done = pulsetrainer(bench, *words, "slow.h5", "-o", "seen.h5")
     tells(done.err, "seen before")
+    done = pulsetrainer(bench, "evaluate", "diagnostic.h5", *models)  # which proves nothing
+    assert "extended.h5 was made with diagnostic.h5" in done.err
+    assert " model.h5 was made with" not in done.err
 
 
 def test_quick_says_that_it_is_quick(bench):

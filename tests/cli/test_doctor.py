@@ -46,6 +46,16 @@ def test_troubles_of_the_device_are_found(run, setting, name, state):
     assert done.code == (1 if state == "problem" else 0)
 
 
+def test_lost_samples_are_no_noise_of_the_current(run):
+    """What comes behind them is later than its place in the list: the way down was taken for noise."""
+    lossy, whole = (
+        _named(run("doctor", "--port", f"bench:?{wire}", "--json"))["current noise"]
+        for wire in ("wire=0.0001", "wire=0")
+    )
+    said = [float(one["found"].split()[0]) for one in (lossy, whole)]
+    assert said[0] == pytest.approx(said[1], rel=0.1)
+
+
 def test_the_gains_of_tune_are_in_force(run):
     """A coil on which the delivered gains ring is followed, and it is said which gains are in force."""
     coil = "bench:?resistance=3&inductance=0.008&supply=24"
@@ -82,6 +92,15 @@ def test_an_absent_port_is_a_problem_with_a_fix(run):
     assert "link" not in done.out
     found = [re.match(r"\S+ +\S.*?  +", line) for line in done.out.splitlines() if line[:1].isalpha()]
     assert len({one.end() for one in found if one}) == 1  # below one another
+
+
+def test_a_parameter_of_another_port_is_told_as_it_is_typed(run):
+    """The option is --port here, though in Python it is an argument."""
+    done = run("doctor", "--port", "qemu:?seed=3")
+    assert done.code == 1
+    assert "--port: the emulated device (qemu:) has no parameter 'seed'" in done.out
+    assert '--port "bench:?seed=3' in done.out
+    assert "`port`" not in done.out
 
 
 def test_without_a_compiler_the_fix_is_named(run, tmp_path):

@@ -118,6 +118,7 @@ def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
     cut = read(tmp_path / "run.h5", Run).output
     refused = pulsetrainer(tmp_path, *words)
     assert refused.code == 2
+    assert "--resume" in refused.err.partition("try: ")[2]  # not only how to replace it
     done = pulsetrainer(tmp_path, *words, "--resume")
     assert done.code == 0, done
     run = read(tmp_path / "run.h5", Run)

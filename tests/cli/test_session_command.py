@@ -102,7 +102,8 @@ def test_a_dry_run_of_a_quiz_by_key_needs_the_keys_too(run):
 
 def test_a_session_in_a_file_has_its_sheet_made_again(run, tmp_path):
     """The same page as when it was pressed; models, bounds and an evaluation do not go with it."""
-    assert run(*SHORT, "--beats", 3, "--variability", 4, "--html", "s.html").code == 0
+    done = run(*SHORT, "--beats", 3, "--variability", 4, "--html", "s.html")
+    assert (done.code, done.out.splitlines()[-1]) == (0, "wrote s.html")
     assert "vary by 4 %" in (tmp_path / "s.html").read_text()
     done = run("evaluate", "s.h5", "--html", "again.html", "--json")
     assert (done.code, done.json["beats"], done.json["complete"]) == (0, 3, True)

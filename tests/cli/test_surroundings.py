@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import shutil
 import subprocess
 from pathlib import Path
@@ -10,6 +12,7 @@ import pytest
 from test_screen import on_terminal
 
 from program import PROGRAM, cold
+from pulsetrainer.cli.guard import funnel
 
 NOWHERE = "/proc/nowhere"  # cannot be made, by root neither
 SURROUNDINGS = {
@@ -72,6 +75,26 @@ def test_a_terminal_of_twenty_columns(there):
     evaluated = on_terminal(there, "evaluate", "played.h5", COLUMNS="20", TERM="dumb").decode()
     assert max(len(line.rstrip("\r")) for line in evaluated.splitlines()) <= 20
     assert "mean error, compensated" in " ".join(evaluated.split())
+
+
+@pytest.mark.slow
+def test_without_a_home_a_library_says_nothing_about_it(there):
+    """What matplotlib does without a folder for its cache is its own business."""
+    done = cold(there, "plot", "model.h5", env=SURROUNDINGS["no home"])
+    assert (done.code, done.err) == (0, "")
+
+
+def test_what_may_not_be_written_is_no_bug(monkeypatch):
+    """Such as the file of a shell that --install-completion wants to extend."""
+
+    def program(**_words):
+        raise PermissionError(errno.EACCES, "Permission denied", "/home/x/.bashrc")
+
+    said = io.StringIO()
+    monkeypatch.setattr("sys.stderr", said)
+    assert funnel(program, ["--install-completion"]) == 3
+    assert "error: /home/x/.bashrc: Permission denied" in said.getvalue()
+    assert "bug" not in said.getvalue()
 
 
 def test_a_full_disk_behind_the_results_is_no_bug():

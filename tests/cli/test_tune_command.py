@@ -93,6 +93,8 @@ def test_an_earlier_entry_is_replaced_only_if_asked(run, tmp_path):
     refused = run("tune", "--port", COIL, "-o", "pulsetrainer.toml", "--json")
     assert (refused.code, refused.json["error"]["kind"]) == (2, "usage")
     assert path.read_bytes() == before
+    assert "--overwrite" in refused.json["error"]["hint"]
+    assert "the rest of the file stays" in refused.json["error"]["hint"]
     done = run("tune", "--port", COIL, "-o", "pulsetrainer.toml", "--json", "--overwrite")
     assert done.code == 0, done.err
     tree = tomllib.loads(path.read_text())

@@ -23,6 +23,7 @@ def test_a_notebook_runs_and_shows_its_artefacts(path):
     for page in pages:
         assert "<svg" in page
         assert "\x1b" not in page
+        assert "warning  " not in page  # what is shown to a newcomer is a model that describes its record
     assert not [output for output in outputs if output.output_type in ("error", "stderr")]
 
 

@@ -19,7 +19,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError, DataError
-from pulsetrainer.report.facts import loop_words
+from pulsetrainer.report.facts import facts, loop_words
 from wording import raises, tells
 
 NOISE = 0.003  # of the span
@@ -240,6 +240,20 @@ def test_both_forms_are_drawn_and_printed(butterfly, clockwise):
         mostly = loop_words(replace(model, fit=replace(model.fit, loop="clockwise")))
         assert mostly.startswith("mostly clockwise") is (model is butterfly)
         assert model.plot() is not None
+
+
+@pytest.mark.parametrize(("draw", "seed", "runs"), [
+    (devices.DIRECT[0], 1000, "falling, clockwise, the output lags"),
+    (devices.stop_sum, 4004, "falling, counterclockwise, the output leads"),
+])  # fmt: skip
+def test_a_falling_loop_is_said_to_run_as_it_is_drawn(draw, seed, runs):
+    """The mirror image of a loop runs the other way: in `identify`, in `show` and in the note of the form."""
+    _, u, y, _, _ = measured(draw, seed)
+    model = pt.identify(run_of(u, -np.sign(np.corrcoef(u, y)[0, 1]) * y), levels=16)
+    assert loop_words(model) == runs
+    way = runs.split(", ")[1]
+    assert facts(model)["loop"] == way
+    assert all(f"runs {way}:" in note for note in model.fit.notes if "its loop runs" in note)
 
 
 def test_a_dual_model_is_inverted_exactly(clockwise):

@@ -11,7 +11,7 @@ import store_examples
 from pulsetrainer.artefacts import Cause, Parameter
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report import tables
-from pulsetrainer.report.diagnosis_figures import ranking
+from pulsetrainer.report.diagnosis_figures import course, ranked, ranking
 from pulsetrainer.report.diagnosis_text import answer, explains, parameters, sections
 
 NAN = float("nan")
@@ -148,3 +148,19 @@ def test_the_chart_shows_what_explains_something():
     )
     axes = ranking(replace(found, causes=(strong, weak, none))).axes[0]
     assert {label.get_text() for label in axes.get_yticklabels()} == {"delay", "viscous"}
+
+
+def test_the_chart_says_no_more_than_the_table():
+    """Where nothing is beyond noise a cause that was found has no share, in the table and in the chart."""
+    found = store_examples.diagnosis()
+    told = replace(_cause(0.001, found=True), explains_percent=100.0)
+    within = replace(found, causes=(told,), static_percent=1.0, floor_percent=1.0)
+    assert ranked(within) == []
+    assert ranked(replace(within, static_percent=2.0)) == [told]
+
+
+@pytest.mark.parametrize("verdict", ["none", "unknown"])
+def test_the_figure_bears_the_verdict_of_the_page(verdict):
+    """A cause that is told, but is no verdict, is none in the figure's title either."""
+    found = replace(store_examples.diagnosis(), verdict=verdict)
+    assert course(found).axes[0].get_title("left") == f"verdict: {verdict}"

@@ -137,3 +137,10 @@ def test_what_is_shown_of_a_file_is_what_it_holds():
         fields -= {"offset"}  # in words, with its unit
         assert fields
         assert {name: shown[name] for name in fields} == {name: getattr(artefact, name) for name in fields}
+
+
+@pytest.mark.parametrize("heading", ["U_a", "input (Spannung U_a)", "output (coil_force)", "Spannung U_a"])
+def test_a_heading_of_somebodys_table_stays_as_it_is(heading):
+    """Its underscore is part of the name, as on the axes of a figure."""
+    assert label(heading) == heading
+    assert (label("dropped_samples"), label("fast_rate_Hz")) == ("dropped samples", "fast rate, Hz")

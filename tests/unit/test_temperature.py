@@ -110,6 +110,19 @@ def test_lost_samples_and_no_current_tell_nothing_false():
     assert meter.temperature_K == pytest.approx(before, abs=0.5)
 
 
+def test_a_window_at_the_foot_of_a_pulse_hardly_moves_what_is_known():
+    """There a thousandth of the duty looks like six kelvin; the first window is believed all the same."""
+    meter, alone = Thermometer(COLD, TERM), Thermometer(COLD, TERM)
+    meter.add(*telemetry(20.0, 5.0)[:4])
+    before_K = meter.temperature_K
+    time_s, foot = 20.0 + DT_S * np.arange(1002), np.full(1002, 0.13)
+    duty = COLD.duty_offset - 1e-3 + COLD.duty_per_A * foot
+    assert meter.add(time_s, foot, foot, duty)
+    assert abs(meter.temperature_K - before_K) < 0.5
+    assert alone.add(time_s, foot, foot, duty)
+    assert alone.temperature_K == pytest.approx(-5.0, abs=0.5)
+
+
 def test_a_window_of_one_steep_fall_tells_nothing():
     """There e counts for kelvins, and it is known to a quarter: the reading before it stays."""
     meter = Thermometer(replace(COLD, duty_s_per_A=0.75 * COLD.duty_s_per_A), TERM)

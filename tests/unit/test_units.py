@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pint
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+import pulsetrainer as pt
 from pulsetrainer.artefacts.units import (
     SECONDS,
     check_unit,
@@ -16,6 +18,7 @@ from pulsetrainer.artefacts.units import (
     split_unit,
     symbol_of,
     unit_of,
+    units_of,
     with_seconds,
 )
 from pulsetrainer.errors import DataError
@@ -212,3 +215,14 @@ def test_the_two_letters_that_look_like_micro_are_one_unit():
 def test_micro_is_one_prefix_however_it_is_spelled(ours, theirs, same):
     """A record and a model in `um` and `µm` are of one device."""
     assert same_units(("A", ours), ("A", theirs)) is same
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [("A N", "A and N"), ("1 1", "no units"), ("V 1", "V and no unit"), ("A m^2", "A and m²")],
+)
+def test_the_units_of_a_run_in_words(units, said):
+    """A table without units was told to be in 1 and 1."""
+    of_input, of_output = units.split()
+    run = pt.Run(None, np.zeros(2), np.zeros(2), input_unit=of_input, output_unit=of_output)
+    assert units_of(run) == said
