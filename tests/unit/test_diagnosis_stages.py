@@ -1438,6 +1438,29 @@ def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, 
     assert after.findings[0].explains_percent == pytest.approx(80.0 if found else 30.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "beside", "added", "found"),
+    [
+        ("offset-drift", "creep", 2525.0, False),  # of which 100 are missed without it
+        ("offset-drift", "creep", 2475.0, True),
+        ("step", "creep", 2525.0, False),
+        ("viscous", "creep", 2525.0, True),  # of the device
+        ("offset-drift", None, 2525.0, True),  # only the weights could hold it
+    ],
+)
+def test_a_slow_fault_that_the_causes_beside_it_hold_is_none(monkeypatch, name, beside, added, found):
+    """It mends the formula of a creep: taken out, the next record was predicted 1.5 times worse."""
+    monkeypatch.setattr(repetition, "refit", _refitted)
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    monkeypatch.setattr(repetition, "squares_added", lambda *_: added)
+    others = [] if beside is None else [_finding(beside, 80.0)]
+    names = [one.cause.id for one in others]
+    state = _state(_fit(500.0, *names, name), findings=(*others, _finding(name, 10.0)))
+    after = repetition.stage(state)
+    assert after.findings[-1].found is found
+    assert after.repeated.names == ((*names, name) if found else tuple(names))
+
+
 def _refitted(problem, terms, near) -> Fit:
     """A fit of squares 500, without any one of its causes 800: that is 30 % of what can be explained."""
     return Fit(500.0, tuple(terms), _without={term.cause.id: Fit(800.0) for term in terms})

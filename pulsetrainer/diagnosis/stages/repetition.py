@@ -13,7 +13,8 @@ by itself.
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
-cent of the span, was not found: it mends the formula of another cause, or nothing. What is left beside it is
+cent of the span, was not found: it mends the formula of another cause, or nothing. Nor was a slow fault of
+the measurement of which the causes beside it hold nearly all. What is left beside it is
 refitted without it, and a step asked again whether it only settles.
 """
 
@@ -27,7 +28,13 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
-from pulsetrainer.diagnosis.stages.rivals import AT_BOUND, MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES
+from pulsetrainer.diagnosis.stages.rivals import (
+    AT_BOUND,
+    MAY_BE_NOTHING,
+    MAY_BE_WEAR,
+    SETTLES,
+    squares_added,
+)
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -96,7 +103,16 @@ def _is_nothing(state: State, finding: Finding) -> bool:
     """Whether a finding may be nothing, and would matter little: beside the others, or at all."""
     share = finding.explains_percent / PERCENT
     little = share < LIMITS.mends or state.rms_of(share) < LIMITS.matters * state.floor.span
-    return MAY_BE_NOTHING in finding.doubts and little
+    return (MAY_BE_NOTHING in finding.doubts and little) or _is_held(state, finding)
+
+
+def _is_held(state: State, finding: Finding) -> bool:
+    """Whether other causes hold nearly all that a slow fault of the measurement adds, and it mends one."""
+    term = next((one for one in state.current.terms if one.cause is finding.cause), None)
+    if term is None or len(state.current.terms) == 1 or not (term.cause.drifts and term.cause.corrects):
+        return False
+    fall = finding.explains_percent / PERCENT * state.floor.reducible(state.baseline)
+    return fall < LIMITS.held_by_others * squares_added(state, term)
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:
