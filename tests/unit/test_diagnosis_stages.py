@@ -1363,6 +1363,7 @@ def _asked_again(monkeypatch, shares):
     monkeypatch.setattr(fitting, "refit", refitted)
     monkeypatch.setattr(repetition, "refit", refitted)
     monkeypatch.setattr(repetition, "repeated", repeated)
+    monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
     names = ("creep", "thermal-drift", "output-lag", "step")
     findings = tuple(_finding(name, 20.0) for name in names)
     return repetition.stage(_state(_fit(500.0, *names), findings=findings))
@@ -1471,6 +1472,7 @@ def test_a_step_beside_what_is_gone_is_asked_again_whether_it_settles(monkeypatc
     """Beside a slow cause it was a small rest of that; without it, it is that in the whole."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: settles and len(state.current.terms) == 1)
     findings = (_finding("step", 2.0), _finding("thermal-drift", 9.0, doubts=(rivals.MAY_BE_NOTHING,)))
     after = repetition.stage(_state(_fit(500.0, "step", "thermal-drift"), findings=findings))

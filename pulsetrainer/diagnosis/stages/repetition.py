@@ -43,6 +43,7 @@ DOUBT, NOT_ADDED, A_FAULT = "does not repeat", "not added", "may be a fault"
 
 def stage(state: State) -> State:
     """Return the state with the causes that do not repeat, and the model without them."""
+    state = _without_held(state)
     kept = state.current
     asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
     told: dict[str, str] = {one.cause.id: A_FAULT for one in asked if _may_be_a_fault(one)}
@@ -58,6 +59,12 @@ def stage(state: State) -> State:
     )
     findings = tuple(replace(one, found=one.found and not _is_nothing(state, one)) for one in findings)
     return _without_what_is_gone(replace(state, findings=findings, repeated=kept))
+
+
+def _without_held(state: State) -> State:
+    """Return the state without slow faults of the measurement that the causes beside them hold."""
+    findings = tuple(replace(one, found=one.found and not _is_held(state, one)) for one in state.findings)
+    return _without_what_is_gone(replace(state, findings=findings))
 
 
 def _without_what_is_gone(state: State) -> State:
@@ -103,7 +110,7 @@ def _is_nothing(state: State, finding: Finding) -> bool:
     """Whether a finding may be nothing, and would matter little: beside the others, or at all."""
     share = finding.explains_percent / PERCENT
     little = share < LIMITS.mends or state.rms_of(share) < LIMITS.matters * state.floor.span
-    return (MAY_BE_NOTHING in finding.doubts and little) or _is_held(state, finding)
+    return MAY_BE_NOTHING in finding.doubts and little
 
 
 def _is_held(state: State, finding: Finding) -> bool:
