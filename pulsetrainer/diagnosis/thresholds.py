@@ -48,7 +48,7 @@ class Thresholds:
     least_held: int = 100  # readings that stay between two steps the same way: fewer tell nothing
     read_evenly: float = 0.5  # of an even motion, while the reading stays: such an output saw no steps
     not_between: float = 0.5  # of a coarse step of the input: so much is not known beside turns and rests
-    coarse_noise: float = 1.5  # times the noise: larger steps of the output do not average out
+    coarse_noise: float = 1.8  # times the noise, with its own: of steps of 2 sigma 0.7 % does not average out
     steps_apart: float = 2.5  # coarse steps: jumps of fewer are those steps
     state: float = 0.15  # of the span: values farther apart are states of a device that switches
 

@@ -1957,6 +1957,23 @@ def test_a_slow_fault_no_larger_than_slow_noise_takes_no_verdict(times, name, ti
     assert state.background == ({name} if may_be_slow and times > 1.0 else set())
 
 
+@pytest.mark.parametrize(("step", "averages_out"), [(1.79, True), (1.81, False)])
+@pytest.mark.parametrize("left", [200.0, 900.0])
+def test_steps_that_noise_averages_out_take_no_verdict(left, step, averages_out):
+    """Nor are they taken out of the record, nor do they stand for an error that is larger than they are."""
+    firing = Firing("quantisation", "gate", step, "{y}", {"step": step, "percent": 1.0}, None)
+    floor = replace(FLOOR, single=1.0)
+    state = _state(_fit(left), floor=floor, firings=((0, firing),))
+    after = verdict.stage(state)
+    nothing = "none" if left == 200.0 else "unknown"
+    assert after.verdict == (nothing if averages_out else "quantisation")
+    assert after.background == ({"quantisation"} if averages_out else set())
+    assert after.correctable == ([] if averages_out else ["quantisation"])
+    assert after.jagged is not averages_out
+    assert after.findings[0].found
+    assert given_model.withdrawn(after).verdict == ("none" if averages_out else "quantisation")
+
+
 @pytest.mark.parametrize(
     ("share", "times", "said"), [(0.34, 2.9, True), (0.32, 2.9, False), (0.34, 3.5, False)]
 )

@@ -207,8 +207,9 @@ def withdrawn(state: State, told: Collection[str] = ()) -> State:
     gone = {one.cause.id for one in findings if not one.found}
     of_all = ("extended", "not whole")
     evidence = tuple(one for one in state.evidence if one.cause not in gone and one.kind not in of_all)
-    verdict = next((one.cause.id for one in findings if one.found), "none")
-    return replace(state, findings=findings, verdict=verdict, evidence=evidence, extends=False)
+    state = replace(state, findings=findings, evidence=evidence, extends=False)
+    found = [one.cause.id for one in findings if one.found]
+    return replace(state, verdict=next((name for name in found if name not in state.background), "none"))
 
 
 def _of_another_kind(state: State, judged: Judged) -> State:
