@@ -72,7 +72,7 @@ def check_equal_length(artefact: Any, names: tuple[str, ...]) -> None:
         listed = ", ".join(f"{n} has {k}" for n, k in sizes.items())
         raise DataError(
             f"a {artefact.kind} needs arrays of one length along time: {listed}",
-            hint="make the artefact again",
+            hint="give every one a value for each sample; if this comes from a file, make that again",
         )
 
 

@@ -60,12 +60,13 @@ def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
     rates = (
         "was seen at one rate of change only, and at others it is a guess: `verify` RUN.h5 at others tells"
     )
-    return [f"{name} {rates}" for name in at_one_rate] + [
+    doubts = dict.fromkeys(
         f"{one.cause} is in doubt ({'; '.join(one.doubts)}): `verify` RUN.h5, a run that was not diagnosed, "
         "tells whether it repeats"
         for one in found.found
         if one.cause in added and one.doubts
-    ]
+    )
+    return [*(f"{name} {rates}" for name in at_one_rate), *doubts]
 
 
 def _was_fitted(model: Path, run: Path) -> bool:

@@ -30,10 +30,10 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.forms import static_behind
 from pulsetrainer.diagnosis.learned import learned
-from pulsetrainer.diagnosis.prediction import operator_of, predict
-from pulsetrainer.diagnosis.raw import evenly, noise_of
+from pulsetrainer.diagnosis.prediction import operator_of
+from pulsetrainer.diagnosis.raw import noise_of
 from pulsetrainer.diagnosis.scale import Scale
-from pulsetrainer.diagnosis.stages.raw_data import masked_by
+from pulsetrainer.diagnosis.stages.raw_data import followed, masked_by
 from pulsetrainer.diagnosis.state import Given, State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -152,11 +152,7 @@ def rms_of(state: State, model: Model, faults: Sequence[FloatArray] = (), *, est
         turned = [replace(one, output=model.polarity * one.output) for one in counted]
         start, _ = estimated_start(operator_of(model), turned)
     for k, (own, masked) in enumerate(zip(question.records, counted, strict=True)):
-        stamps = question.stamps[k] if question.stamps else None
-        even = evenly(masked, stamps)
-        said = predict(model, even.input, even.step, start) * model.polarity
-        if stamps is not None:
-            said = np.interp(stamps, np.arange(said.size) * even.step, said)
+        said = followed(model, masked, question.stamps[k] if question.stamps else None, start)
         fault = faults[k] if faults else 0.0
         errors.append((said + fault - own.output)[masked.counts])
     return root_mean_square(np.concatenate(errors))

@@ -182,10 +182,20 @@ def _movable(loops: Sequence[Loop], fitted: Fitted) -> FloatArray:
 
 
 def permuted(slope: FloatArray, left: FloatArray, kind: IntArray, rng: np.random.Generator) -> float:
-    """Probability that exchanged loops follow the cause as well."""
+    """Probability that exchanged loops follow the cause as well.
+
+    How well is told in standard errors over the loops, which need not be equally noisy (Chung and Romano,
+    Annals of Statistics 41, 2013: a permutation test keeps its level if its statistic is studentised).
+    """
     overlap = slope @ left.T  # (loops, loops)
     same = [np.flatnonzero(kind == k) for k in np.unique(kind)]
+    place = np.concatenate(same)
     drawn = np.empty(LIMITS.permutations)
     for k in range(drawn.size):
-        drawn[k] = sum(float(overlap[members, rng.permutation(members)].sum()) for members in same)
-    return p_value(abs(float(np.trace(overlap))), np.abs(drawn))
+        drawn[k] = _studentised(overlap[place, np.concatenate([rng.permutation(one) for one in same])])
+    return p_value(_studentised(np.diag(overlap)), drawn)
+
+
+def _studentised(each: FloatArray) -> float:
+    """Size of the sum of what the loops say (n,), in standard errors of it."""
+    return abs(float(np.sum(each))) / max(float(np.linalg.norm(each)), TINY)

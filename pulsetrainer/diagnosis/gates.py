@@ -19,13 +19,16 @@ def check(
     stamps: FloatArray | None = None,
     polarity: int = 1,
     corrected: Sequence[str] = (),
+    said: FloatArray | None = None,
 ) -> list[Firing]:
     """Ask every gate about a record as it was measured; ``low`` and ``high`` are the identified range.
+
+    ``said`` (n,) is what the model as given says of the record.
 
     Wild samples are found first and taken out for the others; a gate is not asked where one has fired that
     blinds it, nor about what was taken out of the record already (``corrected``) or is left of that.
     """
-    raw = Raw(record, low, high, second, stamps, polarity=polarity)
+    raw = Raw(record, low, high, second, stamps, polarity=polarity, said=said)
     out = taken_out(corrected)
     causes = [one for one in library().values() if one.stage == "record" and one.id not in out]
     fired: dict[str, Firing] = {}

@@ -29,6 +29,7 @@ class Raw:
     stamps: FloatArray | None = None  # s, (n,) times of the samples; None: even steps
     wild: BoolArray | None = None  # samples that are wrong one by one
     polarity: int = 1  # the output is that as measured times this
+    said: FloatArray | None = None  # (n,) what the model as given says; None: that is not known
 
     @property
     def reach(self) -> float:

@@ -106,7 +106,11 @@ class State:
     @property
     def jagged(self) -> bool:
         """Whether a gate fired of a cause that leaves what no refit can take away."""
-        return any(library()[firing.cause].jagged for _, firing in self.firings)
+        return any(
+            library()[one.cause].jagged
+            and not library()[one.cause].is_background([one.value / self.scale.of_unit(one.unit)], self.floor)
+            for _, one in self.firings
+        )
 
     @property
     def in_bursts(self) -> bool:
@@ -219,6 +223,7 @@ class State:
         if self.question.quick:
             return []
         found = [one for one in self.findings if one.found and one.cause.corrects and not one.in_doubt]
+        found = [one for one in found if not (one.cause.jagged and one.cause.id in self.background)]
         return [one.cause.id for one in found if one.cause.stage == "record" or not self._of_device(one)]
 
     def _of_device(self, fault: Finding) -> bool:

@@ -48,7 +48,7 @@ class Thresholds:
     least_held: int = 100  # readings that stay between two steps the same way: fewer tell nothing
     read_evenly: float = 0.5  # of an even motion, while the reading stays: such an output saw no steps
     not_between: float = 0.5  # of a coarse step of the input: so much is not known beside turns and rests
-    coarse_noise: float = 1.5  # times the noise: larger steps of the output do not average out
+    coarse_noise: float = 1.8  # times the noise, with its own: of steps of 2 sigma 0.7 % does not average out
     steps_apart: float = 2.5  # coarse steps: jumps of fewer are those steps
     state: float = 0.15  # of the span: values farther apart are states of a device that switches
 
@@ -136,6 +136,7 @@ class Thresholds:
     rates: int = 4  # groups of blocks by their rate, each predicted from the others
     repeated: float = 0.5  # of what the fit gains: a smaller gain on the pieces is chance
     mends: float = 0.1  # of what can be explained: less, of a strength that may be nothing, is not found
+    held_by_others: float = 0.04  # of a fault's squares: foreign plants leave up to 0.035, true pairs 0.12
     piece_worse: float = 0.1  # of that gain: no piece may be predicted worse by more
     piece_told: float = 0.02  # weight of a piece that is left out: enough where the others tell nothing
     wander_pieces: int = 10  # of the time: a gain and an offset of each show that the record wanders ...

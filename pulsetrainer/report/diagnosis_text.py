@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
+from itertools import chain, count, pairwise
 from typing import Any
 
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter
@@ -87,16 +88,21 @@ def parameters(several: Sequence[Parameter]) -> dict[str, str]:
     said: dict[str, str] = {}
     # what was chosen, such as how many time constants there are, comes after what was measured
     for one in sorted(several, key=lambda one: one.chosen):
-        if of_a_curve(one):
-            continue
-        number = len([name for name in said if name.split(" ")[0] == one.name]) + 1
-        said[one.name if number == 1 else f"{one.name} {number}"] = parameter(one)
-    curve = [one for one in several if _CURVE.fullmatch(one.name)]
-    if curve:
-        values = [0.0, *(one.value for one in curve)]
-        ends = with_unit(f"{min(values):.3g} to {max(values):.3g}", curve[0].unit)
-        said["curve"] = f"{ends}: what it adds to the output; the report (--html) draws it"
+        if not of_a_curve(one):
+            said[_numbered(one.name, said)] = parameter(one)
+    values = [one for one in several if _CURVE.fullmatch(one.name)]
+    begins = [k for k, one in enumerate(values) if one.name == values[0].name]
+    for begin, end in pairwise([*begins, len(values)]):
+        curve = [0.0, *(one.value for one in values[begin:end])]
+        ends = with_unit(f"{min(curve):.3g} to {max(curve):.3g}", values[0].unit)
+        said[_numbered("curve", said)] = f"{ends}: what it adds to the output; the report (--html) draws it"
     return said
+
+
+def _numbered(name: str, said: Container[str]) -> str:
+    """Return a name, or, where it is taken, with the next number."""
+    names = chain((name,), (f"{name} {number}" for number in count(2)))
+    return next(one for one in names if one not in said)
 
 
 def of_a_curve(one: Parameter) -> bool:
@@ -125,13 +131,14 @@ def _said(one: Cause) -> dict[str, str]:
 def explains(one: Cause, found: Diagnosis) -> float:
     """Return the share of the error that a cause explains.
 
-    NaN where none is beyond noise, and of a cause that could be instead of another: beside that one it
-    explains nothing.
+    NaN where none is beyond noise, of a cause that could be instead of another, since beside that one it
+    explains nothing, and of one that was read off the raw data, whose samples are left out.
     """
     beyond = not found.static_percent <= found.floor_percent
     untested = one.found and one.p_value is None  # of the model as given, or read off the raw data
     instead = not one.found and any(one.cause in other.confounded_with for other in found.found)
-    return one.explains_percent if (beyond or untested) and not instead else math.nan
+    unknown = instead or (untested and one.explains_percent == 0.0)
+    return one.explains_percent if (beyond or untested) and not unknown else math.nan
 
 
 def tells_shares(found: Diagnosis) -> bool:

@@ -54,7 +54,10 @@ PACKAGES = {  # the tests that answer for a package
         *(f"{UNIT}{one}.py" for one in ("steps_transfer", "temperature")),
     ),
     "diagnosis": (
-        *(f"{UNIT}{one}*.py" for one in ("coarse_input", "congruency", "conductor", "falling", "heat")),
+        *(
+            f"{UNIT}{one}*.py"
+            for one in ("clipped", "coarse_input", "congruency", "conductor", "falling", "heat")
+        ),
         *(f"{UNIT}{one}*.py" for one in ("pinched", "scale", "slow_noise", "sticking", "unlisted")),
         f"{UNIT}diagnosis*.py",
         f"{UNIT}steps_correct.py",

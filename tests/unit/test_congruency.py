@@ -19,6 +19,7 @@ from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.extended import Extended, Term
 from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.problem import problem_for
+from pulsetrainer.diagnosis.thresholds import LIMITS
 
 DT = 1e-3
 HIGH = 1.5
@@ -134,6 +135,17 @@ def test_the_permutations_are_exact():
     p = [congruency.permuted(slope, rng.standard_normal((18, 8)), kind, rng) for _ in range(100)]
     assert 1 <= np.sum(np.asarray(p) <= 0.05) <= 13
     assert 0.4 < np.median(p) < 0.6
+
+
+def test_loops_need_not_be_equally_noisy(monkeypatch):
+    """Where the cause moves them most they may be noisiest: p was 0.01 in one of eight."""
+    monkeypatch.setattr(congruency, "LIMITS", replace(LIMITS, permutations=199))
+    rng = np.random.default_rng(20261125)
+    kind = np.repeat([0, 1, 2], 10)
+    size = np.where(np.arange(30) % 5, 1.0, 4.0)[:, None]
+    drawn = size * rng.standard_normal((2, 300, 30, 8))
+    p = [congruency.permuted(slope, left, kind, rng) for slope, left in zip(*drawn, strict=True)]
+    assert np.sum(np.asarray(p) <= 0.01) <= 6  # 3 are expected
 
 
 @pytest.mark.slow

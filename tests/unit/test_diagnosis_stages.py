@@ -1363,6 +1363,7 @@ def _asked_again(monkeypatch, shares):
     monkeypatch.setattr(fitting, "refit", refitted)
     monkeypatch.setattr(repetition, "refit", refitted)
     monkeypatch.setattr(repetition, "repeated", repeated)
+    monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
     names = ("creep", "thermal-drift", "output-lag", "step")
     findings = tuple(_finding(name, 20.0) for name in names)
     return repetition.stage(_state(_fit(500.0, *names), findings=findings))
@@ -1402,6 +1403,23 @@ def test_what_may_be_a_fault_of_the_measurement_is_not_added(monkeypatch, rival,
 
 
 @pytest.mark.parametrize(
+    ("explains", "doubts", "added"),
+    [(49.9, (rivals.AT_BOUND,), False), (50.1, (rivals.AT_BOUND,), True), (49.9, (), True)],
+)
+def test_what_ends_where_the_search_did_is_added_if_it_takes_away_more_than_it_leaves(
+    monkeypatch, explains, doubts, added
+):
+    """A creep without rests, on a device of another kind, made the next record 2.3 times worse."""
+    monkeypatch.setattr(repetition, "refit", lambda problem, terms, near: Fit(500.0, tuple(terms)))
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    findings = (_finding("creep", explains, doubts=doubts),)  # of 1000; the fit leaves 500
+    after = repetition.stage(_state(_fit(500.0, "creep"), findings=findings))
+    assert after.repeated.names == (("creep",) if added else ())
+    assert (repetition.NOT_ADDED in after.findings[0].doubts) is not added
+    assert not after.findings[0].in_doubt
+
+
+@pytest.mark.parametrize(
     ("explains", "beside", "found"), [(9.9, (), False), (10.1, (), True), (9.9, (rivals.WORSE,), False)]
 )
 def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, beside, found):
@@ -1421,6 +1439,29 @@ def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, 
     assert after.findings[0].explains_percent == pytest.approx(80.0 if found else 30.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "beside", "added", "found"),
+    [
+        ("offset-drift", "creep", 2525.0, False),  # of which 100 are missed without it
+        ("offset-drift", "creep", 2475.0, True),
+        ("step", "creep", 2525.0, False),
+        ("viscous", "creep", 2525.0, True),  # of the device
+        ("offset-drift", None, 2525.0, True),  # only the weights could hold it
+    ],
+)
+def test_a_slow_fault_that_the_causes_beside_it_hold_is_none(monkeypatch, name, beside, added, found):
+    """It mends the formula of a creep: taken out, the next record was predicted 1.5 times worse."""
+    monkeypatch.setattr(repetition, "refit", _refitted)
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    monkeypatch.setattr(repetition, "squares_added", lambda *_: added)
+    others = [] if beside is None else [_finding(beside, 80.0)]
+    names = [one.cause.id for one in others]
+    state = _state(_fit(500.0, *names, name), findings=(*others, _finding(name, 10.0)))
+    after = repetition.stage(state)
+    assert after.findings[-1].found is found
+    assert after.repeated.names == ((*names, name) if found else tuple(names))
+
+
 def _refitted(problem, terms, near) -> Fit:
     """A fit of squares 500, without any one of its causes 800: that is 30 % of what can be explained."""
     return Fit(500.0, tuple(terms), _without={term.cause.id: Fit(800.0) for term in terms})
@@ -1431,6 +1472,7 @@ def test_a_step_beside_what_is_gone_is_asked_again_whether_it_settles(monkeypatc
     """Beside a slow cause it was a small rest of that; without it, it is that in the whole."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: settles and len(state.current.terms) == 1)
     findings = (_finding("step", 2.0), _finding("thermal-drift", 9.0, doubts=(rivals.MAY_BE_NOTHING,)))
     after = repetition.stage(_state(_fit(500.0, "step", "thermal-drift"), findings=findings))
@@ -1485,11 +1527,20 @@ def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, la
         return found
 
     monkeypatch.setattr(begin, "refit", from_rest)
-    monkeypatch.setattr(begin, "estimates_of", lambda *_: {"creep": ()})
-    state = _state(kept, repeated=kept, problem=problem, estimates={"creep": ("known",)})
+    known = (Estimate("tau", 3.0, "1", 2.0, 4.0), Estimate("tau", 9.0, "1", 8.0, 9.5))
+    again = (Estimate("tau", 5.0, "1", 4.5, 5.5), Estimate("tau", 7.0, "1", 6.0, 9.0))
+    monkeypatch.setattr(begin, "estimates_of", lambda *_: {"creep": again})
+    finding = Finding(library()["creep"], found=True, parameters=known)
+    state = _state(kept, repeated=kept, problem=problem, estimates={"creep": known}, findings=(finding,))
     found = begin.stage(state)
     assert (found.repeated is not kept) is at_rest
-    assert found.repeated_estimates == ({"creep": ()} if at_rest else {"creep": ("known",)})
+    # both are told with one interval, that holds what either of them says
+    wide = [{"lower": 2.0, "upper": 5.5}, {"lower": 6.0, "upper": 9.5}]
+    rows, told = ([replace(one, **w) for one, w in zip(r, wide, strict=True)] for r in (again, known))
+    assert found.repeated_estimates["creep"] == (tuple(rows) if at_rest else known)
+    assert found.findings[0].parameters == (tuple(told) if at_rest else known)
+    fewer = begin.stage(replace(state, estimates={"creep": known[:1]}))  # of another number of curves
+    assert fewer.repeated_estimates["creep"] == (again if at_rest else known[:1])
 
 
 @pytest.mark.parametrize(("after", "better"), [(9.81, True), (9.82, False), (10.01, False)])
@@ -1546,9 +1597,11 @@ def _given(
     direction=1.0,
     polarity=1,
     single=0.0,
+    warning="",
     **more,
 ):
     """Judge a model that predicts this of a ramp from 0 to 10; the search leaves ``left``."""
+    fit = SimpleNamespace(warning=warning)
     speed = velocity.Comparison(1.0, 0.5 if wrong is None else wrong, 100.0 if wrong is None else 10.0)
     judged = given_model.Judged([1], [RAMP - predicted], RAMP, predicted, speed, polarity)
     monkeypatch.setattr(given_model, "judge", lambda state, given: judged)
@@ -1558,7 +1611,7 @@ def _given(
     state = _state(_fit(1.0))
     state = replace(
         state,
-        question=replace(state.question, given="given"),
+        question=replace(state.question, given=Given(SimpleNamespace(fit=fit))),
         findings=findings,
         verdict="creep",
         evidence=(Evidence("static"), Evidence("tested", "creep"), *map(Evidence, ("extended", "not whole"))),
@@ -1762,6 +1815,15 @@ def test_what_lay_outside_the_range_stays_in_the_memory_and_looks_like_another_z
     assert (after.verdict == "condition-change") is changed
 
 
+@pytest.mark.parametrize(
+    ("warning", "wrong", "changed"), [("", None, True), ("no form", None, False), ("", 0.4, False)]
+)
+def test_a_model_of_the_wrong_kind_tells_of_no_change(monkeypatch, warning, wrong, changed):
+    """By its own record or by these: a battery that no Preisach model describes was in another condition."""
+    after = _given(monkeypatch, RAMP + 1.0, warning=warning, wrong=wrong, verdict="none", findings=())
+    assert (after.verdict == "condition-change") is changed
+
+
 def test_what_needs_no_time_is_named_where_there_is_none(monkeypatch):
     """Only these causes were tried."""
     state = _given(monkeypatch, RAMP + 0.05)
@@ -1893,6 +1955,23 @@ def test_a_slow_fault_no_larger_than_slow_noise_takes_no_verdict(times, name, ti
     state = replace(state, floor=floor, baseline=baseline, current=_fit(floor.squares + 500.0))
     assert verdict.stage(state).verdict == ("none" if may_be_slow and times > 1.0 else name)
     assert state.background == ({name} if may_be_slow and times > 1.0 else set())
+
+
+@pytest.mark.parametrize(("step", "averages_out"), [(1.79, True), (1.81, False)])
+@pytest.mark.parametrize("left", [200.0, 900.0])
+def test_steps_that_noise_averages_out_take_no_verdict(left, step, averages_out):
+    """Nor are they taken out of the record, nor do they stand for an error that is larger than they are."""
+    firing = Firing("quantisation", "gate", step, "{y}", {"step": step, "percent": 1.0}, None)
+    floor = replace(FLOOR, single=1.0)
+    state = _state(_fit(left), floor=floor, firings=((0, firing),))
+    after = verdict.stage(state)
+    nothing = "none" if left == 200.0 else "unknown"
+    assert after.verdict == (nothing if averages_out else "quantisation")
+    assert after.background == ({"quantisation"} if averages_out else set())
+    assert after.correctable == ([] if averages_out else ["quantisation"])
+    assert after.jagged is not averages_out
+    assert after.findings[0].found
+    assert given_model.withdrawn(after).verdict == ("none" if averages_out else "quantisation")
 
 
 @pytest.mark.parametrize(

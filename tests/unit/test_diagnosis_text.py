@@ -99,12 +99,17 @@ def test_a_cause_that_could_be_instead_has_no_share_of_its_own():
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_a_learned_curve_is_told_by_its_ends_and_not_value_by_value(count):
-    """Its values are of the output, zero at the first knot; several time constants are counted."""
-    curve = [Parameter(f"f{k}", 0.1 * (k - 4), "N", NAN, NAN) for k in range(2, 9)]
+    """Its values are of the output, zero at the first knot; several curves and time constants are counted."""
     kept = [Parameter("state", 3.0, "1", 3.0, 3.0), Parameter("low", 0.0, "A", 0.0, 0.0)]
-    said = parameters([*kept, *[Parameter("tau", 2.0, "s", NAN, NAN), *curve] * count])
-    assert list(said) == [*["tau", "tau 2"][:count], "curve"]
-    assert said["curve"].startswith("-0.2 to 0.4 N")
+    curves = [
+        [Parameter("tau", 2.0, "s", NAN, NAN)]
+        + [Parameter(f"f{k}", size * (k - 4), "N", NAN, NAN) for k in range(2, 9)]
+        for size in (0.1, 0.2)[:count]
+    ]
+    said = parameters(sum(curves, kept))
+    assert list(said) == [*["tau", "tau 2"][:count], *["curve", "curve 2"][:count]]
+    told = [text.partition(":")[0] for name, text in said.items() if name.startswith("curve")]
+    assert told == ["-0.2 to 0.4 N", "-0.4 to 0.8 N"][:count]
 
 
 def test_where_nothing_is_left_no_cause_explains_a_share_of_it():
@@ -117,6 +122,8 @@ def test_where_nothing_is_left_no_cause_explains_a_share_of_it():
     small = replace(found, static_percent=0.9, floor_percent=1.0)
     assert math.isnan(explains(replace(one, found=True), small))
     assert explains(replace(one, found=True, p_value=None), small) == 100.0  # a change of condition
+    gate = replace(one, found=True, p_value=None, explains_percent=0.0)
+    assert math.isnan(explains(gate, small))
 
 
 def test_its_tables_fit_a_terminal_of_eighty_columns():

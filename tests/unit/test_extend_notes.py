@@ -9,9 +9,9 @@ import pytest
 from pulsetrainer.cli.extend import _doubts
 
 
-def _said(name, *, lacks=(), doubts=()):
+def _said(name, *, lacks=(), doubts=(), curves=1):
     cause = SimpleNamespace(cause=name, doubts=doubts)
-    found = SimpleNamespace(found=(cause,), lacks=lacks)
+    found = SimpleNamespace(found=(cause,) * curves, lacks=lacks)
     return _doubts(found, SimpleNamespace(extensions=(cause,)))
 
 
@@ -29,6 +29,6 @@ def test_what_widens_the_loop_and_was_seen_at_one_rate_is_a_guess_at_others(name
 
 
 def test_a_cause_in_doubt_is_told_with_its_doubts():
-    """Each in words."""
-    (line,) = _said("creep", doubts=("it may be nothing", "it wanders"))
-    assert line.startswith("creep is in doubt (it may be nothing; it wanders)")
+    """Each in words, and of several curves once."""
+    (line,) = _said("unlisted", doubts=("it may be nothing", "it wanders"), curves=2)
+    assert line.startswith("unlisted is in doubt (it may be nothing; it wanders)")

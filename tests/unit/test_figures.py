@@ -6,6 +6,7 @@ import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -21,7 +22,7 @@ from matplotlib.figure import Figure
 
 from pulsetrainer.artefacts import Evaluation, Profile, Recorded, Run, units
 from pulsetrainer.errors import DataError
-from pulsetrainer.report import comparison_figure, diagnosis_figures, figures, panels
+from pulsetrainer.report import comparison_figure, diagnosis_figures, figures, panels, planned
 from pulsetrainer.report.directions import directions, turns
 from pulsetrainer.report.facts import run_facts, warmth_words
 from pulsetrainer.report.fewer_points import MOST_POINTS, extremes, path
@@ -576,3 +577,27 @@ def test_the_legend_of_the_coil_lies_above_its_line():
     FigureCanvasAgg(figure).draw()
     (axes,) = (one for one in figure.axes if "[K]" in one.get_ylabel())
     assert axes.get_legend().get_window_extent().y0 > axes.transData.transform((0.0, 15.0))[1]
+
+
+def test_the_axis_of_a_record_is_its_time_counted_from_the_first_sample_where_it_has_a_date():
+    """And the number of the sample where it has none."""
+    (number, words), (plain, time), (dated, since) = (
+        panels.abscissa(stamps, 3)
+        for stamps in (None, np.asarray([2.0, 2.5, 3.0]), np.asarray([1.7e9, 1.7e9 + 1, 1.7e9 + 2]))
+    )
+    assert (number.tolist(), plain.tolist(), dated.tolist()) == ([0, 1, 2], [2.0, 2.5, 3.0], [0, 1, 2])
+    assert "number" in words
+    assert "since" in since
+    assert "since" not in time
+
+
+def test_what_tuning_would_play_is_told_with_the_gains_of_each_step():
+    """But where there are none."""
+    played = SimpleNamespace(what="resistance", seconds=1.0, peak_A=0.5, gains="none")
+    tried = SimpleNamespace(what="trial", seconds=1.0, peak_A=0.5, gains="those found")
+    plan = SimpleNamespace(
+        steps=(played, tried), seconds=2.0, current_limit_A=1.0, force_limit_N=9.0, heat_percent=3.0
+    )
+    said = planned.to_be_tuned(plan)
+    assert said["1. resistance"] == "1.00 s up to 0.500 A"
+    assert said["2. trial"] == "1.00 s up to 0.500 A, gains those found"

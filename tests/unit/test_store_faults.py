@@ -108,11 +108,11 @@ def test_not_hdf5(tmp_path):
     """An empty file, a text, a table: each its own words."""
     for name, content, word in [("e.h5", "", "is empty"), ("t.h5", "hello", "is not an HDF5 file")]:
         (tmp_path / name).write_text(content)
-        _refused(tmp_path / name, kinds.Run, word)
+        assert "table" not in next_step(_refused(tmp_path / name, kinds.Run, word))
     (tmp_path / "t.csv").write_text("t,u,y\n1,2,3\n")
     error = _refused(tmp_path / "t.csv", kinds.Run)
     assert isinstance(error, NotAnArtefactError)
-    assert "pulsetrainer import" in next_step(error)
+    assert f"the table first: pulsetrainer import {tmp_path / 't.csv'}" in next_step(error)
 
 
 def test_hdf5_of_another_program(tmp_path):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
 from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of, values_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
+
+if TYPE_CHECKING:
+    from pulsetrainer.diagnosis.floor import Floor
 
 _COARSE = 0.004  # of the span: finer steps hurt no fit
 _USED = 2  # times that each value comes, on average: in a short record all may differ, far apart as they are
@@ -40,7 +43,10 @@ class Quantisation(Cause):
     leaves = ("saturation", "stick-slip")
     size = "of one step of the {output}"
     texts: ClassVar[Mapping[str, str]] = {
-        "gate": "the output changes in steps of {step:.4g}{in_y}, {percent:.2g} % of its span"
+        "gate": "the output changes in steps of {step:.4g}{in_y}, {percent:.2g} % of its span",
+        "background": (
+            "steps of {size:.4g}{in_y}, which the noise averages out: they are told, but are no verdict"
+        ),
     }
 
     def gate(self, raw: Raw) -> Firing | None:
@@ -54,6 +60,10 @@ class Quantisation(Cause):
         figures = {"step": step, "percent": PERCENT * step / span}
         spread = 0.5 * float(np.ptp(np.quantile(np.diff(values), _MOST)))
         return Firing(self.id, "gate", step, "{y}", figures, spread=spread)
+
+    def is_background(self, sizes: Sequence[float], floor: Floor) -> bool:
+        """Return whether noise carries the output over its steps, so that they average out."""
+        return sizes[0] <= LIMITS.coarse_noise * floor.single
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
         """Output (n,) between the steps, where the hysteresis that fits them best expects it."""

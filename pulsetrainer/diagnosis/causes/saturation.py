@@ -1,4 +1,8 @@
-"""the output is clipped at the end of its range: found on the raw data."""
+"""the output is clipped at the end of its range: found on the raw data.
+
+A rail behind the converter's noise repeats one value exactly. One in front of it is a level at which the
+output stays, within its noise, while the model as given says that it goes on.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,11 @@ from typing import ClassVar
 import numpy as np
 from scipy import ndimage
 
+from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis.causes.base import Cause
-from pulsetrainer.diagnosis.raw import Firing, Raw, noise_of, spacing_of
+from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
+from pulsetrainer.diagnosis.raw import BoolArray, Firing, Raw, noise_of, spacing_of
+from pulsetrainer.diagnosis.thresholds import LIMITS, UNIFORM
 
 _LEAST = 20  # samples at the rail: fewer may be chance
 _PILE = 1.2  # times the samples just inside: noise makes a tail at the end of a distribution, a rail a pile
@@ -21,6 +27,12 @@ _NOISY = 0.7  # converter steps of noise: with less a flat top repeats itself; s
 _BESIDE = 3  # samples beside a cut off one, in time: only those with low noise are left there
 _AROUND = 9  # samples whose mean is near the rail where ...
 _NEAR = 3.0  # ... it is nearer than this many times the noise
+# A rail in front of the noise, against what the model as given says
+_BEYOND = 0.01  # of the span: so far beyond the rail must the model go ...
+_BEYOND_NOISE = 10.0  # ... and so many times the noise
+_FLAT = 1.3  # times the noise: an output that varies more is not held ...
+_FOLLOWS = 0.1  # ... nor is one that follows the model by more than this share
+_BELOW = 0.5  # of the model's error on the whole record: below the rail it must be nearer
 
 
 class Saturation(Cause):
@@ -40,6 +52,10 @@ class Saturation(Cause):
     size = "{output} at which it is clipped"
     texts: ClassVar[Mapping[str, str]] = {
         "gate": "{count:.0f} samples sit at exactly {rail:.4g}{in_y}: the output is clipped there",
+        "held": (
+            "{count:.0f} samples stay within their noise at {rail:.4g}{in_y} where the model as given goes on"
+            " to {said:.4g}{in_y}: the output is clipped there, before it is digitised"
+        ),
         "both": (
             "{count:.0f} samples sit at exactly {rail:.4g} or {other:.4g}{in_y}: the output is clipped there"
         ),
@@ -49,22 +65,67 @@ class Saturation(Cause):
         """Extremes that repeat exactly far more often than the values just inside them, at either end."""
         y = raw.calm.output
         step = spacing_of(y)
-        if noise_of(y) <= _NOISY * step:
-            return None
         rails = [sign for sign in (1.0, -1.0) if _clipped(sign * y, step)]
-        if not rails:
-            return None
+        if not rails or noise_of(y) <= _NOISY * step:
+            return _held(raw)
         ends = [float((sign * y).max()) * sign for sign in rails]
         at = np.any([np.abs(y - rail) <= _AT * step for rail in ends], axis=0)
         noise = noise_of(y, np.where(at, 0.0, 1.0))
         mask = ndimage.binary_dilation(at, iterations=_BESIDE)
-        mean = ndimage.uniform_filter1d(y, _AROUND)
         for sign, rail in zip(rails, ends, strict=True):
-            mask |= sign * mean > sign * rail - _NEAR * noise
+            mask |= _near(sign * y, sign * rail, noise)
         one, other = raw.polarity * ends[0], raw.polarity * ends[-1]
         figures = {"count": float(np.count_nonzero(at)), "rail": one, "other": other}
         kind = "gate" if len(ends) == 1 else "both"
         return Firing(self.id, kind, one, "{y}", figures, mask, spread=step)
+
+    def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
+        """Return the output (n,) without what is clipped, also where only the model as given could tell."""
+        rail, measured = taken.raw.polarity * values[0], taken.raw.calm.output
+        if self.gate(taken.raw) is not None:
+            return super().undo(y, values, taken)
+        sign = 1.0 if rail > measured.mean() else -1.0
+        return np.where(_near(sign * measured, sign * rail, noise_of(measured)), np.nan, y)
+
+
+def _held(raw: Raw) -> Firing | None:
+    """Return the end at which the output is held while the model as given goes on; None where it is not."""
+    if raw.said is None:
+        return None
+    found = [one for sign in (1.0, -1.0) if (one := _held_at(sign, raw.said, raw)) is not None]
+    return max(found, key=lambda one: one.figures["count"], default=None)
+
+
+def _held_at(sign: float, said: FloatArray, raw: Raw) -> Firing | None:
+    y, model = sign * raw.calm.output, sign * said
+    noise, span = max(noise_of(y), spacing_of(y) / np.sqrt(UNIFORM)), float(np.ptp(y))
+    counts = raw.record.counts & np.isfinite(model)
+    beyond = counts & (model > float(y[counts].max()))
+    if np.count_nonzero(beyond) <= _LEAST:
+        return None
+    rail = float(np.median(y[beyond]))
+    over = counts & (model > rail + _NEAR * noise)
+    held, goes = y[over], model[over]
+    if (
+        not held.size
+        or goes.max() - rail < max(_BEYOND * span, _BEYOND_NOISE * noise)
+        or held.std() > _FLAT * noise
+    ):
+        return None
+    below = counts & (model < rail - _NEAR * noise)
+    error = root_mean_square((y - model)[below]) if below.any() else np.inf
+    if np.polyfit(goes, held, 1)[0] > _FOLLOWS or error > _BELOW * root_mean_square((y - model)[counts]):
+        return None
+    mask = _near(y, rail, noise) | (model > rail - _NEAR * noise)
+    rail, back = float(held.mean()), sign * raw.polarity
+    figures = {"count": float(held.size), "rail": back * rail, "said": back * float(goes.max())}
+    sure = LIMITS.normal * noise / np.sqrt(held.size)
+    return Firing("saturation", "held", back * rail, "{y}", figures, mask, spread=sure)
+
+
+def _near(y: FloatArray, rail: float, noise: float) -> BoolArray:
+    """Tell which samples (n,) of an output are at its upper rail, alone or on average, or just below it."""
+    return np.asarray(np.maximum(y, ndimage.uniform_filter1d(y, _AROUND)) > rail - _NEAR * noise)
 
 
 def _clipped(y: FloatArray, step: float) -> bool:

@@ -5,6 +5,8 @@ What a device did before a record decays in it, so that the search fits the begi
 begins from rest. So the causes that repeat are refitted without it. That is the model where it leaves no
 relevantly larger error, or a smaller one, begin and all, after the first fifth of each record; else something
 was going on before the records, and the begin stays free.
+
+Both fits are of the same records, so the interval of a parameter holds what either of them says.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.intervals import estimates_of
 from pulsetrainer.diagnosis.state import State
@@ -32,7 +35,22 @@ def stage(state: State) -> State:
         return replace(state, repeated_estimates=state.estimates)
     known = estimates_of(kept, state.scores, state.held_out, state.floor)
     told = {name: tuple(state.scale.estimate(one) for one in rows) for name, rows in known.items()}
-    return replace(state, repeated=kept, repeated_estimates={**told, **state.by_contrast})
+    told = {**told, **state.by_contrast}
+    findings = tuple(
+        replace(one, parameters=_hull(one.parameters, told.get(one.cause.id, ()))) for one in state.findings
+    )
+    told = {name: _hull(rows, state.estimates.get(name, ())) for name, rows in told.items()}
+    return replace(state, repeated=kept, repeated_estimates=told, findings=findings)
+
+
+def _hull(rows: tuple[Estimate, ...], others: tuple[Estimate, ...]) -> tuple[Estimate, ...]:
+    """Return parameters with intervals that hold those of another fit to the same records too."""
+    if [one.name for one in rows] != [one.name for one in others]:  # another number of curves
+        return rows
+    return tuple(
+        replace(one, lower=min(one.lower, other.lower), upper=max(one.upper, other.upper))
+        for one, other in zip(rows, others, strict=True)
+    )
 
 
 def _late(fitted: Fitted) -> float:

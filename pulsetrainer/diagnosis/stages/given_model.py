@@ -17,8 +17,9 @@ records.
   that is all but a thousandth of the squared error, other causes would only repair the rest of it, and are
   withdrawn. It is none where the causes found, added to what the model as given says, bring it near; nor
   where refitted weights are far off too on blocks that were left out: then no Preisach model describes the
-  device, and that is `unknown`. A mere shift is none where the input left the model's range: what was
-  switched there stays so, and looks like another zero.
+  device, and that is `unknown`. Nor is there a change to be told from a model of the wrong kind, by these
+  records or by its own. A mere shift is none where the input left the model's range: what was switched there
+  stays so, and looks like another zero.
 
 What the raw data show stays, and so does what equal loops show, unless the model is of the wrong kind.
 """
@@ -76,8 +77,7 @@ def stage(state: State) -> State:
         state = withdrawn(state, state.by_contrast)
         if state.verdict == "none" and _unexplained(state, judged):
             state = replace(state, verdict="unknown")
-    changed = against_model(judged.measured, judged.predicted, span * state.baseline.rms, noise)
-    changed = None if changed is not None and _is_memory(state, changed) else changed
+    changed = _changed(state, judged, noise)
     if changed is not None and not _brought_near(state, judged, noise):
         state, more = _drifted(state, judged, changed, noise) or _far_off(state, judged, changed, noise)
         said += more
@@ -87,9 +87,17 @@ def stage(state: State) -> State:
     return replace(state, evidence=(*said, *state.evidence))
 
 
-def _is_memory(state: State, changed: Change) -> bool:
-    """Whether what lay outside the range, and stays switched, looks like this change."""
-    return changed.kind == "shifted" and any(one.cause == OutOfRange.id for _, one in state.firings)
+def _changed(state: State, judged: Judged, noise_rms: float) -> Change | None:
+    """Return how the device changed since its model was made; None where it did not, or nothing tells."""
+    assert state.question.given is not None
+    fit = state.question.given.model.fit
+    if judged.speed.wrong or (fit is not None and fit.warning):
+        return None
+    refitted = state.scale.span * state.baseline.rms
+    changed = against_model(judged.measured, judged.predicted, refitted, noise_rms)
+    # what lay outside the range, and stays switched, looks like another zero
+    outside = any(one.cause == OutOfRange.id for _, one in state.firings)
+    return None if changed is not None and changed.kind == "shifted" and outside else changed
 
 
 def _not_carried(state: State, judged: Judged) -> list[Evidence]:
@@ -199,8 +207,9 @@ def withdrawn(state: State, told: Collection[str] = ()) -> State:
     gone = {one.cause.id for one in findings if not one.found}
     of_all = ("extended", "not whole")
     evidence = tuple(one for one in state.evidence if one.cause not in gone and one.kind not in of_all)
-    verdict = next((one.cause.id for one in findings if one.found), "none")
-    return replace(state, findings=findings, verdict=verdict, evidence=evidence, extends=False)
+    state = replace(state, findings=findings, evidence=evidence, extends=False)
+    found = [one.cause.id for one in findings if one.found]
+    return replace(state, verdict=next((name for name in found if name not in state.background), "none"))
 
 
 def _of_another_kind(state: State, judged: Judged) -> State:

@@ -3,8 +3,9 @@
 Before any model, each record is looked at, sample by sample as it was measured, for what no model can
 repair: an output cut off by its range, single wild samples, coarse steps, jumps, a driver that does not
 follow its reference, an input outside the range that was identified. Each gate stands in the file of its
-cause. A gate that fires is a finding, and the samples it names are left out of everything that follows:
-filled in, since causes filter the output and wild samples must not reach the filters.
+cause; some are also told what the model as given says. A gate that fires is a finding, and the samples it
+names are left out of everything that follows: filled in, since causes filter the output and wild samples must
+not reach the filters.
 
 Only then is an input that was read in coarse steps followed between them, unless the output moves with the
 steps and so saw them. The records are brought to even time steps, sharp turns of the input to where the lines
@@ -20,10 +21,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pulsetrainer.artefacts import Model
+from pulsetrainer.core.initial_state import reaches_an_end
+from pulsetrainer.core.memory import State
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.turns import at_their_tips
 from pulsetrainer.diagnosis import gates
 from pulsetrainer.diagnosis.coarse_input import as_it_moved
+from pulsetrainer.diagnosis.prediction import predict
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale, scale_of, second_of
 from pulsetrainer.diagnosis.state import Question
@@ -50,7 +56,7 @@ def stage(question: Question) -> Masked:
     polarity = 1 if question.given is None else question.given.model.polarity
     corrected = question.corrected or [()] * len(question.records)
     found = [
-        gates.check(record, low, high, second, times, polarity, known)
+        gates.check(record, low, high, second, times, polarity, known, _said(question, record, times))
         for record, times, known in zip(question.records, stamps, corrected, strict=True)
     ]
     masked = [masked_by(record, fired) for record, fired in zip(question.records, found, strict=True)]
@@ -62,6 +68,23 @@ def stage(question: Question) -> Masked:
     scale = scale_of(even, low, high, second)
     firings = tuple((k, one) for k, fired in enumerate(found) for one in fired)
     return Masked(question, tuple(scale.shrunk(record) for record in even), firings, scale)
+
+
+def _said(question: Question, record: Record, stamps: FloatArray | None) -> FloatArray | None:
+    """Return what the model as given says of a record (n,); None where that is open."""
+    if question.given is None or not reaches_an_end(record.input, question.low, question.high):
+        return None
+    return followed(question.given.model, record, stamps, None)
+
+
+def followed(model: Model, record: Record, stamps: FloatArray | None, start: State | None) -> FloatArray:
+    """Output (n,) that a model predicts for a record of polarity 1, at its own samples.
+
+    ``stamps`` (n,) are their times, None: even ones; ``start`` is as for ``predict``.
+    """
+    even = evenly(record, stamps)
+    said = predict(model, even.input, even.step, start) * model.polarity
+    return said if stamps is None else np.interp(stamps, np.arange(said.size) * even.step, said)
 
 
 def masked_by(record: Record, firings: Sequence[Firing]) -> Record:

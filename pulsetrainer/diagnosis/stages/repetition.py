@@ -6,12 +6,15 @@ with the cause the errors must fall by at least half of what they fall by in the
 rise. Nor may they on any quarter of the blocks, sorted by their rate and predicted from the others: a formula
 that only fits the rates of one record misleads at others. A cause that does not do that fits, but does not
 repeat: it is told with these words, and is not added to the model; nor is one that is in doubt for
-another reason (`rivals`), nor one in whose place a fault of the measurement, or a gain that wears off, fits
-as well: that happened in this record, and not in the next. What equal loops show was tested by itself.
+another reason (`rivals`), nor one that ends where the search did and takes away less than it leaves, as what
+a model lacks of another kind of device may, nor one in whose place a fault of the measurement, or a gain that
+wears off, fits as well: that happened in this record, and not in the next. What equal loops show was tested
+by itself.
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
-cent of the span, was not found: it mends the formula of another cause, or nothing. What is left beside it is
+cent of the span, was not found: it mends the formula of another cause, or nothing. Nor was a slow fault of
+the measurement of which the causes beside it hold nearly all. What is left beside it is
 refitted without it, and a step asked again whether it only settles.
 """
 
@@ -25,7 +28,13 @@ from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
-from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES
+from pulsetrainer.diagnosis.stages.rivals import (
+    AT_BOUND,
+    MAY_BE_NOTHING,
+    MAY_BE_WEAR,
+    SETTLES,
+    squares_added,
+)
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
@@ -34,10 +43,11 @@ DOUBT, NOT_ADDED, A_FAULT = "does not repeat", "not added", "may be a fault"
 
 def stage(state: State) -> State:
     """Return the state with the causes that do not repeat, and the model without them."""
+    state = _without_held(state)
     kept = state.current
     asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
     told: dict[str, str] = {one.cause.id: A_FAULT for one in asked if _may_be_a_fault(one)}
-    told |= {one.cause.id: NOT_ADDED for one in asked if one.in_doubt or MAY_BE_WEAR in one.doubts}
+    told |= {one.cause.id: NOT_ADDED for one in asked if _is_not_to_be_added(state, one)}
     once = set(told) or _weakest(state, kept)
     while once:
         told = {**dict.fromkeys(once, DOUBT), **told}
@@ -49,6 +59,12 @@ def stage(state: State) -> State:
     )
     findings = tuple(replace(one, found=one.found and not _is_nothing(state, one)) for one in findings)
     return _without_what_is_gone(replace(state, findings=findings, repeated=kept))
+
+
+def _without_held(state: State) -> State:
+    """Return the state without slow faults of the measurement that the causes beside them hold."""
+    findings = tuple(replace(one, found=one.found and not _is_held(state, one)) for one in state.findings)
+    return _without_what_is_gone(replace(state, findings=findings))
 
 
 def _without_what_is_gone(state: State) -> State:
@@ -83,11 +99,27 @@ def _may_be_a_fault(finding: Finding) -> bool:
     return any(library()[name].corrects for name in finding.confounded_with)
 
 
+def _is_not_to_be_added(state: State, finding: Finding) -> bool:
+    """Whether what speaks against a finding keeps it out of the model that goes on."""
+    taken = finding.explains_percent / PERCENT * state.floor.reducible(state.baseline)
+    little = AT_BOUND in finding.doubts and taken < state.current.squares
+    return finding.in_doubt or MAY_BE_WEAR in finding.doubts or little
+
+
 def _is_nothing(state: State, finding: Finding) -> bool:
     """Whether a finding may be nothing, and would matter little: beside the others, or at all."""
     share = finding.explains_percent / PERCENT
     little = share < LIMITS.mends or state.rms_of(share) < LIMITS.matters * state.floor.span
     return MAY_BE_NOTHING in finding.doubts and little
+
+
+def _is_held(state: State, finding: Finding) -> bool:
+    """Whether other causes hold nearly all that a slow fault of the measurement adds, and it mends one."""
+    term = next((one for one in state.current.terms if one.cause is finding.cause), None)
+    if term is None or len(state.current.terms) == 1 or not (term.cause.drifts and term.cause.corrects):
+        return False
+    fall = finding.explains_percent / PERCENT * state.floor.reducible(state.baseline)
+    return fall < LIMITS.held_by_others * squares_added(state, term)
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:

@@ -111,11 +111,16 @@ def _is_in_step(state: State, term: Term, fall: float) -> bool:
     """Whether a cause is in step with the input, and without it the weights hold most of what it adds."""
     if not term.cause.in_step(term.values, state.problem.frames):
         return False
+    return fall < LIMITS.free_of_weights * squares_added(state, term)
+
+
+def squares_added(state: State, term: Term) -> float:
+    """Return the sum of squares of what a cause of the model adds to the output, averaged."""
     current, simulator = state.current, state.current.simulator
     others = [one for one in current.terms if one is not term]
     pairs = zip(simulator.full(current.terms), simulator.full(others), strict=True)
     added = state.problem.bins.average([whole - rest for whole, rest in pairs])
-    return fall < LIMITS.free_of_weights * float(added @ added)
+    return float(added @ added)
 
 
 def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:

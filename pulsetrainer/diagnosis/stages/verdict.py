@@ -5,10 +5,10 @@ that a gate saw, since no refit takes away what it leaves; else it is `unknown`,
 Otherwise it is the cause that explains most, then what a gate on the raw data saw; that comes first where all
 others together are below half a per cent of the span. Where nothing was found it is `none`, or `inconclusive`
 if the record could not have shown half a per cent of the span of a common cause. A hum no larger than the
-noise is found and told, and takes no verdict; nor does a drift or step no larger than slow noise, or what may
-be one, nor a cause that is in doubt (`rivals`, `repetition`). Of a loop whose branches all pass through one
-point within it, as those of a memristor do, more than noise from sample to sample is `unknown`: no Preisach
-operator has one, and any cause explains some of it.
+noise is found and told, and takes no verdict; nor do steps that noise averages out, nor a drift or step no
+larger than slow noise, or what may be one, nor a cause that is in doubt (`rivals`, `repetition`). Of a loop
+whose branches all pass through one point within it, as those of a memristor do, more than noise from sample
+to sample is `unknown`: no Preisach operator has one, and any cause explains some of it.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ def stage(state: State) -> State:
     gated = _gated(state)
     fired = {one.cause.id for one in gated}
     silent = [Finding(c, False) for c in library().values() if c.stage == "record" and c.id not in fired]
-    faint = state.background
     most = state.rms_of(sum(one.explains_percent for one in found) / PERCENT)
     seen = [*gated, *found] if most < LIMITS.matters * state.floor.span else [*found, *gated]
-    sure = [one.cause.id for one in seen if not one.in_doubt]
-    verdict = next((name for name in sure if name not in faint), "none")
+    told = replace(state, findings=tuple(seen))
+    sure = [one for one in seen if not one.in_doubt and one.cause.id not in told.background]
+    verdict = next((one.cause.id for one in sure), "none")
     if verdict == "none" and state.blind and not state.question.quick:
         verdict = "inconclusive"
-    if replace(state, findings=tuple(seen)).believed.unexplained and not state.question.quick:
-        verdict = next((one.cause.id for one in gated if one.cause.jagged), "unknown")
+    if told.believed.unexplained and not state.question.quick:
+        verdict = next((one.cause.id for one in sure if one.cause.jagged), "unknown")
     return replace(state, findings=(*seen, *rest, *silent), verdict=verdict)
 
 
