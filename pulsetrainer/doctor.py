@@ -129,11 +129,12 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 def _compiler() -> Iterator[Finding]:
     try:
-        words = build.find_compiler()
+        name, *words = build.find_compiler()
     except PulsetrainerError as error:
         yield _finding("compiler", error.message, problem=error.hint)
     else:
-        yield _finding("compiler", f"{shutil.which(words[0]) or ' '.join(words)}, for the virtual bench")
+        said = " ".join((shutil.which(name) or name, *words))  # of ziglang the first word is Python
+        yield _finding("compiler", f"{said}, for the virtual bench")
 
 
 def _emulator() -> Iterator[Finding]:

@@ -340,6 +340,10 @@ INSIDE = {
     "a bench without its colon": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench"), 4, "no port bench", "--port bench:?"
     ),
+    "a table of a pulse that is not there": Mistake(
+        ("invert", "absent.csv", "--model", "model.h5", "-o", "out.h5"),
+        *(3, "absent.csv (argument WAVEFORM) does not exist", "name a pulse of the library"),
+    ),
     "a bench with parameters but without its colon": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench?seed=3&creep=0"),
         *(4, "no port bench?seed=3", "--port 'bench:?seed=3&creep=0'?"),

@@ -36,11 +36,11 @@ def evaluate(
     """
     check_once(inputs)
     job = Job(context, inputs=(*inputs, *model), outputs=(out, html))
-    from pulsetrainer.files import store
     from pulsetrainer.files.bounds import read_bounds
 
     limits = read_bounds(bounds) if bounds else {}
     from pulsetrainer.errors import QualityError
+    from pulsetrainer.files import store
     from pulsetrainer.report.results import evaluated
     from pulsetrainer.steps.evaluate import breaches
 

@@ -118,6 +118,7 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
     option = next((one for one in given.opts if one.startswith("-")), "")
     kinds, folder = _HOLDS.get(name), error.path.parent
     word = str(given.human_readable_name).partition("|")[0].rstrip(".")
+    word = word.upper() if word.islower() else word  # as in the help, where it is given no other
     if name == "inputs" and context.params.get("model"):  # then it is models on a run
         kinds, word = ("run",), "RUN.h5"
     typed = option or f"argument {word}"

@@ -11,7 +11,6 @@ from typer import Context, Option
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Out, Overwrite, Port, TrackHeat
-from pulsetrainer.files.settings import variable
 
 if TYPE_CHECKING:
     from pulsetrainer.files.provenance import Header
@@ -54,7 +53,7 @@ def session(
     answers: Annotated[
         Path | None, Option(help="Answers to the quiz, a pulse name a line; default: by key.")
     ] = None,
-    html: Annotated[Path | None, Option(help="Score sheet to write.", envvar=variable("html"))] = None,
+    html: Annotated[Path | None, Option(help="Score sheet to write.")] = None,
     track_heat: TrackHeat = None,
     port: Port = None,
     limit_current_A: LimitCurrent = None,

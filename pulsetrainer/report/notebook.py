@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from pulsetrainer.report import figures, render, text
 from pulsetrainer.report.tables import ESCAPE
 
-_WIDTH = 100  # characters of a line: sentences are folded there, a table stays whole and is scrolled
+_WIDTH = 80  # characters of a line: sentences are folded there, a wider table is scrolled
 _WHOLE = "white-space: pre; overflow-x: auto"  # notebooks and sites break lines at the column's edge
 
 

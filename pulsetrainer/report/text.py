@@ -38,7 +38,7 @@ def title(artefact: Any) -> str:
 
 
 def of(artefact: Any, width: int | None = None) -> str:
-    """Return an artefact as text: its main figures, a line each, or its tables; folded where it is wider."""
+    """Return an artefact as text: its main figures, a line each, or its tables; only lines are folded."""
     parts: Iterable[Facts | Table]
     if isinstance(artefact, Evaluation):
         parts = tables_of(artefact)
@@ -48,7 +48,10 @@ def of(artefact: Any, width: int | None = None) -> str:
         known = {name: value for name, value in facts(artefact).items() if value is not None}
         parts = [Facts(artefact.kind, known)]
     # below a table a line is left free
-    lines = (tables.rendered(part, width) + "\n" * isinstance(part, Table) for part in parts)
+    lines = (
+        tables.rendered(part) + "\n" if isinstance(part, Table) else tables.rendered(part, width)
+        for part in parts
+    )
     return "".join(lines).rstrip("\n")
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from program import pulsetrainer
+from pulsetrainer import doctor
+from pulsetrainer.simulation import build
 from wording import tells
 
 
@@ -115,6 +117,13 @@ def test_without_a_compiler_the_fix_is_named(run, tmp_path):
         assert "apt install" in found["compiler"]["fix"]
     assert found["emulator"]["state"] == "warning"
     assert "apt install" in found["emulator"]["fix"]
+
+
+def test_a_compiler_that_python_brings_is_named(monkeypatch):
+    """The first word of its command is Python's, which says nothing."""
+    monkeypatch.setattr(build, "find_compiler", lambda: ["/opt/python", "-m", "ziglang", "cc"])
+    (found,) = doctor._compiler()
+    assert found.found == "/opt/python -m ziglang cc, for the virtual bench"
 
 
 def test_a_folder_that_cannot_be_written_is_a_problem():

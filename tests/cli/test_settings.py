@@ -171,6 +171,13 @@ def test_every_setting_reaches_all_commands_that_take_it():
     assert given["doctor"] == given["session"]
 
 
+def test_every_variable_of_an_option_is_that_of_a_setting():
+    """The table of settings names all of them; --html of a session had one of its own."""
+    commands = typer.main.get_command(app).commands.values()
+    variables = {one.envvar for command in commands for one in command.params if one.envvar}
+    assert variables == {one.variable for one in SETTINGS}
+
+
 def test_verbose_says_what_is_done_on_stderr(run):
     """Each step with its time; stdout stays the same."""
     words = ("capture", "identification", "--levels", "4", "--speed", "3", "--current-max", "0.5", "--json")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import nbformat
 import pytest
 from nbclient import NotebookClient
@@ -32,3 +34,11 @@ def test_a_notebook_is_kept_without_outputs(path):
     """What it shows is made anew: nothing of an older version stays on a page."""
     notebook = nbformat.read(path, 4)
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in notebook.cells)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_the_site_takes_along_what_a_notebook_reads(path):
+    """`make site` copies the records whose names stand there in full; of a name in pieces it knows none."""
+    text = path.read_text(encoding="utf-8")
+    named = re.findall(r"tests/data/([^\\\"]*)", text)
+    assert all((ROOT / "tests" / "data" / name.split(")")[0]).is_file() for name in named)
