@@ -16,7 +16,8 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.outliers import _beyond_the_tail
 from pulsetrainer.diagnosis.design import bins_of
-from pulsetrainer.diagnosis.noise import Noise, burstiness, noise_in, quiet_square
+from pulsetrainer.diagnosis.noise import Noise, _edges, burstiness, noise_in, quiet_square
+from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.steps.diagnose import diagnose
 from pulsetrainer.steps.identify import identify
 
@@ -177,3 +178,11 @@ def test_noise_is_no_more_than_all_that_is_left():
     run = Run(0.5 * np.arange(u.size), u, device(u) + noise)
     found = diagnose(run, identify(run), quick=True)
     assert 0.2 < found.noise_percent <= found.rms_percent
+
+
+@pytest.mark.parametrize("count", [4, 7, 60, 61, 62, 63, 2000])
+def test_every_band_of_a_spectrum_has_lines_enough(count):
+    """The last one too, which ends with the spectrum; together they hold each line once."""
+    edges = _edges(np.arange(1.0, count + 1.0))
+    assert (edges[0], edges[-1]) == (0, count)
+    assert min(np.diff(edges)) >= LIMITS.least_lines

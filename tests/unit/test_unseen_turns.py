@@ -111,3 +111,13 @@ def test_a_hidden_turn_is_not_filled_with_a_straight_line():
     assert parted.run.input.size == TURNED.input.size
     assert parted.run.signal == "a.csv"
     assert any("turned unseen in 1 gap" in note for note in parted.notes)
+
+
+@pytest.mark.parametrize(("pause_s", "seams"), [(1e-3, []), (0.1, [3000])])
+def test_parts_whose_clock_goes_on_are_one(pause_s, seams):
+    """One time step after the end of the part before it is its continuation, a tenth of a second a pause."""
+    time_s = 1e-3 * np.arange(U.size)
+    time_s[3000:] += pause_s - 1e-3
+    parts = [pt.Run(time_s=time_s[k], input=U[k], output=Y[k]) for k in (slice(3000), slice(3000, None))]
+    seam = import_parts(parts).run.seam
+    assert (np.zeros(0) if seam is None else np.flatnonzero(seam)).tolist() == seams
