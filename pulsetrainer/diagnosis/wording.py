@@ -228,6 +228,7 @@ DOUBTS: Mapping[str, str] = {
         "it keeps step with the loops, and the model without it can follow most of it: it may be what the "
         "device itself does. Loops at another rate would tell"
     ),
+    "leaves more": "it takes away less than it leaves, so it may be an error of the model itself",
     "own error": (
         "on a recording of one rate without rests it cannot be told from an error of the model itself, and "
         "what is left is nearly as large, or is more than noise"

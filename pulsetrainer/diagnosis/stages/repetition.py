@@ -6,10 +6,8 @@ with the cause the errors must fall by at least half of what they fall by in the
 rise. Nor may they on any quarter of the blocks, sorted by their rate and predicted from the others: a formula
 that only fits the rates of one record misleads at others. A cause that does not do that fits, but does not
 repeat: it is told with these words, and is not added to the model; nor is one that is in doubt for
-another reason (`rivals`), nor one that ends where the search did and takes away less than it leaves, as what
-a model lacks of another kind of device may, nor one in whose place a fault of the measurement, or a gain that
-wears off, fits as well: that happened in this record, and not in the next. What equal loops show was tested
-by itself.
+another reason (`rivals`), nor one in whose place a fault of the measurement, or a gain that wears off, fits
+as well: that happened in this record, and not in the next. What equal loops show was tested by itself.
 
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
@@ -29,7 +27,6 @@ from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.repeats import repeated
 from pulsetrainer.diagnosis.stages.rivals import (
-    AT_BOUND,
     MAY_BE_NOTHING,
     MAY_BE_WEAR,
     SETTLES,
@@ -47,7 +44,7 @@ def stage(state: State) -> State:
     kept = state.current
     asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
     told: dict[str, str] = {one.cause.id: A_FAULT for one in asked if _may_be_a_fault(one)}
-    told |= {one.cause.id: NOT_ADDED for one in asked if _is_not_to_be_added(state, one)}
+    told |= {one.cause.id: NOT_ADDED for one in asked if one.in_doubt or MAY_BE_WEAR in one.doubts}
     once = set(told) or _weakest(state, kept)
     while once:
         told = {**dict.fromkeys(once, DOUBT), **told}
@@ -97,13 +94,6 @@ def _asked_again(state: State, finding: Finding, term: Term) -> Finding:
 def _may_be_a_fault(finding: Finding) -> bool:
     """Whether a fault of the measurement fits as well as a cause of the device."""
     return any(library()[name].corrects for name in finding.confounded_with)
-
-
-def _is_not_to_be_added(state: State, finding: Finding) -> bool:
-    """Whether what speaks against a finding keeps it out of the model that goes on."""
-    taken = finding.explains_percent / PERCENT * state.floor.reducible(state.baseline)
-    little = AT_BOUND in finding.doubts and taken < state.current.squares
-    return finding.in_doubt or MAY_BE_WEAR in finding.doubts or little
 
 
 def _is_nothing(state: State, finding: Finding) -> bool:

@@ -15,7 +15,8 @@ what can be lowered on blocks that were left out (which a device of another kind
 would show it and there are none, a gain that wears off with time, or with the way of the input, fits as well
 (of a step: whatever settles from the begin of the record on), or the record has one rate and no rest, where
 any cause looks like what a model lacks of the device, and it explains little more than what is left and slow,
-or that is more than noise.
+or that is more than noise. So may a cause of the device be that which ends where the search did and takes
+away less than it leaves.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
-OWN_ERROR, STRONGEST, AT_BOUND = "own error", "strength at bound", "at bound"
+OWN_ERROR, STRONGEST, AT_BOUND, LEAVES_MORE = "own error", "strength at bound", "at bound", "leaves more"
 MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, IN_STEP = "spans zero", "may be wear", "settles", "in step"
 
 
@@ -93,6 +94,8 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         yield STRONGEST
     elif any(at_end) or _is_cut(state, known, bounds):
         yield AT_BOUND
+        if cause.lasting and fall < state.current.squares:
+            yield LEAVES_MORE
 
 
 def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
