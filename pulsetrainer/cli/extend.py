@@ -66,7 +66,11 @@ def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
         for one in found.found
         if one.cause in added and one.doubts
     )
-    return [*(f"{name} {rates}" for name in at_one_rate), *doubts]
+    part = (
+        "this is only a part of the error, and on other recordings the rest may be larger than what it mends"
+    )
+    partly = [] if found.whole else [f"{part}: `verify` RUN.h5 tells"]
+    return [*(f"{name} {rates}" for name in at_one_rate), *doubts, *partly]
 
 
 def _was_fitted(model: Path, run: Path) -> bool:

@@ -9,9 +9,9 @@ import pytest
 from pulsetrainer.cli.extend import _doubts
 
 
-def _said(name, *, lacks=(), doubts=(), curves=1):
+def _said(name, *, lacks=(), doubts=(), curves=1, whole=True):
     cause = SimpleNamespace(cause=name, doubts=doubts)
-    found = SimpleNamespace(found=(cause,) * curves, lacks=lacks)
+    found = SimpleNamespace(found=(cause,) * curves, lacks=lacks, whole=whole)
     return _doubts(found, SimpleNamespace(extensions=(cause,)))
 
 
@@ -32,3 +32,9 @@ def test_a_cause_in_doubt_is_told_with_its_doubts():
     """Each in words, and of several curves once."""
     (line,) = _said("unlisted", doubts=("it may be nothing", "it wanders"), curves=2)
     assert line.startswith("unlisted is in doubt (it may be nothing; it wanders)")
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_where_more_than_noise_is_left_a_run_that_was_not_diagnosed_tells(whole):
+    """A viscous part in proportion to the speed, of one with its square: at low speeds it misleads."""
+    assert any("only a part" in line for line in _said("viscous", whole=whole)) is not whole

@@ -26,6 +26,7 @@ _FAR = 0.01  # of the output's span: a model nearer than this is not in question
 _REFITTED = 0.2  # of what the given weights leave: refitted ones must leave less, left out blocks too
 _ALL_BUT = 0.001  # of the squared error: beside such a change nothing that is left over matters
 _GAIN = 2.0 * _FAR  # about the middle of the output, this gain alone would put the model in question
+_OF_SHIFT = 0.5  # a shape that moved more than this share of the shift has changed as well
 _BLOCKS = 10  # of the jackknife: neighbouring samples are not independent
 
 
@@ -99,10 +100,10 @@ class Change:
 
     @property
     def kind(self) -> str:
-        """Which text says it: gain and shape are unchanged within 1 % of the span, and less than the zero."""
+        """Which text says it: gain and shape are unchanged within 1 % of the span, and half of the shift."""
         if self.gain < -1.0:
             return "reversed"
-        least = min(_FAR * self.span, abs(self.shift))
+        least = min(_FAR * self.span, _OF_SHIFT * abs(self.shift))
         return "shifted" if abs(self.gain) <= _GAIN and self.left <= least else "changed"
 
 
