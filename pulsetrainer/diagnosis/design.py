@@ -30,6 +30,7 @@ from pulsetrainer.core.operator import Preisach, follow, rows
 from pulsetrainer.core.plane import FloatArray, IntArray, Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.core.smoothing import penalty
+from pulsetrainer.diagnosis.raw import hums
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
 
@@ -143,9 +144,13 @@ class Bins:
 
 
 def bins_of(records: Sequence[Record]) -> Bins:
-    """Bins over the samples with weight; DataError where hardly any sample has weight."""
+    """Bins over the samples with weight; DataError where hardly any sample has weight.
+
+    A hum has the finest: slow records have averages of several of its periods, in which it would be noise.
+    """
     duration = sum(r.input.size * r.step for r in records)
-    width = max(min(LIMITS.bin_s, duration / LIMITS.enough_rows), duration / LIMITS.most_rows)
+    usual = 0.0 if any(hums(r.output, r.sample_weight) for r in records) else LIMITS.bin_s
+    width = max(min(usual, duration / LIMITS.enough_rows), duration / LIMITS.most_rows)
     numbers, record, time, widths, count = [], [], [], [], 0
     for k, r in enumerate(records):
         per_bin = max(1, round(width / r.step))

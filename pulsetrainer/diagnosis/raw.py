@@ -12,7 +12,7 @@ from scipy import fft, ndimage, signal
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.evidence import Evidence
-from pulsetrainer.diagnosis.thresholds import DIFFERENCES, LIMITS, NORMAL_MAD, THIRD_DIFFERENCE
+from pulsetrainer.diagnosis.thresholds import DIFFERENCES, LIMITS, NORMAL_MAD, THIRD_DIFFERENCE, TINY
 from pulsetrainer.errors import DataError
 
 BoolArray = NDArray[np.bool_]
@@ -126,17 +126,28 @@ def noise_of(y: FloatArray, weight: FloatArray | None = None) -> float:
 
 def noise_beside_hum(y: FloatArray, weight: FloatArray) -> float:
     """White noise (rms) of a record as ``noise_of``, without a line that has most of it: a hum."""
-    third = _third_differences(y, weight)
-    if third.size < LIMITS.line_samples:
-        return noise_of(y, weight)
-    power = np.abs(fft.rfft(third * signal.windows.hann(third.size))) ** 2
-    k, total = int(np.argmax(power)), float(np.sum(power))
-    line = float(np.sum(power[max(k - LIMITS.line_wide, 0) : k + LIMITS.line_wide + 1]))
-    whole = noise_of(y, weight)
-    if line <= LIMITS.line_share * total:
+    third, whole = _third_differences(y, weight), noise_of(y, weight)
+    line = _share_of_a_line(third)
+    if line <= LIMITS.line_share:
         return whole
-    beside = (1.0 - line / total) * float(np.mean(third**2))
+    beside = (1.0 - line) * float(np.mean(third**2))
     return min(whole, float(np.sqrt(beside / THIRD_DIFFERENCE)))
+
+
+def hums(y: FloatArray, weight: FloatArray) -> bool:
+    """Whether one line has most of what a record (n,) does from sample to sample."""
+    return _share_of_a_line(_third_differences(y, weight)) > LIMITS.line_share
+
+
+def _share_of_a_line(third: FloatArray) -> float:
+    """Share of the squares of differences (k,) that one line of their spectrum has; 0 of too few."""
+    if third.size < LIMITS.line_samples:
+        return 0.0
+    power = np.abs(fft.rfft(third * signal.windows.hann(third.size))) ** 2
+    k = int(np.argmax(power))
+    return float(
+        np.sum(power[max(k - LIMITS.line_wide, 0) : k + LIMITS.line_wide + 1]) / max(np.sum(power), TINY)
+    )
 
 
 def _third_differences(y: FloatArray, weight: FloatArray | None) -> FloatArray:

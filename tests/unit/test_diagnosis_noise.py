@@ -186,3 +186,12 @@ def test_every_band_of_a_spectrum_has_lines_enough(count):
     edges = _edges(np.arange(1.0, count + 1.0))
     assert (edges[0], edges[-1]) == (0, count)
     assert min(np.diff(edges)) >= LIMITS.least_lines
+
+
+@pytest.mark.parametrize(("size", "samples"), [(0.0, 4), (0.005, 4), (0.03, 1)])
+def test_a_hum_has_the_finest_averages(size, samples):
+    """In averages of two of its periods a hum of five times the noise was noise, and not named."""
+    time_s = 1e-3 * np.arange(15_000)
+    noise = 0.005 * np.random.default_rng(4).standard_normal(time_s.size)
+    y = np.sin(2.0 * time_s) + size * np.sin(2.0 * np.pi * 330.0 * time_s) + noise
+    assert bins_of([Record(np.sin(2.0 * time_s), y, dt_s=1e-3)]).width == (samples,)
