@@ -56,4 +56,6 @@ def correct(
         "largest change": with_unit(f"{most:.3g}", corrected.output_unit),
         "samples left out": f"{masked} of {corrected.output.size}",
     }
+    if not most and masked == int((~measured.counts).sum()):
+        job.notes(["nothing tells what lies between the steps: the output is as it was"])
     job.show(payload, f"{out}: corrected run", rows)

@@ -31,7 +31,9 @@ _LEAST_COUNT = 1e-3  # that a sample counts at least: keeps the fit regular
 
 
 def between_steps(record: Record, plane: Plane, step: float) -> FloatArray:
-    """Return the expected output (n,) of a record whose output comes in steps.
+    """Return the expected output (n,) of a record whose output comes in steps, or as it is if none tells it.
+
+    Noise that carries it over its steps averages them out; a hysteresis that leaves as much does not tell.
 
     ConvergenceError where a fit does not settle.
     """
@@ -47,6 +49,8 @@ def between_steps(record: Record, plane: Plane, step: float) -> FloatArray:
         square = np.average(mean**2 + noise**2 * (1.0 - count), weights=record.sample_weight)
         noise = max(float(np.sqrt(square)), _LEAST_NOISE * step)
         fitted = found.operator(record.input, record.start)
+    if noise > _MOST_NOISE * step:
+        return record.output
     return fitted + _left_possible(record.output - fitted, step, noise)[0]
 
 

@@ -57,6 +57,20 @@ def test_it_says_what_was_corrected_and_masks_the_rest(folder):
     assert fitted.json["masked_samples"] >= 5
 
 
+def test_where_nothing_tells_what_lies_between_steps_that_is_said(folder):
+    """Noise as large as they are averages them out."""
+    run = pt.load(folder / "other.h5")
+    noisy = run.output + 0.02 * np.random.default_rng(2).standard_normal(run.output.size)
+    stepped = replace(run, output=0.02 * np.round(noisy / 0.02))
+    cause = Cause("quantisation", True, None, 0.0, 0.0, (Parameter("size", 0.02, "N", 0.02, 0.02),))
+    pt.save(stepped, folder / "stepped.h5")
+    pt.save(_diagnosis(stepped, "quantisation", (cause,)), folder / "steps.h5")
+    done = pulsetrainer(folder, "correct", "stepped.h5", "--diagnosis", "steps.h5", "-o", "unchanged.h5")
+    assert done.code == 0, done
+    assert "the output is as it was" in done.err
+    np.testing.assert_array_equal(pt.load(folder / "unchanged.h5").output, stepped.output)
+
+
 def test_a_fault_in_doubt_is_left_in(folder):
     """A step that was found, but predicts worse or may be nothing, changes no sample; the rest is said."""
     told = pt.load(folder / "diagnosis.h5")

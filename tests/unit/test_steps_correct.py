@@ -161,6 +161,9 @@ def test_between_coarse_steps_lies_what_the_hysteresis_says(clean):
     np.testing.assert_allclose(count, np.clip(1.0 - left.var(), least, 1.0), rtol=1e-6)
     noisy = q * np.round((true + q * np.random.default_rng(0).standard_normal(true.size)) / q)
     assert between_steps(Record(clean.input, noisy), plane, q) is noisy
+    wanders = true + 1.5 * q * np.sin(0.01 * np.arange(true.size))  # which no hysteresis follows
+    other = q * np.round(wanders / q)
+    assert between_steps(Record(clean.input, other), plane, q) is other
 
 
 def test_a_recorders_delay_is_taken_out_only_when_told(clean):
