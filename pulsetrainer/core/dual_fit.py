@@ -123,7 +123,8 @@ def _step(
     error = measured - np.concatenate([y for y, _ in pairs])
     rows = np.concatenate([moved for _, moved in pairs])
     usual = _MEDIAN_TO_SIGMA * float(np.median(np.abs(error)))
-    weight = np.minimum(1.0, _HUBER * usual / np.maximum(np.abs(error), np.finfo(float).tiny))
+    whole = max(_HUBER * usual, np.finfo(float).tiny)  # errors up to here count whole
+    weight = whole / np.maximum(np.abs(error), whole)
     root = np.sqrt(weight)
     moved, free = root[:, None] * rows[:, :-1], root * rows[:, -1]
     wanted = root * (error + rows[:, :-1] @ inner.masses)
