@@ -183,7 +183,7 @@ MESSAGES = {
     "current-rail": Message("current above its hard limit", "plug", "during the capture", got=KEPT),
     "force-frozen": Message("force reading", "cause", "during the capture", got=KEPT),
     "force reading": Message("force", "sensor"),
-    "tick-overrun": Message("missed its tick", "cause", "during the capture", got=KEPT),
+    "tick-overrun": Message("missed its tick", "firmware is too slow", "during the capture", got=KEPT),
     "reset": Message("restarted in mid-play (cause: external)", "power supply", got=KEPT),
     "no whole repeat": Message("no repeat was whole", "power supply", got="{file} was not written"),
     "hang": Message("restarted in mid-play (cause: watchdog)", "power supply", got=KEPT),

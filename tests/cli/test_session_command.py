@@ -317,6 +317,7 @@ def _sessions(*folders: Path):
             process.communicate()
 
 
+@pytest.mark.slow
 @pytest.mark.realtime
 def test_killed_at_any_moment_the_file_is_readable(tmp_path):
     """It is a session that was cut off: its beats, what was asked and measured; and it has a score sheet."""
@@ -418,6 +419,7 @@ class Terminal:
         return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
 
 
+@pytest.mark.slow
 @pytest.mark.realtime
 def test_keys_change_the_beats_and_stop(tmp_path):
     """Faster, weaker, another pulse, a pause, on, stop: each is in the beats that follow."""

@@ -111,7 +111,14 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("words", "plays", "seconds", "said", "kept"), CASES.values(), ids=CASES)
+QUICK = ("capture", "play", "session")
+
+
+@pytest.mark.parametrize(
+    ("words", "plays", "seconds", "said", "kept"),
+    [pytest.param(*case, marks=[pytest.mark.slow] * (name not in QUICK)) for name, case in CASES.items()],
+    ids=CASES,
+)
 def test_the_output_is_off_first_and_it_is_said_what_there_is(
     overheard, tmp_path, words, plays, seconds, said, kept
 ):

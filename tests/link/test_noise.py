@@ -116,6 +116,7 @@ def test_a_recorder_gets_what_the_recording_has():
     np.testing.assert_array_equal(ticks, recording.tick)
 
 
+@pytest.mark.slow
 def test_thousands_of_commands_on_a_worse_wire():
     """One bad byte in 300: each answer is the answer to its command, each value the last one accepted."""
     bench = Bench("bench:?ideal")

@@ -133,6 +133,7 @@ def test_the_real_firmware_leaves_its_reference_as_soon_as_it_refuses(monkeypatc
     assert trace.tick[-1] - refused[0] < 1000 + 20 * 10 * codes.TICK_RATE_HZ / 1000  # 100 ms and a block
 
 
+@pytest.mark.slow
 def test_stop_from_other_threads_under_load():
     """Four threads call stop() at any moment, before, during and after plays: each play ends as it should."""
     with open_device("bench:") as device:

@@ -63,6 +63,7 @@ def test_a_falling_copy_drifts_the_other_way_and_is_corrected_alike():
     np.testing.assert_allclose(corrected[1], -corrected[0], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_falling_copy_has_the_mirrored_viscous_part_and_is_extended_alike():
     """What the extended model predicts is that of the rising one, times minus one."""
     one, other = _mirrored(_run(VISCOUS, 0.0), "viscous", "coefficient", VISCOUS)

@@ -100,7 +100,7 @@ def _held_at(sign: float, said: FloatArray, raw: Raw) -> Firing | None:
     y, model = sign * raw.calm.output, sign * said
     noise, span = max(noise_of(y), spacing_of(y) / np.sqrt(UNIFORM)), float(np.ptp(y))
     counts = raw.record.counts & np.isfinite(model)
-    beyond = counts & (model > float(y[counts].max()))
+    beyond = counts & (model > float(y[counts].max(initial=-np.inf)))
     if np.count_nonzero(beyond) <= _LEAST:
         return None
     rail = float(np.median(y[beyond]))
