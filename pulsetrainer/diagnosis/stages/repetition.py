@@ -12,7 +12,8 @@ as well: that happened in this record, and not in the next. What equal loops sho
 That which repeats least goes first; the others are then refitted without it and asked again, since they had
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
 cent of the span, was not found: it mends the formula of another cause, or nothing. Nor was a slow fault of
-the measurement of which the causes beside it hold nearly all. What is left beside it is
+the measurement of which the weights and the causes beside it hold nearly all: it would be taken out as large
+as it was fitted, from a device that never had it. What is left beside it is
 refitted without it, and a step asked again whether it only settles.
 """
 
@@ -59,7 +60,7 @@ def stage(state: State) -> State:
 
 
 def _without_held(state: State) -> State:
-    """Return the state without slow faults of the measurement that the causes beside them hold."""
+    """Return the state without slow faults of the measurement that weights and other causes hold."""
     findings = tuple(replace(one, found=one.found and not _is_held(state, one)) for one in state.findings)
     return _without_what_is_gone(replace(state, findings=findings))
 
@@ -104,9 +105,9 @@ def _is_nothing(state: State, finding: Finding) -> bool:
 
 
 def _is_held(state: State, finding: Finding) -> bool:
-    """Whether other causes hold nearly all that a slow fault of the measurement adds, and it mends one."""
+    """Whether the rest of the model holds nearly all that a slow fault of the measurement adds."""
     term = next((one for one in state.current.terms if one.cause is finding.cause), None)
-    if term is None or len(state.current.terms) == 1 or not (term.cause.drifts and term.cause.corrects):
+    if term is None or not (term.cause.drifts and term.cause.corrects):
         return False
     fall = finding.explains_percent / PERCENT * state.floor.reducible(state.baseline)
     return fall < LIMITS.held_by_others * squares_added(state, term)
