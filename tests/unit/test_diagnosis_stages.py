@@ -1436,7 +1436,7 @@ def test_what_may_be_nothing_beside_a_cause_is_not_found(monkeypatch, explains, 
         ("offset-drift", None, 2845.0, True),
     ],
 )
-def test_a_slow_fault_that_the_causes_beside_it_hold_is_none(monkeypatch, name, beside, added, found):
+def test_a_slow_fault_that_the_rest_of_the_model_holds_is_none(monkeypatch, name, beside, added, found):
     """It mends the formula of a creep: taken out, the next record was predicted 1.5 times worse."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())

@@ -110,7 +110,7 @@ def _is_held(state: State, finding: Finding) -> bool:
     if term is None or not (term.cause.drifts and term.cause.corrects):
         return False
     fall = finding.explains_percent / PERCENT * state.floor.reducible(state.baseline)
-    return fall < LIMITS.held_by_others * squares_added(state, term)
+    return fall < LIMITS.held_by_the_rest * squares_added(state, term)
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:
