@@ -11,7 +11,7 @@ weights that the data do not ask for are zero.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -39,6 +39,10 @@ _SIGN_LEVELS = 24
 _SIGN_SMOOTHING = 0.05
 # Below this share of the output's span the fit is good, and no stiffer density is tried.
 _POOR = 0.02
+# How far first-order curves of signed weights may leave the recorded outputs, of their span ...
+_BEYOND = 0.1
+# ... and the ridges that are tried to keep them there.
+_RIDGES: list[float] = (10.0 ** np.arange(-6.0, 0.5, 0.5)).tolist()
 # Records get an offset each where that lowers the rms error by at least this share.
 SHIFTED = 0.1
 
@@ -55,6 +59,7 @@ class Identified:
     tried: tuple[tuple[float, float], ...] = ()  # (s, held-out rms) when it was chosen, output unit
     stiffness: float = 0.0  # t, how alike the loops are along the diagonal; see ``core.stiffness``
     samples: int = 0  # that count; fewer than cells: what the data do not ask for is zero
+    ridge: float = 0.0  # r, share of trace(G) / n_q, that keeps weights of either sign from running off
 
 
 def correlation_of(records: Sequence[Record]) -> float:
@@ -160,11 +165,36 @@ def _signed(
     upright, zero = levelled(records)
     choice = choose(upright, plane, reading, signed=True) if smoothing == "auto" else Choice(smoothing, ())
     length = max(float(choice.smoothing), LEAST_SIGNED)
-    equations = normal_equations(plane, upright, reading)
-    masses = nnls.solve_signed(*smoothed(equations, length))
-    offset = equations.offset(masses) + zero
-    operator = Preisach(plane, masses / plane.areas, offset, reading, signed=True)
-    return Identified(operator, method, 1, 0.0, length, choice.tried, 0.0, samples)
+    operator, ridge = _kept_in_range(normal_equations(plane, upright, reading), length, upright)
+    operator = replace(operator, offset=operator.offset + zero)
+    return Identified(operator, method, 1, 0.0, length, choice.tried, 0.0, samples, ridge)
+
+
+def _kept_in_range(
+    equations: NormalEquations, smoothing: float, records: Sequence[Record]
+) -> tuple[Preisach, float]:
+    """Fit weights of either sign with the least ridge that keeps first-order curves in the recorded range.
+
+    A record says nothing of weights that it never tells apart, and smoothing lets those run off: after a
+    reversal that was not recorded the output would be many times what it ever was. So r sum m_k^2 is added,
+    r a share of trace(G) / n_q, by the least r of ``_RIDGES`` with which no first-order reversal curve leaves
+    the recorded outputs by more than ``_BEYOND`` of their span (Hoerl, Kennard, "Ridge regression",
+    Technometrics 12, 1970). Returns the operator and r.
+    """
+    plane = equations.plane
+    gram, rhs = smoothed(equations, smoothing)
+    diagonal = gram.diagonal().copy()
+    size = float(diagonal.mean())
+    measured = np.concatenate([r.output[r.counts] for r in records])
+    beyond = _BEYOND * float(np.ptp(measured))
+    for ridge in (0.0, *_RIDGES):
+        np.fill_diagonal(gram, diagonal + ridge * size)
+        masses = nnls.solve_signed(gram, rhs)
+        operator = Preisach(plane, masses / plane.areas, equations.offset(masses), signed=True)
+        lowest, highest = operator.first_order_range
+        if lowest >= measured.min() - beyond and highest <= measured.max() + beyond:
+            break
+    return operator, ridge
 
 
 def _most_dense() -> int:

@@ -150,6 +150,22 @@ class Preisach:
         """Outputs at the negative and at the positive saturation, output unit."""
         return self.offset - self.polarity * self.total, self.offset + self.polarity * self.total
 
+    @property
+    def first_order_range(self) -> tuple[float, float]:
+        """Lowest and highest output of all first-order reversal curves, output unit.
+
+        Down from alpha to beta, -W + 2 E(alpha, low) - 2 E(alpha, beta); up from beta to alpha,
+        W - 2 E(high, beta) + 2 E(alpha, beta). Where mu >= 0 they lie between the saturations.
+
+        Source: Mayergoyz, Mathematical Models of Hysteresis and Their Applications, 2003, section 1.2.
+        """
+        alpha, beta = np.tril_indices(self.plane.n_h + 1)
+        back = 2.0 * self.grid[alpha, beta]
+        down = 2.0 * self.grid[alpha, 0] - self.total - back
+        up = self.total - 2.0 * self.grid[-1, beta] + back
+        curves = self.offset + self.polarity * np.concatenate((down, up))
+        return float(curves.min()), float(curves.max())
+
     @cached_property
     def _signed(self) -> FloatArray:
         return 2.0 * self.plane.signed_everett(self.nodes)

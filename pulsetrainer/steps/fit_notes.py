@@ -37,7 +37,12 @@ def of_form(fitted: Fitted, run: Run, asked: str) -> list[str]:
         why = "no loop that runs one way fits this record"
     else:
         return []
-    return [f"{why}: {how}" if asked == "auto" else f"{how}, as was asked"]
+    held = (
+        f"; the record leaves open what follows some reversals of the {given}: there the weights are held "
+        f"back so that the {output} stays near its recorded range"
+    )
+    said = f"{why}: {how}" if asked == "auto" else f"{how}, as was asked"
+    return [said + (held if fitted.identified.ridge else "")]
 
 
 def of_wild(masks: Sequence[BoolArray]) -> list[str]:

@@ -292,6 +292,23 @@ def test_evaluate_knows_every_form(clockwise, butterfly):
         assert found.rms_percent == pytest.approx(model.fit.rms_percent, rel=0.05)
 
 
+@pytest.mark.parametrize("seed", [0, 3, 5])
+def test_a_signed_model_of_a_spoilt_record_stays_in_the_recorded_range(seed):
+    """Stairs tell few weights apart, and a step of the zero bends them: the rest must not run off."""
+    rng = np.random.default_rng(seed)
+    device = devices.MIXED[seed % len(devices.MIXED)](rng)
+    turns = np.concatenate((np.linspace(0, 1, 9), np.linspace(1, 0, 9)[1:], [0.5, 0.25, 0.75, 1, 0.5, 0]))
+    u = np.interp(np.linspace(0, turns.size - 1, 2000), np.arange(turns.size), turns)
+    span = float(np.ptp(device(u)))
+    y = device(u) + rng.normal(0.0, 0.003 * span, u.size)
+    y[1000:] += 0.06 * span
+    model = pt.identify(run_of(u, y), form="signed")
+    unseen = np.interp(np.linspace(0, 40, 2000), np.arange(41), rng.uniform(0.0, 1.0, 41))
+    wrong = model.predict(unseen) - device(unseen)
+    assert np.std(wrong) < 0.12 * span, f"seed {seed}"  # 1.1 to 1.5 times the span before
+    assert "held back" in " ".join(model.fit.notes)
+
+
 @pytest.mark.parametrize("other", ["dual", "signed"])
 @pytest.mark.parametrize("option", [{"reading": "relay"}, {"method": "alternating"}])
 def test_other_forms_are_fitted_jointly_and_continuously(other, option):
