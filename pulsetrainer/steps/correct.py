@@ -25,9 +25,10 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
 
         y <- (y - b - g (y - y0)), y - b t, y - A sin(2 pi f t + phi), y(t / (1 + e)), y(t + d)
 
-    Samples that cannot be restored (wild, clipped, beside a step) are taken between their neighbours and
-    named in ``masked``: no fit counts them. Coarse steps become what lies between them. What was taken out
-    is in ``corrected`` of the new run.
+    Samples that cannot be restored (wild, far beyond a rail, beside a step) are taken between their
+    neighbours and named in ``masked``: no fit counts them. Coarse steps become what lies between them, and a
+    sample at a rail the output expected just beyond it. What was taken out is in ``corrected`` of the new
+    run.
 
     Parameters
     ----------

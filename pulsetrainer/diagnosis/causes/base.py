@@ -16,7 +16,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from scipy import signal
 
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core import wild
+from pulsetrainer.core.initial_state import known_from
+from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.past import Past
 from pulsetrainer.diagnosis.raw import Firing, Raw
 
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 
 _NO_LAG = 1e-7  # of a time step: a shorter time constant is none
 _NO_PATH = 0.004  # of the range: smaller wiggles of the input are noise and no path
+_LEVELS = 48  # of a hysteresis that tells what the readings leave open
 _STEPS = 20.0  # time steps: where samples are sparse a lag may be as long
 
 Stage = Literal["input", "output", "record"]
@@ -101,7 +105,14 @@ class Taken:
     step_s: float  # of the averages that they were sought in
     empty: float  # output of the empty memory
     record: int = 0  # which of those that were diagnosed
-    begin_s: float = 0.0  # of it, since the begin of the first one
+    begin_s: float = 0.0  # of it, since the first one began
+
+    def known(self, y: FloatArray) -> tuple[Record, Plane]:
+        """Return the record with another output (n,), of which what is known counts, and a plane for it."""
+        one, known = self.raw.record, np.isfinite(y)
+        counts = known & (np.arange(y.size) >= known_from(one.input, self.raw.low, self.raw.high))
+        record = replace(one, output=wild.repaired(y, ~known), sample_weight=counts.astype(np.float64))
+        return record, Plane.uniform(self.raw.low, self.raw.high, _LEVELS)
 
 
 class Cause:

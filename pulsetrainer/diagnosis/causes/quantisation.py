@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from pulsetrainer.core import wild
 from pulsetrainer.core.coarse import between_steps
-from pulsetrainer.core.initial_state import known_from
-from pulsetrainer.core.plane import FloatArray, Plane
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
 from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of, values_of
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -21,7 +18,6 @@ if TYPE_CHECKING:
 
 _COARSE = 0.004  # of the span: finer steps hurt no fit
 _USED = 2  # times that each value comes, on average: in a short record all may differ, far apart as they are
-_LEVELS = 48  # of the hysteresis that tells what lies between the steps
 _MOST = (0.05, 0.95)  # quantiles of the steps: twice their spread is that of the step
 
 
@@ -67,10 +63,4 @@ class Quantisation(Cause):
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
         """Output (n,) between the steps, where the hysteresis that fits them best expects it."""
-        known = np.isfinite(y)
-        weight = known * (
-            np.arange(y.size) >= known_from(taken.raw.record.input, taken.raw.low, taken.raw.high)
-        )
-        record = replace(taken.raw.record, output=wild.repaired(y, ~known), sample_weight=weight * 1.0)
-        between = between_steps(record, Plane.uniform(taken.raw.low, taken.raw.high, _LEVELS), values[0])
-        return np.where(known, between, np.nan)
+        return np.where(np.isfinite(y), between_steps(*taken.known(y), values[0]), np.nan)

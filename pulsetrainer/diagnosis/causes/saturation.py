@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 from scipy import ndimage
 
+from pulsetrainer.core.coarse import beyond_rails
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
@@ -64,28 +65,45 @@ class Saturation(Cause):
     def gate(self, raw: Raw) -> Firing | None:
         """Extremes that repeat exactly far more often than the values just inside them, at either end."""
         y = raw.calm.output
-        step = spacing_of(y)
-        rails = [sign for sign in (1.0, -1.0) if _clipped(sign * y, step)]
-        if not rails or noise_of(y) <= _NOISY * step:
+        rails = _rails(y)
+        if not rails:
             return _held(raw)
-        ends = [float((sign * y).max()) * sign for sign in rails]
-        at = np.any([np.abs(y - rail) <= _AT * step for rail in ends], axis=0)
+        at = np.any(list(rails.values()), axis=0)
         noise = noise_of(y, np.where(at, 0.0, 1.0))
         mask = ndimage.binary_dilation(at, iterations=_BESIDE)
+        ends = [float((sign * y).max()) * sign for sign in rails]
         for sign, rail in zip(rails, ends, strict=True):
             mask |= _near(sign * y, sign * rail, noise)
         one, other = raw.polarity * ends[0], raw.polarity * ends[-1]
         figures = {"count": float(np.count_nonzero(at)), "rail": one, "other": other}
         kind = "gate" if len(ends) == 1 else "both"
-        return Firing(self.id, kind, one, "{y}", figures, mask, spread=step)
+        return Firing(self.id, kind, one, "{y}", figures, mask, spread=spacing_of(y))
 
     def undo(self, y: FloatArray, values: Values, taken: Taken) -> FloatArray:
-        """Return the output (n,) without what is clipped, also where only the model as given could tell."""
+        """Output (n,) as the hysteresis expects it just beyond a rail; NaN where nothing tells it.
+
+        Where no hysteresis describes the record, what is near the rail is lost too: only low noise is left
+        there.
+        """
         rail, measured = taken.raw.polarity * values[0], taken.raw.calm.output
-        if self.gate(taken.raw) is not None:
-            return super().undo(y, values, taken)
-        sign = 1.0 if rail > measured.mean() else -1.0
-        return np.where(_near(sign * measured, sign * rail, noise_of(measured)), np.nan, y)
+        rails = _rails(measured)
+        if not rails:  # only the model as given could tell
+            sign = 1.0 if rail > measured.mean() else -1.0
+            return np.where(_near(sign * measured, sign * rail, noise_of(measured)), np.nan, y)
+        nowhere = np.zeros(y.size, dtype=np.bool_)
+        up, down = (rails.get(sign, nowhere) for sign in (1.0, -1.0))
+        noise = noise_of(measured, np.where(up | down, 0.0, 1.0))
+        whole = beyond_rails(*taken.known(y), up, down, noise)
+        return super().undo(y, values, taken) if whole is None else np.where(np.isfinite(y), whole, np.nan)
+
+
+def _rails(y: FloatArray) -> dict[float, BoolArray]:
+    """Samples (n,) at the upper (1) and at the lower (-1) rail; nothing where noise does not tell one."""
+    step = spacing_of(y)
+    signs = [sign for sign in (1.0, -1.0) if _clipped(sign * y, step)]
+    if not signs or noise_of(y) <= _NOISY * step:
+        return {}
+    return {sign: np.max(sign * y) - sign * y <= _AT * step for sign in signs}
 
 
 def _held(raw: Raw) -> Firing | None:
