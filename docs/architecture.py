@@ -44,8 +44,8 @@ Checked by `make lint` (`lint-imports`; the contracts are in `pyproject.toml`):
 {contracts}
 
 Held by `tests/unit/test_house_rules.py`: outside `cli` nothing prints or exits; random numbers come from a generator that
-is passed in; the core and the diagnosis read no clock and no environment. Errors are one family
-(`pulsetrainer/errors.py`), and `pulsetrainer/cli/guard.py` alone turns them into exit codes.
+is passed in or has a fixed seed; the core and the diagnosis read no clock and no environment. Errors are one family
+(`pulsetrainer/errors.py`), and `pulsetrainer/cli/guard.py` turns those that are raised into exit codes.
 
 The firmware in `firmware/` is C99 without a heap: `core` (protocol, control, safety; no hardware), `hal` (what a port must
 offer), `port` (the host's pseudo-terminal, an emulated Cortex-M4F, the dsPIC33), `plant` (the simulated solenoid).

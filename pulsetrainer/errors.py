@@ -1,8 +1,8 @@
 """One family of errors, each with its exit code and a next step.
 
 Every message says what happened, where (file, dataset, port, argument), what was
-expected and what was got; ``hint`` says what to do next. Only ``cli.guard`` turns
-an error into an exit.
+expected and what was got; ``hint`` says what to do next. Only ``cli`` turns an
+error into an exit.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ class Recorded:
 
     fingerprint: str  # of its samples
     step_s: float  # of the averages that causes were sought in; NaN where the run has no time
-    begin_s: float = 0.0  # since the begin of the first, as if they had been made one after another
+    begin_s: float = 0.0  # since the first one began, as if they had been made one after another
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -1,7 +1,7 @@
 """How an artefact shows itself: as text, in a notebook, as a figure.
 
 Tables and figures are the business of ``report``, a floor above. It is looked up when an artefact is shown,
-so that the artefacts import nothing.
+so that the artefacts import nothing of it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The one funnel: every error becomes a message, a hint and an exit code here, and nowhere else."""
+"""The one funnel: every error that is raised becomes a message, a hint and an exit code here."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hands on a session: keys that change what is played, or that answer, and the screen that goes with them."""
+"""Hands on a session: keys are read and handed on (``steps.steering``), the answers of a quiz among them."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """From the records of one device to one operator: its form, where its levels lie, offsets, the weights.
 
-``identification`` solves for weights on given levels. Here it is decided what it is given: which form the
-records ask for (``forms``), the levels lie evenly, or closer where the loop is steep (``edges``), and records
-whose outputs are shifted against each other get an offset each.
+``identification`` solves for weights on given levels. This module decides what it is given: the form that the
+records ask for (``forms``), levels that lie evenly or closer where the loop is steep (``edges``), and an
+offset for each record where their outputs differ by a constant.
 """
 
 from __future__ import annotations

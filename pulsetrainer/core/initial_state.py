@@ -36,7 +36,7 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
     ``NEAR`` of the range. An input that never gets there is known, up to a constant, from where it first
     reaches an end of its own range: see ``start_of``.
 
-    A device that begins at an end may never have come there: then its first stroke is another than all later
+    A device that begins at an end may never have come there: then its first stroke differs from all later
     ones from that end, which wiping-out makes alike (Mayergoyz 2003, section 1.2). With the ``outputs`` (n,)
     this is seen, and the memory is known from where it next reaches an end. The same goes for an end of the
     input's own range, where what lies beyond may be switched by the first stroke alone.

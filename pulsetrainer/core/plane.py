@@ -1,4 +1,4 @@
-"""The discrete Preisach plane and its Everett surface.
+"""The discrete Preisach plane, its Everett surface, and the two readings of its weights (``Reading``).
 
 The half-plane alpha >= beta over [L_0, L_n] is cut by n_h + 1 edges L into n_q = n_h (n_h + 1) / 2 cells.
 Cell (i, j), i >= j, holds the relays that switch up in [L_i, L_i+1] and down in [L_j, L_j+1]; cells

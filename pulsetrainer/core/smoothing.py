@@ -192,10 +192,11 @@ def dealt(block: IntArray) -> IntArray:
 def choose(records: Sequence[Record], plane: Plane, reading: Reading, *, signed: bool = False) -> Choice:
     """Choose s by the error on held-out blocks of the records, for weights >= 0 or of either sign.
 
-    Each of ``FOLDS`` fits leaves out every fifth block; all are simulated from the start of their record.
-    The sums of the whole minus those of the left-out blocks give the fit, the latter alone its error. The
-    grid is tried in steps of a factor 2^(1/2), and no smoothing as its lower end. Where the held-out error
-    e(s) is flat its minimum is chance, so s is the mean of the grid, in logarithms, weighted by
+    Each of ``FOLDS`` fits leaves out its own fifth of the blocks (``dealt``); all are simulated from the
+    start of their record. The sums of the whole minus those of the left-out blocks give the fit, the latter
+    alone its error. The grid is tried in steps of a factor 2^(1/2), and no smoothing as its lower end. Where
+    the held-out error e(s) is flat its minimum is chance, so s is the mean of the grid, in logarithms,
+    weighted by
 
         exp(-(n / tau) (e(s)^2 / e_min^2 - 1) / 2)
 

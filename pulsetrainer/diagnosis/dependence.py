@@ -77,7 +77,7 @@ class Bank:
     def _ends(self, z: FloatArray) -> tuple[float, float]:
         """Ends of the curve over a state (count,): how far it comes on two pieces at least.
 
-        What is beyond was seen once, such as the begin of a record, and nothing can show that it repeats.
+        What is beyond was seen once, such as the beginning of a record, and nothing can show that it repeats.
         """
         pieces = [z[self.piece == k] for k in range(LIMITS.pieces)]
         reached = np.sort([np.quantile(one, LIMITS.state_ends) for one in pieces if one.size], axis=0)

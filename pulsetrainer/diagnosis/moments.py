@@ -9,7 +9,8 @@ can do taken off. At a moment t of the true one the squares S(t) are larger than
     (S(t) - S(t*)) |d|^2 / var(d'n) <= -2 log(1 - sqrt(0.95)) = 7.35    in 95 of 100
 
 with d what the two change, and n the noise as it is (Hansen, Econometrica 68, 2000, theorem 2: of a moment
-that is searched for it is not chi-square). To it comes what the levels may be in line with d.
+that is searched for it is not chi-square). What the error of the levels may have in
+common with d is added.
 """
 
 from __future__ import annotations

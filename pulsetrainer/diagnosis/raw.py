@@ -1,4 +1,4 @@
-"""What a record shows before any model: its noise, its steps, and the gates that fired on it."""
+"""What a record shows before any model: noise without a hum, steps, and the gates that fired on it."""
 
 from __future__ import annotations
 

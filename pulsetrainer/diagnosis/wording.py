@@ -214,7 +214,7 @@ DOUBTS: Mapping[str, str] = {
         "a fault of the measurement in this recording alone would look like it: it is not added to the model"
     ),
     "may be wear": "here a gain that wears off, with time or with the way of the input, would look like it",
-    "settles": "what settles from the begin of the recording on would look like it, and that is not sudden",
+    "settles": "what settles from the start of the recording would look like it, and that is not sudden",
     "wanders": "what is left still wanders, so it may be a part of that: it is neither added nor taken out",
     "predicts little": (
         "on parts of the recordings that were left out it explains less than half of what could be "

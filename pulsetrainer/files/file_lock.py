@@ -1,8 +1,8 @@
 """Whether the writer of an unfinished file is alive: a lock that the system drops when its process ends.
 
-The lock is a shared one, so that it is in nobody's way: HDF5 takes a shared lock to read. Only who wants to
-throw the file away asks for it alone. Where a file system or computer has no such locks nothing is ever
-taken for abandoned.
+The lock is a shared one, so that it is in nobody's way: HDF5 takes a shared lock to read. Only a writer that
+wants to throw the file away asks for it alone. Where a file system or computer has no such locks nothing is
+ever taken for abandoned.
 """
 
 from __future__ import annotations

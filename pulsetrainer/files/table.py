@@ -30,7 +30,7 @@ from pulsetrainer.files.input_file import unreadable
 
 _WRITTEN_ROWS = 1 << 14
 _NAMED = 5  # bad rows
-_MOST_BAD = 0.99  # of the rows: with more of them bad, the table is another than it was taken for
+_MOST_BAD = 0.99  # of the rows: with more of them bad, the table is not what it was taken for
 _AGAIN = "export the recording again"
 
 

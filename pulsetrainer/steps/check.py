@@ -16,6 +16,7 @@ from pulsetrainer.core.temperature import COPPER_PER_K
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import check_peak
 from pulsetrainer.device.trace import Trace
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import low_pass
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError
@@ -40,11 +41,6 @@ SHAPE_PERCENT = 0.2
 _SHAPE_OF_FIT = 2.0  # times what the model left of its own record, without noise
 _LAG_S = 0.02  # lags of this and less are alike at the pace of a check
 _CREEPS_S = (0.3, 1.0, 3.0)
-# Causes that a gain and an offset leave as they are: they scale with the force, or act before it.
-_SCALABLE = {
-    "delay", "field-lag", "rate-widening", "output-lag", "resonance", "creep", "thermal-drift",
-    "accommodation",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +196,7 @@ def check_updatable(model: Model) -> None:
 
 def hindrance(model: Model) -> str:
     """Return what of a model an offset and a gain do not mend, empty where they mend it."""
-    hindered = [one.cause for one in model.extensions if one.cause not in _SCALABLE]
+    hindered = [one.cause for one in model.extensions if not library()[one.cause].scales]
     if model.form == "direct" and not hindered:
         return ""
     return f"the causes {', '.join(hindered)}" if hindered else f"the form {model.form}"

@@ -1,4 +1,4 @@
-"""Correct: from a run and its diagnosis to the run without the faults of the measurement."""
+"""Correct: from a run and its diagnosis to the run without drift, steps, hum, wild samples and the like."""
 
 from __future__ import annotations
 

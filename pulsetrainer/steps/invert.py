@@ -1,4 +1,4 @@
-"""Invert: from the shape of a pulse and a model to the drive that presses it."""
+"""Invert: from the shape of a pulse and a model to the drive that presses it, by the inversion asked for."""
 
 from __future__ import annotations
 

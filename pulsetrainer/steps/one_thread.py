@@ -1,7 +1,7 @@
 """One thread for the linear algebra of a verb: threads that wait for each other cost ten times the work.
 
-The matrices are many and small. In two threads ``identify`` takes ten times the processor's time of one. Who
-wants more threads sets OMP_NUM_THREADS or OPENBLAS_NUM_THREADS; then nothing is limited here.
+The matrices are many and small. In two threads ``identify`` takes ten times the processor's time of one. To
+use more threads, set OMP_NUM_THREADS or OPENBLAS_NUM_THREADS; then nothing is limited here.
 """
 
 from __future__ import annotations

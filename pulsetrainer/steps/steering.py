@@ -1,4 +1,4 @@
-"""Steering: what a person changes while a session goes on; it takes effect at the next beat."""
+"""Steering: which key changes what while a session goes on; it takes effect at the next beat."""
 
 from __future__ import annotations
 

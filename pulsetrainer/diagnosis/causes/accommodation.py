@@ -26,6 +26,7 @@ class Accommodation(Cause):
     stage = "output"
     order = 60
     family = "slow memory"
+    scales = True
     needs_time = False
     parameters = (
         Quantity("amplitude", "1", -0.5, 1.0, 0.002, "what follows over cycles, per change at once"),

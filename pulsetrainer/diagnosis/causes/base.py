@@ -1,9 +1,10 @@
-"""What a cause is: one file in this folder, with one class derived from ``Cause``; nothing else names it.
+"""What a cause is: one file in this folder, with one class derived from ``Cause``, which the library finds.
 
 The extended model is a chain: the measured input passes the causes of stage ``input`` in their order, then
 the Preisach operator, then the causes of stage ``output``. A cause of stage ``record`` is found on the raw
 data by its own ``gate`` and changes no model. The file holds all that is the cause's own: formula, start
-values, gate, thresholds, flags and words.
+values, gate, thresholds, flags and words. Only where causes are weighed against one another, or a step treats
+one by itself, does other code name it.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ class Frame:
     low: float = 0.0  # end of the input's range
     ends: tuple[float, float] = (0.0, 1.0)  # output at both ends of the input's range
     zero: float = 0.0  # output of the hysteresis where its memory is empty: gains are about it
-    begin_s: float = 0.0  # since the begin of the first record, as if they had been made one after another
+    begin_s: float = 0.0  # since the first record began, as if they had been made one after another
     longest_s: float = 0.0  # of the records, the longest; 0: this one
     past: Past | None = None  # what the causes remember of the piece before; None: there was none
     kept: dict[str, FloatArray] = field(default_factory=dict, repr=False, compare=False)  # of the input alone
@@ -144,6 +145,7 @@ class Cause:
     doubted: ClassVar[bool] = False  # others also set off its gate: it is asked again without what they add
     # what it means
     lasting: ClassVar[bool] = True  # a property of the device, not of the record: goes into the model
+    scales: ClassVar[bool] = False  # a gain and an offset of the output leave it as it is
     corrects: ClassVar[bool] = False  # a fault of the measurement, which can be taken out of the record
     jagged: ClassVar[bool] = False  # leaves what no refit can take away: then what is left is its own
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
@@ -252,6 +254,7 @@ class Late(Cause):
     """A cause by which something is late, with one time constant or delay."""
 
     family = "lag"
+    scales = True
     widens = True
     common = True
     _tried_s: ClassVar[tuple[float, ...]] = (0.002, 0.01, 0.03)  # a sensor's, a coil's, a slow one's

@@ -42,6 +42,7 @@ class Creep(OfKinds):
     stage = "output"
     order = 80
     family = "slow memory"
+    scales = True
     number = "middle"
     meant = "share of the middle one of several time constants (1: it is the only one)"
     tried = (_EQUAL, _ALONE, _FIVE)  # shares of the middle time constant

@@ -26,6 +26,7 @@ class RateWidening(Cause):
     stage = "input"
     order = 30
     family = "lag"
+    scales = True
     widens = True
     parameters = (
         Quantity("coefficient", "({u} s)^0.5", 0.0, 0.16, 4e-4, "lag of the {input}, per root of its speed"),

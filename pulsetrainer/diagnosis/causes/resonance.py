@@ -32,6 +32,7 @@ class Resonance(Cause):
     stage = "output"
     order = 70
     family = "resonance"
+    scales = True
     strengths = 0
     in_rows = True
     parameters = (

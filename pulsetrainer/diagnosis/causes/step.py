@@ -55,7 +55,7 @@ class Step(Cause):
 
     @property
     def wears_about(self) -> float:
-        """What settles from the begin on looks like a step, about empty memory as that."""
+        """What settles from the beginning looks like a step, about empty memory as that."""
         return 0.0
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:

@@ -1,6 +1,6 @@
 """the output falls with heat: y - k h (y - y0) + b h, tau h' = (u - u0)^2 - h.
 
-Neither zero is taken from the data's own, which may lie anywhere. Two kinds are tried: of a device that is
+Neither u0 nor y0 is the zero of the data, which may lie anywhere. Two kinds are tried: of a device that is
 driven one way, u0 is the lower end of the input's range and y0 the output of empty memory; of one that is
 driven both ways, u0 is the middle of the range and y0 that of the output. That heat moves the zero besides
 (b), or that the gain is about another y0, is put in only where noise cannot make the difference
@@ -42,6 +42,7 @@ class ThermalDrift(OfKinds):
     stage = "output"
     order = 50
     family = "slow gain"
+    scales = True
     number = "cold"
     meant = "the {input} at which nothing heats, as a share of its range"
     tried = (0.0, _BOTH_WAYS)  # share of the input's range at which nothing heats

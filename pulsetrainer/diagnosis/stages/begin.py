@@ -1,10 +1,10 @@
-"""Begin: the model that goes on is fitted to the begin of the records too, where it can be.
+"""Begin: the model that goes on is fitted to the beginning of the records too, where it can be.
 
-What a device did before a record decays in it, so that the search fits the begin of each record freely
-(``design``). But a free begin hides how a slow cause begins, and a model that is used elsewhere has none: it
-begins from rest. So the causes that repeat are refitted without it. That is the model where it leaves no
+What a device did before a record decays in it, so that the search fits the beginning of each record freely
+(``design``). But a free beginning hides how a slow cause begins, and a model that is used elsewhere has none:
+it begins from rest. So the causes that repeat are refitted without it. That is the model where it leaves no
 relevantly larger error, or a smaller one, begin and all, after the first fifth of each record; else something
-was going on before the records, and the begin stays free.
+was going on before the records, and the beginning stays free.
 
 Both fits are of the same records, so the interval of a parameter holds what either of them says.
 """
@@ -54,7 +54,7 @@ def _hull(rows: tuple[Estimate, ...], others: tuple[Estimate, ...]) -> tuple[Est
 
 
 def _late(fitted: Fitted) -> float:
-    """Variance of what a fit leaves after the begin of each record, as the model goes on: from rest."""
+    """Variance of what a fit leaves after the beginning of each record, as the model goes on: from rest."""
     bins, left = fitted.problem.bins, fitted.problem.measured - fitted.simulated
     ends = np.asarray([bins.time_s[bins.record == k].max(initial=0.0) for k in range(len(bins.number))])
     return float(np.var(left[bins.time_s > LIMITS.begin_share * ends[bins.record]]))

@@ -40,7 +40,7 @@ def stage(state: State) -> State:
 
 
 def _without(state: State, counts: Sequence[int]) -> State | None:
-    """Search again without so many samples at the begin of each record; None where no more is left out."""
+    """Search again without so many samples at the beginning of each record; None where none can go."""
     records, notes = list(state.question.records), []
     for k, (count, even) in enumerate(zip(counts, state.problem.records, strict=True)):
         weight = records[k].sample_weight.copy()

@@ -1,4 +1,4 @@
-"""Joint fit: the best candidates are refitted together with the weights.
+"""Joint fit: the best of the significant candidates are refitted together with the weights.
 
 The weights have swallowed most of any effect, so that its fit to their residual comes out too small. The
 best three candidates are therefore fitted jointly: parameters of all causes and all weights at once. One

@@ -1,10 +1,10 @@
 """Intervals: how sure the parameters are.
 
 The spread of each parameter is the larger of two: of joint refits, linearised, on redrawn noise, and of
-leaving out a tenth of the record after another. To it come the error of the levels, as if a fifth of it were
-in line with the parameter; a fifth of a sample step, since input and output are not read at one moment; and
-what other formulas would give that are as plausible as the library's. What equal loops show has the interval
-of those loops.
+leaving out each tenth of the record in turn. Added to it are the error of the levels, as if a fifth of it
+were in line with the parameter; a fifth of a sample step, since input and output are not read at one moment;
+and what other formulas would give that are as plausible as the library's. What equal loops show has the
+interval of those loops.
 """
 
 from __future__ import annotations

@@ -6,17 +6,21 @@ between two samples, is named beside it. On a record of one single rate all caus
 the rate are named together: there they are just a wider loop. Causes that equal loops showed have no rivals
 here: equal loops differ by nothing else that is known.
 
-What speaks against a cause that was found is written beside it: it predicts blocks that were left out worse
-than the model without it, the interval of its strength (of a learned curve: of all its points) spans zero, a
-parameter or its interval ends where the search did, or its very strength sits there; it is a hum in step with
-the input, most of which the weights would hold; it is slow and what is left still wanders from one tenth of
-the time to the next, it is slow, belongs to the record, and all causes together take away less than half of
-what can be lowered on blocks that were left out (which a device of another kind leaves), only equal loops
-would show it and there are none, a gain that wears off with time, or with the way of the input, fits as well
-(of a step: whatever settles from the begin of the record on), or the record has one rate and no rest, where
-any cause looks like what a model lacks of the device, and it explains little more than what is left and slow,
-or that is more than noise. So may a cause of the device be that which ends where the search did and takes
-away less than it leaves.
+What speaks against a cause that was found is written beside it:
+
+- it predicts blocks that were left out worse than the model without it;
+- the interval of its strength (of a learned curve: of all its points) spans zero;
+- a parameter, its interval or the strength itself ends where the search did; a cause of the device that does
+  so also where it takes away less than it leaves;
+- it is a hum in step with the input, most of which the weights would hold;
+- it is slow, and what is left still wanders from one tenth of the time to the next;
+- it is slow and of the record, and all causes together take away less than half of what can be lowered on
+  blocks that were left out: a device of another kind leaves as much;
+- only equal loops would show it, and there are none;
+- a gain that wears off with time or with the way of the input fits as well; of a step: whatever settles from
+  the beginning of the record;
+- the record has one rate and no rest, where any cause looks like what a model lacks of the device, and the
+  cause explains little more than what is left and slow, or that is more than noise.
 """
 
 from __future__ import annotations

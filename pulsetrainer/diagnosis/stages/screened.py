@@ -3,8 +3,8 @@
 Each cause that is not in the model yet is tried at a few values, linearised: how far would the residual
 fall? The same is asked of noise that looks like the residual but holds no cause, drawn again and again, and
 of each draw the least likely score over the whole library counts. The p-value of a cause is the share of
-draws with one as unlikely, so that it holds for the search as a whole and not for one cause. A cause goes
-on with p of at most 0.01.
+draws with one as unlikely, so that it holds for the search as a whole and not for one cause. Causes with p of
+at most 0.01 go on to the joint fit.
 
 From the same null follows how small an effect of each cause would have shown: large enough that the test
 finds it in nine of ten records, that what the weights leave of it matters, and that neither is undone by what
