@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pulsetrainer.diagnosis.causes.base import Cause
@@ -19,6 +20,11 @@ class Estimate:
     unit: str
     lower: float
     upper: float
+
+
+def may_be_nothing(strengths: Sequence[Estimate]) -> bool:
+    """Tell whether the intervals of all strengths of a cause span zero."""
+    return bool(strengths) and all(one.lower <= 0 <= one.upper for one in strengths)
 
 
 @dataclass(frozen=True)

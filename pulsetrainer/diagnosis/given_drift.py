@@ -7,7 +7,7 @@ off, a drift of the zero is therefore fitted to what the given weights leave, wh
     y - M(u) - d(u) = b + drift(t)
 
 with d what other causes add, if the model as given is nearer with them. It counts where with it, and no
-shift b, that model is near, and nearer than with another gain and zero.
+shift b, that model is near, and nearer than with another gain and zero, and its interval does not span zero.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from pulsetrainer.diagnosis.causes.condition_change import Change, is_near, left
 from pulsetrainer.diagnosis.causes.offset_drift import OffsetDrift
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term, in_order
-from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, weights_for
 from pulsetrainer.diagnosis.judged import Judged, added
 from pulsetrainer.diagnosis.state import State
@@ -77,6 +77,8 @@ def told(state: State, judged: Judged, changed: Change, noise_rms: float) -> tup
         held_out_gain_percent=float("nan"),
         seen=Evidence("against given", OffsetDrift.id, {"moved": judged.polarity * most, "left": near}),
     )
+    if may_be_nothing(finding.cause.strengths_of(finding.parameters)):
+        return None
     terms = in_order((*others, Term(drift.cause, drift.values)))
     return finding, weights_for(state.problem, terms, state.current)
 

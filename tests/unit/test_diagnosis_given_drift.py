@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 import pulsetrainer as pt
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.diagnosis import given_drift
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.offset_drift import OffsetDrift
 from pulsetrainer.diagnosis.given_drift import drift_in
@@ -97,3 +99,22 @@ def test_the_curve_is_that_of_the_cause():
     plain = OffsetDrift()
     tiny = plain.relaxing.on_output(y, (0.1, 0.02, 2e-5 / LENGTH_S), FRAME)
     np.testing.assert_allclose(tiny, plain.on_output(y, (0.1, 0.02), FRAME), atol=1e-3)
+
+
+@pytest.mark.parametrize(("error", "is_told"), [(0.004, True), (0.006, False)])
+def test_a_drift_that_may_be_nothing_is_not_told(monkeypatch, error, is_told):
+    """Of a solenoid with nothing hidden one was, and what was taken out made its model worse by a third."""
+    cause = OffsetDrift()
+    drift = given_drift.Drifted(cause, (0.01, 0.0), (error, 0.001))
+    said = np.zeros(N)
+    monkeypatch.setattr(given_drift, "_with_drift", lambda *_: (drift, said, said))
+    monkeypatch.setattr(given_drift, "left_by", lambda *_: 0.1)
+    monkeypatch.setattr(given_drift, "is_near", lambda *_: True)
+    monkeypatch.setattr(given_drift, "weights_for", lambda *_: "weights")
+    state = SimpleNamespace(
+        question=SimpleNamespace(timed=True, quick=False), findings=(), current=SimpleNamespace(terms=()),
+        problem=SimpleNamespace(frames=[FRAME]), scale=SimpleNamespace(estimate=lambda one: one),
+    )  # fmt: skip
+    judged = SimpleNamespace(measured=said, predicted=said, polarity=1)
+    told = given_drift.told(state, judged, SimpleNamespace(left=1.0), 0.1)
+    assert (told is not None) is is_told

@@ -1530,6 +1530,23 @@ def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, la
     assert fewer.repeated_estimates["creep"] == (again if at_rest else known[:1])
 
 
+@pytest.mark.parametrize(("cosine", "in_doubt"), [((-0.1, 0.3), True), ((0.01, 0.3), False)])
+def test_what_both_fits_leave_room_for_nothing_of_is_in_doubt(cosine, in_doubt):
+    """One fit alone had a strength whose interval does not span zero."""
+    first = (
+        Estimate("sine", 0.2, "1", 0.1, 0.3), Estimate("cosine", 0.2, "1", 0.1, 0.3),
+        Estimate("frequency", 5.0, "Hz", 4.9, 5.1),
+    )  # fmt: skip
+    second = tuple(
+        replace(one, lower=low, upper=high)
+        for one, (low, high) in zip(first, [(-0.1, 0.25), cosine, (4.8, 5.0)], strict=True)
+    )
+    finding = Finding(library()["periodic"], found=True, parameters=first)
+    told = begin._told_by_both(finding, second)
+    assert told.doubts == ((rivals.MAY_BE_NOTHING,) if in_doubt else ())
+    assert begin._told_by_both(told, second) == told  # it is said once
+
+
 @pytest.mark.parametrize(("after", "better"), [(9.81, True), (9.82, False), (10.01, False)])
 def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, better):
     """By three fifths of the 6 that its causes gain in the search: else nothing is added, and it is said."""

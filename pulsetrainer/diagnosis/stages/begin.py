@@ -6,7 +6,8 @@ it begins from rest. So the causes that repeat are refitted without it. That is 
 relevantly larger error, or a smaller one, begin and all, after the first fifth of each record; else something
 was going on before the records, and the beginning stays free.
 
-Both fits are of the same records, so the interval of a parameter holds what either of them says.
+Both fits are of the same records, so the interval of a parameter holds what either of them says. Where it
+comes to span zero for all strengths of a cause, that cause is in doubt, as any other of which that is so.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from pulsetrainer.diagnosis.finding import Estimate
+from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.intervals import estimates_of
+from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
 
@@ -36,11 +38,18 @@ def stage(state: State) -> State:
     known = estimates_of(kept, state.scores, state.held_out, state.floor)
     told = {name: tuple(state.scale.estimate(one) for one in rows) for name, rows in known.items()}
     told = {**told, **state.by_contrast}
-    findings = tuple(
-        replace(one, parameters=_hull(one.parameters, told.get(one.cause.id, ()))) for one in state.findings
-    )
+    findings = tuple(_told_by_both(one, told.get(one.cause.id, ())) for one in state.findings)
     told = {name: _hull(rows, state.estimates.get(name, ())) for name, rows in told.items()}
     return replace(state, repeated=kept, repeated_estimates=told, findings=findings)
+
+
+def _told_by_both(found: Finding, others: tuple[Estimate, ...]) -> Finding:
+    """Return what was found with the intervals of both fits, in doubt where they leave room for nothing."""
+    both = replace(found, parameters=_hull(found.parameters, others))
+    strengths = both.cause.strengths_of(both.parameters) if found.found else ()
+    if not may_be_nothing(strengths) or MAY_BE_NOTHING in found.doubts:
+        return both
+    return replace(both, doubts=(*both.doubts, MAY_BE_NOTHING))
 
 
 def _hull(rows: tuple[Estimate, ...], others: tuple[Estimate, ...]) -> tuple[Estimate, ...]:

@@ -36,7 +36,7 @@ from pulsetrainer.diagnosis.causes.base import Cause, Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
-from pulsetrainer.diagnosis.finding import Estimate, Finding
+from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import refit
 from pulsetrainer.diagnosis.screening import both_late, in_place, ranked
 from pulsetrainer.diagnosis.state import State
@@ -84,8 +84,7 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         yield NO_LOOPS
     if cause.drifts:
         yield from _of_a_drift(state, term, fall)
-    strengths = cause.strengths_of(known)
-    nothing = bool(strengths) and all(one.lower <= 0 <= one.upper for one in strengths)
+    nothing = may_be_nothing(cause.strengths_of(known))
     if nothing:
         yield MAY_BE_NOTHING
     if _is_in_step(state, term, fall):
