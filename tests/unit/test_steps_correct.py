@@ -15,7 +15,7 @@ from pulsetrainer.core.coarse import between_steps
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
-from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes import base, library
 from pulsetrainer.errors import DataError
 from wording import raises
 
@@ -39,6 +39,12 @@ def clean() -> pt.Run:
     )
     y = _plant()(u) + 0.002 * SPAN * np.random.default_rng(1).standard_normal(u.size)
     return pt.Run(time_s=np.arange(u.size) / RATE_HZ, input=u, output=y, input_unit="A", output_unit="N")
+
+
+@pytest.fixture
+def few_levels(monkeypatch):
+    """As many levels of the hysteresis that tells what lies beyond a rail as the test's plant needs."""
+    monkeypatch.setattr(base, "_LEVELS", 24)
 
 
 def _diagnosis(
@@ -93,7 +99,7 @@ def test_a_hum_sought_in_averages_keeps_its_phase(clean):
     np.testing.assert_allclose(done.output, clean.output, atol=1e-9)
 
 
-def test_wild_and_clipped_samples_are_masked_and_no_fit_counts_them(clean):
+def test_wild_and_clipped_samples_are_masked_and_no_fit_counts_them(clean, few_levels):
     """Every one of them, and the model of the corrected run does not depend on what they were."""
     bad = np.arange(50, 6000, 97)
     wild = clean.output.copy()
@@ -127,7 +133,7 @@ def _assert_told_or_masked(done: pt.Run, clean: pt.Run, rail: float) -> None:
     assert np.abs(done.output - true)[told].max() < 4.0 * noise
 
 
-def test_an_output_cut_off_at_both_ends(clean):
+def test_an_output_cut_off_at_both_ends(clean, few_levels):
     """The model is as good as that of the record without the fault, where the record tells."""
     polarity = -1
     ends = np.quantile(clean.output, (0.1, 0.85))
@@ -142,7 +148,7 @@ def test_an_output_cut_off_at_both_ends(clean):
     assert before - after > 0.9 * (before - least)
 
 
-def test_where_no_hysteresis_describes_the_record_nothing_is_told_beyond_a_rail(clean):
+def test_where_no_hysteresis_describes_the_record_nothing_is_told_beyond_a_rail(clean, few_levels):
     """All samples at the rail are masked, and those near it: there only low noise is left."""
     wanders = clean.output + 0.05 * SPAN * np.sin(0.01 * np.arange(clean.input.size))
     rail = float(np.quantile(wanders, 0.85))
@@ -153,7 +159,7 @@ def test_where_no_hysteresis_describes_the_record_nothing_is_told_beyond_a_rail(
     np.testing.assert_array_equal(done.output[~done.masked], cut.output[~done.masked])
 
 
-def test_clipped_samples_are_masked_where_wild_ones_lie_beyond_them(clean):
+def test_clipped_samples_are_masked_where_wild_ones_lie_beyond_them(clean, few_levels):
     """A wild sample above the rail does not hide it."""
     rail, bad = 0.75 * SPAN, np.arange(50, 6000, 97)
     output = np.round(np.minimum(clean.output, rail), 3)
