@@ -12,6 +12,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperOption
 
+from pulsetrainer.cli.help_text import HelpContext
 from pulsetrainer.cli.next_step import next_step, to_make, with_files
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError
 from pulsetrainer.files.input_file import is_sound, near_names
@@ -49,6 +50,8 @@ _NEAR = 0.7  # how alike a name must be to be taken for the one that was meant
 
 class Command(TyperCommand):
     """A command that names the argument of a file, and says what there is after Ctrl-C."""
+
+    context_class = HelpContext
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse; UsageError where an option of one file was given twice: the first would be lost."""
