@@ -65,9 +65,10 @@ def compare(
     rows = []
     for m in metrics:
         owner, named = names.split(m.name)
-        change = "-" if m.change is None else f"{round(m.change, 2):+.2f}" if round(m.change, 2) else "0.00"
+        values, by = [names.told(m.name, v) for v in m.values], names.told(m.name, m.change)
+        change = "-" if by is None else f"{round(by, 2):+.2f}" if round(by, 2) else "0.00"
         last = [change] * len(differ) if learners else [change, words[m.better]]
-        rows.append([f"{owner.removeprefix('session.')}: {named.words}", named.unit, *m.values, *last])
+        rows.append([f"{owner.removeprefix('session.')}: {named.words}", named.unit, *values, *last])
     head = ["", "unit", *labels, *(differ if learners else ["change", ""])]
     job.screen.table(f"{len(labels)} {loaded[0].kind}s side by side", head, rows)
     if not learners:

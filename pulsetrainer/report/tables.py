@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import isnan
 from typing import Any
 
-from pulsetrainer.report.names import NAMES, digits, split
+from pulsetrainer.report.names import NAMES, digits, split, told
 
 ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
 _BROAD = 10_000  # as wide as the table needs: figures are never cut
@@ -99,7 +99,7 @@ def rendered(part: Facts | Table, width: int | None = None) -> str:
             indents = ((line[: -len(said)], said) for line, said in words)
             lines = "\n".join(folded(lead, said, width, len(lead) + 2) for lead, said in indents) + "\n"
         return lines
-    named = [(label(name), text(value)) for name, value in part.rows.items()]
+    named = [(label(name), text(told(name, value))) for name, value in part.rows.items()]
     longest = max((len(name) for name, _ in named), default=0)
     if width is not None and 2 * longest + 8 > width:  # no room beside the names: below them
         rows = [folded(*one, width) for name, value in named for one in (("  ", name), ("    ", value))]
