@@ -152,7 +152,9 @@ MESSAGES = {
     # --- device ------------------------------------------------------------------------------------------
     "no such port": Message("no port", "pulsetrainer ports", "{port}"),
     "no such emulator": Message("{said}", "{hint}"),
-    "no emulator": Message("{missing}", "{packages}"),
+    "no emulator": Message(
+        "not found", "{packages}`; or simulate without them: `--port bench:`", "qemu:", "needs {missing}"
+    ),
     "does not compile": Message("does not compile", "", got="error"),
     "no cache": Message("cannot write the firmware cache", "", "{folder}"),
     "refused by number": Message("", "", got="{code}", expected="{fault}"),

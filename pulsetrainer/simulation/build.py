@@ -100,14 +100,30 @@ def firmware_image() -> Path:
 
 
 def find_arm_compiler() -> list[str]:
-    """Return the command of a C compiler for the Cortex-M4F, as ``find_compiler``."""
+    """Return the command of a C compiler for the Cortex-M4F; DeviceError where there is none."""
     if shutil.which("arm-none-eabi-gcc"):
         return ["arm-none-eabi-gcc", *_CORTEX_M4F]
     if importlib.util.find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", "cc", *_ZIG_CORTEX_M4F]
-    raise DeviceError(
-        "the emulated device needs a C compiler for Arm once, and arm-none-eabi-gcc is not there",
-        hint=f"install compiler and emulator: `sudo apt install {DEBIAN_PACKAGES}`",
+    raise _not_installed("arm-none-eabi-gcc")
+
+
+def find_emulator() -> str:
+    """Return the path of the emulator; DeviceError where it, or the compiler that it needs, is missing."""
+    program = shutil.which("qemu-system-arm")
+    try:
+        find_arm_compiler()
+    except DeviceError as error:
+        raise error if program else _not_installed("qemu-system-arm and arm-none-eabi-gcc") from error
+    if program is None:
+        raise _not_installed("qemu-system-arm")
+    return program
+
+
+def _not_installed(programs: str) -> DeviceError:
+    return DeviceError(
+        f"the emulated device (qemu:) needs {programs}, not found on this computer",
+        hint=f"install: `sudo apt install {DEBIAN_PACKAGES}`; or simulate without them: `--port bench:`",
     )
 
 
