@@ -55,7 +55,11 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse; UsageError where an option of one file was given twice: the first would be lost."""
-        _, _, order = self.make_parser(ctx).parse_args(list(args))
+        try:
+            _, _, order = self.make_parser(ctx).parse_args(list(args))
+        except Exception as error:
+            setattr(error, "ctx", ctx)  # noqa: B010 - of a value that is missing the parser does not tell where
+            raise
         options = [one for one in order if isinstance(one, TyperOption) and not one.multiple]
         for name, times in Counter(one.opts[-1] for one in options if one.type.name == "path").items():
             if times > 1:
