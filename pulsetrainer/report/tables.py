@@ -44,6 +44,8 @@ def folded(lead: str, text: str, width: int | None, indent: int | None = None) -
         return lead + text
     if indent is None:
         indent = len(lead) if width - len(lead) >= _NARROWEST else 4
+        if len(lead) + len(text.partition(" ")[0]) > width:  # the lead is the first words of the text
+            text, lead = " ".join([*lead.split(), text]), lead[: -len(lead.lstrip()) or None]
     return textwrap.fill(
         text,
         width,
