@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import hashlib
 import importlib.util
 import os
@@ -127,24 +129,41 @@ def _not_installed(programs: str) -> DeviceError:
     )
 
 
+def _place_in(folder: Path) -> str:
+    """Return a new file in a folder, which is made if need be."""
+    folder.mkdir(parents=True, exist_ok=True)
+    handle, path = tempfile.mkstemp(prefix="build-", dir=folder)
+    os.close(handle)
+    return path
+
+
+@functools.cache
+def _folder_of_this_process(why: str) -> Path:
+    """Return a folder that goes with this process: each compiles anew; DeviceError where there is none."""
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="pulsetrainer-"))
+    except OSError as error:
+        raise DeviceError(why, hint="set XDG_CACHE_HOME to a writable folder") from error
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
 def _compiled(image: _Image) -> Path:
     """Return the image's file in the cache, compiled now unless it is there."""
     root = firmware_dir()
     digest = _digest(root, image)
     folder = Path(user_cache_dir("pulsetrainer")) / "firmware"
-    target = folder / f"{image.port}-{digest[:20]}"
-    if target.exists():
-        return target
+    name = f"{image.port}-{digest[:20]}"
+    if (folder / name).exists():
+        return folder / name
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         # Compiled beside its place and moved there: another process sees nothing or the whole.
-        handle, temporary = tempfile.mkstemp(prefix="build-", dir=folder)
-    except OSError as error:
-        raise DeviceError(
-            f"cannot write the firmware cache {folder}: {error}",
-            hint="set XDG_CACHE_HOME to a writable folder",
-        ) from error
-    os.close(handle)
+        temporary = _place_in(folder)
+    except OSError as error:  # a home that may only be read
+        folder = _folder_of_this_process(f"cannot write the firmware cache {folder}: {error}")
+        if (folder / name).exists():
+            return folder / name
+        temporary = _place_in(folder)
     words = [*image.command, f"-DPT_BUILD_HASH=0x{digest[:8]}u", *(f"-I{root / i}" for i in image.folders)]
     words += [*(str(p) for p in image.sources(root)), *image.libraries, "-o", temporary]
     try:
@@ -156,7 +175,7 @@ def _compiled(image: _Image) -> Path:
                 hint=image.remedy,
             )
         Path(temporary).chmod(0o755)
-        Path(temporary).replace(target)
+        Path(temporary).replace(folder / name)
     finally:
         Path(temporary).unlink(missing_ok=True)
-    return target
+    return folder / name
