@@ -15,6 +15,9 @@ PULSES   := normal bifid
 METHODS  := paper continuous extended
 PLAYED   := $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(D)/played-$(p)-$(m).h5))
 
+# What breaks off while it is recorded is kept, as the program says, but under a name that is no target: make
+# would delete it, or take it for whole.
+RECORDING = $(@:.h5=-recording.h5)
 .DELETE_ON_ERROR:
 .SECONDARY:
 .PHONY: install demo ideal test test-slow lint faults bench mutate blind docs site bounds firmware-mps2 firmware-cost clean help
@@ -48,7 +51,7 @@ $(D):
 	mkdir -p $@
 
 $(D)/run.h5: $(FIRMWARE) pulsetrainer/core/excitations.py | $(VENV)/installed $(D)
-	$(PT) capture identification --port '$(PORT)' -o $@ --overwrite
+	$(PT) capture identification --port '$(PORT)' -o $(RECORDING) --overwrite && mv $(RECORDING) $@
 
 # the paper: relays, closest match, spline; ours: continuous reading, exact inverse
 $(D)/model-paper.h5: $(D)/run.h5 $(CORE)
@@ -58,20 +61,20 @@ $(D)/model-continuous.h5: $(D)/run.h5 $(CORE)
 
 # the second act: the same device, not told what it hides, on a signal that tells causes apart
 $(D)/diagnostic.h5: $(FIRMWARE) pulsetrainer/core/excitations.py | $(VENV)/installed $(D)
-	$(PT) capture diagnostic --port '$(PORT)' -o $@ --overwrite
+	$(PT) capture diagnostic --port '$(PORT)' -o $(RECORDING) --overwrite && mv $(RECORDING) $@
 $(D)/diagnosis.h5 $(D)/diagnosis.html &: $(D)/diagnostic.h5 $(D)/model-continuous.h5 $(DIAGNOSE)
 	$(PT) diagnose $< --model $(D)/model-continuous.h5 -o $(D)/diagnosis.h5 --html $(D)/diagnosis.html --overwrite
 $(D)/model-extended.h5: $(D)/diagnosis.h5 $(D)/model-continuous.h5
 	$(PT) extend $< --model $(D)/model-continuous.h5 -o $@ --overwrite
 # a run that neither model was fitted to, at the rate of a pulse
 $(D)/unseen.h5: $(FIRMWARE) pulsetrainer/core/excitations.py | $(VENV)/installed $(D)
-	$(PT) capture identification --speed 6 --port '$(PORT)' -o $@ --overwrite
+	$(PT) capture identification --speed 6 --port '$(PORT)' -o $(RECORDING) --overwrite && mv $(RECORDING) $@
 
 define PULSE_RULES
 $(D)/drive-$(1)-$(2).h5: $(D)/model-$(2).h5 waveforms/$(1).csv pulsetrainer/steps/invert.py
 	$(PT) invert $(1) --model $$< -o $$@ --overwrite
 $(D)/played-$(1)-$(2).h5: $(D)/drive-$(1)-$(2).h5 $(FIRMWARE)
-	$(PT) play $$< --port '$(PORT)' -o $$@ --overwrite
+	$(PT) play $$< --port '$(PORT)' -o $$(RECORDING) --overwrite && mv $$(RECORDING) $$@
 endef
 $(foreach m,$(METHODS),$(foreach p,$(PULSES),$(eval $(call PULSE_RULES,$(p),$(m)))))
 

@@ -42,7 +42,8 @@ def gather() -> None:
         copy = SITE / file.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         if file.suffix == ".ipynb":  # its links to others: there they are pages
-            copy.write_text(file.read_text(encoding="utf-8").replace(".ipynb)", ".html)"), encoding="utf-8")
+            text = file.read_text(encoding="utf-8")
+            copy.write_text(re.sub(r"(\]\([^):]+)\.(?:ipynb|md)\)", r"\1.html)", text), encoding="utf-8")
         else:
             shutil.copyfile(file, copy)
     (SITE / "docs" / "api.md").write_text(api(), encoding="utf-8")

@@ -138,12 +138,10 @@ def _compiler() -> Iterator[Finding]:
 
 
 def _emulator() -> Iterator[Finding]:
-    missing = [p for p in ("qemu-system-arm", "arm-none-eabi-gcc") if not shutil.which(p)]
-    if missing:
-        said = f"{' and '.join(missing)} not found; only --port qemu: needs it"
-        yield _finding("emulator", said, warning=f"sudo apt install {build.DEBIAN_PACKAGES}")
-    else:
-        yield _finding("emulator", str(shutil.which("qemu-system-arm")))
+    try:
+        yield _finding("emulator", build.find_emulator())
+    except PulsetrainerError as error:
+        yield _finding("emulator", error.message, warning=error.hint)
 
 
 def _folder() -> Iterator[Finding]:

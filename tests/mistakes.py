@@ -159,11 +159,28 @@ _WORDS_OF_A_TIRED_HAND = {
         *("play normal -o out.h5", 3, "normal (argument ", "pulsetrainer invert normal"),
     ),
     "two pulses": (
-        *("invert normal bifid --model model.h5 -o out.h5", 2, "got bifid as well", "run it once for each"),
+        *(
+            "invert normal bifid --model model.h5 -o out.h5",
+            2,
+            "takes WAVEFORM only, got bifid",
+            "run it once for each",
+        ),
     ),
     "a file that a look at the device does not take": ("doctor run.h5", 2, "got run.h5", "pulsetrainer show"),
-    "a table that is absent": ("import absent.csv -o out.h5", 2, "absent.csv does not exist", "file here"),
-    "a folder of nothing": ("identify bare -o out.h5", 3, "bare is a folder", "name another"),
+    "a table that is absent": (
+        "import absent.csv -o out.h5",
+        2,
+        "absent.csv does not exist",
+        "give its path",
+    ),
+    "json before the command": (
+        *("--json show run.h5", 2, "pulsetrainer has no option --json", "behind the command"),
+    ),
+    "an output without its name": ("identify run.h5 -o", 2, "-o needs a value: file to write", "behind -o"),
+    "an option in the place of a name": (
+        *("capture identification -o --json", 2, "--json stands where the name of a file", "then --json"),
+    ),
+    "a folder of nothing": ("identify bare -o out.h5", 3, "bare is a folder", "bare holds none"),
     "a folder as a page": ("evaluate played.h5 --html bare", 2, "bare is a folder", "name a file in it"),
     "one run twice": ("identify run.h5 run.h5 -o out.h5", 2, "run.h5 is named twice", "each file once"),
     "a quiz of one pulse": (
@@ -225,7 +242,12 @@ _WORDS_OF_A_TIRED_HAND = {
         *("evaluate played.h5 --bounds round.toml", 2, "got [98, 90]", "percent = [90.0, 98.0]"),
     ),
     "a bound of one number": (
-        *("evaluate played.h5 --bounds one.toml", 2, "a pair [low, high], got 90", "lowest and the highest"),
+        *(
+            "evaluate played.h5 --bounds one.toml",
+            2,
+            "a pair [low, high], got 90",
+            "= [81.0, 99.0], the lowest",
+        ),
     ),
     "a bound of a pulse": (
         *(
@@ -257,6 +279,7 @@ PREPARATION = (
     ("identify", "run.h5", "--levels", "12", "-o", "model.h5"),
     ("invert", "normal", "--model", "model.h5", "-o", "drive.h5", "--periods", "1"),
     ("play", "drive.h5", "-o", "played.h5", "--repeats", "1"),
+    ("session", "--model", "model.h5", "--beats", "2", "-o", "session.h5"),
 )
 TABLES = {
     "empty.csv": "",
@@ -289,6 +312,13 @@ INSIDE = {
     ),
     "a table that is empty": Mistake(
         ("import", "empty.csv", "-o", "out.h5"), 2, "empty.csv is empty", "export"
+    ),
+    "a session and a playback": Mistake(
+        ("evaluate", "session.h5", "played.h5"), 2, "got 1 playback, 1 session", "one session at a time"
+    ),
+    "a session, a run and a model": Mistake(
+        *(("evaluate", "run.h5", "session.h5", "--model", "model.h5"), 2),
+        *("got 1 run, 1 session, 1 model", "one session at a time"),
     ),
     "a run without a model": Mistake(("evaluate", "run.h5"), 2),
     "a model without its option": Mistake(
@@ -350,7 +380,7 @@ INSIDE = {
     ),
     "too many levels for the coil": Mistake(
         ("capture", "identification", "-o", "out.h5", "--levels", "2000"),
-        *(3, "heats the coil", "fewer --levels"),
+        *(3, "heats even a cold coil to 108 % of", "fewer --levels"),
     ),
     "a pulse whose time stands still": Mistake(
         ("invert", "still.csv", "--model", "model.h5", "-o", "out.h5"), 3, "line 4", "with more digits\n"

@@ -97,7 +97,7 @@ MESSAGES = {
     "too fast": Message("from one sample to the next", "speed", expected="1.5", got="1e+297"),
     "longer than the device plays": Message("the device stays on", "{next}", expected="900 s", got="{got} s"),
     "too many samples": Message(
-        "samples", "fewer", expected="more than {most}", got="{times} times {samples}"
+        "samples", "at most", expected="more than {most}", got="{times} times {samples}"
     ),
     "not a smoothing": Message(
         "--smoothing", "--smoothing auto", expected="a number from 0 to 1", got="'{got}'"
@@ -152,12 +152,14 @@ MESSAGES = {
     # --- device ------------------------------------------------------------------------------------------
     "no such port": Message("no port", "pulsetrainer ports", "{port}"),
     "no such emulator": Message("{said}", "{hint}"),
-    "no emulator": Message("{missing}", "{packages}"),
+    "no emulator": Message(
+        "not found", "{packages}`; or simulate without them: `--port bench:`", "qemu:", "needs {missing}"
+    ),
     "does not compile": Message("does not compile", "", got="error"),
     "no cache": Message("cannot write the firmware cache", "", "{folder}"),
     "refused by number": Message("", "", got="{code}", expected="{fault}"),
     "too hot now": Message("too hot", "wait", got="% of its limit"),
-    "too hot ever": Message("however cold", ""),
+    "too hot ever": Message("even a cold coil", "lower current", got=" % of the heat that it bears"),
     "another shape": Message("shape", ""),
     "stray current": Message("current flows although the reference is zero", ""),
     "current flows on": Message("still flow", "plug", got="{amperes}"),

@@ -25,12 +25,17 @@ class Shown:
         return str(_report("text").title(self))
 
     def _repr_html_(self) -> str:
-        return str(_report("notebook").html(self))
+        return str(_notebook().html(self))
 
     def plot(self) -> Axes:
         """Draw the artefact and return the first axes of its figure; ``axes.figure`` is the whole."""
-        axes: Axes = _report("notebook").plot(self)
+        axes: Axes = _notebook().plot(self)
         return axes
+
+
+def _notebook() -> Any:
+    _report("any_backend")  # before matplotlib is loaded
+    return _report("notebook")
 
 
 def _report(name: str) -> Any:

@@ -11,6 +11,7 @@ import typer
 from typer import Option
 
 from pulsetrainer.cli import guard, settings
+from pulsetrainer.cli.help_text import Program
 from pulsetrainer.cli.naming import Command
 from pulsetrainer.files import settings as setting_files
 from pulsetrainer.version import __version__
@@ -18,6 +19,7 @@ from pulsetrainer.version import __version__
 # Plain help: drawing it with rich would cost a third of the time until it shows.
 app = typer.Typer(
     name="pulsetrainer",
+    cls=Program,
     help="Make a hysteretic solenoid press a true arterial pulse: capture, identify, invert, play, evaluate.",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},

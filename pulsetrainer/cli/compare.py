@@ -36,9 +36,8 @@ def compare(
     form = figure_format(out, "a comparison", "csv") if out is not None else ""
     job = Job(context, inputs=evaluations, outputs=(out,))
     from pulsetrainer.files import store
-    from pulsetrainer.report import names
-    from pulsetrainer.report.results import as_csv, labels_of
-    from pulsetrainer.steps.compare import differing_quizzes
+    from pulsetrainer.report.results import as_csv, labels_of, side_by_side
+    from pulsetrainer.steps.compare import differing_quizzes, differing_units
 
     labels = labels_of(evaluations)
     with job.working("comparing"):
@@ -53,7 +52,8 @@ def compare(
 
             job.write(out, render.encode(comparison_figure.draw(labels, values), form))
     job.alike(evaluations)
-    job.notes(differing_quizzes(loaded, list(map(str, evaluations))))
+    given = list(map(str, evaluations))
+    job.notes([*differing_quizzes(loaded, given), *differing_units(loaded, given)])
     sources = [
         {"file": path, **picked(header, "title", "created")}
         for path, header in zip(evaluations, headers, strict=True)
@@ -61,13 +61,7 @@ def compare(
     job.screen.result({"evaluations": sources, "metrics": plain(metrics), "output": out})
     learners = isinstance(loaded[0], pt.Session)
     differ = ["difference"] if learners and len(loaded) == 2 else []  # of a class it would say nothing
-    words = {True: "better", False: "worse", None: ""}
-    rows = []
-    for m in metrics:
-        owner, named = names.split(m.name)
-        change = "-" if m.change is None else f"{round(m.change, 2):+.2f}" if round(m.change, 2) else "0.00"
-        last = [change] * len(differ) if learners else [change, words[m.better]]
-        rows.append([f"{owner.removeprefix('session.')}: {named.words}", named.unit, *m.values, *last])
+    rows = side_by_side(metrics, verdicts=not learners, change=bool(differ) or not learners)
     head = ["", "unit", *labels, *(differ if learners else ["change", ""])]
     job.screen.table(f"{len(labels)} {loaded[0].kind}s side by side", head, rows)
     if not learners:

@@ -54,7 +54,7 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
         if type(error).__name__ == "NoArgsIsHelpError":  # a bare command is not wrong: this is its help
             sys.stdout.write(f"{error}\n")
             return UsageError.exit_code
-        problem = usage_of(error, _command_in(words), words) or _problem_of(error)
+        problem = usage_of(error, words) or _problem_of(error)
         _trace(debug)
     else:
         return int(code or 0)

@@ -12,6 +12,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperOption
 
+from pulsetrainer.cli.help_text import HelpContext
 from pulsetrainer.cli.next_step import next_step, to_make, with_files
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError
 from pulsetrainer.files.input_file import is_sound, near_names
@@ -50,9 +51,15 @@ _NEAR = 0.7  # how alike a name must be to be taken for the one that was meant
 class Command(TyperCommand):
     """A command that names the argument of a file, and says what there is after Ctrl-C."""
 
+    context_class = HelpContext
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse; UsageError where an option of one file was given twice: the first would be lost."""
-        _, _, order = self.make_parser(ctx).parse_args(list(args))
+        try:
+            _, _, order = self.make_parser(ctx).parse_args(list(args))
+        except Exception as error:
+            setattr(error, "ctx", ctx)  # noqa: B010 - of a value that is missing the parser does not tell where
+            raise
         options = [one for one in order if isinstance(one, TyperOption) and not one.multiple]
         for name, times in Counter(one.opts[-1] for one in options if one.type.name == "path").items():
             if times > 1:

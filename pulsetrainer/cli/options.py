@@ -50,7 +50,8 @@ Port = Annotated[
     str | None,
     Option(
         "--port",
-        help="bench: (default), bench:?seed=3, qemu:, /dev/ttyUSB0, COM3 or socket://host:port.",
+        help="bench: (simulated, the default), bench:?seed=3, qemu: (emulated; needs qemu-system-arm), "
+        "/dev/ttyUSB0, COM3 or socket://host:port.",
         envvar="PULSETRAINER_PORT",
     ),
 ]

@@ -35,11 +35,8 @@ _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
 _NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*([^\d\s.,]*)'$")
 
 
-def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> UsageError | None:
-    """Return what the parser objects to, or None when the error is not the parser's.
-
-    ``named`` is the command, which the parser does not always tell, and ``words`` is what was typed.
-    """
+def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
+    """Return what the parser objects to in the ``words`` that were typed; None where it is not the parser."""
     explain = getattr(error, "format_message", None)
     if explain is None:
         return None
@@ -54,6 +51,8 @@ def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> Us
         if given == "--settings":
             behind = command.removeprefix("pulsetrainer")
             hint = f"it stands before the command: pulsetrainer --settings FILE{behind}"
+        elif given == "--json" and command == "pulsetrainer":
+            hint = "it stands behind the command: pulsetrainer show FILE.h5 --json"
         return UsageError(f"{command} has no option {given}", hint=hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
@@ -64,7 +63,7 @@ def usage_of(error: Exception, named: str = "", words: Sequence[str] = ()) -> Us
         said = f"{option} {str(getattr(error, 'message', error)).rstrip('.')}"
         return UsageError(said, hint=_EXAMPLES.get(option, help_))
     return (
-        _with_or_without_value(error, named)
+        _with_or_without_value(error, context, help_)
         if kind == "BadOptionUsage"
         else _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
     )
@@ -128,13 +127,14 @@ def _missing(parameter: Any, context: Any, help_: str) -> UsageError:
     return UsageError(said, hint=like)
 
 
-def _with_or_without_value(error: Exception, command: str) -> UsageError:
-    """A value where none goes, or none where one does; the parser does not tell of which command."""
+def _with_or_without_value(error: Exception, context: Any, help_: str) -> UsageError:
+    """A value where none goes, or none where one does."""
     option = getattr(error, "option_name", "an option")
-    help_ = " ".join(("pulsetrainer", *filter(None, [command]), "--help"))
+    params = getattr(getattr(context, "command", None), "params", ())
     if "not take" in str(getattr(error, "message", "")):
         return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
-    return UsageError(f"{option} needs a value", hint=help_)
+    meaning = next((f": {_meaning(one)}" for one in params if option in one.opts), "")
+    return UsageError(f"{option} needs a value{meaning}", hint=f"write it behind {option}, or see {help_}")
 
 
 def _columns(table: Path) -> tuple[str, ...]:
@@ -172,7 +172,7 @@ def _other(said: str, command: str, parsed: Any) -> UsageError:
 
 def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     """What stands behind the arguments that a command takes."""
-    taken = [p.human_readable_name for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
+    taken = [_named(p) for p in getattr(parsed, "params", ()) if not p.opts[0].startswith("-")]
     name = command.rpartition(" ")[2]
     instead = _INSTEAD.get(name, "{command} --help")
     if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
@@ -188,7 +188,8 @@ def _named(parameter: Any) -> str:
     """Name of an option as it is typed, or of an argument as the help names it."""
     names = sorted((name for name in parameter.opts if name.startswith("-")), key=len)
     if not names:
-        return str(parameter.human_readable_name)
+        word = str(parameter.human_readable_name)
+        return word.upper() if word.islower() else word  # as in the help, where it is given no other
     return names[0] if len(names) == 1 else f"{names[0]} ({names[-1]})"
 
 

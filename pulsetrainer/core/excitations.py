@@ -40,7 +40,10 @@ def check_size(times: int, samples: float, most: int = MOST_SAMPLES) -> None:
     """Raise ArgumentError where so many ``samples`` so many ``times`` are more than ``most``."""
     if times > most or not times * samples <= most:  # either may be beyond every float
         raise ArgumentError(
-            f"{str(times)[:20]} times {samples:.6g} samples are more than {most:.0e}", hint="fewer of them"
+            f"{str(times)[:20]} times {samples:.6g} samples are more than {most:,}",
+            hint=f"at most {int(most // samples)} of them"
+            if 0 < samples <= most
+            else "give fewer, or shorter ones",
         )
 
 

@@ -153,7 +153,7 @@ class Rehearsal:
         current = codes.CURRENT_UNIT_A * wire.astype(float)
         waits_s = wait_s(self._heat, current, rate_Hz)
         if math.isinf(waits_s):
-            raise too_hot_ever()
+            raise too_hot_ever(current, rate_Hz)
         if waits_s > 0:
             raise DeviceError(
                 f"the coil would be too hot: at {100 * self._heat:.0f} % of its limit by then",
@@ -202,10 +202,11 @@ def less_current(than: str) -> str:
     )
 
 
-def too_hot_ever() -> ArgumentError:
-    """Return the refusal of what heats even a cold coil beyond its limit."""
+def too_hot_ever(current_A: FloatArray, rate_Hz: float) -> ArgumentError:
+    """Return the refusal of a current (n,) that heats even a cold coil beyond its limit."""
+    share = 100.0 * float(course(0.0, current_A, rate_Hz).max())
     return ArgumentError(
-        "this reference heats the coil beyond its limit, however cold it is at the start",
+        f"this reference heats even a cold coil to {math.ceil(share)} % of the heat that it bears",
         hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher `speed`), "
         "or at a lower current",
     )
@@ -219,7 +220,7 @@ def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed:
     """
     seconds = wait_s(heat, reference_A, rate_Hz)
     if math.isinf(seconds):
-        raise too_hot_ever()
+        raise too_hot_ever(reference_A, rate_Hz)
     if seconds > 0:
         raise DeviceError(
             f"the coil is too hot for this: it is at {100 * heat:.0f} % of its limit"

@@ -26,9 +26,11 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
             case _:
                 of, _, figure = name.rpartition(".")
                 usual = [0.5, 1.5]
-                with contextlib.suppress(TypeError, ValueError):  # the wrong way round, or in quotes
-                    low, high = sorted(map(float, pair))
-                    usual = [low, high]
+                with contextlib.suppress(TypeError, ValueError):  # the wrong way round, in quotes, or one
+                    low, high = sorted(
+                        map(float, pair if isinstance(pair, list) else (0.9 * pair, 1.1 * pair))
+                    )
+                    usual = [float(f"{low:.4g}"), float(f"{high:.4g}")]
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
                     hint=f"write {figure} = {usual}, the lowest and the highest" if of else _HOW,

@@ -41,7 +41,9 @@ def check_artefact(path: Path | str) -> None:
 def check_no_option(path: Path) -> None:
     """Raise UsageError for an option in the place of a file: the parser took it for a value."""
     if str(path).startswith("--"):
-        raise UsageError(f"{path} is an option, expected a file", hint="name the file before it")
+        raise UsageError(
+            f"{path} stands where the name of a file is expected", hint=f"name the file, then {path}"
+        )
 
 
 def is_journal(path: Path | str) -> bool:
@@ -76,7 +78,11 @@ def _files_in(folder: Path) -> str:
     """Return a hint with the first few files of a folder that was given in place of a file."""
     files = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
     offered = ", ".join(map(str, _offered(files)))
-    return f"name a file in it: {offered}" if offered else "name another: it holds no file that can be read"
+    return (
+        f"name a file in it: {offered}"
+        if offered
+        else f"give the path of a file; {folder} holds none that can be read"
+    )
 
 
 def _offered(files: Iterable[Path]) -> list[Path]:
@@ -94,7 +100,7 @@ def _names_in(folder: Path, path: Path) -> str:
     near = near or [name for name in names if name.endswith(path.suffix or ".h5")]
     offered = ", ".join(file.name for file in _offered(folder / name for name in near))
     where = "here" if folder == Path() else f"in {folder}"
-    return f"files {where}: {offered}" if offered else f"no file {where} has a similar name"
+    return f"files {where}: {offered}" if offered else f"no file {where} has a similar name: give its path"
 
 
 def near_names(path: Path, kinds: Sequence[str]) -> list[str]:

@@ -5,7 +5,7 @@ The names are those of docs/vocabulary.md; files and ``--json`` keep the keys.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 FORCE: Final = "% of full force"
 _ROUNDING: Final = 1e-6
@@ -43,8 +43,7 @@ NAMES: Final = {
     "fit_rms_percent": Named("rms error of the fit", "% of span"),
     "coverage_percent": Named("cells switched", "%"),
     # of a session
-    "nrmse": Named("rms error", "of the target's range"),
-    "nrmse_percent": Named("rms error", "% of the target's range"),
+    "nrmse": Named("rms error", "% of the target's range"),
     "error_jnd": Named("mean error", "just noticeable differences"),
     "beat_timing_max_ms": Named("max timing error", "ms"),
     "rate_cv_percent": Named("spread of the rate", "% of that asked for"),
@@ -64,6 +63,11 @@ OVERVIEW: Final = (
     "scaled.max_abs_error_percent", "compensated.max_abs_error_percent",
     "scaled.hysteresis_percent", "compensated.hysteresis_percent",
 )  # fmt: skip
+
+
+def told(name: str, value: Any) -> Any:
+    """Return a figure in the unit that a person reads: ``nrmse``, a share in files, is told in percent."""
+    return 100.0 * value if name.rpartition(".")[2] == "nrmse" and value is not None else value
 
 
 def split(dotted: str) -> tuple[str, Named]:

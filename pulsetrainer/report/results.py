@@ -15,9 +15,13 @@ from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.units import with_seconds, with_unit
 from pulsetrainer.report.facts import loop_words, minor_words, run_facts, span_words, warmth_words
+from pulsetrainer.report.names import digits, split, told
 from pulsetrainer.report.tables import picked
+from pulsetrainer.report.tables import text as shown
 
 _SMALL = 0.1  # of a unit: three decimals would not tell a range of less
+
+_VERDICT: Final = {True: "better", False: "worse", None: ""}
 
 Said = tuple[dict[str, Any], str, dict[str, Any]]
 
@@ -192,6 +196,32 @@ def as_csv(files: Sequence[Path], metrics: Mapping[str, Sequence[float | None]])
     writer.writerow(["file", *metrics])
     writer.writerows([str(file), *(values[k] for values in metrics.values())] for k, file in enumerate(files))
     return text.getvalue()
+
+
+def side_by_side(metrics: Sequence[Any], *, verdicts: bool, change: bool) -> list[list[Any]]:
+    """Return a row for each figure of ``compare``: name, unit, values; as wanted the change, and a verdict.
+
+    A unit that is not the same everywhere stands behind each value.
+    """
+    rows = []
+    for m in metrics:
+        owner, named = split(m.name)
+        values: list[Any] = [told(m.name, value) for value in m.values]
+        unit = m.units[0] if len(set(m.units)) == 1 else named.unit
+        if len(set(m.units)) > 1:
+            values = [f"{shown(v)} {u}".rstrip() for v, u in zip(values, m.units, strict=True)]
+        row = [f"{owner.removeprefix('session.')}: {named.words}", unit, *values]
+        rows.append(row + [_change(m)] * change + [_VERDICT[m.better]] * verdicts)
+    return rows
+
+
+def _change(metric: Any) -> str:
+    """Return a change with its sign; one that two decimals cannot show only where a unit is small."""
+    by = told(metric.name, metric.change)
+    if by is None:
+        return "-"
+    small = digits(abs(by)) if metric.units and metric.better is not None else f"{abs(by):.2f}"
+    return f"{'-' if by < 0 else '+'}{small}" if float(small) else "0.00"
 
 
 def labels_of(files: Sequence[Path]) -> list[str]:

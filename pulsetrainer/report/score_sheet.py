@@ -9,13 +9,13 @@ import numpy as np
 
 from pulsetrainer.artefacts import Score, Session
 from pulsetrainer.report.html import number, page
-from pulsetrainer.report.names import NAMES
+from pulsetrainer.report.names import NAMES, told
 
 _FIGURES = (
     ("mean_abs_error_percent", ""),
     ("max_abs_error_percent", ""),
     ("error_jnd", ".3f"),
-    ("nrmse_percent", ""),
+    ("nrmse", ""),
     ("beat_timing_max_ms", ""),
     ("rate_cv_percent", ".3f"),
     ("amplitude_cv_percent", ""),
@@ -37,7 +37,7 @@ def render_session(
     """
     quiz = session.quiz if score is not None else None
     count = np.bincount(session.beats.pulse, minlength=len(session.pulses))
-    value = {name: getattr(session, name, 100.0 * session.nrmse) for name, _ in _FIGURES}
+    value = {name: told(name, getattr(session, name)) for name, _ in _FIGURES}
     return page(
         "session.html.j2",
         **header,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import isnan
 from typing import Any
 
-from pulsetrainer.report.names import NAMES, digits, split
+from pulsetrainer.report.names import NAMES, digits, split, told
 
 ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
 _BROAD = 10_000  # as wide as the table needs: figures are never cut
@@ -44,6 +44,8 @@ def folded(lead: str, text: str, width: int | None, indent: int | None = None) -
         return lead + text
     if indent is None:
         indent = len(lead) if width - len(lead) >= _NARROWEST else 4
+        if len(lead) + len(text.partition(" ")[0]) > width:  # the lead is the first words of the text
+            text, lead = " ".join([*lead.split(), text]), lead[: -len(lead.lstrip()) or None]
     return textwrap.fill(
         text,
         width,
@@ -99,7 +101,7 @@ def rendered(part: Facts | Table, width: int | None = None) -> str:
             indents = ((line[: -len(said)], said) for line, said in words)
             lines = "\n".join(folded(lead, said, width, len(lead) + 2) for lead, said in indents) + "\n"
         return lines
-    named = [(label(name), text(value)) for name, value in part.rows.items()]
+    named = [(label(name), text(told(name, value))) for name, value in part.rows.items()]
     longest = max((len(name) for name, _ in named), default=0)
     if width is not None and 2 * longest + 8 > width:  # no room beside the names: below them
         rows = [folded(*one, width) for name, value in named for one in (("  ", name), ("    ", value))]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import hashlib
 import importlib.util
 import os
@@ -100,15 +102,50 @@ def firmware_image() -> Path:
 
 
 def find_arm_compiler() -> list[str]:
-    """Return the command of a C compiler for the Cortex-M4F, as ``find_compiler``."""
+    """Return the command of a C compiler for the Cortex-M4F; DeviceError where there is none."""
     if shutil.which("arm-none-eabi-gcc"):
         return ["arm-none-eabi-gcc", *_CORTEX_M4F]
     if importlib.util.find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", "cc", *_ZIG_CORTEX_M4F]
-    raise DeviceError(
-        "the emulated device needs a C compiler for Arm once, and arm-none-eabi-gcc is not there",
-        hint=f"install compiler and emulator: `sudo apt install {DEBIAN_PACKAGES}`",
+    raise _not_installed("arm-none-eabi-gcc")
+
+
+def find_emulator() -> str:
+    """Return the path of the emulator; DeviceError where it, or the compiler that it needs, is missing."""
+    program = shutil.which("qemu-system-arm")
+    try:
+        find_arm_compiler()
+    except DeviceError as error:
+        raise error if program else _not_installed("qemu-system-arm and arm-none-eabi-gcc") from error
+    if program is None:
+        raise _not_installed("qemu-system-arm")
+    return program
+
+
+def _not_installed(programs: str) -> DeviceError:
+    return DeviceError(
+        f"the emulated device (qemu:) needs {programs}, not found on this computer",
+        hint=f"install: `sudo apt install {DEBIAN_PACKAGES}`; or simulate without them: `--port bench:`",
     )
+
+
+def _place_in(folder: Path) -> str:
+    """Return a new file in a folder, which is made if need be."""
+    folder.mkdir(parents=True, exist_ok=True)
+    handle, path = tempfile.mkstemp(prefix="build-", dir=folder)
+    os.close(handle)
+    return path
+
+
+@functools.cache
+def _folder_of_this_process(why: str) -> Path:
+    """Return a folder that goes with this process: each compiles anew; DeviceError where there is none."""
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="pulsetrainer-"))
+    except OSError as error:
+        raise DeviceError(why, hint="set XDG_CACHE_HOME to a writable folder") from error
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 def _compiled(image: _Image) -> Path:
@@ -116,19 +153,17 @@ def _compiled(image: _Image) -> Path:
     root = firmware_dir()
     digest = _digest(root, image)
     folder = Path(user_cache_dir("pulsetrainer")) / "firmware"
-    target = folder / f"{image.port}-{digest[:20]}"
-    if target.exists():
-        return target
+    name = f"{image.port}-{digest[:20]}"
+    if (folder / name).exists():
+        return folder / name
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         # Compiled beside its place and moved there: another process sees nothing or the whole.
-        handle, temporary = tempfile.mkstemp(prefix="build-", dir=folder)
-    except OSError as error:
-        raise DeviceError(
-            f"cannot write the firmware cache {folder}: {error}",
-            hint="set XDG_CACHE_HOME to a writable folder",
-        ) from error
-    os.close(handle)
+        temporary = _place_in(folder)
+    except OSError as error:  # a home that may only be read
+        folder = _folder_of_this_process(f"cannot write the firmware cache {folder}: {error}")
+        if (folder / name).exists():
+            return folder / name
+        temporary = _place_in(folder)
     words = [*image.command, f"-DPT_BUILD_HASH=0x{digest[:8]}u", *(f"-I{root / i}" for i in image.folders)]
     words += [*(str(p) for p in image.sources(root)), *image.libraries, "-o", temporary]
     try:
@@ -140,7 +175,7 @@ def _compiled(image: _Image) -> Path:
                 hint=image.remedy,
             )
         Path(temporary).chmod(0o755)
-        Path(temporary).replace(target)
+        Path(temporary).replace(folder / name)
     finally:
         Path(temporary).unlink(missing_ok=True)
-    return target
+    return folder / name

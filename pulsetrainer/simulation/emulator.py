@@ -6,7 +6,6 @@ import contextlib
 import os
 import secrets
 import select
-import shutil
 import signal
 import socket
 import struct
@@ -20,7 +19,7 @@ from pulsetrainer.device.schemes import OpenPort
 from pulsetrainer.device.transport import PortLostError
 from pulsetrainer.errors import DeviceError
 from pulsetrainer.simulation.bad_wire import through
-from pulsetrainer.simulation.build import DEBIAN_PACKAGES, firmware_image
+from pulsetrainer.simulation.build import find_emulator, firmware_image
 from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, QemuOptions, parse_qemu
 
 QEMU_PORT = "qemu:"
@@ -126,13 +125,7 @@ class Emulator:
                 "the emulated device needs a POSIX shell, which this system does not have",
                 hint="use Linux, macOS or WSL for qemu:, or a real device with --port COM3",
             )
-        program = shutil.which("qemu-system-arm")
-        if program is None:
-            raise DeviceError(
-                "the emulator qemu-system-arm is not there",
-                hint=f"install it with its compiler: `sudo apt install {DEBIAN_PACKAGES}`",
-            )
-        words = [program, "-M", "mps2-an386", "-kernel", str(firmware_image())]
+        words = [find_emulator(), "-M", "mps2-an386", "-kernel", str(firmware_image())]
         words += ["-display", "none", "-monitor", "none", "-icount", _REAL_TIME]
         words += ["-chardev", "socket,id=wire,fd=3", "-serial", "chardev:wire"]
         seed = secrets.randbits(32)

@@ -93,6 +93,7 @@ class Ledger:
             self._low, self._high = min(self._low, float(x.min())), max(self._high, float(x.max()))
         if error.size > max(_ENOUGH * x.size, 4):
             mean, most = float(error.mean()), float(error.max())
+        if beat.whole and np.isfinite(mean):  # a few samples of a foot have neither height nor time
             slope = np.gradient(x) * RATE_HZ
             rows = np.stack((x, -slope, np.ones_like(x)))[:, there]
             gain, late, _ = np.linalg.lstsq(rows.T, y[there], rcond=None)[0].tolist()

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from pulsetrainer.artefacts import Evaluation, Session
 from pulsetrainer.artefacts.evaluation import HEADLINES
+from pulsetrainer.artefacts.units import shown
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.arguments import check_several, named
 from pulsetrainer.steps.quiz import score
@@ -16,7 +18,8 @@ from pulsetrainer.steps.quiz import score
 _RISING = (  # more is better
     "mean_error_reduction_percent", "gain_percent", "right_percent", "right_from_percent", "right_to_percent",
 )  # fmt: skip
-_SAME = 0.005  # smaller changes are no change: a figure is shown with two digits
+_IN_UNITS = ("rms", "offset")  # of a model; the others are always in one unit
+_SAME = 0.005  # smaller is no change: two digits are shown; of what is in units it is a share
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +28,9 @@ class Metric:
 
     name: str
     values: tuple[float | None, ...]
-    change: float | None  # last minus first of those that have it
+    change: float | None  # last minus first of those that have it; None where these are in other units
     better: bool | None  # None: no change beyond the spread between repeats, or nothing to compare
+    units: tuple[str, ...] = ()  # in which the values are; empty where it is always the same one
 
 
 def compare(
@@ -76,11 +80,12 @@ def compare(
     tested = [one for one in evaluations if isinstance(one, Evaluation)]
     every = [_of_session(one) for one in sessions] or _named(tested, [one.figures() for one in tested])
     spreads = _named(tested, [_spreads(one) for one in tested])
+    units = _named(tested, [_units(one) for one in tested])
     headlines = tuple(f".{one}" for one in HEADLINES)
     wanted = [
         n for n in dict.fromkeys(n for one in every for n in one) if everything or n.endswith(headlines)
     ]
-    metrics = tuple(_metric(name, every, spreads) for name in wanted)
+    metrics = tuple(_metric(name, every, spreads, units) for name in wanted)
     if not any(sum(v is not None for v in m.values) > 1 for m in metrics):
         raise DataError(
             f"no two of {', '.join(titles)} have a figure in common",
@@ -106,6 +111,30 @@ def differing_quizzes(compared: Sequence[Evaluation | Session], names: Sequence[
     return [f"the quizzes are not alike: {', '.join(said)}"]
 
 
+def differing_units(compared: Sequence[Evaluation | Session], names: Sequence[str]) -> list[str]:
+    """Say that models predict outputs in different units, of which only percentages can be compared."""
+    units = {
+        name: shown(model.output_unit) or "1"
+        for name, one in zip(names, compared, strict=True)
+        if isinstance(one, Evaluation)
+        for model in one.models
+    }
+    if len(set(units.values())) < 2:
+        return []
+    said = ", ".join(f"{name} is in {unit}" for name, unit in units.items())
+    return [f"the outputs are in different units ({said}): only what is in percent is compared"]
+
+
+def _units(one: Evaluation) -> dict[str, str]:
+    """Return the unit of each figure that is in the unit of the output."""
+    stems = one.stems[len(one.waveforms) :]
+    return {
+        f"{stem}.{name}": shown(model.output_unit)
+        for stem, model in zip(stems, one.models, strict=True)
+        for name in _IN_UNITS
+    }
+
+
 def _spreads(one: Evaluation) -> dict[str, float]:
     """How far each figure goes from one repeat to the next, by its name; of none that is not known."""
     found = {}
@@ -121,7 +150,7 @@ def _spreads(one: Evaluation) -> dict[str, float]:
     return {name: spread for name, spread in found.items() if np.isfinite(spread)}
 
 
-def _named(evaluations: Sequence[Evaluation], every: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+def _named(evaluations: Sequence[Evaluation], every: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Figures of each evaluation under names that are alike where they are to be compared.
 
     Where no evaluation holds a pulse twice its inversion is left out of the name: before and after may
@@ -155,12 +184,20 @@ def _of_session(one: Session) -> dict[str, float]:
     return found
 
 
-def _metric(name: str, every: Sequence[dict[str, float]], spreads: Sequence[dict[str, float]]) -> Metric:
+def _metric(
+    name: str,
+    every: Sequence[dict[str, float]],
+    spreads: Sequence[dict[str, float]],
+    units: Sequence[dict[str, str]],
+) -> Metric:
     values = tuple(one.get(name) for one in every)
+    said = tuple(one.get(name, "") for one in units) if any(name in one for one in units) else ()
+    there = [k for k, value in enumerate(values) if value is not None]
+    if len(there) < 2 or (said and said[there[0]] != said[there[-1]]):
+        return Metric(name, values, None, None, said)
+    first, last = (every[k][name] for k in (there[0], there[-1]))
     spread = max((one.get(name, 0.0) for one in spreads), default=0.0)
-    there = [v for v in values if v is not None]
-    change = there[-1] - there[0] if len(there) > 1 else None
-    better = None
-    if change is not None and abs(change) >= max(_SAME, spread):
-        better = (change > 0) == name.endswith(_RISING)
-    return Metric(name, values, change, better)
+    same = max(_SAME * (max(abs(first), abs(last)) if said else 1.0), spread)
+    rising = name.endswith(_RISING)
+    better = (last > first) if rising else (abs(last) < abs(first))  # an offset may be negative
+    return Metric(name, values, last - first, better if abs(last - first) >= same else None, said)

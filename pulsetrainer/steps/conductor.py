@@ -73,6 +73,7 @@ class Beat:
     play: Play
     in_record: int
     strength: float
+    whole: bool = True  # False: it was cut, so that a question ends on time
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,7 +281,8 @@ class Conductor:
 
         end = float(force(np.asarray([end_s - place.start_s]))[0])
         then = _Place(place.number + 1, end_s, end, play.pulse, at)
-        beat = Beat(place.start_s, end_s - place.start_s, first, since.size, play, at, strength)
+        whole = end_s == place.start_s + interval_s
+        beat = Beat(place.start_s, end_s - place.start_s, first, since.size, play, at, strength, whole)
         return force(since), beat, then
 
 

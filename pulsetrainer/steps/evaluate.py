@@ -76,7 +76,7 @@ def evaluate(
     called = named(model_names, [f"model {n}" for n in range(1, len(tested) + 1)], argument="model_names")
     played = [one for one in given if isinstance(one, Playback)]
     runs = [one for one in given if isinstance(one, Run)]
-    if played and not runs:
+    if played and len(played) == len(given):
         if tested:
             raise UsageError(
                 f"{titles[0]} is a playback, and models are tested on a run",
@@ -84,7 +84,7 @@ def evaluate(
             )
         errors = tuple(_of_playback(name, one) for name, one in zip(titles, played, strict=True))
         return Evaluation(waveforms=errors, model=played[-1].waveform.model)
-    if len(runs) == 1 and not played and tested:
+    if len(runs) == len(given) == 1 and tested:
         return _of_run(titles[0], runs[0], tested, called)
     sessions = len(given) - len(played) - len(runs)  # of which the command evaluates one
     counts = {"playback": len(played), "run": len(runs), "session": sessions, "model": len(tested)}

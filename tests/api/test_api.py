@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
 import subprocess
 import sys
@@ -127,3 +128,19 @@ def test_a_pulse_may_be_given_as_arrays_a_name_or_a_drive():
     for pulse in ((one, shape), named):
         again = pt.invert(pulse, model)
         assert np.allclose(again.target[again.scored], named.target[named.scored], atol=1e-3)
+
+
+@pytest.mark.parametrize(("asked", "left"), [("nonsense", ""), ("svg", "svg")])
+def test_an_artefact_shows_itself_whatever_backend_is_asked_for(asked, left):
+    """Its figure needs none; one that exists is still that of whoever draws beside it."""
+    code = (
+        f"import os, pulsetrainer as pt\nmodel = pt.load({str(KEPT / 'model.h5')!r})\n"
+        "assert '<svg' in model._repr_html_()\nmodel.plot()\n"
+        f"import matplotlib\nassert os.environ['MPLBACKEND'] == {asked!r}\n"
+        f"assert {left!r} in ('', matplotlib.rcParams['backend'])\n"
+    )
+    environment = {**os.environ, "MPLBACKEND": asked, "DISPLAY": ""}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr

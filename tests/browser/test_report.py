@@ -204,6 +204,17 @@ def test_a_phone_never_scrolls_sideways(opened, width):
         assert [one for one in measure(page, "texts") if one["px"] < 7.0] == []
 
 
+def test_a_command_is_broken_between_words(opened, report):
+    """On a phone too: of a line that ended in -- nobody knew whether a blank belonged there."""
+    page = opened(width=390)
+    broken = """codes => codes.flatMap(code => [...code.querySelectorAll("span:not(.line)")])
+        .filter(word => word.textContent.length < 30 && word.getClientRects().length > 1 ||
+            getComputedStyle(word).display !== "inline-block").map(word => word.textContent)"""
+    assert page.eval_on_selector_all("pre:not([id])", broken) == []
+    plain = "codes => codes.filter(code => !code.querySelector('.line')).map(code => code.textContent)"
+    assert page.eval_on_selector_all("pre:not([id])", plain) == []
+
+
 @pytest.mark.slow
 def test_paper_has_everything(opened, report):
     """The PDF of a dark screen: dark on light, every section, and what was folded away."""
@@ -211,6 +222,7 @@ def test_paper_has_everything(opened, report):
     page = opened(scheme="dark")
     page.emulate_media(media="print", color_scheme="dark")
     assert sum(_rgb(page.evaluate("getComputedStyle(document.body).color"))) < 200
+    assert page.evaluate("getComputedStyle(document.documentElement).colorScheme") == "light"
     assert measure(page, "beyond") == []
     headings = page.locator("h1, h2").all_text_contents()
     provenance = page.locator("#provenance-json").text_content()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from collections.abc import Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -22,6 +24,7 @@ PAGES = (
     "docs/commands.html",
     "docs/format.html",
     "docs/theory.html",
+    "docs/how-to/batches.html",
     "docs/notebooks/first-pulse.html",
     "docs/notebooks/your-own-record.html",
 )
@@ -107,6 +110,18 @@ def test_axe_finds_nothing(visit, name):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
     found = axe.Axe().run(visit(name)).response["violations"]
     assert [(one["id"], [node["html"][:120] for node in one["nodes"]]) for one in found] == []
+
+
+def test_every_link_within_the_site_leads_to_a_page(site):
+    """Those of the notebooks too, of which the builder of the site knows none."""
+    dead = {
+        (page.relative_to(site).as_posix(), link)
+        for page in site.rglob("*.html")
+        if page.name != "404.html"
+        for link in re.findall(r'<a [^>]*href="([^":#]+)[#"]', page.read_text(encoding="utf-8"))
+        if not (page.parent / unquote(link)).exists()
+    }
+    assert dead == set()
 
 
 def test_the_search_works_without_a_network(visit):

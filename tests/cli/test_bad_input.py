@@ -244,8 +244,8 @@ def test_a_signal_in_milliseconds_is_one(ready):
 @pytest.mark.parametrize(
     ("words", "samples", "most"),
     [
-        (("capture", "identification", "--repeats", "1000000"), "98001", "1e+09"),
-        (("play", "drive.h5", "--repeats", "1000000"), "", "1e+08"),
+        (("capture", "identification", "--repeats", "1000000"), "98001", "1,000,000,000"),
+        (("play", "drive.h5", "--repeats", "1000000"), "", "100,000,000"),
     ],
 )
 def test_more_than_memory_and_days_can_hold_is_refused_at_once(ready, words, samples, most):

@@ -11,7 +11,7 @@ import pytest
 
 import pulsetrainer as pt
 from program import pulsetrainer
-from pulsetrainer.artefacts import Beats, Quiz, Session
+from pulsetrainer.artefacts import Beats, ModelEvaluation, Quiz, Session
 from wording import refusal
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
@@ -100,6 +100,39 @@ def test_a_file_beside_itself_or_a_copy_is_told(run, built_small, tmp_path):
         assert ("are the same file" in done.err) is told
     models = ("--model", KEPT / "model.h5") * 2
     assert "are the same file" in run("evaluate", KEPT / "run.h5", *models).err
+
+
+def _predicted(unit: str, rms: float, offset: float = 0.0) -> pt.Evaluation:
+    y = rms * np.ones(3)
+    return pt.Evaluation(models=(ModelEvaluation("m.h5", rms, 2.0, 5.0, 0.0, None, y, y, unit, offset),))
+
+
+def test_figures_in_different_units_are_not_compared(tmp_path):
+    """They stand beside each other with their units, without change or verdict; percentages have them."""
+    for name, one in (("force", _predicted("N", 0.2)), ("field", _predicted("T", 0.01))):
+        pt.save(one, tmp_path / f"{name}.h5")
+    files = ("force.h5", "field.h5", "--all")
+    done = pulsetrainer(tmp_path, "compare", *files)
+    (row,) = (line for line in done.out.splitlines() if "model: rms error " in line and "0.01" in line)
+    assert row.split()[3:] == ["0.20", "N", "0.01", "T", "-"]
+    assert "force.h5 is in N, field.h5 is in T" in done.err
+    found = {m["name"]: m for m in pulsetrainer(tmp_path, "compare", *files, "--json").json["metrics"]}
+    assert [found[f"model.{name}"]["change"] for name in ("rms", "offset", "rms_percent")] == [
+        None,
+        None,
+        0.0,
+    ]
+    assert [m["better"] for m in found.values()] == [None] * len(found)
+
+
+def test_figures_in_one_small_unit_are_compared(tmp_path):
+    """Their unit is told, a change of half is one, and a zero that lies closer is better on either side."""
+    for name, one in (("old", _predicted("T", 0.004, -0.003)), ("new", _predicted("T", 0.002, -0.001))):
+        pt.save(one, tmp_path / f"{name}.h5")
+    done = pulsetrainer(tmp_path, "compare", "old.h5", "new.h5", "--all")
+    rows = {line.split()[1]: line.split() for line in done.out.splitlines() if " T " in line}
+    assert rows["rms"][3:] == ["T", "0.004", "0.002", "-0.002", "better"]
+    assert rows["offset"][2:] == ["T", "-0.003", "-0.001", "+0.002", "better"]
 
 
 def test_two_evaluations_without_a_common_figure(run, built_small, tmp_path):

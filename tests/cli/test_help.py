@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import os
 import re
 import subprocess
 import sys
@@ -66,17 +65,18 @@ def test_what_is_told_as_an_option_is_one():
     assert {name: where for name, where in told.items() if name not in options - {"capture"}} == {}
 
 
-def test_a_narrow_terminal_folds_what_a_command_does():
-    """Nothing of it is cut."""
-    found = {}
-    for width in ("60", "200"):
-        words = [sys.executable, "-m", "pulsetrainer", "--help"]
-        done = subprocess.run(
-            words, capture_output=True, text=True, check=True, env={**os.environ, "COLUMNS": width}
-        )
-        assert "..." not in done.stdout.replace("[ARGS]...", "")
-        found[width] = done.stdout.split()
-    assert found["60"] == found["200"]
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_a_narrow_terminal_folds_help_between_words(command, monkeypatch, capsys):
+    """Nothing of it is cut, no word is broken, and no line of several words is too long."""
+    told, parser = {}, typer.main.get_command(program)
+    for columns in (200, 20, 30, 40, 49, 60, 79):
+        monkeypatch.setenv("COLUMNS", str(columns))
+        parser.main([*command.split(), "--help"], standalone_mode=False)
+        told[columns] = capsys.readouterr().out
+        assert told[columns].split() == told[200].split(), columns
+        long = (line for line in told[columns].splitlines() if len(line) > columns)
+        assert [line for line in long if len(line.split()) > 1] == [], columns
+    assert command or "..." not in told[200].replace("[ARGS]...", "")
 
 
 def test_version(run):

@@ -153,6 +153,14 @@ def test_no_figure_is_cut_on_a_narrow_terminal(tmp_path, columns):
     assert max(map(len, lines)) <= max(columns, 22)  # a time stamp is one word
 
 
+def test_a_look_at_the_computer_fits_a_narrow_terminal(tmp_path):
+    """What is found goes on below what was looked at, where there is no room beside it."""
+    said = on_terminal(tmp_path, "doctor", "--no-capture", COLUMNS="20", PULSETRAINER_PORT="bench:").decode()
+    lines = re.split("[\r\n]+", ESCAPE.sub("", said))
+    long = [line for line in lines if len(line) > 20 and " fix: " not in line and "looking" not in line]
+    assert [line for line in long if len(line.split()) > 1] == []
+
+
 def test_long_words_are_folded_between_words_and_commands_are_not(tmp_path):
     """A message reads well on a narrow terminal; what is to be copied stays in one piece."""
     main, terminal = pty.openpty()

@@ -33,6 +33,13 @@ def script(name: str):
     return module
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
+def test_every_column_of_a_table_has_a_heading(page):
+    """A screen reader tells it with each cell."""
+    heads = re.findall(r"^(\|.*\|)\n\|[-:| ]+\|$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert [head for head in heads if re.search(r"\|\s*\|", head)] == []
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_the_picture_of_the_readme_is_that_of_the_demo(theme):
     """It shows the beat that is kept, and names the errors of the table below it."""

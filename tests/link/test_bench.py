@@ -150,10 +150,20 @@ def test_a_compiler_that_fails_is_quoted(monkeypatch, tmp_path):
     assert list((tmp_path / "pulsetrainer" / "firmware").iterdir()) == []
 
 
-def test_a_cache_that_cannot_be_written_is_told(monkeypatch, tmp_path):
-    """A file where the cache folder should be."""
+def test_a_cache_that_cannot_be_written_is_done_without(monkeypatch, tmp_path):
+    """A file where the cache folder should be: compiled once for this process, where there is any room."""
     (tmp_path / "pulsetrainer").write_text("in the way", encoding="utf-8")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    made = tmp_path / "made"
+    monkeypatch.setattr(build.tempfile, "mkdtemp", lambda **_: made)
+    build._folder_of_this_process.cache_clear()
+    assert {build.firmware_executable(), build.firmware_executable()} == set(made.iterdir())
+    build._folder_of_this_process.cache_clear()
+
+    def nowhere(**_):
+        raise OSError("no room")
+
+    monkeypatch.setattr(build.tempfile, "mkdtemp", nowhere)
     with raises(DeviceError, "no cache", folder=tmp_path):
         build.firmware_executable()
 

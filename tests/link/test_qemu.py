@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pulsetrainer import doctor
 from pulsetrainer.device.opening import open_device
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation import build
@@ -90,13 +91,19 @@ def test_parameters_that_make_sense():
     assert parse_qemu("qemu:?ambient=-20&coil=3").settings == (("ambient", -20.0), ("coil", 3.0))
 
 
-@pytest.mark.parametrize("missing", ["qemu-system-arm", "arm-none-eabi-gcc"])
+@pytest.mark.parametrize(
+    "missing", [("qemu-system-arm",), ("arm-none-eabi-gcc",), ("qemu-system-arm", "arm-none-eabi-gcc")]
+)
 def test_what_is_missing_is_named_with_its_packages(monkeypatch, missing):
-    """Neither emulator nor compiler comes with the package: which one, and how to get both."""
-    monkeypatch.setattr(shutil, "which", lambda name: None if name == missing else f"/usr/bin/{name}")
+    """Neither comes with the package: all that is missing, how to get it, and the way without."""
+    monkeypatch.setattr(shutil, "which", lambda name: None if name in missing else f"/usr/bin/{name}")
     monkeypatch.setattr(build.importlib.util, "find_spec", lambda _: None)
-    with raises(DeviceError, "no emulator", missing=missing, packages=DEBIAN_PACKAGES):
+    said = " and ".join(missing)
+    with raises(DeviceError, "no emulator", missing=said, packages=DEBIAN_PACKAGES):
         open_device("qemu:")
+    (found,) = doctor._emulator()
+    assert said in found.found
+    assert found.state == "warning"
 
 
 def test_ziglang_stands_in_for_the_arm_compiler(monkeypatch):
@@ -104,6 +111,8 @@ def test_ziglang_stands_in_for_the_arm_compiler(monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _: None)
     monkeypatch.setattr(build.importlib.util, "find_spec", lambda _: object())
     assert build.find_arm_compiler()[:4] == [sys.executable, "-m", "ziglang", "cc"]
+    monkeypatch.setattr(shutil, "which", {"qemu-system-arm": "/usr/bin/qemu-system-arm"}.get)
+    assert [one.state for one in doctor._emulator()] == ["ok"]
 
 
 # --- with one -----------------------------------------------------------------------------------

@@ -266,6 +266,27 @@ def test_the_ledger_finds_what_was_done_to_a_force():
     assert figures["augmentation_index_error_percent"] < 3.0
 
 
+def test_a_beat_that_was_cut_has_no_height_and_no_time():
+    """The end of a question left 16 ms of a foot: height and time of its noise were those of the session."""
+
+    def decide(number, time_s):
+        return None if number > 9 else Play(0, 1.0, 75.0, time_s + 0.016 if number == 5 else np.inf)
+
+    _, given, _ = _conducted(pt.load(KEPT / "model.h5"), decide)
+    ledger = Ledger(NAMES[:1])
+    for piece in given:
+        ledger.give(piece)
+    target = np.concatenate([g.target for g in given])
+    noise = 0.02 * np.random.default_rng(5).normal(size=target.size)
+    ledger.measure(np.arange(target.size), target + noise)
+    figures, beats = ledger.figures(), ledger.beats("N")
+    assert beats.interval_s[5] == pytest.approx(0.016)
+    assert np.flatnonzero(np.isnan(beats.gain)).tolist() == [5]
+    assert np.isfinite(beats.mean_error).all()
+    assert figures["amplitude_cv_percent"] < 0.5
+    assert figures["beat_timing_max_ms"] < 1.0
+
+
 def test_figures_of_a_session_are_what_they_are_called():
     """Beats that are weak and late by turns; after a rest all are later, which is no change of the rate."""
 

@@ -257,7 +257,7 @@ BAD = {
         lambda: shape(value=np.array([-1e308, 0.0, 1.0, 1e308])),
         ["too high", "4 s, inf"],
     ),
-    "more periods than memory": (lambda: train(periods=10**9), ["1000000000 times 400", "1e+08"]),
+    "more periods than memory": (lambda: train(periods=10**9), ["1000000000 times 400", "100,000,000"]),
     "no periods": (lambda: train(periods=0), ["period", "0"]),
     "no range of force": (lambda: train(low=1.0), ["low < high", "1"]),
     "train at no rate": (lambda: train(rate_Hz=0.0), ["rate", "positive", "0"]),

@@ -97,7 +97,7 @@ def test_folder_and_special_files(run_file):
     """A folder, a device, a pipe and an impossible name are not opened."""
     assert f"name a file in it: {run_file}" in _refused(run_file.parent, kinds.Run, "is a folder").hint
     (run_file.parent / "bare").mkdir()
-    assert "no file that can be read" in _refused(run_file.with_name("bare"), kinds.Run, "is a folder").hint
+    assert "none that can be read" in _refused(run_file.with_name("bare"), kinds.Run, "is a folder").hint
     _refused(Path("/dev/null"), kinds.Run, "not an ordinary file")
     os.mkfifo(run_file.with_name("pipe"))
     _refused(run_file.with_name("pipe"), kinds.Run, "not an ordinary file")

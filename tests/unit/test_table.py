@@ -881,7 +881,8 @@ def test_a_column_is_found_with_its_unit_written_otherwise(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "hint"), [("zzzz.csv", "files in {}: a.csv"), ("zzzz", "no file in {} has a similar name")]
+    ("name", "hint"),
+    [("zzzz.csv", "files in {}: a.csv"), ("zzzz", "no file in {} has a similar name: give its path")],
 )
 def test_an_absent_file_is_answered_with_those_of_its_ending(tmp_path, name, hint):
     """Where no name is alike: of a table the tables, of a name without an ending the artefacts."""

@@ -145,6 +145,31 @@ def test_make_makes_what_the_commands_make(tmp_path, hand):
     assert not (tmp_path / "out/left").exists()
 
 
+@pytest.mark.parametrize("engine", ["make", pytest.param("snakemake", marks=SLOW)])
+def test_what_a_broken_off_recording_kept_is_there(tmp_path, engine):
+    """Both engines delete what a failed command made; what the message names is kept, and is no target."""
+    (tmp_path / "one.tsv").write_text("name\tport\nleft\tbench:?break=force-high@2\n")
+    if engine == "make":
+        done = make(tmp_path, "DEVICES=one.tsv", f"CAPTURE={SHORT['capture']}")
+    else:
+        done = snakemake(tmp_path, "--cores", 1, devices="one.tsv", **SHORT)
+    assert done.returncode != 0
+    (kept,) = re.findall(r"kept in (\S+) \(complete=false\)", done.stdout + done.stderr)
+    assert (tmp_path / kept).exists()
+    assert not (tmp_path / "out/left/run.h5").exists()
+
+
+@pytest.mark.parametrize("rules", ["Makefile", "workflow/Makefile", "workflow/Snakefile"])
+def test_whatever_is_recorded_gets_its_name_at_the_end(rules):
+    """Of captures and playbacks alike, since both say that they keep what they have."""
+    lines = re.findall(
+        r"^\s.*(?: capture | play ).*--port.*(?:\n.* mv .*)?", (ROOT / rules).read_text(), re.MULTILINE
+    )
+    assert len(lines) >= 2
+    for line in lines:
+        assert re.search(r"-o \S*recording\S* .*mv \S*recording\S* ", line, re.DOTALL | re.IGNORECASE), line
+
+
 @pytest.mark.slow
 def test_summary_is_a_table_of_all_devices(batch):
     """One row a device, with the numbers of its file."""
