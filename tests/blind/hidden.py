@@ -135,7 +135,7 @@ class Data:
 
 
 def draw(kind: str, seed: int) -> Case:
-    """Draw a case: ``control``, ``single:NAME``, ``weak:NAME``, ``pair`` or ``unknown``."""
+    """Draw a case: ``control``, ``single:NAME``, ``weak:NAME``, ``pair``, ``triple`` or ``unknown``."""
     rng = np.random.default_rng([seed, *kind.encode()])
     settings = {
         "seed": int(rng.integers(1, 10_000)),
@@ -145,7 +145,8 @@ def draw(kind: str, seed: int) -> Case:
     kind, _, name = kind.partition(":")
     if kind == "unknown":
         return Case(seed, (), settings, {}, OUTSIDE[int(rng.integers(len(OUTSIDE)))])
-    names = {"control": [], "pair": _pair(rng)}.get(kind, [name])
+    several = _of_different_families(rng)
+    names = {"control": [], "pair": several[:2], "triple": several}.get(kind, [name])
     factor = _log(rng, 0.02, 0.5) if kind == "weak" else 1.0
     truth = {}
     for one in names:
@@ -154,11 +155,11 @@ def draw(kind: str, seed: int) -> Case:
     return Case(seed, tuple(names), settings, truth)
 
 
-def _pair(rng):
-    """Two causes of different families: two of one family are one cause to any eye."""
+def _of_different_families(rng):
+    """Three causes of different families: two of one family are one cause to any eye."""
     names: list[str] = []
     for name in rng.permutation([name for name in LIBRARY if name not in ALONE]).tolist():
-        if len(names) < 2 and not any(name in f and set(names) & f for f in FAMILIES):
+        if len(names) < 3 and not any(name in f and set(names) & f for f in FAMILIES):
             names.append(name)
     return names
 

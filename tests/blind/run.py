@@ -38,6 +38,7 @@ def jobs_of(options) -> list[tuple[str, int]]:
     jobs = [(f"single:{name}", first + k) for k in range(options.each) for name in hidden.LIBRARY]
     jobs += [("unknown", first + k) for k in range(options.unknowns)]
     jobs += [("pair", first + k) for k in range(options.pairs)]
+    jobs += [("triple", first + k) for k in range(options.triples)]
     jobs += [("control", first + k) for k in range(options.controls)]
     jobs = [jobs[k] for k in np.random.default_rng(first).permutation(len(jobs))]
     return jobs + [(f"weak:{name}", first + k) for k in range(options.weak) for name in table.SWEPT]
@@ -52,6 +53,7 @@ def main() -> None:
     parser.add_argument("--weak", type=int, default=12, help="weak cases per cause, for the detection limit")
     parser.add_argument("--unknowns", type=int, default=60)
     parser.add_argument("--pairs", type=int, default=60)
+    parser.add_argument("--triples", type=int, default=0)
     parser.add_argument("--first", type=int, default=1000, help="first seed")
     parser.add_argument("--processes", type=int, default=os.cpu_count())
     options = parser.parse_args()

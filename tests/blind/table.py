@@ -52,7 +52,7 @@ def words(rows) -> str:
     gains = np.asarray([r["held_out"] for r in named])
     gains = gains[np.isfinite(gains)]
     seconds = [r["seconds"] for r in rows]
-    controls, unknowns, pairs = (kinds.get(k, []) for k in ("control", "unknown", "pair"))
+    controls, unknowns, pairs, triples = (kinds.get(k, []) for k in ("control", "unknown", "pair", "triple"))
     lines = [
         "| figure | measured (95 % confidence) | target |",
         "|---|---|---|",
@@ -64,6 +64,7 @@ def words(rows) -> str:
         f"| outside the library: unknown | {_share(unknowns, lambda r: r['right'])} | >= 0.90 |",
         f"| pairs: exactly both | {_share(pairs, lambda r: r['right'])} | >= 0.85 |",
         f"| pairs: both classes | {_share(pairs, lambda r: r['in_class'])} | |",
+        f"| triples: exactly all three | {_share(triples, lambda r: r['right'])} | |",
         f"| parameter error, median | {_median(100 * errors)} % | <= 5 % |",
         f"| truth within the 95 % interval | {sum(cover)}/{len(cover)} | |",
         f"| held-out gain of the reducible part, median | {_median(gains)} % | |",
