@@ -33,7 +33,6 @@ def test_the_names_are_those_of_the_contract():
         text = inspect.getdoc(getattr(pt, name))
         assert text, name
         assert ">>>" in text, name
-    assert set(dir(pt)) >= NOUNS | VERBS
     with pytest.raises(AttributeError):
         _ = pt.identfy
 
@@ -127,3 +126,35 @@ def test_a_pulse_may_be_given_as_arrays_a_name_or_a_drive():
     for pulse in ((one, shape), named):
         again = pt.invert(pulse, model)
         assert np.allclose(again.target[again.scored], named.target[named.scored], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda diagnosis, model: pt.extend(diagnosis, model), "expected a Model, got a Diagnosis"),
+        (lambda diagnosis, model: pt.correct(model, diagnosis), "expected a Run, got a Model"),
+        (lambda _, model: pt.evaluate(model), "expected a Playback or a Run, got a Model"),
+        (lambda _, model: pt.compare(model), "expected an Evaluation or a Session, got a Model"),
+        (lambda _, model: pt.refine(model, None), "expected a Waveform, got a Model"),
+        (
+            lambda *_: pt.identify(pt.load(KEPT / "run.h5"), levels=1),
+            "`levels` must be a whole number from 2 to 500",
+        ),
+        (
+            lambda *_: pt.identify(pt.load(KEPT / "run.h5"), levels=501),
+            "`levels` must be a whole number from 2 to 500",
+        ),
+        (lambda *_: pt.read_table("x.csv"), "name of a column for input and for output"),
+    ],
+)
+def test_what_is_of_another_kind_is_refused_with_what_was_expected(call, said):
+    """By every verb in the same way, as a ValueError too; its hint stands below it."""
+    with pytest.raises(ArgumentError, match=said) as caught:
+        call(pt.load(KEPT / "diagnosis.h5"), pt.load(KEPT / "model.h5"))
+    assert isinstance(caught.value, ValueError)
+    assert caught.value.__notes__[0].startswith("hint: ")
+
+
+def test_what_is_listed_is_public():
+    """Completion in a shell shows nothing else."""
+    assert set(dir(pt)) == set(pt.__all__)
