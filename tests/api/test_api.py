@@ -69,7 +69,7 @@ def test_every_artefact_shows_itself(path):
 def test_errors_are_python_exceptions(tmp_path, capfd):
     """Nothing exits, nothing is printed; a ValueError where a caller expects one."""
     model = pt.load(KEPT / "model.h5")
-    with raises(ArgumentError, "not such an argument", argument="n_h", got="1") as caught:
+    with raises(ArgumentError, "not such an argument", argument="`levels`", got="1") as caught:
         pt.identify(pt.load(KEPT / "run.h5"), levels=1)
     assert isinstance(caught.value, ValueError)
     with pytest.raises(UsageError):
@@ -131,18 +131,18 @@ def test_a_pulse_may_be_given_as_arrays_a_name_or_a_drive():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda diagnosis, model: pt.extend(diagnosis, model), "expected a Model, got a Diagnosis"),
+        (pt.extend, "expected a Model, got a Diagnosis"),
         (lambda diagnosis, model: pt.correct(model, diagnosis), "expected a Run, got a Model"),
         (lambda _, model: pt.evaluate(model), "expected a Playback or a Run, got a Model"),
         (lambda _, model: pt.compare(model), "expected an Evaluation or a Session, got a Model"),
         (lambda _, model: pt.refine(model, None), "expected a Waveform, got a Model"),
         (
             lambda *_: pt.identify(pt.load(KEPT / "run.h5"), levels=1),
-            "`levels` must be a whole number from 2 to 500",
+            "whole number from 2 to 500",
         ),
         (
             lambda *_: pt.identify(pt.load(KEPT / "run.h5"), levels=501),
-            "`levels` must be a whole number from 2 to 500",
+            "whole number from 2 to 500",
         ),
         (lambda *_: pt.read_table("x.csv"), "name of a column for input and for output"),
     ],

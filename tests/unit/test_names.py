@@ -17,7 +17,7 @@ from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.session import FIGURES
 from pulsetrainer.artefacts.waveform import RefinePass
 from pulsetrainer.report import figures, html
-from pulsetrainer.report.facts import facts
+from pulsetrainer.report.facts import facts, run_facts
 from pulsetrainer.report.names import FORCE, NAMES, headed, split
 from pulsetrainer.report.tables import label, text
 from pulsetrainer.report.text import tables_of
@@ -151,5 +151,5 @@ def test_reversals_are_counted_as_import_counts_them():
     """Those of noise are none: one number for one record."""
     rng = np.random.default_rng(0)
     u = np.abs(np.mod(np.linspace(0.0, 6.0, 3000), 2.0) - 1.0) + rng.normal(0.0, 0.003, 3000)
-    run = Run(time_s=np.arange(3000) / 100, input=u, output=u)
+    run = pt.Run(time_s=np.arange(3000) / 100, input=u, output=u)
     assert run_facts(run)["reversals"] == report_of(run).reversals == 5
