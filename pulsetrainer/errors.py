@@ -26,8 +26,6 @@ class PulsetrainerError(Exception):
         self.message = message
         self.hint = hint
         self.kept = kept
-        if hint:
-            self.add_note(f"hint: {hint}")  # what Python shows below the message
 
 
 class QualityError(PulsetrainerError):

@@ -148,11 +148,11 @@ def test_a_pulse_may_be_given_as_arrays_a_name_or_a_drive():
     ],
 )
 def test_what_is_of_another_kind_is_refused_with_what_was_expected(call, said):
-    """By every verb in the same way, as a ValueError too; its hint stands below it."""
+    """By every verb in the same way, as a ValueError too, with a hint."""
     with pytest.raises(ArgumentError, match=said) as caught:
         call(pt.load(KEPT / "diagnosis.h5"), pt.load(KEPT / "model.h5"))
     assert isinstance(caught.value, ValueError)
-    assert caught.value.__notes__[0].startswith("hint: ")
+    assert caught.value.hint
 
 
 def test_what_is_listed_is_public():
