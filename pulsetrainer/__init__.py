@@ -45,9 +45,13 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'pulsetrainer' has no attribute {name!r}")
     home = "artefacts" if name[0].isupper() else "api" if name in _OF_THE_API else f"steps.{name}"
     found = getattr(import_module(f"pulsetrainer.{home}"), name)
+    if home != "artefacts":
+        from pulsetrainer.steps.arguments import kinds_checked  # noqa: PLC0415 - the import costs nothing
+
+        found = kinds_checked(found)
     globals()[name] = found
     return found
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

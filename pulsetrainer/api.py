@@ -191,10 +191,13 @@ def read_table(
 
     Several files are parts of one run. ``columns`` are those of ``files.run_from_table.run_from_table``:
     ``input`` and ``output`` (names of columns), and ``time``, ``reference``, ``input_unit``, ``output_unit``,
-    ``rate_Hz`` or ``no_time`` where the file does not say it. ``resample`` makes the time steps even.
+    ``rate_Hz`` or ``no_time`` where the file does not say it; with
+    ``skip_bad_rows=True`` rows with blank cells or text are left out. ``resample`` makes the time steps even.
 
     Raises
     ------
+    ArgumentError
+        The column of the input or of the output is not named.
     UsageError
         Two options contradict each other, or there is no time to resample.
     DataError
@@ -209,6 +212,11 @@ def read_table(
     (7833, 'N')
     """
     several = [paths] if isinstance(paths, str | Path) else paths
+    if missing := [name for name in ("input", "output") if columns.get(name) is None]:
+        raise ArgumentError(
+            f"read_table needs the name of a column for {' and for '.join(missing)}",
+            hint=f'such as pt.read_table("{several[0]}", input="u", output="y")',
+        )
     parts = [run_from_table(path, **columns).run for path in several]
     return import_parts(parts, resample=resample).run
 

@@ -228,7 +228,14 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a number in thousandths": (
         *("correct run.h5 --diagnosis diagnosis.h5 -o out.h5 --delay 1ms", 2, "got '1ms'"),
-        "write the number alone, with a point: delay of the recorder of the output, s",
+        "write it in s, without the unit: 0.001",
+    ),
+    "milliamperes": (
+        *("capture identification -o out.h5 --current-max 1500mA", 2, "got '1500mA'"),
+        "write it in A, without the unit: 1.5",
+    ),
+    "a report that is a command": (
+        *("report", 2, "there is no command 'report'", "pulsetrainer evaluate played.h5 --html"),
     ),
     "a page behind -o": (
         *("diagnose run.h5 --model model.h5 -o out.html", 2, "out.html ends in '.html'", "--html out.html"),

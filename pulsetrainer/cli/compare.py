@@ -63,9 +63,9 @@ def compare(
     differ = ["difference"] if learners and len(loaded) == 2 else []  # of a class it would say nothing
     rows = side_by_side(metrics, verdicts=not learners, change=bool(differ) or not learners)
     head = ["", "unit", *labels, *(differ if learners else ["change", ""])]
-    job.screen.table(f"{len(labels)} {loaded[0].kind}s side by side", head, rows)
+    job.screen.table(f"{len(labels)} {loaded[0].kind}s", head, rows)
     if not learners:
-        job.screen.line(
-            "change: ", "from the first to the last; one within the spread between repeats gets no verdict"
-        )
+        judged = any(m.better is not None for m in metrics)
+        unsure = "; one within the spread between repeats gets no verdict" * judged
+        job.screen.line("change: ", f"from the first to the last{unsure}")
     job.wrote(out)

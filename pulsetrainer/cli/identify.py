@@ -10,10 +10,9 @@ from typer import Argument, Context, Option
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Out, Overwrite, setting, word_or_number
-from pulsetrainer.steps.arguments import check_once
+from pulsetrainer.steps.arguments import MOST_LEVELS, check_once
 
 Reading = Literal["continuous", "relay"]
-_MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
 
 
 def identify(
@@ -27,7 +26,7 @@ def identify(
             "--levels",
             "Levels of the Preisach plane; default: 48, fewer for a short record.",
             min=2,
-            max=_MOST_LEVELS,
+            max=MOST_LEVELS,
         ),
     ] = None,
     form: Annotated[

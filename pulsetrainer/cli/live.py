@@ -15,7 +15,7 @@ import numpy as np
 
 from pulsetrainer.cli.console import drawing
 from pulsetrainer.report.characters import plotted
-from pulsetrainer.steps.steering import KEYS
+from pulsetrainer.steps.steering import keys_in
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -76,8 +76,7 @@ class Live:
         elif beat is not None:
             rate = 60.0 / now.interval_s
             said += f"  {self._names[beat.pulse]}  {rate:.0f}/min  {100 * beat.amplitude:.0f} %"
-        keys = "  ".join(f"{'space' if key == ' ' else key} {what}" for key, what in KEYS.items())
-        return Text("\n".join([*lines, said, self.status(), keys]), no_wrap=True, overflow="crop")
+        return Text("\n".join([*lines, said, self.status(), keys_in(width)]), no_wrap=True, overflow="crop")
 
     def _progress(self, share: float) -> None:
         self._share = share

@@ -29,6 +29,11 @@ _INSTEAD = {
 }
 # of them, those that are no file's name
 _NO_FILE = {"ports", "doctor"}
+_NO_COMMAND = {
+    "version": "pulsetrainer --version",
+    "help": "pulsetrainer --help, or pulsetrainer identify --help",
+    "report": "evaluate writes it: pulsetrainer evaluate played.h5 --html report.html",
+}
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
@@ -160,12 +165,8 @@ def _other(said: str, command: str, parsed: Any) -> UsageError:
     unknown = _UNKNOWN.match(said)
     if unknown is None:
         return UsageError(said, hint=help_)
-    if unknown[1] == "version":
-        return UsageError("there is no command 'version'", hint="pulsetrainer --version")
-    if unknown[1] == "help":
-        return UsageError(
-            "there is no command 'help'", hint="pulsetrainer --help, or pulsetrainer identify --help"
-        )
+    if unknown[1] in _NO_COMMAND:
+        return UsageError(f"there is no command {unknown[1]!r}", hint=_NO_COMMAND[unknown[1]])
     near = f"did you mean {unknown[2]}? All commands: " if unknown[2] else ""
     return UsageError(f"there is no command {unknown[1]!r}", hint=f"{near}{help_}")
 
@@ -218,6 +219,8 @@ def _as_a_number(parameter: Any, must: str) -> str:
     if given is None:
         return ""
     told = re.sub(r".*, (\S+?)[.;,].*", r"\1", _meaning(parameter) + ".")  # "Top of the range, A."
+    if given[3] == f"m{told}":
+        return f"write it in {told}, without the unit: {float(f'{given[1]}.{given[2] or 0}') / 1000:g}"
     if given[3] and given[3] != told:  # what is typed in ms must not be taken for s
         return f"write the number alone, with a point: {_meaning(parameter)}"
     return f"write it with a point and without a unit: {given[1]}.{given[2] or 0}"

@@ -31,6 +31,7 @@ _WIDEST = 0.1
 _WINDOWS = (31, 21, 15, 9, 5)
 # What a filter takes away is noise alone as long as it is not larger than this times what noise would be.
 _NOISE_ONLY = 1.1
+_LOOKED_AT = 1_000_000  # samples that are enough to count turns
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,11 @@ class Cleaned:
     dead_band: float  # h: swings up to here are noise, input unit
     removed: int  # reversals that are gone
     kept: int  # reversals that are left
+
+
+def every(samples: int) -> int:
+    """Return the step at which a record of so many samples is looked at, where its turns are counted."""
+    return -(-samples // _LOOKED_AT)
 
 
 def estimate(values: ArrayLike) -> float:

@@ -127,6 +127,26 @@ def check_peak(reference_A: FloatArray, limit_A: float, *, hint: str = "") -> No
         )
 
 
+def check_force(
+    current_A: FloatArray, rate_Hz: float, limit_N: float, foretold_N: FloatArray | None = None
+) -> None:
+    """Raise DeviceError where a current (n,) in A gives a force beyond the limit in force.
+
+    ``foretold_N`` (n,) is the force that a model predicts, NaN where it is not known; None: no more than that
+    a lower force would be implausible.
+    """
+    expected_N = least_force(current_A, rate_Hz) if foretold_N is None else foretold_N
+    most = float(np.fmax.reduce(expected_N, initial=0.0))
+    if most > limit_N:
+        # a slower stroke creeps higher, and sensors have noise: a tenth of the limit is left to them
+        told_A = math.floor(100 * current_A[int(np.argmax(expected_N > 0.9 * limit_N))]) / 100
+        lower = "a lower `current_max_A`" if foretold_N is None else f"`current_max_A` at most {told_A:g}"
+        raise DeviceError(
+            f"the device would stop: a force of {most:.3g} N is predicted, and its limit is {limit_N:g} N",
+            hint=f"raise `limit_force_N`, or {less_current(lower)}",
+        )
+
+
 class Rehearsal:
     """A device as it is delivered, with a cold coil: it plays nothing, and refuses what the device would."""
 
@@ -160,12 +180,12 @@ class Rehearsal:
                 hint="play fewer repeats, or at a lower current",
             )
         self._warm(current, rate_Hz)
-        self._press(current, rate_Hz, expected_N)
+        check_force(current, rate_Hz, self.force_N, expected_N)
 
     def stream(self, reference_A: FloatArray, rate_Hz: float, expected_N: FloatArray) -> None:
         """Take the next piece (n,) of a reference without a known end as played; otherwise as ``play``."""
         current = codes.CURRENT_UNIT_A * to_wire(reference_A, limit_A=self.current_A).astype(float)
-        self._press(current, rate_Hz, expected_N)
+        check_force(current, rate_Hz, self.force_N, expected_N)
         if self._warm(current, rate_Hz) > 1.0:
             raise DeviceError(
                 "the device would stop: the coil becomes too hot in the middle of a beat",
@@ -178,20 +198,6 @@ class Rehearsal:
         self._heat, most = float(heat[-1]), float(heat.max())
         self.most_heat = max(self.most_heat, most)
         return most
-
-    def _press(self, current_A: FloatArray, rate_Hz: float, foretold_N: FloatArray | None) -> None:
-        expected_N = least_force(current_A, rate_Hz) if foretold_N is None else foretold_N
-        most = float(np.nanmax(expected_N))
-        if most > self.force_N:
-            # a slower stroke creeps higher, and sensors have noise: a tenth of the limit is left to them
-            told_A = math.floor(100 * current_A[int(np.argmax(expected_N > 0.9 * self.force_N))]) / 100
-            at_most = f"`current_max_A` at most {told_A:g}"
-            lower = "a lower `current_max_A`" if foretold_N is None else at_most
-            raise DeviceError(
-                f"the device would stop: a force of {most:.3g} N is predicted, and its limit is "
-                f"{self.force_N:g} N",
-                hint=f"raise `limit_force_N`, or {less_current(lower)}",
-            )
 
 
 def less_current(than: str) -> str:

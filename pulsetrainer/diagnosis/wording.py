@@ -116,7 +116,7 @@ TEXTS: Mapping[str, str] = {
 # What a cause is known by; whether the records lack what shows it
 SIGNATURES: Mapping[bool, str] = {
     False: "What gives it away: {mark}",
-    True: "What would give it away cannot all be seen here: {mark}",
+    True: "What would show it is not all in these recordings: {mark}",
 }
 # Where an error is largest, by the quantity that it was sorted by
 PLACES: Mapping[str, str] = {

@@ -266,7 +266,7 @@ def _other_units(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[
     """Say which headings name another unit than the one that was given: the numbers are not converted."""
     return [
         f"the heading {table.names[table.index(column)]!r} of {table.path} says {own}, and `{meaning}_unit` "
-        f"{unit}: taken as {unit}, number by number"
+        f"{unit}: taken as {unit}, not converted"
         for meaning, (column, unit) in meanings.items()
         if (own := table.unit(column)) and not same_units([own], [unit])
     ]

@@ -48,7 +48,13 @@ def course(found: Diagnosis) -> Figure:
     verdict = ", ".join(causes) if found.verdict in causes else found.verdict
     above.set_title(f"verdict: {verdict}{' (quick screen)' if found.quick else ''}", wrap=True)
     panels.headroom(above)
-    panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="left without causes")
+    panels.trace(
+        below,
+        found.time_s,
+        found.output - found.before,
+        **ERROR,
+        label="left before causes are added",
+    )
     if found.extended_percent < found.static_percent:
         left = found.output - found.after
         panels.trace(below, found.time_s, left, **MODEL, label="with the causes found")

@@ -10,7 +10,7 @@ import numpy as np
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
 from pulsetrainer.artefacts.time_steps import gaps_of, steps_of
 from pulsetrainer.artefacts.units import with_unit
-from pulsetrainer.core.memory import turning_points
+from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.report.diagnosis_text import parameters
 
@@ -54,8 +54,8 @@ def run_facts(run: Run, reversals: int | None = None) -> dict[str, Any]:
     """Return the main figures of a run; its ``reversals`` are counted unless they are given."""
     steps = steps_of(run.time_s) if run.time_s is not None and run.time_s.size > 1 else None
     if reversals is None:
-        turns = turning_points(run.input if run.reference is None else run.reference)
-        reversals = turns[:-1].size
+        turned = run.input if run.reference is None else run.reference
+        reversals = input_noise.clean(turned[:: max(input_noise.every(turned.size), 1)]).kept
     parts = run.parts()
     return {
         "signal": run.signal,

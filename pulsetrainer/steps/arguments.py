@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
+from functools import wraps
+from inspect import signature
 from typing import Any
 
 from pulsetrainer.errors import ArgumentError, UsageError
 
 EXCITATIONS = ("identification", "diagnostic")
+MOST_LEVELS = 500  # 400 take three minutes and 1.4 GB
 
 
 def check_beat(beat: str | int | None) -> None:
@@ -58,18 +62,58 @@ def check_quiz(choices: int, questions: int) -> None:
         )
 
 
-def check_is(kind: type, *given: object) -> None:
+def check_is(kind: type | tuple[type, ...], *given: object) -> None:
     """Raise ArgumentError for what is of another kind, such as the name of the file that it is in."""
     for one in given:
         if not isinstance(one, kind):
+            wanted = " or ".join(_a(k) for k in (kind if isinstance(kind, tuple) else (kind,)))
             name = str(one) if isinstance(one, str) or hasattr(one, "__fspath__") else ""
             raise ArgumentError(
-                f"expected a {kind.__name__}, got {repr(name) if name else f'a {type(one).__name__}'}",
+                f"expected {wanted}, got {repr(name) if name else _a(type(one))}",
                 hint=f"pt.load({name!r}) gives it" if name else "see its help",
             )
 
 
-def several(kind: type, given: Any) -> list[Any]:
+def _a(kind: type) -> str:
+    return f"an {kind.__name__}" if kind.__name__[0] in "AEIOaeio" else f"a {kind.__name__}"
+
+
+def kinds_checked(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a verb that raises ArgumentError for an artefact of another kind than its annotations name."""
+    from pulsetrainer.artefacts import KINDS
+
+    whole, known = signature(verb), {kind.__name__: kind for kind in KINDS.values()}
+    kinds = {}
+    for name, parameter in whole.parameters.items():
+        words = re.findall(r"\w+", re.sub(r"Sequence\[.*?\]|None", "", str(parameter.annotation)))
+        if words and known.keys() >= set(words):
+            kinds[name] = tuple(known[word] for word in words)
+
+    @wraps(verb)
+    def checked(*given: Any, **named: Any) -> Any:
+        try:
+            bound = whole.bind(*given, **named).arguments
+        except TypeError:  # the verb says it better
+            return verb(*given, **named)
+        for name, allowed in kinds.items():
+            one = bound.get(name)
+            if one is not None and (isinstance(one, str) or not isinstance(one, Iterable)):
+                check_is(allowed, one)
+        return verb(*given, **named)
+
+    return checked
+
+
+def check_levels(levels: int | None) -> None:
+    """Raise ArgumentError for what is no number of levels; None is no choice."""
+    if levels is not None and (not 2 <= levels <= MOST_LEVELS or levels != int(levels)):
+        raise ArgumentError(
+            f"`levels` must be a whole number from 2 to {MOST_LEVELS}, got {levels}",
+            hint="48 levels suit most devices",
+        )
+
+
+def several(kind: type | tuple[type, ...], given: Any) -> list[Any]:
     """Return what was given, one or many, as a list; raises as ``check_is``."""
     whole = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
     check_is(kind, *whole)

@@ -12,7 +12,7 @@ from pulsetrainer.artefacts import Evaluation, Session
 from pulsetrainer.artefacts.evaluation import HEADLINES
 from pulsetrainer.artefacts.units import shown
 from pulsetrainer.errors import DataError
-from pulsetrainer.steps.arguments import check_several, named
+from pulsetrainer.steps.arguments import check_several, named, several
 from pulsetrainer.steps.quiz import score
 
 _RISING = (  # more is better
@@ -65,6 +65,7 @@ def compare(
     >>> [metric.better for metric in pt.compare([before, before])]
     [None, None, None]
     """
+    evaluations = several((Evaluation, Session), evaluations)
     check_several(evaluations)
     titles = named(names, [f"number {k}" for k in range(1, len(evaluations) + 1)])
     sessions = [one for one in evaluations if isinstance(one, Session)]

@@ -22,7 +22,7 @@ from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps import fit_notes
-from pulsetrainer.steps.arguments import EXCITATIONS, named, several
+from pulsetrainer.steps.arguments import EXCITATIONS, check_levels, named, several
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -98,11 +98,13 @@ def identify(
     >>> model.fit.coverage_percent
     100.0
     """
+    check_levels(levels)
     whole = several(Run, runs)
     titles = named(names, [f"run {number}" for number in range(1, len(whole) + 1)])
     _check_runs(titles, whole)
     notes = [
         f"{title} is incomplete; fitting the {run.input.size} samples it has"
+        + (": capture --resume would finish it" if run.captured else "")
         for title, run in zip(titles, whole, strict=True)
         if not run.complete
     ]

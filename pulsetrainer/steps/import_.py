@@ -21,7 +21,6 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.errors import DataError, UsageError
 
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range
-_LOOKED_AT = 1_000_000  # samples; of a longer record every so many are looked at
 _LEAST = 2  # samples between two gaps: of fewer there is no step to resample
 
 
@@ -88,7 +87,7 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
     steps = steps_of(whole.time_s) if whole.time_s is not None else None
     gaps = gaps_of(whole.time_s, whole.seam)
     low, high = float(whole.input.min()), float(whole.input.max())
-    every = -(-whole.input.size // _LOOKED_AT)
+    every = input_noise.every(whole.input.size)
     u, y = whole.input[::every], whole.output[::every]
     cleaned = input_noise.clean(u)
     correlation = correlation_of([Record(u, y)])

@@ -16,7 +16,7 @@ from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.temperature import Thermometer
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.follower import INTERRUPTED
-from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
+from pulsetrainer.device.limits import Limits, Rehearsal, check_force, check_peak
 from pulsetrainer.device.plausibility import judge_against, judge_repeat
 from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
@@ -95,7 +95,8 @@ def play(
     DataError
         The drive is no current in A.
     DeviceError
-        The device stopped by itself. The whole repeats so far are in the error's ``kept``.
+        A limit would stop the device, or it stopped by itself. The whole repeats so far are in the error's
+        ``kept``.
     Interrupted
         Ctrl-C: the output was stopped first; ``kept`` as above.
 
@@ -115,6 +116,8 @@ def play(
         )
     _check(drive, repeats)
     check_peak(np.concatenate((drive.compensated, drive.scaled)), device.info.current_limit_A)
+    check_force(drive.compensated, drive.rate_Hz, device.info.force_limit_N, drive.predicted)
+    check_force(drive.scaled, drive.rate_Hz, device.info.force_limit_N)
     currents = {"compensated": drive.compensated, "scaled": drive.scaled}
     kept: dict[str, list[FloatArray]] = {name: [] for name in DRIVES}
     dropped, fault, remedy = 0, "", ""

@@ -25,7 +25,7 @@ from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.temperature import Windows, record_of
 from pulsetrainer.device.codes import MAX_DECIMATION
 from pulsetrainer.device.device import Device
-from pulsetrainer.device.limits import check_peak
+from pulsetrainer.device.limits import check_force, check_peak
 from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.arguments import EXCITATIONS
@@ -189,8 +189,11 @@ def record(
     info, rate_Hz = device.info, course.signal.rate_Hz
     check_top(course.signal, info.current_limit_A)
     decimation = decimation_for(info.tick_rate_Hz, rate_Hz)
+    high = float(course.signal.value.max())
+    stroke = conditioning_loop(high, rate_Hz) if condition_first else np.zeros(0)
+    check_force(stroke if stroke.size else course.signal.value, rate_Hz, info.force_limit_N)
     windows, begun_cold = Windows(), at == 0
-    high, parts, step = float(course.signal.value.max()), 0, info.tick_rate_Hz
+    parts, step = 0, info.tick_rate_Hz
     for part in parts_of(course, at, device.longest_play_s):
         if condition_first:
             _LOG.info("conditioning: once around the major loop")

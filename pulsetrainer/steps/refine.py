@@ -11,7 +11,7 @@ from pulsetrainer.artefacts import BoolArray, Model, RefinePass, Waveform
 from pulsetrainer.core import inversion, learning, metrics
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.device.device import Device
-from pulsetrainer.device.limits import Limits, Rehearsal, check_peak
+from pulsetrainer.device.limits import Limits, Rehearsal, check_force, check_peak
 from pulsetrainer.errors import ArgumentError, DataError, Interrupted
 from pulsetrainer.steps.invert import slew_limit
 from pulsetrainer.steps.invertible import Invertible, invertible
@@ -90,6 +90,7 @@ def refine(
     """
     model = check(drive, passes)
     check_peak(drive.compensated, device.info.current_limit_A)
+    check_force(drive.compensated, drive.rate_Hz, device.info.force_limit_N, drive.predicted)
     part = invertible(model, drive.rate_Hz)
     middle = slice(part.lead.size, drive.time_s.size - part.tail.size)
     limit = slew_limit(slew, model)

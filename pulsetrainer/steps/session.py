@@ -14,7 +14,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.core.rhythm import Rhythm
 from pulsetrainer.device.device import Device
-from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, check_peak
+from pulsetrainer.device.limits import ON_TIME_S, RAMP_S, Limits, Rehearsal, check_force, check_peak
 from pulsetrainer.diagnosis.prediction import extended_of
 from pulsetrainer.errors import DataError, DeviceError
 from pulsetrainer.steps.arguments import check_asked_for
@@ -93,6 +93,13 @@ def reach_of(model: Model, pulses: Sequence[Pulse], rates: Sequence[float | None
     return Reach(max(lows), min(highs))
 
 
+def _check_stroke(model: Model, current_A: float, force_N: float) -> None:
+    """Refuse a model whose whole range, over which each part of a session begins, is beyond a limit."""
+    check_peak(model.edges, current_A)
+    stroke = major_loop(float(model.edges[0]), float(model.edges[-1]), RATE_HZ)
+    check_force(stroke, RATE_HZ, force_N, extended_of(model)(stroke, 1.0 / RATE_HZ))
+
+
 @one_thread
 def perform(
     model: Model,
@@ -114,11 +121,11 @@ def perform(
     coil's temperature from the duty, before and all the time, and makes up for the force that it costs;
     None: where the model has a thermal term and knows the coil. ``watch`` gets each piece of telemetry.
 
-    DataError where the model cannot be used; DeviceError where the device cannot be talked to, or its
-    firmware knows no open-ended waves.
+    DataError where the model cannot be used; DeviceError where the model foretells a force
+    beyond the limit in force, the device cannot be talked to, or its firmware knows no open-ended waves.
     """
     check_model(model)
-    check_peak(model.edges, device.info.current_limit_A)
+    _check_stroke(model, device.info.current_limit_A, device.info.force_limit_N)
     beating = [Pulse(shape) for shape in pulses]
     reach = reach_of(model, beating, rates)
     meter = thermometer_of(model, device, asked=track_heat)
@@ -165,7 +172,7 @@ def plan(
     """
     check_model(model)
     rehearsal = Rehearsal(limits or Limits())
-    check_peak(model.edges, rehearsal.current_A)
+    _check_stroke(model, rehearsal.current_A, rehearsal.force_N)
     beating = [Pulse(shape) for shape in pulses]
     reach = reach_of(model, beating, rates)
     coil_of(model, asked=track_heat)

@@ -17,6 +17,15 @@ KEYS = {
 }  # fmt: skip
 
 
+def keys_in(width: int) -> str:
+    """Return what the keys do, on one line of a width: the words where there is room, and always the stop."""
+    named = [f"{'space' if key == ' ' else key} {what}" for key, what in KEYS.items()]
+    short = ["+ - rate", "< > height", "p pulse", "space pause", "q stop"]
+    return next(
+        (line for line in ("  ".join(named), "  ".join(short)) if len(line) <= width), " ".join(short)
+    )
+
+
 @dataclass
 class Steering:
     """Decides as ``programme`` does, but for what was changed by key.

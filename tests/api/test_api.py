@@ -34,7 +34,6 @@ def test_the_names_are_those_of_the_contract():
         text = inspect.getdoc(getattr(pt, name))
         assert text, name
         assert ">>>" in text, name
-    assert set(dir(pt)) >= NOUNS | VERBS
     with pytest.raises(AttributeError):
         _ = pt.identfy
 
@@ -71,7 +70,7 @@ def test_every_artefact_shows_itself(path):
 def test_errors_are_python_exceptions(tmp_path, capfd):
     """Nothing exits, nothing is printed; a ValueError where a caller expects one."""
     model = pt.load(KEPT / "model.h5")
-    with raises(ArgumentError, "not such an argument", argument="n_h", got="1") as caught:
+    with raises(ArgumentError, "not such an argument", argument="`levels`", got="1") as caught:
         pt.identify(pt.load(KEPT / "run.h5"), levels=1)
     assert isinstance(caught.value, ValueError)
     with pytest.raises(UsageError):
@@ -144,3 +143,35 @@ def test_an_artefact_shows_itself_whatever_backend_is_asked_for(asked, left):
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (pt.extend, "expected a Model, got a Diagnosis"),
+        (lambda diagnosis, model: pt.correct(model, diagnosis), "expected a Run, got a Model"),
+        (lambda _, model: pt.evaluate(model), "expected a Playback or a Run, got a Model"),
+        (lambda _, model: pt.compare(model), "expected an Evaluation or a Session, got a Model"),
+        (lambda _, model: pt.refine(model, None), "expected a Waveform, got a Model"),
+        (
+            lambda *_: pt.identify(pt.load(KEPT / "run.h5"), levels=1),
+            "whole number from 2 to 500",
+        ),
+        (
+            lambda *_: pt.identify(pt.load(KEPT / "run.h5"), levels=501),
+            "whole number from 2 to 500",
+        ),
+        (lambda *_: pt.read_table("x.csv"), "name of a column for input and for output"),
+    ],
+)
+def test_what_is_of_another_kind_is_refused_with_what_was_expected(call, said):
+    """By every verb in the same way, as a ValueError too, with a hint."""
+    with pytest.raises(ArgumentError, match=said) as caught:
+        call(pt.load(KEPT / "diagnosis.h5"), pt.load(KEPT / "model.h5"))
+    assert isinstance(caught.value, ValueError)
+    assert caught.value.hint
+
+
+def test_what_is_listed_is_public():
+    """Completion in a shell shows nothing else."""
+    assert set(dir(pt)) == set(pt.__all__)

@@ -217,7 +217,7 @@ def test_a_play_whose_force_reading_is_dead_stuck_or_half_never_ends_well(tmp_pa
     save(replace(drive, predicted=nothing_foretold, **drives), tmp_path / "drive.h5")
     words = ["play", "drive.h5", "-o", "played.h5", "--port", f"bench:?break={what}@{at_s}", "--json"]
     refusal(
-        pulsetrainer(tmp_path, *words, "--limit-force", "3" if what == "force-zero" and not at_s else "14"),
+        pulsetrainer(tmp_path, *words, "--limit-force", "5" if what == "force-zero" and not at_s else "14"),
         4,
         "force reading",
     )

@@ -291,6 +291,8 @@ def test_what_a_limit_hints_at_helps(ready, tmp_path, words, limit):
     dry = pulsetrainer(tmp_path, *words, *limited, "--dry-run", "--json")
     run = pulsetrainer(tmp_path, *words, *limited, "--json")
     assert dry.code == run.code > 0
+    said = [done.json["error"]["message"] for done in (dry, run)]
+    assert said[1].startswith(said[0]), "refused before anything moves"
     hints = [done.json["error"]["hint"] for done in (dry, run)]
     assert all(limit in hint and "--current-max" in hint for hint in hints)
     top = re.search(r"--current-max at most ([\d.]+)", hints[0])[1]

@@ -24,7 +24,7 @@ from pulsetrainer.steps.performance import Performance
 from pulsetrainer.steps.programme import Change, Programme
 from pulsetrainer.steps.recording import PAUSE_S
 from pulsetrainer.steps.session import check_model, reach_of
-from pulsetrainer.steps.steering import AMPLITUDE_STEP, RATE_STEP_BPM, Steering
+from pulsetrainer.steps.steering import AMPLITUDE_STEP, RATE_STEP_BPM, Steering, keys_in
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
 NAMES = ("normal", "bifid", "parvus-et-tardus")
@@ -465,3 +465,11 @@ def test_a_fault_says_when_the_part_began_in_which_it_came(model):
     assert found.parts == 3
     assert found.fault.startswith("force trip")
     assert f" {begun_s:.1f} s" in found.fault
+
+
+@pytest.mark.parametrize("width", [48, 58, 78, 100])
+def test_the_line_of_keys_fits_and_names_the_one_that_stops(width):
+    """At widths of terminals from the smallest on; it was cut there."""
+    line = keys_in(width)
+    assert len(line) <= width
+    assert line.endswith("q stop")

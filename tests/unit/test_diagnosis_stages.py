@@ -1287,7 +1287,7 @@ def test_each_cause_found_brings_its_evidence(monkeypatch):
     ]  # fmt: skip
     assert found[1].figures == {"p": 0.005, "explains": 20.0}
     assert found[-1].names == ("rates",)
-    assert "cannot all be seen here: relaxation" in wording.sentence(found[1], {})
+    assert "not all in these recordings: relaxation" in wording.sentence(found[1], {})
 
 
 def test_what_the_records_show_is_cited_as_seen(monkeypatch):

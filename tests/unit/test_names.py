@@ -17,11 +17,12 @@ from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.session import FIGURES
 from pulsetrainer.artefacts.waveform import RefinePass
 from pulsetrainer.report import figures, html
-from pulsetrainer.report.facts import facts
+from pulsetrainer.report.facts import facts, run_facts
 from pulsetrainer.report.names import FORCE, NAMES, headed, split
 from pulsetrainer.report.tables import label, text
 from pulsetrainer.report.text import tables_of
 from pulsetrainer.steps.compare import compare
+from pulsetrainer.steps.import_ import report_of
 
 VOCABULARY = (Path(__file__).parents[2] / "docs" / "vocabulary.md").read_text(encoding="utf-8")
 EVALUATION = examples.evaluation()
@@ -144,3 +145,11 @@ def test_a_heading_of_somebodys_table_stays_as_it_is(heading):
     """Its underscore is part of the name, as on the axes of a figure."""
     assert label(heading) == heading
     assert (label("dropped_samples"), label("fast_rate_Hz")) == ("dropped samples", "fast rate, Hz")
+
+
+def test_reversals_are_counted_as_import_counts_them():
+    """Those of noise are none: one number for one record."""
+    rng = np.random.default_rng(0)
+    u = np.abs(np.mod(np.linspace(0.0, 6.0, 3000), 2.0) - 1.0) + rng.normal(0.0, 0.003, 3000)
+    run = pt.Run(time_s=np.arange(3000) / 100, input=u, output=u)
+    assert run_facts(run)["reversals"] == report_of(run).reversals == 5
