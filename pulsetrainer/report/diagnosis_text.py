@@ -21,7 +21,7 @@ ERRORS = (
     ("the model as given", "rms_percent", ""),
     ("a model fitted anew to these recordings", "", "static_percent"),
     ("that model with the causes found", "extended_rms_percent", "extended_percent"),
-    ("noise alone (for averages with the steps of the levels)", "noise_percent", "floor_percent"),
+    ("noise alone (averages: plus the levels)", "noise_percent", "floor_percent"),
 )
 COLUMNS = {
     "explains": "share of the squared error beyond noise that goes with this cause in the model; shares of "

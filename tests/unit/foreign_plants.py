@@ -87,7 +87,9 @@ class ForeignDevice:
     press: Callable[[FloatArray], FloatArray] | None = None  # in the plant's place
     shift_N: Callable[[int], float] = lambda play: 0.0  # of the zero, by the number of the play
 
-    info = SimpleNamespace(tick_rate_Hz=TICK_HZ, serial="foreign", firmware="none", current_limit_A=np.inf)
+    info = SimpleNamespace(
+        tick_rate_Hz=TICK_HZ, serial="foreign", firmware="none", current_limit_A=np.inf, force_limit_N=np.inf
+    )
 
     def play(self, current: FloatArray, rate_Hz: float, *, decimation: int = 10, on_block=None) -> Trace:
         """Press a current (n,) from rest; nobody watches it."""
