@@ -163,6 +163,7 @@ class Rehearsal:
         ArgumentError where the device would not play it; DeviceError where it would stop: the coil becomes
         too hot by then, or the force too high.
         """
+        check_force(reference_A, rate_Hz, self.force_N, expected_N)
         wire = checked_wire(
             reference_A,
             rate_Hz,
@@ -180,7 +181,6 @@ class Rehearsal:
                 hint="play fewer repeats, or at a lower current",
             )
         self._warm(current, rate_Hz)
-        check_force(current, rate_Hz, self.force_N, expected_N)
 
     def stream(self, reference_A: FloatArray, rate_Hz: float, expected_N: FloatArray) -> None:
         """Take the next piece (n,) of a reference without a known end as played; otherwise as ``play``."""

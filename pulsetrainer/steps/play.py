@@ -116,12 +116,12 @@ def play(
         )
     _check(drive, repeats)
     check_peak(np.concatenate((drive.compensated, drive.scaled)), device.info.current_limit_A)
+    tracked = _Tracked.of(drive, device, track_heat)
     check_force(drive.compensated, drive.rate_Hz, device.info.force_limit_N, drive.predicted)
     check_force(drive.scaled, drive.rate_Hz, device.info.force_limit_N)
     currents = {"compensated": drive.compensated, "scaled": drive.scaled}
     kept: dict[str, list[FloatArray]] = {name: [] for name in DRIVES}
     dropped, fault, remedy = 0, "", ""
-    tracked = _Tracked.of(drive, device, track_heat)
     for number in range(repeats * len(DRIVES)):
         name = DRIVES[number % len(DRIVES)]
         repeat = number // len(DRIVES) + 1
