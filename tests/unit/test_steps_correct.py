@@ -10,8 +10,8 @@ from scipy.stats import truncnorm
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Cause, Diagnosis, Parameter, Recorded
-from pulsetrainer.core import coarse as coarse_steps
-from pulsetrainer.core.coarse import between_steps
+from pulsetrainer.core import censored
+from pulsetrainer.core.censored import between_steps
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
@@ -206,9 +206,9 @@ def test_between_coarse_steps_lies_what_the_hysteresis_says(clean):
     done = between_steps(Record(clean.input, coarse), plane, q)
     assert np.abs(done - coarse).max() <= 0.5 * q * (1 + 1e-9)
     assert np.std(done - true) < 0.33 * np.std(coarse - true)
-    apart, least = np.linspace(-2.9, 2.9, 25), coarse_steps._LEAST_COUNT
+    apart, least = np.linspace(-2.9, 2.9, 25), censored._LEAST_COUNT
     for low, high in ((apart - 0.5, apart + 0.5), (apart, np.inf + apart), (apart - np.inf, apart)):
-        mean, count = coarse_steps._left_possible(2.0 * low, 2.0 * high)
+        mean, count = censored._left_possible(2.0 * low, 2.0 * high)
         left = truncnorm(2.0 * low, 2.0 * high)
         np.testing.assert_allclose(mean, left.mean(), rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(count, np.clip(1.0 - left.var(), least, 1.0), rtol=1e-6)

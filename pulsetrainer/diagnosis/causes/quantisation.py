@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from pulsetrainer.core.coarse import between_steps
+from pulsetrainer.core.censored import between_steps
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values
 from pulsetrainer.diagnosis.raw import Firing, Raw, spacing_of, values_of

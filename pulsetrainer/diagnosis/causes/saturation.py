@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 from scipy import ndimage
 
-from pulsetrainer.core.coarse import beyond_rails
+from pulsetrainer.core.censored import beyond_rails
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Taken, Values

@@ -1,4 +1,4 @@
-"""Outputs of which a reading tells only an interval, told by the hysteresis that fits all readings best.
+"""Censored outputs: a reading in coarse steps, or at a rail, tells an interval; the best hysteresis the rest.
 
 A sample of a coarse converter that reads c was anywhere in c - q/2 .. c + q/2, one that is cut off at a rail
 anywhere beyond it. With noise s and a fitted output p the likelihood of an interval a .. b is
@@ -28,7 +28,7 @@ _LEAST_NOISE = 0.05  # of a step: keeps the edges of a step finite
 _MOST_NOISE = 0.35  # of a step: with more the averages of the readings are right as they are
 _DIFFERENCES = (3, 20.0)  # third ones, and their variance for white noise: 1 + 9 + 9 + 1
 _TAIL = 6.0  # standard deviations beyond an edge: farther out the edge itself is wanted
-_ENDLESS = 37.0  # standard deviations: beyond these the density is less than the smallest number
+_ENDLESS = 37.0  # standard deviations, for an interval without an end: nothing is left beyond them
 _LEAST_LEFT = 0.5  # of the noise beside a rail: no fit leaves less
 _DESCRIBED = 2.0  # times that noise: where more is left, nothing tells what lies beyond the rail
 _TELLS = 0.05  # that a sample at a rail counts at least, to be told: two and a half standard deviations
