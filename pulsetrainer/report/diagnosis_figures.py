@@ -48,16 +48,10 @@ def course(found: Diagnosis) -> Figure:
     verdict = ", ".join(causes) if found.verdict in causes else found.verdict
     above.set_title(f"verdict: {verdict}{' (quick screen)' if found.quick else ''}", wrap=True)
     panels.headroom(above)
-    panels.trace(
-        below,
-        found.time_s,
-        found.output - found.before,
-        **ERROR,
-        label="left before causes are added",
-    )
+    panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="without causes")
     if found.extended_percent < found.static_percent:
         left = found.output - found.after
-        panels.trace(below, found.time_s, left, **MODEL, label="with the causes found")
+        panels.trace(below, found.time_s, left, **MODEL, label="with them")
     below.axhline(0.0, **GUIDE)
     below.set_ylabel(label("measured − model", found.output_unit))
     name = "sample number" if _timeless(found) else label("time", "s")
