@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import pulsetrainer.simulation  # noqa: F401 - announces the ports bench: and qemu:
-from pulsetrainer.artefacts import Model, Run, Session, Waveform
+from pulsetrainer.artefacts import KINDS, Model, Run, Session, Waveform
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device import opening as _device
 from pulsetrainer.device.device import Device
@@ -58,6 +58,8 @@ def save(artefact: Any, path: Path | str, *, overwrite: bool = False, title: str
 
     Raises
     ------
+    ArgumentError
+        It is no artefact.
     UsageError
         The file exists and ``overwrite`` is not set, or its folder is missing or not writable.
     DataError
@@ -70,6 +72,7 @@ def save(artefact: Any, path: Path | str, *, overwrite: bool = False, title: str
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     pt.save(model, pathlib.Path(folder) / "copy.h5")
     """
+    check_is(tuple(KINDS.values()), artefact)
     header = provenance.make_header(
         title or f"{artefact.kind} saved from Python",
         program="Python",  # what was done there nobody can tell but whoever did it

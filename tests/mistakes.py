@@ -31,6 +31,7 @@ def lay_out(folder: Path) -> None:
     (folder / "other").mkdir()
     (folder / "other" / "run.csv").write_text("t_s,current_A,force_N\n0,0,0\n")
     (folder / "wrong.toml").write_text("levles = 48\n")
+    (folder / "limits.toml").write_text("[limits]\ncurent_A = 1.0\n")
     (folder / "bare").mkdir()
     (folder / "bare.toml").write_text("")
     (folder / "pulse.toml").write_text("normal = 3\n")
@@ -262,6 +263,17 @@ _WORDS_OF_A_TIRED_HAND = {
             2,
             "the bound normal in pulse.toml",
             "normal.continuous.mean",
+        ),
+    ),
+    "the shell behind the switch": (
+        *("--show-completion zsh", 2, "takes no value, got zsh", "_PULSETRAINER_COMPLETE=source_zsh"),
+    ),
+    "a setting of a table that is nearly one": (
+        *(
+            "--settings limits.toml show run.h5",
+            2,
+            "'limits.curent_A'",
+            "did you mean current_A below [limits]?",
         ),
     ),
     "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),

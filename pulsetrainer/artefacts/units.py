@@ -187,14 +187,18 @@ def unit_of(template: str, input_unit: str, output_unit: str) -> str:
     return text
 
 
+def plain(unit: str) -> str:
+    """Return a unit without brackets around one word: ``N/(A)^2``, which formulas make, becomes N/A^2."""
+    return re.sub(r"\((\w+)\)", r"\1", unit)
+
+
 def shown(unit: str) -> str:
     """Return the unit as it is printed: ``N/A^2`` becomes N/A², ``percent`` %, ``1`` nothing."""
     if unit in ("1", "", "dimensionless"):
         return ""
     if unit == "percent":
         return "%"
-    # brackets around one word, as in N/(A)^2, are for machines
-    head, *powers = re.sub(r"\((\w+)\)", r"\1", unit).replace("**", "^").split("^")
+    head, *powers = plain(unit).replace("**", "^").split("^")
     for power in powers:
         if "." in power:  # there is no raised point
             head += f"^{power}"

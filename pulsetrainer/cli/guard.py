@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import errno
 import io
 import json
 import logging
 import os
+import re
 import signal
 import sys
 import traceback
@@ -22,6 +24,11 @@ from pulsetrainer.cli.starting import loaded
 from pulsetrainer.cli.usage import check_apart, usage_of
 from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
 
+# where a terminal has no Unicode: as the importer reads units
+_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
+_IN_LETTERS = str.maketrans(
+    {"µ": "u", "μ": "u", "Ω": "Ohm", "°": "deg", "·": "*", "×": "x", "±": "+-", "−": "-"}
+)
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _STOPPED = "stopped by you; what was not finished was not written"
 _DEBUG_HINT = "run it again with --debug for the whole traceback, and report it"
@@ -97,13 +104,25 @@ def end_like_ctrl_c() -> None:
             signal.signal(number, interrupt)
 
 
+def _in_letters(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Spell what an encoding lacks: ``N^2`` for N², an escape where there is no spelling."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    lacking = error.object[error.start : error.end]
+    spelled = re.sub(
+        "[⁰¹²³⁴-⁹⁻⁺]+", lambda power: "^" + power[0].translate(_RAISED), lacking.translate(_IN_LETTERS)
+    )
+    return spelled.encode("ascii", "backslashreplace").decode("ascii"), error.end
+
+
 def speak_any_encoding() -> None:
-    """Let a terminal or pipe without Unicode show what it cannot spell as escapes, instead of failing."""
+    """Let a terminal or pipe without Unicode show what it cannot spell in letters, instead of failing."""
+    codecs.register_error("in letters", _in_letters)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             spelled = stream.encoding.lower().replace("-", "") == "utf8" and stream.errors != "strict"
             if not spelled:
-                stream.reconfigure(errors="backslashreplace")
+                stream.reconfigure(errors="in letters")
 
 
 def _be_verbose() -> None:

@@ -29,6 +29,7 @@ _INSTEAD = {
 }
 # of them, those that are no file's name
 _NO_FILE = {"ports", "doctor"}
+_SHELLS = ("bash", "zsh", "fish", "powershell", "pwsh")  # that typer writes a completion for
 _NO_COMMAND = {
     "version": "pulsetrainer --version",
     "help": "pulsetrainer --help, or pulsetrainer identify --help",
@@ -94,6 +95,19 @@ def check_apart(words: Sequence[str]) -> None:
                 f"there is no option {word}: the file to write stands behind -o and a blank",
                 hint=f"-o {shlex.quote(name)}" + "; --output names a column" * ("import" in words),
             )
+    _check_completion(words)
+
+
+def _check_completion(words: Sequence[str]) -> None:
+    """UsageError for ``--show-completion zsh``: typer asks the surroundings for the shell, not the words."""
+    first, second = (*words, "", "")[:2]
+    if first in ("--show-completion", "--install-completion") and second:
+        raise UsageError(
+            f"{first} is for the shell it runs in and takes no value, got {second}",
+            hint=f"run it in {second}, or let it print: _PULSETRAINER_COMPLETE=source_{second} pulsetrainer"
+            if second in _SHELLS
+            else f"write {first} alone",
+        )
 
 
 def _as_typed(option: str, words: Sequence[str]) -> str:

@@ -7,11 +7,13 @@ evaluation of several waveforms does, they stand one below another, and a column
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pulsetrainer.artefacts import DrivePlayback, Evaluation, FloatArray, Model, Playback
+from pulsetrainer.artefacts.units import plain
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
 from pulsetrainer.files.table import numbered
@@ -66,6 +68,7 @@ def _along_time(artefact: Any, before: str = "") -> list[tuple[str, FloatArray]]
 def _cells(model: Model) -> list[tuple[str, FloatArray]]:
     """The density of a model, a row a cell: the edges between which its relays switch up and down."""
     up, down = np.tril_indices(model.levels)  # the order of core.plane
+    model = replace(model, weights_unit=plain(model.weights_unit))
     unit = model.edges_unit
     edges = [
         (_heading(f"switches {way} {end}", unit), model.edges[at])

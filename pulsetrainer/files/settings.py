@@ -125,7 +125,7 @@ def _value(path: Path, key: str, value: Any) -> Any:
         import difflib  # noqa: PLC0415 - needed by a mistake only
 
         near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]}?" if near else f"there are: {', '.join(known)}"
+        hint = f"did you mean {_in_its_table(near[0])}?" if near else f"there are: {', '.join(known)}"
         table, _, name = key.rpartition(".")
         if name in known:
             hint = f"put {name} above [{table}]: what stands below that belongs to it"
@@ -136,13 +136,19 @@ def _value(path: Path, key: str, value: Any) -> Any:
         value = float(value)
     if type(value) is not setting.kind or (isinstance(value, int | float) and not value > 0):
         wanted = {str: "text", int: "a whole number above 0", float: f"a number of {setting.unit} above 0"}
-        table, _, name = key.rpartition(".")
+        name = key.rpartition(".")[2]
         usual = {str: '"bench:"', int: "5", float: "1.0"}[setting.kind]
         raise UsageError(
             f"{path} sets {key} = {value!r}; it must be {wanted[setting.kind]}",
-            hint=f"write, for instance, {name} = {usual}" + (f" below [{table}]" if table else ""),
+            hint=f"write, for instance, {_in_its_table(key, f'{name} = {usual}')}",
         )
     return value
+
+
+def _in_its_table(key: str, words: str = "") -> str:
+    """Return a key, or ``words`` of it, as written in the file: ``current_A below [limits]``."""
+    table, _, name = key.rpartition(".")
+    return (words or name) + (f" below [{table}]" if table else "")
 
 
 def effective(file: Path | None, environment: Mapping[str, str]) -> list[tuple[Setting, Any, str]]:

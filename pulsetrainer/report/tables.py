@@ -84,7 +84,7 @@ def listed(title: str, columns: Sequence[str], rows: Sequence[Sequence[Any]]) ->
     """Yield a table as a list: each row's name, below it its figures with the names of their columns."""
     heads = [name.replace("-\n", "-").replace("\n", " ") for name in columns]
     width = max((len(head) for head in heads[1:]), default=0)
-    yield title
+    yield from title.splitlines()
     for row in rows:
         yield f"  {text(row[0])}"
         for head, cell in zip(heads[1:], row[1:], strict=True):

@@ -32,6 +32,8 @@ def of_form(fitted: Fitted, run: Run, asked: str) -> list[str]:
         how = f"fitted with the roles exchanged, {given} over {output} (dual form)"
         way = "clockwise" if fitted.operator.polarity > 0 else "counterclockwise"
         why = f"the {output} leads the {given}, its loop runs {way}"
+        if asked == "auto":
+            how += f"; if {given} and {output} were swapped by mistake, record or import them the right way"
     elif fitted.form == "signed":
         how = "fitted with weights of either sign (signed form)"
         why = "no loop that runs one way fits this record"

@@ -152,6 +152,7 @@ def test_an_artefact_shows_itself_whatever_backend_is_asked_for(asked, left):
         (lambda diagnosis, model: pt.correct(model, diagnosis), "expected a Run, got a Model"),
         (lambda _, model: pt.evaluate(model), "expected a Playback or a Run, got a Model"),
         (lambda _, model: pt.compare(model), "expected an Evaluation or a Session, got a Model"),
+        (lambda diagnosis, _: pt.save(diagnosis.causes, "out.h5"), "got a tuple"),
         (lambda _, model: pt.refine(model, None), "expected a Waveform, got a Model"),
         (
             lambda *_: pt.identify(pt.load(KEPT / "run.h5"), levels=1),

@@ -99,3 +99,4 @@ def test_the_weights_of_a_model_stand_at_their_cells():
     up, down = columns["switches up from [A]"], columns["switches down from [A]"]
     assert np.all(up >= down)
     assert len(set(zip(up, down, strict=True))) == up.size == 15
+    assert "Preisach weights mu [N/A^2]" in columns
