@@ -61,7 +61,7 @@ TEXTS: Mapping[str, str] = {
         "the time were left out: it is not taken for a property of the device"
     ),
     "largest": "The remaining error is largest {place}, {times:.1f} times its smallest value.",
-    "quick": "Quick screen: no model was fitted again, so the strengths are rough, by a tenth or more either way.",
+    "quick": "Quick screen: no model was fitted again, so strengths are rough: off by a tenth or more.",
     "lacks": "The recording is limited: {names}.",
     "untimed": (
         "The recordings have no time, so only causes that depend on the order of the samples were tried "

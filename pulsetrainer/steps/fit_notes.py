@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pulsetrainer.artefacts import BoolArray, Run
+from pulsetrainer.artefacts import BoolArray, Model, Run
 from pulsetrainer.core.fit import Fitted
 from pulsetrainer.core.forms import SMALLEST, leaves_more_than_noise
 from pulsetrainer.core.input_noise import white
@@ -76,6 +76,19 @@ def of_no_minor_loops(fitted: Fitted, run: Run, minor_percent: float) -> list[st
         f"minor loops tell only {minor_percent:.0f} % of the cells apart: with weights of either sign the "
         f"{run.output_quantity} is a guess after any reversal of the {run.input_quantity} that this record "
         "does not hold. Record loops within the major one too"
+    )
+    return [said]
+
+
+def of_guessed_turns(model: Model) -> list[str]:
+    """Say, before a model is inverted, that its record hardly held a minor loop."""
+    told = model.fit.minor_percent if model.fit else float("nan")
+    if not told < TOLD_APART:
+        return []
+    said = (
+        f"the record of this model has hardly any minor loops (cells told apart: {told:.0f} %): where the "
+        f"{model.output_quantity} turns within its range the drive is a guess, which the expected error does "
+        "not count. Identify on a record with loops within the major one"
     )
     return [said]
 

@@ -316,7 +316,8 @@ def _of_noise(cleaned: Sequence[input_noise.Cleaned], unit: str) -> list[str]:
     sigma, band = with_unit(f"{worst.sigma:.2g}", unit), with_unit(f"{worst.dead_band:.2g}", unit)
     kept = sum(clean.kept for clean in cleaned)
     found = f"noise of {sigma} in the measured input"
-    return [f"{found} made {removed} false reversals, all below {band}: taken out; {kept} real ones are left"]
+    left = "1 real one is left" if kept == 1 else f"{kept} real ones are left"
+    return [f"{found} made {removed} false reversals, all below {band}: taken out; {left}"]
 
 
 def _of_offsets(names: Sequence[str], fitted: Fitted, runs: Sequence[Run]) -> list[str]:

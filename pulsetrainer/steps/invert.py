@@ -17,6 +17,7 @@ from pulsetrainer.core.pulses import Shape, train
 from pulsetrainer.device.limits import ON_TIME_S
 from pulsetrainer.diagnosis.prediction import extended_of, predict
 from pulsetrainer.errors import ArgumentError, DataError, UsageError
+from pulsetrainer.steps import fit_notes
 from pulsetrainer.steps.arguments import check_force_range
 from pulsetrainer.steps.drive_layout import Layout, laid_out
 from pulsetrainer.steps.invertible import Invertible, invertible
@@ -112,6 +113,7 @@ def invert(
     _check_sampled(shape, rate_Hz)
     _check_length(shape, model, periods)
     _check_describes(model, name, despite_warning=despite_warning)
+    notes += fit_notes.of_guessed_turns(model)
     chosen = _method(method, model, name)
     part = invertible(model, own_Hz)
     if model.form == "signed":

@@ -13,7 +13,7 @@ from pulsetrainer.artefacts import Extension, Parameter
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.errors import DataError
-from wording import raises
+from wording import raises, tells
 
 ROWS = 1200
 
@@ -128,3 +128,15 @@ def test_a_drive_stays_within_the_record_also_where_the_ends_of_a_dual_model_lie
     assert u.min() - slack <= drive.compensated.min() < drive.compensated.max() <= u.max() + slack
     assert drive.predicted_max_error_percent < 0.01
     assert drive.clipped_samples == 0
+
+
+def test_a_model_of_one_loop_says_that_turns_within_it_are_a_guess():
+    """The error that it expects of its own drive is none, whatever the device does there."""
+    u = np.concatenate((np.linspace(0, 1, 300), np.linspace(1, 0, 300)))
+    y = np.concatenate((u[:300] ** 2, np.sqrt(u[300:])))
+    alone = pt.identify(pt.Run(time_s=np.arange(600) / 100, input=u, output=y), levels=12)
+    several = replace(alone, fit=replace(alone.fit, minor_percent=60.0))
+    said, silent = (" ".join(pt.invert("normal", one).notes) for one in (alone, several))
+    tells(said, "no minor loops")
+    with pytest.raises(AssertionError):
+        tells(silent, "no minor loops")
