@@ -121,6 +121,8 @@ class Bins:
             if own.size == 0:
                 continue
             at = np.floor(self.time_s[own] / (width * step)).astype(np.int64)
+            if own.size == self.count == at[-1] + 1:  # one record without a hole: nothing is copied
+                return through(columns, k, width * step)
             last = np.maximum(np.searchsorted(at, np.arange(at[-1] + 1), side="right") - 1, 0)
             result[own] = through(columns[own[last]], k, width * step)[at]
         return result
@@ -329,7 +331,7 @@ class Projector:
         self.design, self.cells = design, free
         # filtered nodes are not sparse: then the columns of the few positive cells are faster than all
         nodes = design.nodes
-        self._columns = design.bins.settled(nodes[:, free]) if isinstance(nodes, np.ndarray) else None
+        self._columns = nodes[:, free] if isinstance(nodes, np.ndarray) else None
         block = design.gram[np.ix_(free, free)]
         # where no cell is seen at all, any ridge does
         block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max()) or 1.0
@@ -341,7 +343,7 @@ class Projector:
         settled = bins.settled(columns)
         if self._columns is not None:
             along = linalg.cho_solve(self.factor, self._columns.T @ settled, check_finite=False)
-            return np.asarray(settled - self._columns @ along)
+            return np.asarray(settled - bins.settled(self._columns @ along))
         masses = np.zeros((design.plane.n_q, columns.shape[1]))
         masses[self.cells] = linalg.cho_solve(
             self.factor, design.across(settled)[self.cells], check_finite=False

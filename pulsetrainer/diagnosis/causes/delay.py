@@ -32,11 +32,17 @@ class Delay(Late):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         before = remembered(frame.past, self.id, y[:0])
-        whole = np.concatenate((before, y))
         steps = values[0] / frame.dt_s
-        remember(frame.past, self.id, whole[-math.ceil(steps) - 1 :])
-        at = np.maximum(np.arange(len(before), len(whole)) - steps, 0.0)
-        first = at.astype(np.int64)
-        then = np.minimum(first + 1, len(whole) - 1)
-        share = (at - first).reshape(-1, *[1] * (y.ndim - 1))
-        return np.asarray((1.0 - share) * whole[first] + share * whole[then])
+        late = math.ceil(steps)
+        whole = np.concatenate((before, y)) if len(before) else y
+        remember(frame.past, self.id, whole[-late - 1 :])
+        if late == 0:
+            return y
+        still = min(max(late - len(before), 0), len(y))  # of these nothing has arrived but the first value
+        count, first = len(y) - still, len(before) + still - late
+        shown = np.empty(y.shape)
+        shown[:still] = whole[0]
+        arrived = shown[still:]
+        np.multiply(whole[first : first + count], 1.0 - (late - steps), out=arrived)
+        arrived += (late - steps) * whole[first + 1 : first + 1 + count]
+        return shown
