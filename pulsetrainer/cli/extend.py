@@ -66,9 +66,7 @@ def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
         for one in found.found
         if one.cause in added and one.doubts
     )
-    part = (
-        "this is only a part of the error, and on other recordings the rest may be larger than what it mends"
-    )
+    part = "this is not all of the error, and on other recordings the rest may be larger than what it mends"
     partly = [] if found.whole else [f"{part}: `verify` RUN.h5 tells"]
     return [*(f"{name} {rates}" for name in at_one_rate), *doubts, *partly]
 

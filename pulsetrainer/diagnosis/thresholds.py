@@ -144,6 +144,7 @@ class Thresholds:
     wander_fall: float = 0.1  # ... and so much of what a drift took away
     gain_in_use: float = 0.6  # of what causes gain in the search: true ones keep 0.68 and more
     begin_share: float = 0.2  # of a record: what went on before it has decayed by then
+    settled_times: float = 5.0  # of the longest time constant: a rest after which 0.7 % is still under way
     slow_share: float = 0.4  # of what is left: so much that may be slow noise is sought in the bank too
 
     # Unlisted

@@ -37,7 +37,7 @@ TEXTS: Mapping[str, str] = {
         "The smallest effects that these recordings would have shown, rms, % of the span: {limits}"
     ),
     "not whole": (
-        "Only a part of it is explained by {names}: {rest:.2g} % of the span is something else, which noise "
+        "Not all of it is explained by {names}: {rest:.2g} % of the span is something else, which noise "
         "and levels do not account for"
     ),
     "slow noise": (
@@ -61,7 +61,10 @@ TEXTS: Mapping[str, str] = {
         "the time were left out: it is not taken for a property of the device"
     ),
     "largest": "The remaining error is largest {place}, {times:.1f} times its smallest value.",
-    "quick": "Quick screen: no model was fitted again, so strengths are rough: off by a tenth or more.",
+    "quick": (
+        "Quick screen: no cause was fitted together with the model, so strengths are rough: off by a tenth "
+        "or more."
+    ),
     "lacks": "The recording is limited: {names}.",
     "untimed": (
         "The recordings have no time, so only causes that depend on the order of the samples were tried "
@@ -104,9 +107,18 @@ TEXTS: Mapping[str, str] = {
         "describes well, or the recordings are too short to fit one"
     ),
     "no gain": (
-        "Extended by {names} and used from rest, the model would predict these recordings little or no "
-        "better than as it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is "
-        "added to it."
+        "Extended by {names} and used from rest, the model would predict these recordings little better than "
+        "as it was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it."
+    ),
+    "no better": (
+        "Extended by {names} and used from rest, the model would predict these recordings worse than as it "
+        "was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it."
+    ),
+    "under way": (
+        "Extended by {names} and used from rest, the model would predict these recordings worse than as it "
+        "was given ({extended:.3g} % of the span against {given:.3g} %), so nothing is added to it. It "
+        "describes them only where their beginning is left open: the device was still settling from what "
+        "came before."
     ),
     "overshadowed": (
         "The change accounts for {share:.2f} % of the squared error. Adding {names} would only reduce what "
@@ -172,6 +184,10 @@ ADVICE: Mapping[str, str] = {
         "Extend the model with what was found, then test it on another recording, which was not fitted: "
         "pulsetrainer evaluate. From the measurement: {names}; pulsetrainer correct takes that out of the "
         "recording."
+    ),
+    "rest first": (
+        "The device was still settling when these recordings began. Let it rest for {rest} where they begin, "
+        "then record the same again and diagnose that: what was found can then be added to the model."
     ),
     "again": (
         "What was found is in doubt, or does not repeat within these recordings, so nothing is added to the "
@@ -302,12 +318,12 @@ class Bench:
             "biases": self._levels(experiment.BIASES),
             "width": with_unit(figure(experiment.WIDTH * self.scale.reach), self.unit),
             **{name: self._rate(faster * one) for name, one in rates.items()},
-            **{name: self._time(one / faster) for name, one in times.items()},
+            **{name: self.time(one / faster) for name, one in times.items()},
         }
 
     def lasting(self, name: str, faster: float) -> str:
         """Return how long an experiment takes, as the end of a phrase."""
-        return f", about {self._time(experiment.length_s(name) / faster)} in all" if self.timed else ""
+        return f", about {self.time(experiment.length_s(name) / faster)} in all" if self.timed else ""
 
     def _level(self, share: float) -> str:
         return with_unit(self._number(share), self.unit)
@@ -331,7 +347,8 @@ class Bench:
         per_second = f"{shown(self.unit) or '1'}/s"
         return with_unit(figure(ranges * self.scale.reach / self.scale.second), per_second)
 
-    def _time(self, seconds: float) -> str:
+    def time(self, seconds: float) -> str:
+        """Return a time of the diagnosis in words, in the unit of the record."""
         if not self.timed:
             return "several times as long as a loop takes"
         return with_seconds(seconds * self.scale.second)
@@ -388,7 +405,7 @@ def advice(one: Evidence, bench: Bench) -> str:
         lasting=bench.lasting(one.names[0], faster) if tied else "",
         missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),
         command=OURS if bench.ours else "",
-        **one.figures,
+        **{name: bench.time(value) if name == "rest" else value for name, value in one.figures.items()},
     )
 
 

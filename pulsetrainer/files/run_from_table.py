@@ -29,6 +29,7 @@ _ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the 
 _DAY_S = 86_400.0
 _COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
 _EXACT = 0.02  # of a step: what rounding of large stamps may be off by
+_SLOW_S = 1.0  # a step of so much is rare, and usual for milliseconds taken as seconds
 _SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
@@ -148,13 +149,17 @@ def _time(
     elif not unit and _unknown_unit(table, heading):
         said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
         notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
-    words = f"time from {split_unit(heading)[0]} [{unit or 's'}]"
+    words = f"time from {split_unit(heading)[0]} " + (f"[{unit}]" if unit else "(no unit: taken as s)")
     stamps, again = _begun_again(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
     if again:
         table = replace(table, columns={**table.columns, heading: stamps})
         notes = (*notes, f"the time of {table.path} {again}")
     time_s = seconds(table, time, of_record=True)
-    if np.spacing(np.abs(time_s[0])) > _EXACT * float(np.median(np.diff(time_s))):
+    step = float(np.median(np.diff(time_s)))
+    if not unit and step >= _SLOW_S:
+        said = f"the samples of {table.path} lie {step:g} s apart, if its time is in seconds as taken"
+        notes = (*notes, f"{said} (for ms write the heading as '{heading} [ms]')")
+    if np.spacing(np.abs(time_s[0])) > _EXACT * step:
         notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
     return _Time(time_s, words, notes)
 

@@ -142,8 +142,11 @@ def explains(one: Cause, found: Diagnosis) -> float:
 
 
 def tells_shares(found: Diagnosis) -> bool:
-    """Tell whether any cause has a share: not where nothing is beyond noise and nothing was fitted."""
-    return any(math.isfinite(explains(one, found)) for one in found.causes)
+    """Tell whether any cause has a share: not where nothing is beyond noise and nothing was fitted.
+
+    Those of a quick screen are first estimates, each as if it were alone: together they say nothing.
+    """
+    return not found.quick and any(math.isfinite(explains(one, found)) for one in found.causes)
 
 
 def _row(one: Cause, found: Diagnosis) -> tuple[Any, ...]:

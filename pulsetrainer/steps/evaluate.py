@@ -32,6 +32,7 @@ from pulsetrainer.steps.one_thread import one_thread
 
 _REPEATED = re.compile(r"#\d+(?=\.)")  # the number of a name that is there again
 BEYOND = 0.005  # of the model's range: an input further out than this was never identified
+_TOLD = 0.1  # % of the samples, in figures
 
 
 @one_thread
@@ -174,10 +175,13 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
         if model.fit and model.fit.warning:
             notes.append(f"warning: {title}: {model.fit.warning}")
         if _is_fitted_to(model, run):
-            notes.append(f"{title} was fitted to {name}: how good it is, another run shows")
+            raw = "; its fit took the noise of the input out, this prediction does not"
+            noisy = model.fit is not None and model.fit.false_reversals > 0 and model.form != "direct"
+            notes.append(f"{title} was fitted to {name}: how good it is, another run shows{raw * noisy}")
         if one.outside_percent > 0:
+            share = f"{one.outside_percent:.1f}" if one.outside_percent >= _TOLD else f"less than {_TOLD}"
             notes.append(
-                f"{one.outside_percent:.1f} % of the input of {name} is outside the range of {title}, "
+                f"{share} % of the input of {name} is outside the range of {title}, "
                 "where it predicts its outermost values"
             )
         if one.start != "known":

@@ -83,7 +83,7 @@ def _nothing_in(diagnosis: Diagnosis, name: str) -> DataError:
     why = (
         "only screened for causes and fitted none"
         if diagnosis.quick
-        else f"ended with the verdict {diagnosis.verdict!r} and found no property of the device that repeats"
+        else f"ended with the verdict {diagnosis.verdict!r} and has nothing that would hold elsewhere"
     )
     if diagnosis.correctable:
         hint = "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis DIAGNOSIS.h5 -o corrected.h5"

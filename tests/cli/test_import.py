@@ -236,6 +236,21 @@ def test_a_time_of_whole_steps_in_another_unit_is_no_count(run, tmp_path, headin
     assert done.json["facts"]["rate_Hz"] == pytest.approx(rate_Hz)
 
 
+@pytest.mark.parametrize(("heading", "said"), [("Zeit", True), ("Zeit [s]", False), ("Zeit in ms", False)])
+def test_a_slow_record_without_a_unit_of_time_may_be_one_in_milliseconds(run, tmp_path, heading, said):
+    """It is taken as seconds, which is said, and how to say otherwise."""
+    t = 10.0 * np.arange(300)
+    u = 1.0 + np.sin(t / 100.0)
+    rows = np.stack((t, u, u**2), axis=1)
+    np.savetxt(
+        tmp_path / "r.csv", rows, fmt="%.6g", delimiter=",", header=f"{heading},u [A],y [N]", comments=""
+    )
+    done = run("import", "r.csv", "--input", "u", "--output", "y", "-o", "run.h5")
+    assert done.code == 0
+    assert ("no unit: taken as s" in done.out, "10 s apart" in done.err) == (said, said)
+    assert ("'Zeit [ms]'" in done.err) is said
+
+
 def test_rows_that_are_merely_counted_are_no_time(run, tmp_path):
     """A magnetic loop is indexed 0, 1, 2: that is said, and only its order counts, unless --time insists."""
     done = run(*_words("bh_steel_m130_27s_1", "-o", "run.h5", "--json"))

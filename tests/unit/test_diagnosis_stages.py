@@ -1547,17 +1547,28 @@ def test_what_both_fits_leave_room_for_nothing_of_is_in_doubt(cosine, in_doubt):
     assert begin._told_by_both(told, second) == told  # it is said once
 
 
-@pytest.mark.parametrize(("after", "better"), [(9.81, True), (9.82, False), (10.01, False)])
-def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, better):
-    """By three fifths of the 6 that its causes gain in the search: else nothing is added, and it is said."""
+@pytest.mark.parametrize(
+    ("after", "free", "said"),
+    [(9.81, True, None), (9.82, True, "no gain"), (10.01, True, "under way"), (10.01, False, "no better")],
+)
+def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, free, said):
+    """By three fifths of the 6 that its causes gain in the search: else nothing is added, and it is said why.
+
+    What is worse, and described its records only with a free beginning, was under way before them.
+    """
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
     monkeypatch.setattr(extension, "rms_of", lambda state, model, known: after if model == "extended" else 10)
-    state = _state(_fit(500.0, "creep"))
+    begun = SimpleNamespace(bins=SimpleNamespace(begins_free=free))
+    state = _state(replace(_fit(500.0, "creep"), problem=begun))
     state = replace(state, repeated=state.current, question=replace(state.question, given=Given("given")))
     found = extension.stage(state)
-    assert found.extended == ("extended" if better else None)
-    assert [one.kind for one in found.evidence] == ([] if better else ["no gain"])
-    assert bool(found.extensions) is better
+    assert found.extended == (None if said else "extended")
+    assert [one.kind for one in found.evidence] == ([said] if said else [])
+    assert bool(found.extensions) is (said is None)
+    waits = advice.stage(replace(found, verdict="creep")).advice
+    assert (waits.kind == "rest first") is (said == "under way")
+    tau = max(state.current.terms[0].values)
+    assert waits.figures.get("rest", 5.0 * tau) == pytest.approx(5.0 * tau)
 
 
 @pytest.mark.parametrize(
@@ -1691,7 +1702,7 @@ def test_an_output_that_falls_where_the_model_rises_is_reversed(monkeypatch, wro
     assert [one.kind for one in after.evidence] == ["reversed", "static"]
     offset, gain = after.findings[0].parameters
     assert (offset.value, gain.value) == pytest.approx((10.0, -1.5), abs=0.01)
-    assert advice._advice(after).kind == "identify anew"
+    assert advice.stage(after).advice.kind == "identify anew"
 
 
 @pytest.mark.parametrize("polarity", [1, -1])

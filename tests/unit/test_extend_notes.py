@@ -37,4 +37,4 @@ def test_a_cause_in_doubt_is_told_with_its_doubts():
 @pytest.mark.parametrize("whole", [True, False])
 def test_where_more_than_noise_is_left_a_run_that_was_not_diagnosed_tells(whole):
     """A viscous part in proportion to the speed, of one with its square: at low speeds it misleads."""
-    assert any("only a part" in line for line in _said("viscous", whole=whole)) is not whole
+    assert any("not all of the error" in line for line in _said("viscous", whole=whole)) is not whole

@@ -1,9 +1,10 @@
 """Advice: what to measure next.
 
 Where the model as given is of the wrong kind, or of another condition, that comes first: another model is
-needed. Where causes are tied, the experiment on which they look least alike, tried on paper with the model
-that was found. Else what the recordings lack; else what the verdict asks for: a fault of the measurement is
-taken out of the record (`correct`), a property of the device goes into the model (`extend`).
+needed. Where the device was still settling when the records began, it must rest first. Where causes are tied,
+the experiment on which they look least alike, tried on paper with the model that was found. Else what the
+recordings lack; else what the verdict asks for: a fault of the measurement is taken out of the record
+(`correct`), a property of the device goes into the model (`extend`).
 """
 
 from __future__ import annotations
@@ -33,14 +34,21 @@ _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 
 def stage(state: State) -> State:
     """Return the state with its advice."""
-    return replace(state, advice=_advice(state))
+    return replace(state, advice=_of_the_conditions(state) or _of_the_causes(state))
 
 
-def _advice(state: State) -> Evidence:
+def _of_the_conditions(state: State) -> Evidence | None:
     another = [one for one in state.evidence if one.kind in _ANOTHER_MODEL]
     if another:
         alone = another[0].record is not None  # only one of the records is not the model's
         return Evidence("conditions" if alone else _ANOTHER_MODEL[another[0].kind])
+    began = [one for one in state.evidence if one.kind == "under way"]
+    if began and state.extended is None:
+        return Evidence("rest first", figures={"rest": began[0].figures["rest"]})
+    return None
+
+
+def _of_the_causes(state: State) -> Evidence:
     tied = next((one for one in state.findings if one.found and one.confounded_with), None)
     if tied is not None:
         names = (tied.cause.id, *tied.confounded_with)

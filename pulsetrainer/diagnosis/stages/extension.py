@@ -46,8 +46,28 @@ def _extended(state: State, given: Model) -> State:
         return replace(state, extended=extended)
     figures = {"given": PERCENT * before / state.scale.span, "extended": PERCENT * after / state.scale.span}
     names = tuple(term.cause.id for term in state.extensions)
-    said = Evidence("no gain", figures=figures, names=names)
+    said = Evidence(_why_not(state, before, after), figures=figures | _rest(state), names=names)
     return replace(state, repeated=None, evidence=(*state.evidence, said))
+
+
+def _why_not(state: State, before: float, after: float) -> str:
+    """Which evidence says why nothing is added, by the errors of the model as given and extended."""
+    assert state.repeated is not None
+    if after <= before:
+        return "no gain"
+    return "under way" if state.repeated.problem.bins.begins_free else "no better"
+
+
+def _rest(state: State) -> dict[str, float]:
+    """How long the device must rest before a record, so that nothing is under way when it begins."""
+    assert state.repeated is not None
+    times = [
+        value
+        for term in (*state.repeated.terms, *state.current.terms)
+        for quantity, value in zip(term.cause.quantities(state.problem.frames[0]), term.values, strict=True)
+        if quantity.unit == "s"
+    ]
+    return {"rest": LIMITS.settled_times * max(times, default=0.0)}
 
 
 def _without_contrast(state: State) -> State:
