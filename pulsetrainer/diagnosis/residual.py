@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import ndimage, signal
@@ -44,10 +45,7 @@ def groups(problem: Problem) -> list[Group]:
     level = problem.bins.average([r.input for r in problem.records])
     reach = problem.plane.high - problem.plane.low
     speed = np.abs(rate)
-    by_rate = np.digitize(speed, LIMITS.rate_edges).astype(np.int64)
-    at_rate = np.asarray(
-        [np.median(speed[by_rate == k]) if np.any(by_rate == k) else np.nan for k in range(by_rate.max() + 1)]
-    )
+    by_rate, at_rate = _by_speed(speed)
     share = (level - problem.plane.low) / reach
     by_level = np.clip((share * LIMITS.groups).astype(np.int64), 0, LIMITS.groups - 1)
     at_level = problem.plane.low + (np.arange(LIMITS.groups) + 0.5) / LIMITS.groups * reach
@@ -63,6 +61,22 @@ def groups(problem: Problem) -> list[Group]:
         Group("direction", "1", np.asarray([-1.0, 0.0, 1.0]), direction),
         Group("time", "s", at_time, by_time),
     ]
+
+
+def _by_speed(speed: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the group of each speed (count,) and the median of each; a rate on an edge is not parted."""
+    number = np.digitize(speed, LIMITS.rate_edges).astype(np.int64)
+
+    def medians() -> list[float]:
+        return [
+            float(np.median(speed[number == k])) if np.any(number == k) else float("nan")
+            for k in range(number.max() + 1)
+        ]
+
+    for k, (slower, faster) in enumerate(pairwise(medians()), start=1):
+        if faster < LIMITS.same_rate * slower:
+            number[number == k] = k - 1
+    return number, np.asarray(medians())
 
 
 def rms_by(group: Group, residual: FloatArray) -> FloatArray:

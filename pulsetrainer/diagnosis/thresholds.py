@@ -234,6 +234,7 @@ class Thresholds:
 
     # Where the residual is
     rate_edges: tuple[float, ...] = (0.05, 0.3, 1.0, 3.0, 7.0)  # ranges a second; below the first is rest
+    same_rate: float = 1.1  # times: groups whose medians are closer are one rate that lies on an edge
     rate_s: float = 0.01  # over which the rate of the input is averaged
     rate_samples: int = 3  # on each side, at least, of that mean
     groups: int = 10  # of level and of time

@@ -494,6 +494,15 @@ def test_a_record_has_several_rates_by_its_way_or_by_its_time():
         assert "rates" in residual.excitation_limits(problem_for([Record(u, u + 0.0, dt_s=dt)], 0.0, 1.0))
 
 
+@pytest.mark.parametrize(("slower", "faster", "groups"), [(2.98, 3.02, 1), (2.0, 4.0, 2)])
+def test_a_rate_on_an_edge_of_the_groups_is_one_group(slower, faster, groups):
+    """Else a figure against the rate has two values at one place."""
+    speed = np.repeat([slower, faster], 50)
+    number, at = residual._by_speed(speed)
+    assert np.unique(number).size == np.isfinite(at).sum() == groups
+    np.testing.assert_allclose(at[number], speed, rtol=0.02)
+
+
 def test_residuals_are_grouped():
     """Root mean square of each group; nothing where a group is empty."""
     group = residual.Group("level", "1", np.zeros(3), np.asarray([0, 0, 2]))
