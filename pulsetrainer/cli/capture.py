@@ -65,7 +65,6 @@ def capture(
         check_resumable(out)
     from pulsetrainer.artefacts import Run
     from pulsetrainer.core.course import Course
-    from pulsetrainer.report.planned import to_be_captured
     from pulsetrainer.steps.capture import excitation, plan
     from pulsetrainer.steps.recording import samples_played
 
@@ -90,6 +89,8 @@ def capture(
         if earlier is not None:
             at = samples_played(earlier.run, course)
         if dry_run:
+            from pulsetrainer.report.planned import to_be_captured
+
             job.check_device()
             planned = plan(
                 played, levels=levels, condition=condition, repeats=repeats, limits=job.limits, at=at

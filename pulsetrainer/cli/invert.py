@@ -73,7 +73,6 @@ def invert(
     job = Job(context, inputs=inputs, outputs=(out,))
     check_beat(beat)
     check_force_range(force_min, force_max)
-    from pulsetrainer.report.results import drive_title, inverted
     from pulsetrainer.steps.invert import invert as inverse_of
     from pulsetrainer.steps.transfer import check_refined
 
@@ -97,6 +96,8 @@ def invert(
         )
         if refined is not None:
             drive = pt.transfer(drive, refined, slew=slew_A_per_s)
+        from pulsetrainer.report.results import drive_title, inverted
+
         if pulse == Path(waveform):  # a file of the user's, wherever it lies
             job.uses(pulse)
         job.save(out, drive, drive_title(drive))
