@@ -59,7 +59,7 @@ def evaluate(
     Raises
     ------
     UsageError
-        A run without a model, several runs, or playbacks with models.
+        A run without a model, several runs, playbacks with models, or sessions, which keep their own errors.
     DataError
         A playback holds no whole repeat, or a model is in other units than the run.
 
