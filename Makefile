@@ -40,9 +40,12 @@ $(VENV)/installed: pyproject.toml
 	@touch $@
 	@echo "done; now: . $(BIN)/activate"
 
-$(VENV)/installed-test: $(VENV)/installed
-	$(BIN)/pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[test]'
-	@touch $@
+# what the tests need holds what the program needs: on a fresh machine all of it in one go
+$(VENV)/installed-test: pyproject.toml
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "downloading and installing pulsetrainer with what its tests need into $(VENV): a minute or two"
+	@$(BIN)/pip install --quiet --disable-pip-version-check --use-pep517 --editable '.[test]'
+	@touch $(VENV)/installed $@
 
 install: $(VENV)/installed  ## the program into .venv
 

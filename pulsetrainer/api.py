@@ -23,7 +23,6 @@ from pulsetrainer.errors import ArgumentError, UsageError
 from pulsetrainer.files import provenance, pulses, store
 from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.tuning import read_tuned
-from pulsetrainer.steps.arguments import check_is
 from pulsetrainer.steps.import_ import import_parts
 from pulsetrainer.steps.invert import invert as _invert
 from pulsetrainer.steps.one_beat import shape_of
@@ -172,7 +171,6 @@ def tune(device: Device, *, pulses: Sequence[Pulse] = ("normal", "bifid"), **opt
 
 @_as(_invert)
 def invert(pulse: Pulse, model: Model, **options: Any) -> Waveform:  # noqa: D103
-    check_is(Model, model)  # before the pulse: the two are easily swapped
     return _invert(_shape(pulse), model, **options)
 
 

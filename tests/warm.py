@@ -11,7 +11,6 @@ import atexit
 import json
 import os
 import select
-import signal
 import socket
 import sys
 import traceback
@@ -30,9 +29,11 @@ def serve(path: str) -> None:
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
     import typer
+    from scipy import fft, interpolate, linalg, ndimage, optimize, signal, sparse, special, stats  # noqa: F401
 
     from pulsetrainer.cli import app
 
+    _draw_once()
     app.app = typer.main.get_command(app.app)  # the parser, made once for all children
     listener = socket.socket(socket.AF_UNIX)
     listener.bind(path)
@@ -48,6 +49,21 @@ def serve(path: str) -> None:
             _keep(connection)
         connection.close()
         _reap()
+
+
+def _draw_once() -> None:
+    """Load what a figure and a table load when the first of them is made: fonts, formats, styles."""
+    import io
+
+    import rich.console
+    import rich.markup
+    import rich.table  # noqa: F401
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    figure.subplots().set_title("once")
+    for form in ("svg", "png", "pdf"):
+        figure.savefig(io.BytesIO(), format=form)
 
 
 def _reap() -> None:

@@ -65,10 +65,6 @@ def capture(
         check_resumable(out)
     from pulsetrainer.artefacts import Run
     from pulsetrainer.core.course import Course
-    from pulsetrainer.files.resume import earlier_of
-    from pulsetrainer.recorded import capture_into
-    from pulsetrainer.report.planned import to_be_captured
-    from pulsetrainer.report.results import captured
     from pulsetrainer.steps.capture import excitation, plan
     from pulsetrainer.steps.recording import samples_played
 
@@ -84,6 +80,8 @@ def capture(
     job.notes(_of_options(context, signal, played.name, own=table is None))
     course, earlier, at = Course(played, repeats), None, 0
     if resume:
+        from pulsetrainer.files.resume import earlier_of
+
         earlier = earlier_of(out, {name: context.params[name] for name in _SAME}, overwrite=overwrite)
     else:
         job.left_over(out, Run, "an interrupted capture: continue it with --resume, or delete it")
@@ -91,6 +89,8 @@ def capture(
         if earlier is not None:
             at = samples_played(earlier.run, course)
         if dry_run:
+            from pulsetrainer.report.planned import to_be_captured
+
             job.check_device()
             planned = plan(
                 played, levels=levels, condition=condition, repeats=repeats, limits=job.limits, at=at
@@ -101,6 +101,8 @@ def capture(
             return
         view = job.view(float(played.value.max()), live=live)
         with job.working(f"capturing {signal}", view) as progress, job.open_device() as device:
+            from pulsetrainer.recorded import capture_into  # a port that is none waits for no HDF5
+
             info, ancestors = device.info, []
             if earlier is not None:
                 earlier.check_device(info.serial)
@@ -115,6 +117,8 @@ def capture(
             )  # fmt: skip
     if got.dropped_samples:
         job.notes([f"{got.dropped_samples} samples were lost on the wire; the rest is right"])
+    from pulsetrainer.report.results import captured
+
     job.show(*captured(out, played.name, got, info))
 
 

@@ -35,13 +35,13 @@ def compare(
     check_several(evaluations)
     form = figure_format(out, "a comparison", "csv") if out is not None else ""
     job = Job(context, inputs=evaluations, outputs=(out,))
-    from pulsetrainer.files import store
-    from pulsetrainer.report.results import as_csv, labels_of, side_by_side
-    from pulsetrainer.steps.compare import differing_quizzes, differing_units
-
-    labels = labels_of(evaluations)
     with job.working("comparing"):
         loaded = [job.load_any(path, pt.Evaluation, pt.Session) for path in evaluations]
+        from pulsetrainer.files import store
+        from pulsetrainer.report.results import as_csv, labels_of, side_by_side
+        from pulsetrainer.steps.compare import differing_quizzes, differing_units
+
+        labels = labels_of(evaluations)
         headers = [store.read_header(path) for path in evaluations]
         metrics = pt.compare(loaded, names=list(map(str, evaluations)), everything=everything)
         values = {m.name: m.values for m in metrics}

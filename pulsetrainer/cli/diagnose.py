@@ -34,19 +34,21 @@ def diagnose(
     """
     check_once(runs)
     job = Job(context, inputs=(*runs, model), outputs=(out, html))
-    from pulsetrainer.files import store
-    from pulsetrainer.report.diagnosis_text import sections
-    from pulsetrainer.report.results import diagnosed
-
     with job.working("diagnosing") as progress:
+        # before the verb, which is slow to import
+        measured, given = [job.load(path, pt.Run) for path in runs], job.load(model, pt.Model)
         found = pt.diagnose(
-            [job.load(path, pt.Run) for path in runs],
-            job.load(model, pt.Model),
+            measured,
+            given,
             quick=quick,
             seed=seed,
             names=[str(path) for path in (*runs, model)],
             progress=progress,
         )
+        from pulsetrainer.files import store
+        from pulsetrainer.report.diagnosis_text import sections
+        from pulsetrainer.report.results import diagnosed
+
         header = job.save(out, found, f"Diagnosis of {', '.join(path.stem for path in runs)}")
         known = set(store.read_header(model).provenance.inputs.values())
         own = not known or bool(known & set(header.provenance.inputs.values()))

@@ -11,7 +11,7 @@ import pulsetrainer as pt
 from pulsetrainer.cli.console import Screen, plain
 from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, Overwrite
-from pulsetrainer.steps.arguments import check_once
+from pulsetrainer.steps.arguments import check_measured, check_once
 
 
 def evaluate(
@@ -39,17 +39,15 @@ def evaluate(
     from pulsetrainer.files.bounds import read_bounds
 
     limits = read_bounds(bounds) if bounds else {}
-    from pulsetrainer.errors import QualityError
-    from pulsetrainer.files import store
-    from pulsetrainer.report.results import evaluated
-    from pulsetrainer.steps.evaluate import breaches
-
     with job.working("evaluating") as progress:
         measured = [job.load_any(path, pt.Playback, pt.Run, pt.Session) for path in inputs]
         if len(measured) == 1 and isinstance(measured[0], pt.Session):
             _of_session(job, inputs[0], measured[0], html, alone=not (model or out or bounds))
             return
         models = [job.load(path, pt.Model) for path in model]
+        check_measured(str(inputs[0]), measured, models)  # before the verb, which is slow to import
+        from pulsetrainer.steps.evaluate import breaches
+
         progress(0.2)
         evaluation = pt.evaluate(
             measured, models, names=list(map(str, inputs)), model_names=list(map(str, model))
@@ -62,6 +60,10 @@ def evaluate(
             from pulsetrainer.report.html import render_evaluation
 
             job.page(html, render_evaluation, evaluation, header)
+    from pulsetrainer.errors import QualityError
+    from pulsetrainer.files import store
+    from pulsetrainer.report.results import evaluated
+
     failed = None
     if broken:
         listed = "; ".join(f"{b.metric} = {b.value:.4g} is outside [{b.low:g}, {b.high:g}]" for b in broken)

@@ -69,11 +69,10 @@ def identify(
     job = Job(context, inputs=runs, outputs=(out,))
     length = word_or_number(smoothing, "auto", "--smoothing", "auto or a number from 0 to 1", least=0, most=1)
 
-    from pulsetrainer.report.results import identified
-
     with job.working("fitting") as progress:
+        loaded = [job.load(path, pt.Run) for path in runs]  # before the verb, which is slow to import
         model = pt.identify(
-            [job.load(path, pt.Run) for path in runs],
+            loaded,
             levels=levels,
             form=form,
             reading=operator or reading,
@@ -89,4 +88,6 @@ def identify(
     job.notes(model.fit.notes)
     if model.fit.warning:
         job.screen.line("warning: ", model.fit.warning)
+    from pulsetrainer.report.results import identified
+
     job.show(*identified(out, model, job.seconds))

@@ -73,11 +73,14 @@ def invert(
     job = Job(context, inputs=inputs, outputs=(out,))
     check_beat(beat)
     check_force_range(force_min, force_max)
-    from pulsetrainer.report.results import drive_title, inverted
     from pulsetrainer.steps.invert import invert as inverse_of
+    from pulsetrainer.steps.transfer import check_refined
 
     with job.working(f"inverting {waveform}") as progress:
         source = job.load(model, pt.Model)
+        refined = None if learnt is None else job.load(learnt, pt.Waveform)
+        if refined is not None:
+            check_refined(refined)
         drive = inverse_of(
             read_pulse(waveform),
             source,
@@ -91,8 +94,10 @@ def invert(
             name=str(model),
             progress=progress,
         )
-        if learnt is not None:
-            drive = pt.transfer(drive, job.load(learnt, pt.Waveform), slew=slew_A_per_s)
+        if refined is not None:
+            drive = pt.transfer(drive, refined, slew=slew_A_per_s)
+        from pulsetrainer.report.results import drive_title, inverted
+
         if pulse == Path(waveform):  # a file of the user's, wherever it lies
             job.uses(pulse)
         job.save(out, drive, drive_title(drive))

@@ -79,12 +79,9 @@ def session(
         if str(path) == name:
             job.uses(path)
     from pulsetrainer.cli.hands import Hands
-    from pulsetrainer.cli.score import say_pressed
     from pulsetrainer.core.rhythm import Rhythm
     from pulsetrainer.files.changes import read_answers, read_changes
     from pulsetrainer.files.pulses import read_pulse
-    from pulsetrainer.recorded import session_into
-    from pulsetrainer.report.planned import to_be_pressed
     from pulsetrainer.steps.programme import Change, Programme
     from pulsetrainer.steps.quiz import Blind
     from pulsetrainer.steps.session import LEAD_S, LIVE_LEAD_S, check_model, plan, with_quiz
@@ -132,8 +129,13 @@ def session(
             planned = plan(
                 loaded, shapes, chosen, limits=job.limits, watch=lambda s: progress(share(s)), **asked
             )
+        from pulsetrainer.report.planned import to_be_pressed
+
         job.would("press a session", planned, to_be_pressed(planned, job.limits.force_N))
         return
+    from pulsetrainer.cli.score import say_pressed
+    from pulsetrainer.recorded import session_into
+
     said = "a session that was cut off; its sheet: `pulsetrainer evaluate {left} --html sheet.html`"
     job.left_over(out, pt.Session, said)
     with job.open_device(loaded) as device, job.working("session", steered.live) as progress:

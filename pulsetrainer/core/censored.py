@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy import special
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.identification import identify
 from pulsetrainer.core.plane import BoolArray, FloatArray, Plane
@@ -110,7 +110,7 @@ def _left_possible(low: FloatArray, high: FloatArray) -> tuple[FloatArray, Float
     low, high = np.where(flip, -high, low), np.where(flip, -low, high)
     near = high > -_TAIL
     a, b = np.where(near, np.maximum(low, -_ENDLESS), -1.0), np.where(near, np.minimum(high, _ENDLESS), 1.0)
-    share = special.ndtr(b) - special.ndtr(a)
+    share = scipy.special.ndtr(b) - scipy.special.ndtr(a)
     at = [np.exp(-0.5 * np.minimum(x**2, 700.0)) / np.sqrt(2.0 * np.pi) for x in (a, b)]
     mean = (at[0] - at[1]) / share
     count = mean**2 - (a * at[0] - b * at[1]) / share

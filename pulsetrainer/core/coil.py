@@ -16,8 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.optimize
-import scipy.signal
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.errors import DataError

@@ -33,10 +33,17 @@ def cooled(heat: float, seconds: float) -> float:
 
 def added(reference_A: NDArray[np.float64], rate_Hz: float) -> NDArray[np.float64]:
     """Return the heat (n,) that a reference (n,) in A gives a cold coil, at each of its samples."""
-    from scipy.signal import lfilter  # noqa: PLC0415 - slow to load: what plays nothing waits for nothing
-
     share = -math.expm1(-1.0 / (rate_Hz * HEAT_TAU_S))
-    heat: NDArray[np.float64] = lfilter([share], [1.0, share - 1.0], reference_A**2 / HEAT_LIMIT_A2)
+    fed = share * reference_A**2 / HEAT_LIMIT_A2
+    heat, before = np.empty(fed.size), 0.0
+    # numpy alone: a filter of scipy's would load for longer than all else that a refusal needs
+    block = max(1, math.ceil(rate_Hz * HEAT_TAU_S))  # in which what is left stays a number of ordinary size
+    left = _left(min(block, fed.size), rate_Hz)
+    for at in range(0, fed.size, block):
+        one = fed[at : at + block]
+        part = left[: one.size]
+        heat[at : at + block] = part * (before + np.cumsum(one / part))
+        before = heat[min(at + block, fed.size) - 1]
     return heat
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.device import codes
 from pulsetrainer.device.heat import course, in_words, wait_s
-from pulsetrainer.device.plausibility import least_force
+from pulsetrainer.device.plausibility import least_force, settled_least
 from pulsetrainer.device.trace import FloatArray
 from pulsetrainer.errors import ArgumentError, DeviceError
 
@@ -135,6 +135,8 @@ def check_force(
     ``foretold_N`` (n,) is the force that a model predicts, NaN where it is not known; None: no more than that
     a lower force would be implausible.
     """
+    if foretold_N is None and np.max(settled_least(current_A), initial=0.0) <= limit_N:
+        return  # at once: the filters that tell it sample by sample are slow to load
     expected_N = least_force(current_A, rate_Hz) if foretold_N is None else foretold_N
     most = float(np.fmax.reduce(expected_N, initial=0.0))
     if most > limit_N:
@@ -216,6 +218,12 @@ def too_hot_ever(current_A: FloatArray, rate_Hz: float) -> ArgumentError:
         hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher `speed`), "
         "or at a lower current",
     )
+
+
+def check_ever_cool(reference_A: FloatArray, rate_Hz: float) -> None:
+    """Raise ArgumentError for a reference (n,) in A that even a cold coil does not bear."""
+    if math.isinf(wait_s(0.0, reference_A, rate_Hz)):
+        raise too_hot_ever(reference_A, rate_Hz)
 
 
 def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed: bool) -> None:

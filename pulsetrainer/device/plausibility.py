@@ -145,7 +145,12 @@ def _outside(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> 
 def least_force(current_A: FloatArray, rate_Hz: float) -> FloatArray:
     """Return the force (n,) in N below which a reading would be implausible, for a current (n,) in A."""
     least, _ = _recent(np.arange(current_A.size) / rate_Hz, current_A)
-    force: FloatArray = _LEAST_GAIN * np.interp(least, _CURRENT_A, _RISING_N) - _OFFSET_N
+    return settled_least(least)
+
+
+def settled_least(current_A: FloatArray) -> FloatArray:
+    """Return the same for currents (n,) that have stood: no current that peaks there gives a higher one."""
+    force: FloatArray = _LEAST_GAIN * np.interp(current_A, _CURRENT_A, _RISING_N) - _OFFSET_N
     return force
 
 

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import linalg
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray, IntArray
@@ -178,7 +178,7 @@ def _movable(loops: Sequence[Loop], fitted: Fitted) -> FloatArray:
     if not columns:
         return np.empty((0, 0))
     matrix = np.stack(columns, axis=1)
-    return np.asarray(linalg.orth(matrix / np.maximum(np.linalg.norm(matrix, axis=0), TINY)))
+    return np.asarray(scipy.linalg.orth(matrix / np.maximum(np.linalg.norm(matrix, axis=0), TINY)))
 
 
 def permuted(slope: FloatArray, left: FloatArray, kind: IntArray, rng: np.random.Generator) -> float:

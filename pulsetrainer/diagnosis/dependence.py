@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import fft, linalg, optimize
 
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.diagnosis.causes.base import Values, spread
@@ -50,7 +50,7 @@ class Bank:
             for y, frame in zip(simulator.inner(fitted.terms), simulator.frames, strict=True)
         ]
         own = fitted.projector(fitted.slopes)
-        self.known = linalg.orth(own) if own.shape[1] else own
+        self.known = scipy.linalg.orth(own) if own.shape[1] else own
         self.residual = self.project(fitted.residual[:, None])[:, 0]
 
     def project(self, columns: FloatArray) -> FloatArray:
@@ -112,7 +112,7 @@ def best_dependence(
     seen = [own for _, _, own in found]
     scores = _falls(seen, bank.residual[:, None], bank.piece)[:, 0].tolist()
     tau, part, own = found[int(np.argmax(scores))]
-    axes = linalg.orth(own.astype(np.float64))
+    axes = scipy.linalg.orth(own.astype(np.float64))
 
     def free_of_both(columns: FloatArray) -> FloatArray:
         left = bank.project(columns)
@@ -130,10 +130,10 @@ def _drawn(noise: Noise, draws: int, rng: np.random.Generator) -> FloatArray:
     """Noise (count, draws) with a spectrum and a local size."""
     drawn = np.empty((draws, noise.bins.count))
     for own, at in noise.bins.places:
-        size = fft.next_fast_len(int(at[-1]) + 1, real=True)
-        lines = fft.rfft(rng.standard_normal((draws, size)), axis=1)
-        lines *= np.sqrt(noise.at(fft.rfftfreq(size)))
-        drawn[:, own] = np.take(fft.irfft(lines, size, axis=1), at, axis=1)
+        size = scipy.fft.next_fast_len(int(at[-1]) + 1, real=True)
+        lines = scipy.fft.rfft(rng.standard_normal((draws, size)), axis=1)
+        lines *= np.sqrt(noise.at(scipy.fft.rfftfreq(size)))
+        drawn[:, own] = np.take(scipy.fft.irfft(lines, size, axis=1), at, axis=1)
     return np.asarray((drawn * noise.scale).T)
 
 
@@ -148,7 +148,7 @@ def _refined(bank: Bank, kind: int, tau: float, fastest: float, slowest: float) 
         return float(np.sum((bank.residual - free @ bank.curve(free)) ** 2))
 
     near = np.log((max(tau / LIMITS.state_ratio, fastest), min(tau * LIMITS.state_ratio, slowest)))
-    best = optimize.minimize_scalar(
+    best = scipy.optimize.minimize_scalar(
         left, bounds=near, method="bounded", options={"xatol": LIMITS.state_settled}
     )
     tau = float(np.exp(best.x))

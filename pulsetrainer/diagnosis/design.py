@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import linalg, sparse
 
 from pulsetrainer.core import nnls
 from pulsetrainer.core.memory import Trace
@@ -68,7 +68,7 @@ class Bins:
     @cached_property
     def free(self) -> FloatArray:
         """Orthonormal columns (count, k) of what is fitted freely: one offset, the start of each record."""
-        return np.asarray(linalg.qr(self._starts, mode="economic", check_finite=False)[0])
+        return np.asarray(scipy.linalg.qr(self._starts, mode="economic", check_finite=False)[0])
 
     @cached_property
     def _starts(self) -> FloatArray:
@@ -130,7 +130,7 @@ class Bins:
     def constant(self, along: FloatArray) -> float:
         """Return the offset that belongs to coordinates (k,) along ``free``."""
         upper = self.free.T @ self._starts
-        return float(linalg.solve_triangular(upper, along, check_finite=False)[0])
+        return float(scipy.linalg.solve_triangular(upper, along, check_finite=False)[0])
 
     def settled(self, columns: FloatArray) -> FloatArray:
         """Signals (count,) or (count, m) without their offset and start."""
@@ -180,7 +180,7 @@ class Design:
     plane: Plane
     bins: Bins
     nodes: (
-        sparse.csr_array | FloatArray
+        scipy.sparse.csr_array | FloatArray
     )  # B (count, n_q) in node space, or B A in cells where causes filter it
     smoothing: float
 
@@ -194,15 +194,15 @@ class Design:
         shown: Callable[[FloatArray], FloatArray] | None = None,
     ) -> Design:
         """Average the rows of the inputs that the hysteresis sees, one per record; ``shown`` filters them."""
-        packed = sparse.csr_array((bins.count, plane.n_q))
+        packed = scipy.sparse.csr_array((bins.count, plane.n_q))
         for number, path in zip(bins.number, paths, strict=True):
             inside = np.flatnonzero(number >= 0)
             where = number[inside]
             share = 1.0 / bins.sizes[where]
             own, base = rows(plane, path.trace)
-            of_samples = sparse.csr_array((share, (where, inside)), shape=(bins.count, own.shape[0]))
+            of_samples = scipy.sparse.csr_array((share, (where, inside)), shape=(bins.count, own.shape[0]))
             anchor = path.trace.anchor[inside]
-            of_nodes = sparse.csr_array((share, (where, anchor)), shape=(bins.count, base.shape[0]))
+            of_nodes = scipy.sparse.csr_array((share, (where, anchor)), shape=(bins.count, base.shape[0]))
             packed = packed + of_samples @ own + of_nodes @ base
         if shown is None:
             return cls(plane, bins, packed, smoothing)
@@ -335,17 +335,17 @@ class Projector:
         block = design.gram[np.ix_(free, free)]
         # where no cell is seen at all, any ridge does
         block[np.diag_indices_from(block)] += LIMITS.ridge * float(np.diagonal(block).max()) or 1.0
-        self.factor = linalg.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
+        self.factor = scipy.linalg.cho_factor(block, lower=True, overwrite_a=True, check_finite=False)
 
     def __call__(self, columns: FloatArray) -> FloatArray:
         """Columns (count, k) without their fitted part."""
         bins, design = self.design.bins, self.design
         settled = bins.settled(columns)
         if self._columns is not None:
-            along = linalg.cho_solve(self.factor, self._columns.T @ settled, check_finite=False)
+            along = scipy.linalg.cho_solve(self.factor, self._columns.T @ settled, check_finite=False)
             return np.asarray(settled - bins.settled(self._columns @ along))
         masses = np.zeros((design.plane.n_q, columns.shape[1]))
-        masses[self.cells] = linalg.cho_solve(
+        masses[self.cells] = scipy.linalg.cho_solve(
             self.factor, design.across(settled)[self.cells], check_finite=False
         )
         return settled - bins.settled(design.output(masses))

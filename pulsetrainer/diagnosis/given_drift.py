@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
@@ -117,7 +117,7 @@ def drift_in(left: FloatArray, frames: Sequence[Frame], average: _Average) -> Dr
     tried = np.geomspace(*LIMITS.slowings) / frames[0].length_s * np.asarray([[1.0], [-1.0]])
     best = float(min(tried.ravel(), key=squares))
     ends = np.sort(best * np.asarray((0.5, 2.0)))  # beyond its neighbours
-    slowing = float(optimize.minimize_scalar(squares, bounds=ends, method="bounded").x)
+    slowing = float(scipy.optimize.minimize_scalar(squares, bounds=ends, method="bounded").x)
     relaxes = squares(slowing) < LIMITS.nearer**2 * squares(0.0)
     known = columns(slowing if relaxes else 0.0)
     solved = _solved(known, left)

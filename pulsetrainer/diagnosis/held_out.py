@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import linalg
 
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.smoothing import blocks
@@ -109,8 +109,8 @@ class HeldOut:
             normal = share * smooth + left[:-1, :-1]
             normal[np.diag_indices(size)] *= 1.0 + LIMITS.ridge_held_out
             normal[np.diag_indices(size)] += TINY
-            factor = linalg.cho_factor(normal, lower=True, check_finite=False, overwrite_a=True)
-            change = linalg.cho_solve(factor, left[:-1, -1] - share * pull, check_finite=False)
+            factor = scipy.linalg.cho_factor(normal, lower=True, check_finite=False, overwrite_a=True)
+            change = scipy.linalg.cho_solve(factor, left[:-1, -1] - share * pull, check_finite=False)
             yield fitted.residual[own] - rows.output(change)[own], change[free.size : free.size + extra]
 
 

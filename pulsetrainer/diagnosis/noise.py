@@ -20,8 +20,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import fft, signal, stats
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.design import Bins
@@ -48,15 +48,15 @@ class Noise:
         """Covariance (k, k) of what noise has along columns (count, k)."""
         total = np.zeros((columns.shape[1], columns.shape[1]))
         for own, at in self.bins.places:
-            size = fft.next_fast_len(2 * (int(at[-1]) + 1), real=True)
+            size = scipy.fft.next_fast_len(2 * (int(at[-1]) + 1), real=True)
             spread = np.zeros((columns.shape[1], size))
             spread[:, at] = (columns[own] * self.scale[own, None]).T
-            lines = fft.rfft(spread, axis=1)
+            lines = scipy.fft.rfft(spread, axis=1)
             twice = np.full(lines.shape[1], 2.0)
             twice[0] = 1.0
             if size % 2 == 0:
                 twice[-1] = 1.0
-            lines *= np.sqrt(twice * self.at(fft.rfftfreq(size)) / size)
+            lines *= np.sqrt(twice * self.at(scipy.fft.rfftfreq(size)) / size)
             real = lines.view(np.float64)
             total += real @ real.T
         return total
@@ -122,10 +122,10 @@ def _lines(columns: FloatArray, bins: Bins) -> tuple[FloatArray, FloatArray, Flo
     for own, at in bins.places:
         size = int(at[-1]) + 1
         spread = np.zeros((columns.shape[1], size))
-        window = signal.windows.hann(size, sym=False)
+        window = scipy.signal.windows.hann(size, sym=False)
         spread[:, at] = columns[own].T * window[at]
-        power = np.abs(fft.rfft(spread, axis=1)) ** 2 / max(float(window @ window), TINY)
-        found.append((fft.rfftfreq(size)[1:], power[0, 1:], power[1:, 1:].mean(axis=0)))
+        power = np.abs(scipy.fft.rfft(spread, axis=1)) ** 2 / max(float(window @ window), TINY)
+        found.append((scipy.fft.rfftfreq(size)[1:], power[0, 1:], power[1:, 1:].mean(axis=0)))
     frequency, lines, white = (np.concatenate(one) for one in zip(*found, strict=True))
     order = np.argsort(frequency, kind="stable")
     return frequency[order], lines[order], white[order]
@@ -180,7 +180,9 @@ def burstiness(residual: FloatArray, bins: Bins, level: FloatArray) -> float:
     """
     bands = np.asarray(_octaves(residual / _scale(residual, bins, level), bins)[0])
     power = bands.var(axis=1)
-    return float(np.average(stats.kurtosis(bands, axis=1, fisher=False), weights=np.maximum(power, TINY)))
+    return float(
+        np.average(scipy.stats.kurtosis(bands, axis=1, fisher=False), weights=np.maximum(power, TINY))
+    )
 
 
 def _impulses(residual: FloatArray, usual: float) -> float:
@@ -197,12 +199,12 @@ def _octaves(residual: FloatArray, bins: Bins) -> tuple[list[FloatArray], FloatA
     for own, at in bins.places:
         spread = np.zeros(int(at[-1]) + 1)
         spread[at] = residual[own]
-        lines, frequency = fft.rfft(spread), fft.rfftfreq(spread.size)
+        lines, frequency = scipy.fft.rfft(spread), scipy.fft.rfftfreq(spread.size)
         upper = 1.0
         for k, band in enumerate(bands):
             lower = 0.5 ** (k + 2) if k < LIMITS.octaves else -1.0
             inside = (frequency > lower) & (frequency <= upper)
-            band[own] = fft.irfft(np.where(inside, lines, 0.0), spread.size)[at]
+            band[own] = scipy.fft.irfft(np.where(inside, lines, 0.0), spread.size)[at]
             upper = lower
     return bands[:-1], bands[-1]
 
@@ -219,6 +221,6 @@ def _trimmed(values: FloatArray, share: float) -> float:
     """Mean square of normal values, told without the largest ones."""
     squares = np.sort(values**2)
     kept = max(round((1.0 - share) * values.size), 1)
-    edge = float(stats.norm.isf(0.5 * share))
-    expected = 1.0 - 2.0 * edge * float(stats.norm.pdf(edge)) / (1.0 - share)
+    edge = float(scipy.stats.norm.isf(0.5 * share))
+    expected = 1.0 - 2.0 * edge * float(scipy.stats.norm.pdf(edge)) / (1.0 - share)
     return float(squares[:kept].mean()) / expected

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import fft, ndimage, signal
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
@@ -108,7 +108,7 @@ def evenly(record: Record, stamps: FloatArray | None) -> Record:
 def _gaps(stamps: FloatArray, step: float) -> BoolArray:
     """Tell which steps (n - 1,) between stamps are gaps: longer than those around them, and than usual."""
     steps = np.diff(stamps)
-    usual = np.maximum(ndimage.median_filter(steps, LIMITS.usual_of, mode="nearest"), step)
+    usual = np.maximum(scipy.ndimage.median_filter(steps, LIMITS.usual_of, mode="nearest"), step)
     return np.asarray(steps > LIMITS.gap_steps * usual)
 
 
@@ -143,7 +143,7 @@ def _share_of_a_line(third: FloatArray) -> float:
     """Share of the squares of differences (k,) that one line of their spectrum has; 0 of too few."""
     if third.size < LIMITS.line_samples:
         return 0.0
-    power = np.abs(fft.rfft(third * signal.windows.hann(third.size))) ** 2
+    power = np.abs(scipy.fft.rfft(third * scipy.signal.windows.hann(third.size))) ** 2
     k = int(np.argmax(power))
     return float(
         np.sum(power[max(k - LIMITS.line_wide, 0) : k + LIMITS.line_wide + 1]) / max(np.sum(power), TINY)
@@ -156,7 +156,7 @@ def _third_differences(y: FloatArray, weight: FloatArray | None) -> FloatArray:
         return np.zeros(0)
     third = np.diff(y, DIFFERENCES)
     if weight is not None:
-        known = ndimage.minimum_filter1d(weight, DIFFERENCES + 1, origin=-2)[:-DIFFERENCES] > 0
+        known = scipy.ndimage.minimum_filter1d(weight, DIFFERENCES + 1, origin=-2)[:-DIFFERENCES] > 0
         third = third[known] if np.count_nonzero(known) >= LIMITS.noise_least else third
     return np.asarray(third - np.median(third))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import ndimage, signal
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray, IntArray
@@ -91,7 +91,7 @@ def spectrum(problem: Problem, residual: FloatArray) -> tuple[FloatArray, FloatA
     own = problem.bins.record == np.argmax(np.bincount(problem.bins.record))
     one, time = residual[own], problem.bins.time_s[own]
     step = float(np.median(np.diff(time)))
-    frequency, density = signal.welch(one, 1.0 / step, nperseg=min(one.size, LIMITS.welch))
+    frequency, density = scipy.signal.welch(one, 1.0 / step, nperseg=min(one.size, LIMITS.welch))
     edges = frequency[1] * 2.0 ** (np.arange(0.0, np.log2(frequency[-1] / frequency[1]) + THIRD, THIRD))
     band = np.digitize(frequency, edges)
     power = np.bincount(band, weights=density, minlength=edges.size + 1) * (frequency[1] - frequency[0])
@@ -136,8 +136,8 @@ def _holds(record: Record) -> bool:
     if count >= record.input.size:
         return False
     least = max(count, 1)
-    highest = ndimage.maximum_filter1d(record.input, least)
-    lowest = ndimage.minimum_filter1d(record.input, least)
+    highest = scipy.ndimage.maximum_filter1d(record.input, least)
+    lowest = scipy.ndimage.minimum_filter1d(record.input, least)
     inside = slice(least // 2, record.input.size - least // 2)
     reach = float(np.ptp(record.input))
     noise = input_noise.estimate(record.input)

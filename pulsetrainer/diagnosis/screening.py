@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy import linalg, special, stats
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes import library
@@ -104,14 +104,14 @@ class _Block:
             own = np.log(self.choices) + 0.5 * np.log(half) - half
             return float(np.sqrt(2.0 * half[np.argmax(own <= surprise)]))
         if self.as_it_is:
-            return float(stats.norm.isf(np.exp(surprise)))
+            return float(scipy.stats.norm.isf(np.exp(surprise)))
         chance = np.exp(surprise) * (2.0 if self.one_sided else 1.0)
-        return float(np.sqrt(stats.chi2.isf(chance, self.basis.shape[1])))
+        return float(np.sqrt(scipy.stats.chi2.isf(chance, self.basis.shape[1])))
 
     def surprises(self, along: FloatArray, covariance: FloatArray) -> FloatArray:
         """Logarithms of p (m,) for parts along the basis (k, m), of which noise has a covariance."""
         if self.as_it_is:
-            return np.asarray(special.log_ndtr(-along[0] / np.sqrt(covariance[0, 0])))
+            return np.asarray(scipy.special.log_ndtr(-along[0] / np.sqrt(covariance[0, 0])))
         size = np.sum(along * np.linalg.solve(covariance, along), axis=0)
         surprise = _log_tail(size, self.basis.shape[1])
         if self.choices:
@@ -125,10 +125,10 @@ class _Block:
 def _log_tail(square: FloatArray, count: int) -> FloatArray:
     """Logarithm of the chance (m,) that chi-square of ``count`` squares is larger; the usual ones by hand."""
     if count == 1:
-        return np.asarray(np.log(2.0) + special.log_ndtr(-np.sqrt(square)))
+        return np.asarray(np.log(2.0) + scipy.special.log_ndtr(-np.sqrt(square)))
     if count == 2:
         return -0.5 * square
-    return np.asarray(stats.chi2.logsf(square, count))
+    return np.asarray(scipy.stats.chi2.logsf(square, count))
 
 
 _RANKED: WeakKeyDictionary[Fitted, tuple[Score, ...]] = WeakKeyDictionary()
@@ -281,7 +281,7 @@ def _blocks(problem: Problem, fitted: Fitted, changed: Fitted) -> list[_Block]:
     """
     project = fitted.projector
     own = project(fitted.slopes)
-    known = linalg.orth(own) if own.shape[1] else own
+    known = scipy.linalg.orth(own) if own.shape[1] else own
     parts = _at_full_rate(problem, fitted)
     timed = all(record.timed for record in problem.records)
     tried: list[tuple[Cause, list[Values]]] = [

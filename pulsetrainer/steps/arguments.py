@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from inspect import signature
@@ -62,16 +63,14 @@ def check_quiz(choices: int, questions: int) -> None:
         )
 
 
-def check_is(kind: type | tuple[type, ...], *given: object) -> None:
+def _check_is(kinds: tuple[type, ...], one: object) -> None:
     """Raise ArgumentError for what is of another kind, such as the name of the file that it is in."""
-    for one in given:
-        if not isinstance(one, kind):
-            wanted = " or ".join(_a(k) for k in (kind if isinstance(kind, tuple) else (kind,)))
-            name = str(one) if isinstance(one, str) or hasattr(one, "__fspath__") else ""
-            raise ArgumentError(
-                f"expected {wanted}, got {repr(name) if name else _a(type(one))}",
-                hint=f"pt.load({name!r}) gives it" if name else "see its help",
-            )
+    if not isinstance(one, kinds):
+        name = str(one) if isinstance(one, str) or hasattr(one, "__fspath__") else ""
+        raise ArgumentError(
+            f"expected {' or '.join(map(_a, kinds))}, got {repr(name) if name else _a(type(one))}",
+            hint=f"pt.load({name!r}) gives it" if name else "see its help",
+        )
 
 
 def _a(kind: type) -> str:
@@ -79,29 +78,42 @@ def _a(kind: type) -> str:
 
 
 def kinds_checked(verb: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a verb that raises ArgumentError for an artefact of another kind than its annotations name."""
-    from pulsetrainer.artefacts import KINDS
+    """Return a verb that raises ArgumentError for an artefact of another kind than its annotations name.
 
-    whole, known = signature(verb), {kind.__name__: kind for kind in KINDS.values()}
-    kinds = {}
-    for name, parameter in whole.parameters.items():
-        words = re.findall(r"\w+", re.sub(r"Sequence\[.*?\]|None", "", str(parameter.annotation)))
-        if words and known.keys() >= set(words):
-            kinds[name] = tuple(known[word] for word in words)
+    Where they name a sequence, each that is in it is looked at.
+    """
+    whole = signature(verb)
+    kinds = {name: _kinds_in(str(one.annotation)) for name, one in whole.parameters.items()}
 
     @wraps(verb)
     def checked(*given: Any, **named: Any) -> Any:
         try:
-            bound = whole.bind(*given, **named).arguments
+            bound = whole.bind(*given, **named)
         except TypeError:  # the verb says it better
             return verb(*given, **named)
-        for name, allowed in kinds.items():
-            one = bound.get(name)
-            if one is not None and (isinstance(one, str) or not isinstance(one, Iterable)):
-                check_is(allowed, one)
-        return verb(*given, **named)
+        for name, one in bound.arguments.items():
+            alone, each = kinds[name]
+            if each and isinstance(one, Iterable) and not isinstance(one, str):
+                bound.arguments[name] = several(one)  # which may be gone through only once
+                for single in bound.arguments[name]:
+                    _check_is(each, single)
+            elif (alone or each) and one is not None:
+                _check_is(alone or each, one)
+        return verb(*bound.args, **bound.kwargs)
 
     return checked
+
+
+def _kinds_in(annotation: str) -> tuple[tuple[type, ...], tuple[type, ...]]:
+    """Return the kinds of artefact that an annotation names alone, and those in a sequence."""
+    from pulsetrainer.artefacts import KINDS
+
+    known = {kind.__name__: kind for kind in KINDS.values()}
+    alone = re.findall(r"\w+", re.sub(r"Sequence\[.*?\]|None", "", annotation))
+    each = re.findall(r"\w+", " ".join(re.findall(r"Sequence\[(.*?)\]", annotation)))
+    if not known.keys() >= {*alone, *each}:
+        return (), ()
+    return tuple(known[word] for word in alone), tuple(known[word] for word in each)
 
 
 def check_levels(levels: int | None) -> None:
@@ -113,11 +125,9 @@ def check_levels(levels: int | None) -> None:
         )
 
 
-def several(kind: type | tuple[type, ...], given: Any) -> list[Any]:
-    """Return what was given, one or many, as a list; raises as ``check_is``."""
-    whole = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
-    check_is(kind, *whole)
-    return whole
+def several(given: Any) -> list[Any]:
+    """Return what was given, one or many, as a list."""
+    return list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
 
 
 def named(names: Sequence[str], usual: Sequence[str], *, argument: str = "names") -> Sequence[str]:
@@ -144,4 +154,25 @@ def check_several(evaluations: Sequence[object]) -> None:
         raise UsageError(
             f"compare needs at least two evaluations, got {len(evaluations)}",
             hint="pulsetrainer compare before.h5 after.h5",
+        )
+
+
+def check_measured(first: str, given: Sequence[Any], models: Sequence[Any]) -> None:
+    """Raise UsageError for artefacts that `evaluate` does not take together; ``first`` names one."""
+    counts = Counter(one.kind for one in given)
+    if counts["playback"] == len(given) > 0:
+        if models:
+            raise UsageError(
+                f"{first} is a playback, and models are tested on a run",
+                hint="leave `model` out, or give a run: pulsetrainer evaluate run.h5 --model model.h5",
+            )
+    elif not (counts["run"] == len(given) == 1 and models):
+        order = {kind: counts[kind] for kind in ("playback", "run", "session")} | {"model": len(models)}
+        got = [f"{count} {word}{'s' if count > 1 else ''}" for word, count in order.items() if count]
+        raise UsageError(
+            "evaluate takes playbacks, or one run together with the models to test on it, or one session; "
+            f"got {', '.join(got) or 'nothing'}",
+            hint="one session at a time; side by side: pulsetrainer compare ben.h5 carla.h5"
+            if counts["session"]
+            else "pulsetrainer evaluate run.h5 --model model.h5",
         )

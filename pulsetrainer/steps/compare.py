@@ -65,7 +65,7 @@ def compare(
     >>> [metric.better for metric in pt.compare([before, before])]
     [None, None, None]
     """
-    evaluations = several((Evaluation, Session), evaluations)
+    evaluations = several(evaluations)
     check_several(evaluations)
     titles = named(names, [f"number {k}" for k in range(1, len(evaluations) + 1)])
     sessions = [one for one in evaluations if isinstance(one, Session)]

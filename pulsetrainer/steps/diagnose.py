@@ -11,7 +11,7 @@ from pulsetrainer.diagnosis import procedure
 from pulsetrainer.diagnosis.answered import diagnosis_of
 from pulsetrainer.diagnosis.question import question_of
 from pulsetrainer.errors import UsageError
-from pulsetrainer.steps.arguments import check_is, named, several
+from pulsetrainer.steps.arguments import named, several
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -62,8 +62,7 @@ def diagnose(
     >>> pt.diagnose(run, model, quick=True).quick
     True
     """
-    whole = several(Run, runs)
-    check_is(Model, model)
+    whole = several(runs)
     if not whole:
         raise UsageError(
             "diagnose needs at least one run", hint="pulsetrainer capture diagnostic -o diagnostic.h5"

@@ -17,6 +17,7 @@ from pulsetrainer.artefacts import (
     ModelEvaluation,
     Playback,
     Run,
+    Session,
     WaveformEvaluation,
 )
 from pulsetrainer.artefacts.units import same_units, units_of
@@ -26,7 +27,7 @@ from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
-from pulsetrainer.steps.arguments import named, several
+from pulsetrainer.steps.arguments import check_measured, named, several
 from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES, to_their_tips
 from pulsetrainer.steps.one_thread import one_thread
 
@@ -37,7 +38,7 @@ _TOLD = 0.1  # % of the samples, in figures
 
 @one_thread
 def evaluate(
-    measured: Playback | Run | Sequence[Playback | Run],
+    measured: Playback | Run | Sequence[Playback | Run | Session],
     models: Model | Sequence[Model] = (),
     *,
     names: Sequence[str] = (),
@@ -59,7 +60,7 @@ def evaluate(
     Raises
     ------
     UsageError
-        A run without a model, several runs, or playbacks with models.
+        A run without a model, several runs, playbacks with models, or sessions, which keep their own errors.
     DataError
         A playback holds no whole repeat, or a model is in other units than the run.
 
@@ -71,32 +72,14 @@ def evaluate(
     >>> pt.evaluate(run, [pt.identify(run, levels=8)]).models[0].rms_percent < 0.1
     True
     """
-    given = [measured] if isinstance(measured, Playback | Run) else list(measured)
-    tested = several(Model, models)
+    given, tested = several(measured), several(models)
     titles = named(names, [f"{one.kind} {number}" for number, one in enumerate(given, 1)])
     called = named(model_names, [f"model {n}" for n in range(1, len(tested) + 1)], argument="model_names")
-    played = [one for one in given if isinstance(one, Playback)]
-    runs = [one for one in given if isinstance(one, Run)]
-    if played and len(played) == len(given):
-        if tested:
-            raise UsageError(
-                f"{titles[0]} is a playback, and models are tested on a run",
-                hint="leave `model` out, or give a run: pulsetrainer evaluate run.h5 --model model.h5",
-            )
-        errors = tuple(_of_playback(name, one) for name, one in zip(titles, played, strict=True))
-        return Evaluation(waveforms=errors, model=played[-1].waveform.model)
-    if len(runs) == len(given) == 1 and tested:
-        return _of_run(titles[0], runs[0], tested, called)
-    sessions = len(given) - len(played) - len(runs)  # of which the command evaluates one
-    counts = {"playback": len(played), "run": len(runs), "session": sessions, "model": len(tested)}
-    got = [f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts.items() if count]
-    raise UsageError(
-        "evaluate takes playbacks, or one run together with the models to test on it, or one session; got "
-        + (", ".join(got) or "nothing"),
-        hint="one session at a time; side by side: pulsetrainer compare ben.h5 carla.h5"
-        if sessions
-        else "pulsetrainer evaluate run.h5 --model model.h5",
-    )
+    check_measured(titles[0] if titles else "", given, tested)
+    if tested:
+        return _of_run(titles[0], given[0], tested, called)
+    errors = tuple(_of_playback(name, one) for name, one in zip(titles, given, strict=True))
+    return Evaluation(waveforms=errors, model=given[-1].waveform.model)
 
 
 # --- playbacks ------------------------------------------------------------------------------------------

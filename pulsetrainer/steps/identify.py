@@ -99,7 +99,7 @@ def identify(
     100.0
     """
     check_levels(levels)
-    whole = several(Run, runs)
+    whole = several(runs)
     titles = named(names, [f"run {number}" for number in range(1, len(whole) + 1)])
     _check_runs(titles, whole)
     notes = [

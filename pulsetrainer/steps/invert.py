@@ -21,7 +21,7 @@ from pulsetrainer.steps import fit_notes
 from pulsetrainer.steps.arguments import check_force_range
 from pulsetrainer.steps.drive_layout import Layout, laid_out
 from pulsetrainer.steps.invertible import Invertible, invertible
-from pulsetrainer.steps.one_beat import one_beat
+from pulsetrainer.steps.one_beat import one_beat, say_if_several
 from pulsetrainer.steps.one_thread import one_thread
 from pulsetrainer.steps.progress import Progress, silent
 
@@ -121,6 +121,8 @@ def invert(
     forces = _force_range(part, model, force_min, force_max, name)
     if chosen == "extended":
         forces = _within_beats(shape, model, part, forces, (force_min, force_max), rate_Hz, own_Hz)
+    if beat is None:
+        say_if_several(shape, notes)  # after what can be refused: to find beats loads filters
     notes += _stretched(shape, forces, (force_min, force_max), model)
     progress(0.2)
     layout = laid_out(shape, part, forces, periods, rate_Hz, own_Hz)

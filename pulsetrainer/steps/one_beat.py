@@ -30,7 +30,6 @@ def one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Shap
     """Return the beat that is asked for, out of a recording of several."""
     check_beat(beat)
     if beat is None:
-        _say_if_several(recording, notes)
         return recording
     found = find_beats(recording)
     lengths = found.periods_s
@@ -41,7 +40,7 @@ def one_beat(recording: Shape, beat: str | int | None, notes: list[str]) -> Shap
     return found.mean() if beat == "mean" else found.single(int(beat))
 
 
-def _say_if_several(recording: Shape, notes: list[str]) -> None:
+def say_if_several(recording: Shape, notes: list[str]) -> None:
     """Say it where a recording of several beats is about to be played as one period."""
     if len(recording.feet_s) > 1:  # it says itself where its beats begin
         return

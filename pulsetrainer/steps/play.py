@@ -22,7 +22,6 @@ from pulsetrainer.device.trace import Block, Trace
 from pulsetrainer.device.wording import FORCE_REMEDY
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.errors import ArgumentError, DataError, DeviceError
-from pulsetrainer.steps.arguments import check_is
 from pulsetrainer.steps.heat import Correction, coil_of, thermometer_of
 from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.stopped import raise_if_stopped
@@ -109,7 +108,6 @@ def play(
     >>> played.complete, played.compensated.output.shape[0]
     (True, 1)
     """
-    check_is(Waveform, drive)
     if isinstance(device, str):
         raise ArgumentError(
             f"expected a device, got {device!r}", hint=f"with pt.open_device({device!r}) as device: ..."

@@ -25,7 +25,7 @@ from pulsetrainer.core.plane import FloatArray, Plane
 from pulsetrainer.core.temperature import Windows, record_of
 from pulsetrainer.device.codes import MAX_DECIMATION
 from pulsetrainer.device.device import Device
-from pulsetrainer.device.limits import check_force, check_peak
+from pulsetrainer.device.limits import check_ever_cool, check_force, check_peak
 from pulsetrainer.device.trace import Block
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.steps.arguments import EXCITATIONS
@@ -195,6 +195,7 @@ def record(
     windows, begun_cold = Windows(), at == 0
     parts, step = 0, info.tick_rate_Hz
     for part in parts_of(course, at, device.longest_play_s):
+        check_ever_cool(part.reference(course), rate_Hz)  # before the loop, which would be for nothing
         if condition_first:
             _LOG.info("conditioning: once around the major loop")
             condition(device, high, rate_Hz)

@@ -97,12 +97,7 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
 
 def check_transfer(drive: Waveform, refined: Waveform) -> Model:
     """Return the model of both drives; DataError, as of ``transfer``, where nothing can be carried over."""
-    model, of_refined = check(drive, passes=1), check(refined, passes=1)
-    if not refined.passes:
-        raise DataError(
-            f"the drive of {refined.name} that `learnt` names was not refined: nothing was learnt on it",
-            hint="refine it first: pulsetrainer refine REFINED.h5 -o refined.h5",
-        )
+    model, of_refined = check(drive, passes=1), check_refined(refined)
     if model.fingerprint != of_refined.fingerprint:
         raise DataError(
             f"what was learnt on {refined.name} belongs to another model than the one that {drive.name} is "
@@ -121,6 +116,16 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
             hint="refine this drive itself",
         )
     return model
+
+
+def check_refined(refined: Waveform) -> Model:
+    """Return the model of a drive; DataError where nothing was learnt on it."""
+    if not refined.passes:
+        raise DataError(
+            f"the drive of {refined.name} that `learnt` names was not refined: nothing was learnt on it",
+            hint="refine it first: pulsetrainer refine REFINED.h5 -o refined.h5",
+        )
+    return check(refined, passes=1)
 
 
 def _check_general(refined: Waveform, drive: Waveform, told: float, uncertain: float) -> None:

@@ -129,7 +129,9 @@ def test_a_pulse_may_be_given_as_arrays_a_name_or_a_drive():
         assert np.allclose(again.target[again.scored], named.target[named.scored], atol=1e-3)
 
 
-@pytest.mark.parametrize(("asked", "left"), [("nonsense", ""), ("svg", "svg")])
+@pytest.mark.parametrize(
+    ("asked", "left"), [("nonsense", ""), pytest.param("svg", "svg", marks=pytest.mark.slow)]
+)
 def test_an_artefact_shows_itself_whatever_backend_is_asked_for(asked, left):
     """Its figure needs none; one that exists is still that of whoever draws beside it."""
     code = (

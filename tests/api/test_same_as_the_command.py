@@ -17,7 +17,7 @@ from pulsetrainer.steps.check import updated
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 KEPT = DATA / "files-0.1"
-MEASURED = ("bh_ferrite_mnzn_1.csv", "davinci_f0p5_torque10.csv")
+MEASURED = ("bh_ferrite_mnzn_1.csv", pytest.param("davinci_f0p5_torque10.csv", marks=pytest.mark.slow))
 
 
 def same(one: object, other: object, where: str = "") -> None:

@@ -66,7 +66,10 @@ def test_the_image_is_clean_under_strict_warnings(make):
     assert make("mps2") == ""
 
 
-@pytest.mark.parametrize("unit", ["frame", "wave", "pid", "safety", "app"])
+@pytest.mark.parametrize(
+    "unit",
+    ["pid", *(pytest.param(unit, marks=pytest.mark.slow) for unit in ("frame", "wave", "safety", "app"))],
+)
 def test_the_unit_tests_of_the_core_pass_on_this_processor(make, unit):
     """The same C tests as on the host, each limit and fault to the tick, on the Cortex-M4F."""
     told = make(f"mps2-test-{unit}")  # its exit status is the program's

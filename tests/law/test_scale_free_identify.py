@@ -58,7 +58,9 @@ def _plain(form: str) -> pt.Model:
     return _model(form)
 
 
-@pytest.mark.parametrize("form", DEVICES)
+@pytest.mark.parametrize(
+    "form", [pytest.param(form, marks=pytest.mark.slow if form == "signed" else ()) for form in DEVICES]
+)
 @settings(max_examples=4, deadline=None)
 @given(k=POWERS, a=POWERS, b=st.floats(-10, 10), c=POWERS, sign=SIGNS, d=st.floats(-10, 10))
 def test_a_model_is_the_same_in_all_units(form, k, a, b, c, sign, d):

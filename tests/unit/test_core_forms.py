@@ -110,7 +110,7 @@ def test_the_form_is_named_right(draws, form, count):
     assert found.count(form) / len(found) >= 0.95
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (1, 2))])
 def test_a_loop_of_sharp_corners_that_leads_is_still_dual(seed):
     """A spring beside one sliding element: on a coarse plane weights of either sign leave half as much.
 
@@ -156,9 +156,8 @@ def test_a_dual_model_predicts_within_the_noise(draw, seed):
     assert error <= 1.3
 
 
-@pytest.mark.parametrize(
-    "seed", [7301, *(pytest.param(s, marks=pytest.mark.slow) for s in range(7500, 7512))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [7301, *range(7500, 7512)])
 def test_steep_branches_of_a_dual_model_are_predicted_within_the_noise(seed):
     """The output is remembered with its noise, which a fit to the input takes for exact."""
     model, error = held_out(devices.steep_exchanged_plane, seed)
@@ -358,7 +357,13 @@ def test_a_record_that_no_form_describes_is_said_to_be_one(output):
     assert pt.invert("normal", model, despite_warning=True).compensated.size
 
 
-@pytest.mark.parametrize("draws", [devices.DIRECT, devices.CLOCKWISE, devices.BUTTERFLY, devices.MIXED])
+@pytest.mark.parametrize(
+    "draws",
+    [
+        *(devices.DIRECT, devices.CLOCKWISE, devices.BUTTERFLY),
+        pytest.param(devices.MIXED, marks=pytest.mark.slow),
+    ],
+)
 def test_a_record_that_a_form_describes_has_no_warning(draws):
     """The sentence is for others."""
     _, u, y, _, _ = measured(draws[0], 7)

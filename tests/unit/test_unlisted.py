@@ -308,10 +308,8 @@ def _triangles(turns, rates):
     return np.concatenate(pieces)
 
 
-@pytest.mark.parametrize(
-    "turns",
-    [(0.0, 1.5, 0.5, 1.1, 0.3, 1.3, 0.0), pytest.param((0.0, 1.5, 0.0), marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", [(0.0, 1.5, 0.5, 1.1, 0.3, 1.3, 0.0), (0.0, 1.5, 0.0)])
 def test_an_input_that_never_rests_does_not_make_it_noise(turns):
     """What is slow is heard as noise where nothing rests; a dependence is sought in it all the same."""
     u = _triangles(turns, (1.5, 3.0, 6.0))

@@ -107,7 +107,11 @@ def make(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-    "line", ["bench 3\tbench:?seed=3", "right  bench:?seed=4", "right\t", "left\tbench:?seed=5"]
+    "line",
+    [
+        *("right  bench:?seed=4", "left\tbench:?seed=5"),
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ("bench 3\tbench:?seed=3", "right\t")),
+    ],
 )
 def test_a_device_without_name_or_port_is_no_other_device(tmp_path, line):
     """A blank in a name, or blanks for the tab, left the port empty: the default device was played."""

@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from scipy import signal
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import wild
 from pulsetrainer.core.initial_state import known_from
@@ -333,8 +333,8 @@ def low_pass(
     b = np.asarray([slope, 1.0 - a - slope])
     # the filter's first step must see the first value as its past
     last_in, last_out = remembered(past, f"lag {name}", np.repeat(x[:1], 2))
-    state = signal.lfiltic(b, np.asarray([1.0, -a]), y=[last_out], x=[last_in])
-    filtered, _ = signal.lfilter(b, np.asarray([1.0, -a]), x, zi=state)
+    state = scipy.signal.lfiltic(b, np.asarray([1.0, -a]), y=[last_out], x=[last_in])
+    filtered, _ = scipy.signal.lfilter(b, np.asarray([1.0, -a]), x, zi=state)
     remember(past, f"lag {name}", np.asarray([x[-1], filtered[-1]]))
     return np.asarray(filtered)
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
+import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.wild import isolated
@@ -54,12 +54,12 @@ class Outliers(Cause):
     def gate(self, raw: Raw) -> Firing | None:
         """Samples far from the median around them, farther than fast turns go."""
         y = raw.record.output
-        apart = np.abs(y - ndimage.median_filter(y, _AROUND, mode="nearest"))
+        apart = np.abs(y - scipy.ndimage.median_filter(y, _AROUND, mode="nearest"))
         steps = np.abs(np.diff(y, prepend=y[0]))
-        usual = _TIP * ndimage.percentile_filter(steps, _FAST, _NEAR, mode="nearest")
+        usual = _TIP * scipy.ndimage.percentile_filter(steps, _FAST, _NEAR, mode="nearest")
         noise = max(_SIGMAS * _DIFFERENCE * noise_of(y), _STEPS * spacing_of(y), TINY)
         limit = np.maximum(usual, noise)
-        own = ndimage.median_filter(raw.record.input, _ALONE, mode="nearest")  # a wild input is no turn
+        own = scipy.ndimage.median_filter(raw.record.input, _ALONE, mode="nearest")  # a wild input is no turn
         back = _comes_back(own) / (raw.high - raw.low)
         told = (back <= _BACK) & (apart > _STEEP * back * float(np.ptp(y)))
         told &= ~_hurries(own) & ~raw.beside_breaks(_AROUND)
@@ -97,8 +97,8 @@ def _comes_back(u: FloatArray) -> FloatArray:
     There the output turns as fast, and no sample can be told from those beside it.
     """
     width = 2 * _LINE + 1
-    way = width * ndimage.uniform_filter1d(np.abs(np.diff(u, prepend=u[0])), width, mode="nearest")
-    swing = ndimage.maximum_filter1d(u, width, mode="nearest") - ndimage.minimum_filter1d(
+    way = width * scipy.ndimage.uniform_filter1d(np.abs(np.diff(u, prepend=u[0])), width, mode="nearest")
+    swing = scipy.ndimage.maximum_filter1d(u, width, mode="nearest") - scipy.ndimage.minimum_filter1d(
         u, width, mode="nearest"
     )
     return np.asarray(way - swing)
@@ -110,8 +110,8 @@ def _hurries(u: FloatArray) -> NDArray[np.bool_]:
     A force that follows the speed comes and goes with it.
     """
     steps = np.abs(np.diff(u, prepend=u[0]))
-    usual = ndimage.percentile_filter(steps, _FAST, _NEAR, mode="nearest")
-    return np.asarray(ndimage.maximum_filter1d(steps, 2 * _LINE + 1, mode="nearest") > _TIP * usual)
+    usual = scipy.ndimage.percentile_filter(steps, _FAST, _NEAR, mode="nearest")
+    return np.asarray(scipy.ndimage.maximum_filter1d(steps, 2 * _LINE + 1, mode="nearest") > _TIP * usual)
 
 
 def _off_line(y: FloatArray, at: int, side: int) -> float:

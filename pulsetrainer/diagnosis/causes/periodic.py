@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy import fft, ndimage, signal
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
@@ -63,13 +63,13 @@ class Periodic(Cause):
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         k = int(np.argmax([one.size for one in residual]))  # a long record has the sharpest lines
         frame, one = frames[k], residual[k]
-        power = np.abs(fft.rfft(one * np.hanning(one.size))) ** 2
-        frequency = fft.rfftfreq(one.size, frame.dt_s)
+        power = np.abs(scipy.fft.rfft(one * np.hanning(one.size))) ** 2
+        frequency = scipy.fft.rfftfreq(one.size, frame.dt_s)
         power[frequency < max(_SLOWEST_Hz, _PERIODS / (one.size * frame.dt_s))] = 0.0
         if not power.any():
             return []
         # against its surroundings: a line, not the slope of a spectrum
-        around = ndimage.median_filter(power, size=_LINES) + _FLOOR * power.max(initial=0.0) + TINY
+        around = scipy.ndimage.median_filter(power, size=_LINES) + _FLOOR * power.max(initial=0.0) + TINY
         k = int(np.argmax(power / around * (power > _LEAST * power.max(initial=0.0))))
         best = _refined(one, float(frequency[k]), float(frequency[1]), frame.dt_s)
         size = _TRIED * frame.span
@@ -89,7 +89,7 @@ class Periodic(Cause):
         """Return whether the input has one frequency, of which this is a multiple as far as can be told."""
         frame = max(frames, key=lambda one: one.input.size)
         moved = frame.input - frame.input.mean()
-        power = np.abs(fft.rfft(moved * np.hanning(moved.size))) ** 2
+        power = np.abs(scipy.fft.rfft(moved * np.hanning(moved.size))) ** 2
         k, apart = int(np.argmax(power)), 1.0 / (moved.size * frame.dt_s)
         if k == 0 or np.sum(power[max(k - _WIDE, 0) : k + _WIDE + 1]) < _ONE_LINE * np.sum(power):
             return False
@@ -118,5 +118,5 @@ def _sine(values: Values, record: int, time_s: FloatArray) -> FloatArray:
 def _refined(residual: FloatArray, frequency: float, width: float, dt_s: float) -> float:
     """Frequency of the largest line within a ``width`` of ``frequency``: a spectrum's bins are too coarse."""
     low, high = max(frequency - width, 0.0), min(frequency + width, 0.5 / dt_s)
-    lines = signal.zoom_fft(residual, [low, high], _FINER, fs=1.0 / dt_s, endpoint=True)
+    lines = scipy.signal.zoom_fft(residual, [low, high], _FINER, fs=1.0 / dt_s, endpoint=True)
     return float(np.linspace(low, high, _FINER)[int(np.argmax(np.abs(lines)))])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from scipy import signal
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.input_noise import real_turns
 from pulsetrainer.core.plane import FloatArray
@@ -51,9 +51,9 @@ class Resonance(Cause):
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         b, a = _filter(*values, frame.dt_s)
-        at_first = np.multiply.outer(signal.lfilter_zi(b, a), y[0])
+        at_first = np.multiply.outer(scipy.signal.lfilter_zi(b, a), y[0])
         state = remembered(frame.past, self.id, at_first)
-        moved, state = signal.lfilter(b, a, y, axis=0, zi=state)
+        moved, state = scipy.signal.lfilter(b, a, y, axis=0, zi=state)
         remember(frame.past, self.id, state)
         return np.asarray(moved)
 
@@ -69,5 +69,5 @@ def _filter(frequency: float, damping: float, dt_s: float) -> tuple[FloatArray, 
     """Coefficients of the oscillator, exact for an output that is straight between samples."""
     turn = 2.0 * np.pi * frequency
     oscillator = (np.asarray([turn**2]), np.asarray([1.0, 2.0 * damping * turn, turn**2]))
-    b, a, _ = signal.cont2discrete(oscillator, dt_s, method="foh")
+    b, a, _ = scipy.signal.cont2discrete(oscillator, dt_s, method="foh")
     return b.ravel(), a

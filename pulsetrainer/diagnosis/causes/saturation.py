@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from scipy import ndimage
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.censored import beyond_rails
 from pulsetrainer.core.metrics import root_mean_square
@@ -70,7 +70,7 @@ class Saturation(Cause):
             return _held(raw)
         at = np.any(list(rails.values()), axis=0)
         noise = noise_of(y, np.where(at, 0.0, 1.0))
-        mask = ndimage.binary_dilation(at, iterations=_BESIDE)
+        mask = scipy.ndimage.binary_dilation(at, iterations=_BESIDE)
         ends = [float((sign * y).max()) * sign for sign in rails]
         for sign, rail in zip(rails, ends, strict=True):
             mask |= _near(sign * y, sign * rail, noise)
@@ -143,7 +143,7 @@ def _held_at(sign: float, said: FloatArray, raw: Raw) -> Firing | None:
 
 def _near(y: FloatArray, rail: float, noise: float) -> BoolArray:
     """Tell which samples (n,) of an output are at its upper rail, alone or on average, or just below it."""
-    return np.asarray(np.maximum(y, ndimage.uniform_filter1d(y, _AROUND)) > rail - _NEAR * noise)
+    return np.asarray(np.maximum(y, scipy.ndimage.uniform_filter1d(y, _AROUND)) > rail - _NEAR * noise)
 
 
 def _clipped(y: FloatArray, step: float) -> bool:

@@ -20,7 +20,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy import ndimage, stats
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.plane import FloatArray
@@ -97,10 +97,10 @@ class StickSlip(Cause):
             return None
         moved = _jumps(record.output, wide)
         size = np.abs(moved)
-        around = ndimage.median_filter(size[::wide], _AROUND, mode="nearest").repeat(wide)[: size.size]
+        around = scipy.ndimage.median_filter(size[::wide], _AROUND, mode="nearest").repeat(wide)[: size.size]
         noise = np.sqrt(2.0 / wide) * noise_of(record.output)
         least = _SIGMAS * np.maximum(_spread(moved, record, dt_s, wide, raw.reach), noise)
-        peak = (size == ndimage.maximum_filter1d(size, 2 * wide + 1)) & (size > least)
+        peak = (size == scipy.ndimage.maximum_filter1d(size, 2 * wide + 1)) & (size > least)
         broken = replace(raw, record=record, stamps=None).beside_breaks(_APART * wide)
         found = _slow(record.input, dt_s, wide, raw.reach) & peak & (size > _SHARPER * around) & ~broken
         count = np.count_nonzero(found)
@@ -154,10 +154,10 @@ def _spread(moved: FloatArray, record: Record, dt_s: float, wide: int, reach: fl
 
     At rest the output does not stick; where no rest is at a level, it is the slow samples that change least.
     """
-    rate = np.abs(ndimage.uniform_filter1d(np.gradient(record.input, dt_s), _RATE * wide)) / reach
-    usual = ndimage.median_filter(moved[::wide], _AROUND, mode="nearest").repeat(wide)[: moved.size]
+    rate = np.abs(scipy.ndimage.uniform_filter1d(np.gradient(record.input, dt_s), _RATE * wide)) / reach
+    usual = scipy.ndimage.median_filter(moved[::wide], _AROUND, mode="nearest").repeat(wide)[: moved.size]
     apart = np.abs(moved - usual)
-    level = ndimage.uniform_filter1d(record.output, wide)
+    level = scipy.ndimage.uniform_filter1d(record.output, wide)
     edges = np.quantile(level, np.linspace(0.0, 1.0, _LEVELS + 1))
     group = np.clip(np.searchsorted(edges, level) - 1, 0, _LEVELS - 1)
     spread = np.zeros(_LEVELS)
@@ -165,14 +165,14 @@ def _spread(moved: FloatArray, record: Record, dt_s: float, wide: int, reach: fl
         own = group == k
         for part, share in ((own & (rate < _REST), 0.5), (own & (rate < _RATES[1]), _QUIET), (own, _QUIET)):
             if np.count_nonzero(part) >= _ENOUGH * wide:
-                spread[k] = float(np.quantile(apart[part], share)) / stats.norm.ppf(0.5 + 0.5 * share)
+                spread[k] = float(np.quantile(apart[part], share)) / scipy.stats.norm.ppf(0.5 + 0.5 * share)
                 break
     return spread[group]
 
 
 def _slow(u: FloatArray, dt_s: float, wide: int, reach: float) -> FloatArray:
     """Whether the input moves slowly and evenly at each sample (n,)."""
-    rate = ndimage.uniform_filter1d(np.gradient(u, dt_s), _RATE * wide) / reach
+    rate = scipy.ndimage.uniform_filter1d(np.gradient(u, dt_s), _RATE * wide) / reach
     moved = np.abs(rate)
     # both sides: between two rests a short ramp is no even motion, and all of it looks like a jump
     change = np.max([np.abs(np.roll(rate, side * _APART * wide) - rate) for side in (-1, 1)], axis=0)

@@ -8,7 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import interpolate
+import scipy  # its parts load when they are first used
 
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import (
@@ -176,8 +176,8 @@ class Part:
 
 
 @cache
-def _curves() -> interpolate.CubicSpline:
-    return interpolate.CubicSpline(np.linspace(0.0, 1.0, KNOTS), np.eye(KNOTS), bc_type="natural")
+def _curves() -> scipy.interpolate.CubicSpline:
+    return scipy.interpolate.CubicSpline(np.linspace(0.0, 1.0, KNOTS), np.eye(KNOTS), bc_type="natural")
 
 
 class Unlisted(Cause):
