@@ -23,6 +23,7 @@ from pulsetrainer.errors import ArgumentError, UsageError
 from pulsetrainer.files import provenance, pulses, store
 from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.tuning import read_tuned
+from pulsetrainer.steps.arguments import check_is
 from pulsetrainer.steps.import_ import import_parts
 from pulsetrainer.steps.invert import invert as _invert
 from pulsetrainer.steps.one_beat import shape_of
