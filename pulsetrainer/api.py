@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import pulsetrainer.simulation  # noqa: F401 - announces the ports bench: and qemu:
-from pulsetrainer.artefacts import KINDS, Model, Run, Session, Waveform
+from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
 from pulsetrainer.core.pulses import Shape
 from pulsetrainer.device import opening as _device
 from pulsetrainer.device.device import Device
@@ -23,7 +23,6 @@ from pulsetrainer.errors import ArgumentError, UsageError
 from pulsetrainer.files import provenance, pulses, store
 from pulsetrainer.files.run_from_table import run_from_table
 from pulsetrainer.files.tuning import read_tuned
-from pulsetrainer.steps.arguments import check_is
 from pulsetrainer.steps.import_ import import_parts
 from pulsetrainer.steps.invert import invert as _invert
 from pulsetrainer.steps.one_beat import shape_of
@@ -53,7 +52,13 @@ def load(path: Path | str) -> Any:
     return store.read_any(path)
 
 
-def save(artefact: Any, path: Path | str, *, overwrite: bool = False, title: str = "") -> None:
+def save(
+    artefact: Run | Model | Waveform | Playback | Evaluation | Diagnosis | Session,
+    path: Path | str,
+    *,
+    overwrite: bool = False,
+    title: str = "",
+) -> None:
     """Write an artefact to a file: whole, or not at all.
 
     Raises
@@ -72,7 +77,6 @@ def save(artefact: Any, path: Path | str, *, overwrite: bool = False, title: str
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     pt.save(model, pathlib.Path(folder) / "copy.h5")
     """
-    check_is(tuple(KINDS.values()), artefact)
     header = provenance.make_header(
         title or f"{artefact.kind} saved from Python",
         program="Python",  # what was done there nobody can tell but whoever did it
