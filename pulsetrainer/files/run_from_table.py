@@ -29,7 +29,7 @@ _ROW_NAMES = {"column1", "index", "sample", "row", "no", "nr", "n", "#"}  # the 
 _DAY_S = 86_400.0
 _COUNTERS, _COUNTER = frozenset(["us", "ms"]), 2.0**32  # a microcontroller's
 _EXACT = 0.02  # of a step: what rounding of large stamps may be off by
-_SLOW_S = 1.0  # a step of so much is rare, and usual for milliseconds taken as seconds
+_SLOW_S, _MANY = 1.0, 100  # a step of so much is rare in many rows, and usual for ms taken as seconds
 _SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
@@ -156,7 +156,7 @@ def _time(
         notes = (*notes, f"the time of {table.path} {again}")
     time_s = seconds(table, time, of_record=True)
     step = float(np.median(np.diff(time_s)))
-    if not unit and step >= _SLOW_S:
+    if not unit and step >= _SLOW_S and time_s.size >= _MANY:
         said = f"the samples of {table.path} lie {step:g} s apart, if its time is in seconds as taken"
         notes = (*notes, f"{said} (for ms write the heading as '{heading} [ms]')")
     if np.spacing(np.abs(time_s[0])) > _EXACT * step:

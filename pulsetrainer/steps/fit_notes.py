@@ -82,11 +82,11 @@ def of_no_minor_loops(fitted: Fitted, run: Run, minor_percent: float) -> list[st
 
 def of_guessed_turns(model: Model) -> list[str]:
     """Say, before a model is inverted, that its record hardly held a minor loop."""
-    told = model.fit.minor_percent if model.fit else float("nan")
-    if not told < TOLD_APART:
+    fit = model.fit
+    if fit is None or fit.loop == "none" or not fit.minor_percent < TOLD_APART:
         return []
     said = (
-        f"the record of this model has hardly any minor loops (cells told apart: {told:.0f} %): where the "
+        f"the record of this model has hardly any minor loops (cells told apart: {fit.minor_percent:.0f} %): where the "
         f"{model.output_quantity} turns within its range the drive is a guess, which the expected error does "
         "not count. Identify on a record with loops within the major one"
     )
