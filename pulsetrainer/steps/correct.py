@@ -1,4 +1,4 @@
-"""Correct: from a run and its diagnosis to the run without drift, steps, hum, wild samples and the like."""
+"""Correct: a run without drift, steps, hum, wild samples and the like, and with what a rail cut off."""
 
 from __future__ import annotations
 

@@ -199,8 +199,8 @@ def test_what_would_have_shown_of_a_cause_in_the_model_is_asked_against_the_nois
     norm = state.floor.span * np.sqrt(state.floor.count)
     before, today = Sight(0.5, 8.0, 3.0), Sight(0.5, 2.0, 3.0)
     relevant = state.floor.relevant
-    assert state.limits["creep"] == pytest.approx(before.least(relevant, 64.0) / norm)
-    after = screened.stage(state).limits
+    assert state.detectable["creep"] == pytest.approx(before.least(relevant, 64.0) / norm)
+    after = screened.stage(state).detectable
     assert after["delay"] == pytest.approx(today.least(relevant, 1.0) / norm)
     assert after["creep"] == pytest.approx(today.least(relevant) / norm)
 
