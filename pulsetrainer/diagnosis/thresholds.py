@@ -104,9 +104,7 @@ class Thresholds:
     slow_noise: float = 3.0  # times the noise from sample to sample: averages with more have slow noise
     burstiness: float = 4.5  # kurtosis in octaves: drawn noises have 2.9 to 4, bursts and loads 5.5 to 8
     bursts_span: float = 0.004  # of the span: plants of other kinds leave less that comes in bursts
-    matters: float = (
-        0.005  # of the span: so much must show, or nothing can be said; a convention, not measured
-    )
+    matters: float = 0.005  # of the span: so much must show, or nothing can be said; by convention
     draws: int = 1999  # of the noise: the smallest p is a twentieth of the limit
     probes: int = 12  # white signals that tell how much of a spectrum the weights and the library take away
     band: float = 1.15  # of its frequency: width of a band of the noise's spectrum ...

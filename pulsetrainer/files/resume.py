@@ -1,4 +1,4 @@
-"""Resuming a recording: which file holds it, and is it this one? ``steps.recording`` tells how far it came."""
+"""Resuming a recording: which file holds it, is it this one? ``steps.recording`` tells how far it came."""
 
 from __future__ import annotations
 
