@@ -1126,12 +1126,12 @@ SEEN = dict.fromkeys([cause.id for cause in CAUSE.values() if cause.common], 0.0
 @pytest.mark.parametrize(
     ("more", "expected", "blind"),
     [
-        ({"limits": SEEN}, "none", ()),
-        ({"limits": SEEN | {"creep": 0.0051}}, "inconclusive", ("creep",)),
-        ({"limits": {k: v for k, v in SEEN.items() if k != "delay"}}, "inconclusive", ("delay",)),
-        ({"limits": SEEN | {"step": 9.0}}, "none", ()),
-        ({"limits": {}}, "none", ()),
-        ({"limits": SEEN | {"creep": 0.1}, "findings": (_finding("delay", 9.0),)}, "delay", ("creep",)),
+        ({"detectable": SEEN}, "none", ()),
+        ({"detectable": SEEN | {"creep": 0.0051}}, "inconclusive", ("creep",)),
+        ({"detectable": {k: v for k, v in SEEN.items() if k != "delay"}}, "inconclusive", ("delay",)),
+        ({"detectable": SEEN | {"step": 9.0}}, "none", ()),
+        ({"detectable": {}}, "none", ()),
+        ({"detectable": SEEN | {"creep": 0.1}, "findings": (_finding("delay", 9.0),)}, "delay", ("creep",)),
     ],
 )
 def test_nothing_found_is_none_only_where_it_could_have_been_seen(more, expected, blind):
