@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pulsetrainer as pt
+from pulsetrainer.steps.arguments import readable
 
 HEAD = """\
 # The Python API
@@ -69,7 +70,7 @@ def _sentence(value: Any) -> str:
 def _entry(name: str, verb: Any, level: int = 3) -> Iterator[str]:
     """Yield a heading, the signature, and the docstring with its sections as lists."""
     yield f"{'#' * level} {name}\n"
-    yield f"```python\n{name}{_signature(verb)}\n```\n"
+    yield f"```python\n{name}{readable(verb)}\n```\n"
     section = ""
     for block in (inspect.getdoc(verb) or "").split("\n\n"):
         head, _, rest = block.partition("\n")
@@ -86,26 +87,6 @@ def _entry(name: str, verb: Any, level: int = 3) -> Iterator[str]:
         else:
             section = ""
             yield f"{_code(' '.join(said.split()))}\n"
-
-
-class _Plain(str):
-    """An annotation as it was written, without the quotes that a text has in a signature."""
-
-    __slots__ = ()
-
-    def __repr__(self) -> str:
-        return str(self)
-
-
-def _signature(verb: Any) -> str:
-    written = inspect.signature(verb)
-    plain = [
-        one if one.annotation is one.empty else one.replace(annotation=_Plain(one.annotation))
-        for one in written.parameters.values()
-    ]
-    text = str(written.replace(parameters=plain, return_annotation=_Plain(written.return_annotation)))
-    text = re.sub(r"pulsetrainer\.[a-z_.]*", "", text)
-    return re.sub(r" = <function [^>]*>", " = silent", text)
 
 
 def _items(block: str) -> Iterator[str]:

@@ -51,9 +51,16 @@ The firmware in `firmware/` is C99 without a heap: `core` (protocol, control, sa
 offer), `port` (the host's pseudo-terminal, an emulated Cortex-M4F, the dsPIC33), `plant` (the simulated solenoid).
 [PROTOCOL.md](firmware/PROTOCOL.md) is what both sides speak.
 
+The pages are made by scripts in `docs/`: `make.py` writes all that come from the code, with `architecture.py` (this page),
+`verdict.py` (how a verdict is reached) and `api_reference.py` (the Python API); `site.py` gathers them for the site.
+
 ## Where to find what
 
 {modules}
+
+### firmware/core
+
+{firmware}
 """
 
 
@@ -69,7 +76,8 @@ def architecture_page(mark: str) -> str:
             for part, below in sorted(imports.items())
         ),
         contracts="\n".join(f"- {name}." for name in _contracts()),
-        modules="\n".join(_modules()),
+        modules="\n".join(_modules()).rstrip(),
+        firmware="\n".join(_firmware()),
     )
 
 
@@ -127,6 +135,14 @@ def _modules() -> Iterator[str]:
             if path.name not in ("__init__.py", "__main__.py"):
                 yield f"- [{path.name}]({path.relative_to(ROOT)}): {_sentence(path)}"
         yield ""
+
+
+def _firmware() -> Iterator[str]:
+    """Yield every header of the firmware's core with the first paragraph of its first comment."""
+    for path in sorted((ROOT / "firmware" / "core").glob("*.h")):
+        comment = path.read_text(encoding="utf-8").removeprefix("/*").partition("*/")[0]
+        first = comment.partition("\n *\n")[0].replace("\n *", " ")
+        yield f"- [{path.name}]({path.relative_to(ROOT)}): {' '.join(first.split())}"
 
 
 def _sentence(path: Path) -> str:

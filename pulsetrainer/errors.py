@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Final
+
+TRY: Final = "try: "  # the note with which a traceback shows a hint begins so
 
 
 class PulsetrainerError(Exception):
@@ -26,6 +28,8 @@ class PulsetrainerError(Exception):
         self.message = message
         self.hint = hint
         self.kept = kept
+        if hint:  # for Python; the command line words it anew
+            self.add_note(f"{TRY}{hint}")
 
 
 class QualityError(PulsetrainerError):
@@ -94,7 +98,11 @@ class NotAnArtefactError(DataError):
     """A file that this program did not write."""
 
     def __init__(self, message: str, *, path: Path | str) -> None:
-        super().__init__(message, hint="give an HDF5 file that pulsetrainer wrote")
+        super().__init__(
+            message,
+            hint="give a file that pulsetrainer wrote; of a table: "
+            f"pt.read_table({str(path)!r}, input=..., output=...)",
+        )
         self.path = Path(path)
 
 

@@ -140,7 +140,17 @@ _WORDS_OF_A_TIRED_HAND = {
         *("--current-max must be a number, got '1,2'", "with a point and without a unit: 1.2"),
     ),
     "a number with its unit": (
-        *("capture identification -o out.h5 --current-max 1.2A", 2, "got '1.2A'", "without a unit: 1.2"),
+        *("capture identification -o out.h5 --current-max 1.2A", 2, "got '1.2A'", "alone, in A: 1.2"),
+    ),
+    "a force with its unit": (
+        *("invert normal --model model.h5 -o out.h5 --force-max 20N", 2, "got '20N'", "alone, in N: 20"),
+    ),
+    "a share with its sign": (
+        *("session --model model.h5 -o out.h5 --amplitude 50%", 2, "got '50%'", "alone, in %: 50"),
+    ),
+    "a force in another unit": (
+        *("invert normal --model model.h5 -o out.h5 --force-max 20kN", 2, "got '20kN'"),
+        "the number alone: force at its top, N or",
     ),
     "an option of another command": (
         "identify run.h5 --model model.h5 -o out.h5",
@@ -241,6 +251,16 @@ _WORDS_OF_A_TIRED_HAND = {
     "a page behind -o": (
         *("diagnose run.h5 --model model.h5 -o out.html", 2, "out.html ends in '.html'", "--html out.html"),
     ),
+    "a page of evaluate without an ending": (
+        *("evaluate played.h5 --html evaluation", 2, "has no such ending", "name it evaluation.html"),
+    ),
+    "a page of diagnose without an ending": (
+        *("diagnose run.h5 --model model.h5 -o out.h5 --html d", 2, "d has no such ending", "name it d.html"),
+    ),
+    "a page of session without an ending": (
+        *("session --model model.h5 -o out.h5 --html sheet", 2, "has no such ending", "name it sheet.html"),
+    ),
+    "a figure that is none": (*("plot run.h5 -o out.h5", 2, "out.h5 ends in '.h5'", "name it out.png"),),
     "one playback twice": ("evaluate played.h5 played.h5", 2, "played.h5 is named twice", "each file once"),
     "one table twice": (
         *("import x.csv x.csv --input u --output y -o out.h5", 2, "x.csv is named twice", "each file once"),

@@ -153,7 +153,7 @@ MESSAGES = {
     "no such port": Message("no port", "pulsetrainer ports", "{port}"),
     "no such emulator": Message("{said}", "{hint}"),
     "no emulator": Message(
-        "not found", "{packages}`; or simulate without them: `--port bench:`", "qemu:", "needs {missing}"
+        "not found", "{packages}`; or simulate without them: `port` bench:", "qemu:", "needs {missing}"
     ),
     "does not compile": Message("does not compile", "", got="error"),
     "no cache": Message("cannot write the firmware cache", "", "{folder}"),

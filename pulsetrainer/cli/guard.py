@@ -22,7 +22,7 @@ from pulsetrainer.cli.console import say
 from pulsetrainer.cli.next_step import as_options, next_step
 from pulsetrainer.cli.starting import loaded
 from pulsetrainer.cli.usage import check_apart, usage_of
-from pulsetrainer.errors import DataError, Interrupted, PulsetrainerError, UsageError
+from pulsetrainer.errors import TRY, DataError, Interrupted, PulsetrainerError, UsageError
 
 # where a terminal has no Unicode: as the importer reads units
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻⁺", "0123456789-+")
@@ -146,7 +146,8 @@ def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
         sys.stdout.write(json.dumps({"schema": 1, "command": command, "error": error}) + "\n")
     say("error: ", message)
     for note in getattr(problem, "__notes__", ()):
-        say("note: ", str(note))
+        if not note.startswith(TRY):
+            say("note: ", note)
     if hint:  # not folded: a command in it is copied in one piece
         sys.stderr.write(f"  try: {hint}\n")
 

@@ -37,7 +37,7 @@ def import_(
     reference_column: Annotated[str | None, Option("--reference", help="Column of the reference.")] = None,
     input_unit: Annotated[str | None, Option(help="Unit of the input; default: from the header.")] = None,
     output_unit: Annotated[str | None, Option(help="Unit of the output; default: from the header.")] = None,
-    rate: Annotated[float | None, Option(help="Samples a second, instead of a time column.")] = None,
+    rate: Annotated[float | None, Option(help="Samples a second, Hz, instead of a time column.")] = None,
     no_time: Annotated[
         bool, Option("--no-time", help="Ignore time: only the order of the samples counts.")
     ] = False,

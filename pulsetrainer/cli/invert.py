@@ -25,9 +25,12 @@ def invert(
         ),
     ] = None,
     force_min: Annotated[
-        float | None, Option(help="Force (or other output) at the foot of the pulse; default: the lowest.")
+        float | None,
+        Option(help="Force at the foot of the pulse, N or the output's unit; default: the lowest."),
     ] = None,
-    force_max: Annotated[float | None, Option(help="Force at its top; default: the highest.")] = None,
+    force_max: Annotated[
+        float | None, Option(help="Force at its top, N or the output's unit; default: the highest.")
+    ] = None,
     beat: Annotated[
         str | None,
         Option(
@@ -43,7 +46,7 @@ def invert(
         setting(
             "slew_A_per_s",
             "--slew",
-            "Fastest the drive may move, input unit a second; default: 30 A/s for a model of our own "
+            "Fastest the drive may move, A/s or input unit a second; default: 30 for a model of our own "
             "device, none for any other.",
         ),
     ] = None,

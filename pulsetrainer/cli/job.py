@@ -296,8 +296,12 @@ def check_ending(path: Path, context: typer.Context) -> None:
         then = "; then `pulsetrainer export` makes a table of it, `pulsetrainer plot` a figure"
         if ending == ".html" and "html" in context.params:
             then = f", and the page with --html {path}"
-    if ending in _FORMATS and not right.startswith(ending):  # .htm is a page too
-        raise UsageError(f"{what}, but {path} ends in {ending!r}", hint=f"name it {path.stem}{right}{then}")
+    formats = _FORMATS | {""} if right == ".html" else _FORMATS  # a browser goes by the ending
+    if path.is_dir():  # which is told when it is looked at
+        return
+    if ending in formats and not (ending and right.startswith(ending)):  # .htm is a page too
+        got = f"ends in {ending!r}" if ending else "has no such ending"
+        raise UsageError(f"{what}, but {path} {got}", hint=f"name it {path.stem}{right}{then}")
 
 
 def _is_path(value: Any) -> bool:

@@ -30,7 +30,7 @@ def session(
         float | None, Option(help="Beats a minute, 20 to 240; default: each pulse's own.")
     ] = None,
     amplitude: Annotated[float, Option(help="Height of the pulses, % of what the model reaches.")] = 100.0,
-    minutes: Annotated[float | None, Option(help="Length; default: 5, or the quiz's.")] = None,
+    minutes: Annotated[float | None, Option(help="Length, min; default: 5, or the quiz's.")] = None,
     beats: Annotated[int | None, Option(help="Length in beats, instead of minutes.")] = None,
     variability: Annotated[
         float, Option(min=0, max=25, help="Standard deviation of the intervals between beats, %.")

@@ -75,6 +75,9 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
     )
 
 
+_UNIT = re.compile(r", (%|A|A/s|Hz|min|N|s|V)(?=[ .;,])")  # of a number, as its help says it: "Top, A."
+
+
 def _bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageError:
     source = context.get_parameter_source(parameter.name) if context is not None else None
     if source is not None and source.name == "ENVIRONMENT":  # nobody typed the option
@@ -232,12 +235,15 @@ def _as_a_number(parameter: Any, must: str) -> str:
     given = _NEARLY_A_NUMBER.search(must) if "float" in getattr(parameter.type, "name", "") else None
     if given is None:
         return ""
-    told = re.sub(r".*, (\S+?)[.;,].*", r"\1", _meaning(parameter) + ".")  # "Top of the range, A."
-    if given[3] == f"m{told}":
-        return f"write it in {told}, without the unit: {float(f'{given[1]}.{given[2] or 0}') / 1000:g}"
-    if given[3] and given[3] != told:  # what is typed in ms must not be taken for s
-        return f"write the number alone, with a point: {_meaning(parameter)}"
-    return f"write it with a point and without a unit: {given[1]}.{given[2] or 0}"
+    number, unit = given[1] + (f".{given[2]}" if given[2] else ""), given[3]
+    said = _UNIT.search(_meaning(parameter) + ".")
+    if not unit:
+        return f"write it with a point and without a unit: {number}"
+    if said and unit == said[1]:
+        return f"write the number alone, in {unit}: {number}"
+    if said and unit == f"m{said[1]}":
+        return f"write it in {said[1]}, without the unit: {float(number) / 1000:g}"
+    return f"write the number alone: {_meaning(parameter)}"  # what is typed in ms must not be taken for s
 
 
 def _without(parameter: Any, help_: str) -> str:

@@ -98,7 +98,7 @@ def find_beats(record: Shape) -> Beats:
     )
     peaks = peaks - 1
     if peaks.size == 0 or not height > 0:
-        raise DataError(f"{record.name} holds no pulse that stands out", hint="leave --beat out for one beat")
+        raise DataError(f"{record.name} holds no pulse that stands out", hint="leave `beat` out for one beat")
     feet = [_lowest(smooth, a, b) for a, b in pairwise(peaks.tolist())]
     foot = float(np.median(smooth[feet])) if feet else float(smooth.min())
     before, after = _lowest(smooth, 0, int(peaks[0])), _lowest(smooth, int(peaks[-1]), p.size - 1)
@@ -109,7 +109,7 @@ def find_beats(record: Shape) -> Beats:
     if len(feet) < 2:
         raise DataError(
             f"{record.name} holds no whole beat, only a part of one",
-            hint="leave --beat out, or record longer",
+            hint="leave `beat` out, or record longer",
         )
     return Beats(record, np.asarray(feet, dtype=np.int64))
 

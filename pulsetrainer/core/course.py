@@ -32,7 +32,7 @@ class Course:
 
     def __post_init__(self) -> None:
         if self.repeats < 1:
-            raise ArgumentError(f"repeats must be at least 1, got {self.repeats}", hint="--repeats 1")
+            raise ArgumentError(f"repeats must be at least 1, got {self.repeats}", hint="give `repeats` 1")
         check_size(self.repeats, self.signal.value.size, MOST_RECORDED)
 
     @property

@@ -1,4 +1,4 @@
-"""Which way a loop runs, read off the major loop of a fitted operator."""
+"""Which way a loop runs, read off the major loop of a fitted operator; in words it is in ``report.facts``."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pulsetrainer.core.operator import Preisach
 Loop = Literal["counterclockwise", "clockwise", "butterfly", "none"]
 
 OPEN = 0.002  # of the output's span: a loop that is nowhere wider is none
+_MIRRORED = {"counterclockwise": "clockwise", "clockwise": "counterclockwise"}
 CROSSED = 0.05  # of the loop's area: what runs the other way and is less is no crossing
 _POINTS = 257
 
@@ -33,3 +34,8 @@ def loop_of(operator: Preisach | Dual, doubt: float = 0.0) -> Loop:
     if leads <= CROSSED * (lags + leads):
         return "counterclockwise"
     return "clockwise" if lags <= CROSSED * (lags + leads) else "butterfly"
+
+
+def drawn(loop: str, polarity: int) -> str:
+    """Return which way a loop runs in a drawing; ``loop_of`` tells it of a rising output."""
+    return _MIRRORED.get(loop, loop) if polarity < 0 else loop

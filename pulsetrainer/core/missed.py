@@ -1,4 +1,4 @@
-"""What a model misses along the path of one input, and what that says of another input.
+"""What a model misses along the path of one input, and what that says of another input: for ``transfer``.
 
     missed(t) = c + tau dz/dt(t) + sum_k d_k sqrt(A_k / A) s_k(t) + noise
 

@@ -1,8 +1,8 @@
-"""The heat of the coil: what a play adds, how long to wait, and what is remembered from one day to the next.
+"""The heat of the coil, as the firmware counts it (firmware/core/heat.c): what a play adds, how long to wait.
 
 The device averages the squared current, dh/dt = (i^2 / HEAT_LIMIT_A2 - h) / HEAT_TAU_S, and stops at h = 1.
 After power-on it does not know how hot its coil is and assumes the limit; a host that has seen it before
-tells.
+tells, from what is remembered here from one day to the next.
 """
 
 from __future__ import annotations

@@ -78,12 +78,12 @@ def find_device_port() -> str:
         return ours[0]
     if ours:
         raise DeviceError(
-            f"{len(ours)} devices are connected: {', '.join(ours)}", hint=f"choose one: --port {ours[0]}"
+            f"{len(ours)} devices are connected: {', '.join(ours)}", hint=f"choose one: `port` {ours[0]}"
         )
     others = ", ".join(p.device for p in every) or "none"
     raise DeviceError(
         f"no device found: no port has the USB id 0403:6015 (ports here: {others})",
-        hint="connect the device, name its port with --port, or use the virtual bench: --port bench:",
+        hint="connect the device, name its `port`, or use the virtual bench: `port` bench:",
     )
 
 
@@ -116,9 +116,9 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
         scheme = scheme.rstrip(":").lower()
         return DeviceError(
             f"there is no port {port} (ports here: {present})",
-            hint=f"did you mean --port {shlex.quote(f'{scheme}:{mark}{rest}')}?"
+            hint=f"did you mean `port` {shlex.quote(f'{scheme}:{mark}{rest}')}?"
             if scheme in ("bench", "qemu")
-            else "check the cable, then `pulsetrainer ports`; without a device use --port bench:, over a "
+            else "check the cable, then `pulsetrainer ports`; without a device use `port` bench:, over a "
             "network socket://host:port",
         )
     if number in {errno.ENOTTY, errno.EINVAL, errno.EISDIR}:

@@ -234,7 +234,7 @@ def _cause(state: State, finding: Finding, words: Words) -> Cause:
         confounded_with=finding.confounded_with,
         text=wording.cause_text(finding, words),
         doubts=tuple(wording.DOUBTS[one] for one in finding.doubts),
-        detectable_from_percent=PERCENT * state.limits.get(finding.cause.id, float("nan")),
+        detectable_from_percent=PERCENT * state.detectable.get(finding.cause.id, float("nan")),
     )
 
 

@@ -1,4 +1,4 @@
-"""How small an error can be, and how large an effect must be to matter.
+"""How small an error can be, and how large an effect must be to be relevant.
 
 What no cause can lower is the noise of the averages and the discretisation error, of the plane's levels and
 of an input that is read in coarse steps; an effect smaller than the latter, than 0.3 of the former or than

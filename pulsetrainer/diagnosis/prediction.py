@@ -67,6 +67,6 @@ def predict(model: Model, inputs: FloatArray, dt_s: float | None, start: State |
         raise DataError(
             f"this model is extended by {', '.join(e.cause for e in model.extensions)}, which depend on "
             "time, but the time step is unknown",
-            hint="give the run a time: import it again with --time COLUMN or --rate HZ",
+            hint="give the run a time: import it again with `time` COLUMN or `rate_Hz` HZ",
         )
     return extended_of(model)(inputs, dt_s)

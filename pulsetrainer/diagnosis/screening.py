@@ -61,8 +61,8 @@ class Sight:
         """
         sure = LIMITS.nine_of_ten * self.noise
         tested = self.critical * self.noise + sure
-        matters = sure + float(np.sqrt(sure**2 + relevant))
-        return (max(tested, matters) + float(np.sqrt(max(there, 0.0)))) / self.share
+        relevantly = sure + float(np.sqrt(sure**2 + relevant))
+        return (max(tested, relevantly) + float(np.sqrt(max(there, 0.0)))) / self.share
 
 
 @dataclass(frozen=True)

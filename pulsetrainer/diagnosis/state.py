@@ -84,7 +84,9 @@ class State:
     estimates: Mapping[str, tuple[Estimate, ...]] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()  # of every cause, strongest first
     sights: Mapping[str, Sight] = field(default_factory=dict)  # of every cause that was screened
-    limits: Mapping[str, float] = field(default_factory=dict)  # smallest effects that would show, of the span
+    detectable: Mapping[str, float] = field(
+        default_factory=dict
+    )  # from which effects would show, of the span
     extended: Model | None = None  # with those causes
     verdict: str = "none"
     evidence: tuple[Evidence, ...] = ()
@@ -167,10 +169,10 @@ class State:
     @property
     def blind(self) -> tuple[str, ...]:
         """Ids of the common causes of which these records would not have shown what matters."""
-        if not self.question.timed or not self.limits:
+        if not self.question.timed or not self.detectable:
             return ()
         common = [one.id for one in library().values() if one.common and one.id not in self.current.names]
-        return tuple(one for one in common if not self.limits.get(one, np.inf) <= LIMITS.matters)
+        return tuple(one for one in common if not self.detectable.get(one, np.inf) <= LIMITS.matters)
 
     @property
     def left_rms(self) -> float:
@@ -182,7 +184,7 @@ class State:
         return float(np.sqrt(max(self.current.squares - gains[0], self.floor.squares) / self.floor.count))
 
     def is_whole(self, fitted: Fitted) -> bool:
-        """Whether what a fit leaves is noise, as far as it matters."""
+        """Whether what a fit leaves is noise, as far as it is relevant."""
         floor = self.floor_left
         return fitted.squares - floor.squares <= LIMITS.unexplained_relevant * floor.relevant
 
@@ -239,5 +241,5 @@ class State:
         return PERCENT * min(max(gain / self.floor.reducible(self.baseline), 0.0), 1.0)
 
     def significant(self, score: Score) -> bool:
-        """Whether noise alone hardly scores so much, and it matters."""
+        """Whether noise alone hardly scores so much, and it is relevant."""
         return score.p_value <= LIMITS.p_max and score.gain > self.floor.relevant

@@ -80,7 +80,7 @@ class Thresholds:
     damping_least: float = 0.1  # damping after the first step that does not help
     step_factor: float = 3.0  # a positive parameter moves at most by this factor in one step
 
-    # Floor: what cannot matter
+    # Floor: what is irrelevant
     relevant_noise: float = 0.3  # of the noise of an average: smaller effects are irrelevant
     relevant_span: float = 0.0003  # of the span: smaller effects are irrelevant on any device (decision 044)
     least_reducible: float = 1e-12  # of the baseline's squares: keeps shares finite
@@ -104,7 +104,7 @@ class Thresholds:
     slow_noise: float = 3.0  # times the noise from sample to sample: averages with more have slow noise
     burstiness: float = 4.5  # kurtosis in octaves: drawn noises have 2.9 to 4, bursts and loads 5.5 to 8
     bursts_span: float = 0.004  # of the span: plants of other kinds leave less that comes in bursts
-    matters: float = 0.005  # of the span: an effect so large must show, or nothing can be said
+    matters: float = 0.005  # of the span: so much must show, or nothing can be said; by convention
     draws: int = 1999  # of the noise: the smallest p is a twentieth of the limit
     probes: int = 12  # white signals that tell how much of a spectrum the weights and the library take away
     band: float = 1.15  # of its frequency: width of a band of the noise's spectrum ...

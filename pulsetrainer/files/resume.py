@@ -1,4 +1,4 @@
-"""Resuming a recording that was interrupted: which file holds it, and whether it is this recording."""
+"""Resuming a recording: which file holds it, is it this one? ``steps.recording`` tells how far it came."""
 
 from __future__ import annotations
 

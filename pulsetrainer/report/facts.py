@@ -11,6 +11,7 @@ from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, 
 from pulsetrainer.artefacts.time_steps import gaps_of, steps_of
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core import input_noise
+from pulsetrainer.core.loop import drawn
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.report.diagnosis_text import parameters
 
@@ -80,13 +81,11 @@ _LOOPS = {
     "butterfly": "a {}, it crosses itself",
     "none": "no loop, the output follows the input",
 }
-_MIRRORED = {"counterclockwise": "clockwise", "clockwise": "counterclockwise"}
 
 
 def loop_drawn(model: Model) -> str:
-    """Return which way the loop runs in a drawing; the model has that of a rising output."""
-    loop = model.fit.loop if model.fit else ""
-    return _MIRRORED.get(loop, loop) if model.polarity < 0 else loop
+    """Return which way the loop of a model runs in a drawing; empty where nobody knows."""
+    return drawn(model.fit.loop, model.polarity) if model.fit else ""
 
 
 def loop_words(model: Model) -> str:

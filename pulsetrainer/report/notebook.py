@@ -12,7 +12,8 @@ from pulsetrainer.report import figures, render, text
 from pulsetrainer.report.tables import ESCAPE
 
 _WIDTH = 80  # characters of a line: sentences are folded there, a wider table is scrolled
-_WHOLE = "white-space: pre; overflow-x: auto"  # notebooks and sites break lines at the column's edge
+# notebooks and sites break lines at the column's edge; nbconvert's page sets text in a proportional font
+_WHOLE = "white-space: pre; overflow-x: auto; font-family: monospace"
 
 
 def html(artefact: Any) -> str:

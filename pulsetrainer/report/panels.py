@@ -1,4 +1,4 @@
-"""The parts that figures are made of: each draws one thing on the axes it is given."""
+"""The parts of figures, each on the axes it is given: half-plane of weights, loops, traces, residuals."""
 
 from __future__ import annotations
 

@@ -47,11 +47,7 @@ def of(artefact: Any, width: int | None = None) -> str:
     else:
         known = {name: value for name, value in facts(artefact).items() if value is not None}
         parts = [Facts(artefact.kind, known)]
-    # below a table a line is left free
-    lines = (
-        tables.rendered(part) + "\n" if isinstance(part, Table) else tables.rendered(part, width)
-        for part in parts
-    )
+    lines = (tables.rendered(part, None if isinstance(part, Table) else width) for part in parts)
     return "".join(lines).rstrip("\n")
 
 

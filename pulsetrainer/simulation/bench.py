@@ -90,7 +90,7 @@ class Bench:
         if os.name != "posix":
             raise DeviceError(
                 "the virtual bench needs a pseudo-terminal, which this system does not have",
-                hint="use Linux, macOS or WSL for bench:, or a real device with --port COM3",
+                hint="use Linux, macOS or WSL for bench:, or a real device with `port` COM3",
             )
         self.options = options = parse_bench(port)
         executable = executable or firmware_executable()

@@ -125,7 +125,7 @@ def find_emulator() -> str:
 def _not_installed(programs: str) -> DeviceError:
     return DeviceError(
         f"the emulated device (qemu:) needs {programs}, not found on this computer",
-        hint=f"install: `sudo apt install {DEBIAN_PACKAGES}`; or simulate without them: `--port bench:`",
+        hint=f"install: `sudo apt install {DEBIAN_PACKAGES}`; or simulate without them: `port` bench:",
     )
 
 

@@ -123,7 +123,7 @@ class Emulator:
         if os.name != "posix":
             raise DeviceError(
                 "the emulated device needs a POSIX shell, which this system does not have",
-                hint="use Linux, macOS or WSL for qemu:, or a real device with --port COM3",
+                hint="use Linux, macOS or WSL for qemu:, or a real device with `port` COM3",
             )
         words = [find_emulator(), "-M", "mps2-an386", "-kernel", str(firmware_image())]
         words += ["-display", "none", "-monitor", "none", "-icount", _REAL_TIME]

@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
-from inspect import signature
+from inspect import Signature, signature
 from typing import Any
 
 from pulsetrainer.errors import ArgumentError, UsageError
@@ -77,10 +77,29 @@ def _a(kind: type) -> str:
     return f"an {kind.__name__}" if kind.__name__[0] in "AEIOaeio" else f"a {kind.__name__}"
 
 
+class _Plain(str):
+    """An annotation as it was written, without the quotes that a text has in a signature."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def readable(verb: Callable[..., Any]) -> Signature:
+    """Return the signature of a verb as it is written, for help and the reference."""
+    written = signature(verb)
+    plain = [
+        one if one.annotation is one.empty else one.replace(annotation=_Plain(one.annotation))
+        for one in written.parameters.values()
+    ]
+    return written.replace(parameters=plain, return_annotation=_Plain(written.return_annotation))
+
+
 def kinds_checked(verb: Callable[..., Any]) -> Callable[..., Any]:
     """Return a verb that raises ArgumentError for an artefact of another kind than its annotations name.
 
-    Where they name a sequence, each that is in it is looked at.
+    Where they name a sequence, each that is in it is looked at. Its signature is readable.
     """
     whole = signature(verb)
     kinds = {name: _kinds_in(str(one.annotation)) for name, one in whole.parameters.items()}
@@ -101,6 +120,8 @@ def kinds_checked(verb: Callable[..., Any]) -> Callable[..., Any]:
                 _check_is(alone or each, one)
         return verb(*bound.args, **bound.kwargs)
 
+    shown: Any = checked
+    shown.__signature__ = readable(verb)
     return checked
 
 

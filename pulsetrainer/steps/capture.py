@@ -57,6 +57,8 @@ def capture(
         Go around the major loop once before recording, so that what came before is forgotten.
     repeats
         How often the signal is played, without a pause.
+    progress
+        Told the share of the work that is done, 0 to 1.
 
     Raises
     ------

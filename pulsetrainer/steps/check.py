@@ -88,6 +88,15 @@ def check(model: Model, device: Device, *, progress: Progress = silent) -> Check
     Lag and creep are those that the calibration did not take for hysteresis (``core.beside_hysteresis``):
     they are there on a device that nobody touched, and neither move the offset nor count as another shape.
 
+    Parameters
+    ----------
+    model
+        Of the device.
+    device
+        The device, with its force sensor.
+    progress
+        Told the share of the work that is done, 0 to 1.
+
     Raises
     ------
     DataError

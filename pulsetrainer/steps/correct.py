@@ -1,4 +1,4 @@
-"""Correct: from a run and its diagnosis to the run without drift, steps, hum, wild samples and the like."""
+"""Correct: a run without drift, steps, hum, wild samples and the like, and with what a rail cut off."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     if delay_s and run.dt_s is None:
         raise DataError(
             f"{run_name} has no time, so no delay can be taken out of it",
-            hint="import it again with --time COLUMN or --rate HZ",
+            hint="import it again with `time` COLUMN or `rate_Hz` HZ",
         )
     for _, part in parts:
         length_s = (part.output.size - 1) * (run.dt_s or 0.0)

@@ -43,6 +43,8 @@ def diagnose(
         Of the simulated null distribution.
     names
         Names of the runs and, last, of the model, for messages.
+    progress
+        Told the share of the work that is done, 0 to 1.
 
     Raises
     ------

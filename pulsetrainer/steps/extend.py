@@ -101,7 +101,7 @@ def _verified(model: Model, extended: Model, run: Run) -> Model:
     if run.dt_s is None:
         raise DataError(
             "the run to verify with has no time, and causes need it",
-            hint="import it again with --time COLUMN or --rate HZ",
+            hint="import it again with `time` COLUMN or `rate_Hz` HZ",
         )
 
     def error(one: Model) -> float:

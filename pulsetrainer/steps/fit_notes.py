@@ -10,6 +10,7 @@ from pulsetrainer.artefacts import BoolArray, Model, Run
 from pulsetrainer.core.fit import Fitted
 from pulsetrainer.core.forms import SMALLEST, leaves_more_than_noise
 from pulsetrainer.core.input_noise import white
+from pulsetrainer.core.loop import drawn, loop_of
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.output_curve import rivals
 from pulsetrainer.diagnosis import velocity
@@ -30,8 +31,9 @@ def of_form(fitted: Fitted, run: Run, asked: str) -> list[str]:
     output, given = run.output_quantity, run.input_quantity
     if fitted.form == "dual":
         how = f"fitted with the roles exchanged, {given} over {output} (dual form)"
-        way = "clockwise" if fitted.operator.polarity > 0 else "counterclockwise"
-        why = f"the {output} leads the {given}, its loop runs {way}"
+        loop = loop_of(fitted.operator)
+        runs = f", its loop runs {drawn(loop, fitted.operator.polarity)}" if loop != "none" else ""
+        why = f"the {output} leads the {given}{runs}"
         if asked == "auto":
             how += f"; if {given} and {output} were swapped by mistake, record or import them the right way"
     elif fitted.form == "signed":

@@ -74,9 +74,13 @@ def identify(
         Length below which the density is smoothed, share of the input's range; "auto" by held-out blocks.
         None: "auto", and 0 for relays.
     bootstrap
-        Refits to resampled blocks, drawn from ``seed``: 90 % intervals of the weights and the output.
+        Refits to resampled blocks: 90 % intervals of the weights and the output.
+    seed
+        Of the resampling.
     names
         Names of the runs, for the notes.
+    progress
+        Told the share of the work that is done, 0 to 1.
 
     Raises
     ------
@@ -241,7 +245,7 @@ def _check_runs(names: Sequence[str], runs: Sequence[Run]) -> None:
         if not same_units((run.input_unit, run.output_unit), (first.input_unit, first.output_unit)):
             raise DataError(
                 f"{name} is in {units_of(run)}, but {names[0]} is in {units_of(first)}",
-                hint="import the runs again with the same --input-unit and --output-unit",
+                hint="import the runs again with the same `input_unit` and `output_unit`",
             )
     for what in ("input", "output"):
         largest = float(max(np.fmax.reduce(np.abs(getattr(run, what)), initial=0.0) for run in runs))

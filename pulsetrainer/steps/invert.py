@@ -84,6 +84,8 @@ def invert(
         a period would have fewer than 50 samples or more than 100 000, as many as the pulse itself has.
     name
         Name of the model, for messages.
+    progress
+        Told the share of the work that is done, 0 to 1.
 
     Raises
     ------

@@ -80,12 +80,22 @@ def play(
 ) -> Playback:
     """Play both drives of a waveform alternately, ``repeats`` times each, and return what was measured.
 
-    ``watch`` is shown what comes back as it comes: name of the drive, number of the repeat, places (m,) on
-    the samples of the drive, current and force (m,). ``track_heat`` takes the coil's temperature from the
-    duty, before and between the drives, and makes the compensated one up for it; None: where the model has a
-    thermal term and knows the coil.
-
     Arrays of the playback are (repeats, n), in A and N; NaN where the wire lost a block.
+
+    Parameters
+    ----------
+    drive
+        What ``invert`` or ``refine`` made.
+    repeats
+        How often each of the two drives is played.
+    track_heat
+        Take the coil's temperature from the duty, before and between the drives, and make the compensated one
+        up for it; None: where the model has a thermal term and knows the coil.
+    progress
+        Told the share of the work that is done, 0 to 1.
+    watch
+        Shown what comes back as it comes: name of the drive, number of the repeat, places (m,) on the samples
+        of the drive, current and force (m,).
 
     Raises
     ------

@@ -7,5 +7,14 @@ from collections.abc import Callable
 Progress = Callable[[float], None]
 
 
-def silent(_share: float) -> None:
-    """Tell nobody."""
+class _Silent:
+    """Tell nobody; a class, so that help shows a word for it."""
+
+    def __call__(self, _share: float) -> None:
+        pass
+
+    def __repr__(self) -> str:
+        return "silent"
+
+
+silent = _Silent()

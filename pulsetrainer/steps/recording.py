@@ -1,4 +1,4 @@
-"""Recording: play a course on the device, part by part, into whatever keeps it.
+"""Recording: play a course on the device, part by part, into whatever keeps it; how far an earlier one came.
 
 Only the part that is being played is held in memory. The device stays on for some minutes at most, so a
 long course is played in parts; each begins with the major loop (not recorded) and with the extremes that the

@@ -65,6 +65,8 @@ def refine(
         Most passes; the first one plays the drive as it is.
     slew
         Fastest the current may move, A/s; None: as ``invert``.
+    progress
+        Told the share of the work that is done, 0 to 1.
 
     Raises
     ------

@@ -245,7 +245,9 @@ def session(
     minutes, beats
         The end; neither: after five minutes, or of the quiz.
     variability, respiration, ectopic
-        Irregularity of the rhythm, %, from ``seed``: see ``core.rhythm.Rhythm``.
+        Irregularity of the rhythm, %: see ``core.rhythm.Rhythm``.
+    seed
+        Of the rhythm, and of the order of a quiz.
     changes
         What changes when.
     quiz, answers
@@ -254,6 +256,8 @@ def session(
         In the place of all that: asked for each beat what is played; see ``steps.conductor``.
     track_heat
         As in ``perform``.
+    progress
+        Told the share of the work that is done, 0 to 1.
 
     Raises
     ------

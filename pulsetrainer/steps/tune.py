@@ -82,6 +82,8 @@ def tune(
     supply_V
         Voltage of the supply where it has been measured: ohms and henries are then by it. None: by the
         drop of the free-wheeling diode, 0.6 V. The gains need neither.
+    progress
+        Told the share of the work that is done, 0 to 1.
 
     Raises
     ------

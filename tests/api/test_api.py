@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import traceback
 from html import unescape
 from pathlib import Path
 
@@ -15,8 +16,9 @@ import pytest
 from matplotlib.axes import Axes
 
 import pulsetrainer as pt
-from pulsetrainer.errors import ArgumentError, DataError, NotAnArtefactError, UsageError
+from pulsetrainer.errors import ArgumentError, DataError, NotAnArtefactError, PulsetrainerError, UsageError
 from pulsetrainer.files import store
+from pulsetrainer.report.tables import ESCAPE
 from wording import raises
 
 KEPT = Path(__file__).resolve().parents[1] / "data" / "files-0.1"
@@ -60,6 +62,7 @@ def test_every_artefact_shows_itself(path):
     assert len(str(artefact).splitlines()) > 3
     page = artefact._repr_html_()
     assert page.startswith('<pre style="white-space: pre')  # a table is not broken where a column ends
+    assert "font-family: monospace" in page.partition(">")[0]  # a rule of nbconvert's page sets another one
     lines = unescape(page.partition(">")[2].partition("</pre>")[0]).splitlines()
     sentences = [line for line in lines if re.match(r" {0,20}\w+( \S+)*$", line)]  # no rows of a table
     assert max(map(len, sentences)) <= 80
@@ -173,6 +176,41 @@ def test_what_is_of_another_kind_is_refused_with_what_was_expected(call, said):
         call(pt.load(KEPT / "diagnosis.h5"), pt.load(KEPT / "model.h5"))
     assert isinstance(caught.value, ValueError)
     assert caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (pt.load, "pt.read_table('"),
+        (lambda _: pt.identify("scope.h5"), "pt.load('scope.h5')"),
+        (lambda _: pt.open_device("bench?seed=3"), "`port` 'bench:?seed=3'"),
+    ],
+)
+def test_a_traceback_says_what_to_do(tmp_path, call, said):
+    """Below the message, in words of Python: the hint."""
+    (tmp_path / "table.csv").write_text("t_s,u,y\n0,0,0\n")
+    with pytest.raises(PulsetrainerError) as caught:
+        call(tmp_path / "table.csv")
+    last = traceback.format_exception_only(caught.value)[-1]
+    assert last.startswith("try: ")
+    assert said in last
+    assert "--" not in last
+
+
+@pytest.mark.parametrize("name", sorted(VERBS))
+def test_help_is_readable(name):
+    """No address of a function, no quotes around a type; progress and seed are told with the rest."""
+    verb = getattr(pt, name)
+    head, text = str(inspect.signature(verb)), inspect.getdoc(verb)
+    assert "0x" not in head
+    assert ": '" not in head
+    for parameter in {"progress", "seed"} & set(inspect.signature(verb).parameters):
+        assert f"\n{parameter}\n    " in text.partition("Parameters\n---")[2].partition("\nRaises\n---")[0]
+
+
+def test_a_line_is_left_free_between_tables():
+    """One, as in the command."""
+    assert "\n\n\n" not in ESCAPE.sub("", str(pt.load(KEPT / "diagnosis.h5")))
 
 
 def test_what_is_listed_is_public():

@@ -55,7 +55,7 @@ def limits(job: tuple[str, int]) -> list[tuple[str, int, str, float, float, bool
     for effect in HIDDEN:
         case = drawn.draw(noise, effect, seed, percent=0.0)  # the same plant and noise
         state = answered(case, seed)
-        stated = 100.0 * state.limits.get(effect, float("nan"))
+        stated = 100.0 * state.detectable.get(effect, float("nan"))
         for times in TIMES if np.isfinite(stated) else ():
             state = answered(drawn.draw(noise, effect, seed, percent=times * stated), seed)
             rows.append((noise, seed, effect, stated, times, effect in names_of(state), state.verdict))

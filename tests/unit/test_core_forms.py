@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import form_devices as devices
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 import pulsetrainer as pt
+from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.fit import fit
 from pulsetrainer.core.forms import try_all
 from pulsetrainer.core.identification import identify
@@ -20,6 +22,7 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.report.facts import facts, loop_words
+from pulsetrainer.steps import fit_notes
 from wording import raises, tells
 
 NOISE = 0.003  # of the span
@@ -253,6 +256,17 @@ def test_a_falling_loop_is_said_to_run_as_it_is_drawn(draw, seed, runs):
     way = runs.split(", ")[1]
     assert facts(model)["loop"] == way
     assert all(f"runs {way}:" in note for note in model.fit.notes if "its loop runs" in note)
+
+
+def test_a_loop_too_narrow_to_be_one_runs_no_way():
+    """The note of the dual form has the direction of `core.loop`, as the facts have: here there is none."""
+    plane = Plane.uniform(0.0, 1.0, 8)
+    i, j = plane.cell_indices
+    for off_diagonal, runs in ((0.0, False), (0.3, True)):
+        inner = Preisach(plane, np.where(i == j, 1.0, off_diagonal))
+        fitted = SimpleNamespace(form="dual", operator=Dual(inner), identified=SimpleNamespace(ridge=0.0))
+        (note,) = fit_notes.of_form(fitted, run_of(np.linspace(0, 1, 9), np.linspace(0, 1, 9)), "auto")
+        assert ("its loop runs clockwise" in note) is runs
 
 
 def test_a_dual_model_is_inverted_exactly(clockwise):

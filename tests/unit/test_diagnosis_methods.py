@@ -821,7 +821,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
 @pytest.mark.parametrize(("shown_from", "longer"), [(2.0, True), (50.0, False), (np.inf, False)])
 def test_nobody_is_asked_for_a_recording_without_end(shown_from, longer):
     """Four times as long is advice; a thousand times, or for ever, is none."""
-    state = SimpleNamespace(limits={"delay": shown_from * LIMITS.matters}, blind=("delay",), lacks=())
+    state = SimpleNamespace(detectable={"delay": shown_from * LIMITS.matters}, blind=("delay",), lacks=())
     said = wording.advice(advice._to_see_more(state), wording.Bench(Scale(), "A", ours=True))
     assert ("4 times as long" in said, "less noise" in said) == (longer, True)
     assert not re.search(r"\binf\b|e\+", said)

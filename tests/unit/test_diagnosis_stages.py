@@ -199,8 +199,8 @@ def test_what_would_have_shown_of_a_cause_in_the_model_is_asked_against_the_nois
     norm = state.floor.span * np.sqrt(state.floor.count)
     before, today = Sight(0.5, 8.0, 3.0), Sight(0.5, 2.0, 3.0)
     relevant = state.floor.relevant
-    assert state.limits["creep"] == pytest.approx(before.least(relevant, 64.0) / norm)
-    after = screened.stage(state).limits
+    assert state.detectable["creep"] == pytest.approx(before.least(relevant, 64.0) / norm)
+    after = screened.stage(state).detectable
     assert after["delay"] == pytest.approx(today.least(relevant, 1.0) / norm)
     assert after["creep"] == pytest.approx(today.least(relevant) / norm)
 
@@ -1126,12 +1126,12 @@ SEEN = dict.fromkeys([cause.id for cause in CAUSE.values() if cause.common], 0.0
 @pytest.mark.parametrize(
     ("more", "expected", "blind"),
     [
-        ({"limits": SEEN}, "none", ()),
-        ({"limits": SEEN | {"creep": 0.0051}}, "inconclusive", ("creep",)),
-        ({"limits": {k: v for k, v in SEEN.items() if k != "delay"}}, "inconclusive", ("delay",)),
-        ({"limits": SEEN | {"step": 9.0}}, "none", ()),
-        ({"limits": {}}, "none", ()),
-        ({"limits": SEEN | {"creep": 0.1}, "findings": (_finding("delay", 9.0),)}, "delay", ("creep",)),
+        ({"detectable": SEEN}, "none", ()),
+        ({"detectable": SEEN | {"creep": 0.0051}}, "inconclusive", ("creep",)),
+        ({"detectable": {k: v for k, v in SEEN.items() if k != "delay"}}, "inconclusive", ("delay",)),
+        ({"detectable": SEEN | {"step": 9.0}}, "none", ()),
+        ({"detectable": {}}, "none", ()),
+        ({"detectable": SEEN | {"creep": 0.1}, "findings": (_finding("delay", 9.0),)}, "delay", ("creep",)),
     ],
 )
 def test_nothing_found_is_none_only_where_it_could_have_been_seen(more, expected, blind):

@@ -1,4 +1,4 @@
-"""Acceptance: the best candidate that matters and predicts.
+"""Acceptance: the best candidate that is relevant and predicts.
 
 That a candidate is significant at all was asked before it was refitted (``joint_fit``), which also puts them
 in order. The first one is taken that the record can tell at all and whose refit lowers the squares by a

@@ -41,8 +41,10 @@ def stage(state: State) -> State:
                 np.sqrt(state.current.squares - state.floor_left.squares) / np.sqrt(state.floor.count)
             )
             said.append(Evidence("not whole", figures={"rest": percent * rest}, names=state.current.names))
-    if state.verdict in ("none", "inconclusive") and state.limits:
-        said.append(Evidence("would have shown", figures={k: PERCENT * v for k, v in state.limits.items()}))
+    if state.verdict in ("none", "inconclusive") and state.detectable:
+        said.append(
+            Evidence("would have shown", figures={k: PERCENT * v for k, v in state.detectable.items()})
+        )
     if state.verdict in ("none", "inconclusive", "unknown") and state.current.squares > state.floor.squares:
         said += _largest(state)
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:

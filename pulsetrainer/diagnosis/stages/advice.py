@@ -86,7 +86,7 @@ def _after_verdict(state: State) -> Evidence:
 
 def _to_see_more(state: State) -> Evidence:
     """Ask for what the records lack to show the causes that they could not have shown."""
-    worst = max(state.limits.get(name, np.inf) for name in state.blind)
+    worst = max(state.detectable.get(name, np.inf) for name in state.blind)
     times = (worst / LIMITS.matters) ** 2
     kind = "inconclusive" if state.lacks else "too noisy" if times <= LIMITS.longer else "far too noisy"
     figures = {"matters": PERCENT * LIMITS.matters, "times": max(np.ceil(times), 2.0)}

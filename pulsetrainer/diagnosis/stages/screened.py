@@ -1,4 +1,4 @@
-"""Screening: every cause is scored against noise.
+"""Screening: every cause is scored against noise, and how small an effect would have shown is told.
 
 Each cause that is not in the model yet is tried at a few values, linearised: how far would the residual
 fall? The same is asked of noise that looks like the residual but holds no cause, drawn again and again, and
@@ -7,9 +7,10 @@ draws with one as unlikely, so that it holds for the search as a whole and not f
 at most 0.01 go on to the joint fit.
 
 From the same null follows how small an effect of each cause would have shown: large enough that the test
-finds it in nine of ten records, that what the weights leave of it matters, and that neither is undone by what
-looks like the cause already. Of a cause that is in the model by now it is asked against the noise of today.
-Of one that the weights hold almost whole it is not told: what they leave of it is how finely they are drawn.
+finds it in nine of ten records, that what the weights leave of it is relevant, and that neither is undone by
+what looks like the cause already. Of a cause that is in the model by now it is asked against the noise of
+today. Of one that the weights hold almost whole it is not told: what they leave of it is how finely they are
+drawn.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ def stage(state: State) -> State:
     # of one in the model, what it and later ones explain has left the noise since
     known = {name: replace(one, noise=one.noise * quieter) for name, one in state.sights.items()}
     sights = {**known, **seen}
-    limits = {
+    detectable = {
         name: one.least(state.floor.relevant, gains.get(name, 0.0)) / norm
         for name, one in sights.items()
         if not library()[name].by_contrast
     }
-    return replace(state, scores=scores, sights=sights, limits=limits)
+    return replace(state, scores=scores, sights=sights, detectable=detectable)

@@ -101,7 +101,7 @@ def _predicts(state: State, found: Fitted) -> bool:
 
 
 def _is_above(state: State, floor: Floor) -> bool:
-    """Whether what is left is more than a floor, by what matters."""
+    """Whether what is left is more than a floor, by what is relevant."""
     return state.current.squares - floor.squares > floor.relevant
 
 
