@@ -34,13 +34,13 @@ def of_form(fitted: Fitted, run: Run, asked: str) -> list[str]:
         loop = loop_of(fitted.operator)
         runs = f", its loop runs {drawn(loop, fitted.operator.polarity)}" if loop != "none" else ""
         why = f"the {output} leads the {given}{runs}"
-        if asked == "auto":
-            how += f"; if {given} and {output} were swapped by mistake, record or import them the right way"
     elif fitted.form == "signed":
         how = "fitted with weights of either sign (signed form)"
         why = "no loop that runs one way fits this record"
     else:
         return []
+    if asked == "auto" and loop_of(fitted.operator) == "clockwise":
+        how += f"; if {given} and {output} were swapped by mistake, record or import them the right way"
     held = (
         f"; the record leaves open what follows some reversals of the {given}: there the weights are held "
         f"back so that the {output} stays near its recorded range"
@@ -88,9 +88,9 @@ def of_guessed_turns(model: Model) -> list[str]:
     if fit is None or fit.loop == "none" or not fit.minor_percent < TOLD_APART:
         return []
     said = (
-        f"the record of this model has hardly any minor loops (cells told apart: {fit.minor_percent:.0f} %): where the "
-        f"{model.output_quantity} turns within its range the drive is a guess, which the expected error does "
-        "not count. Identify on a record with loops within the major one"
+        f"the record of this model has hardly any minor loops (cells told apart: {fit.minor_percent:.0f} %): "
+        f"where the {model.output_quantity} turns within its range the drive is a guess, which the expected "
+        "error does not count. Identify on a record with loops within the major one"
     )
     return [said]
 

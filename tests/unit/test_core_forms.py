@@ -485,3 +485,18 @@ def test_a_record_whose_squares_are_no_numbers_is_refused(what, size):
     usual = pt.identify(run_of(u, u**2), levels=8).fit.rms_percent
     small = pt.identify(run_of(scales["input"] * u, scales["output"] * u**2), levels=8).fit.rms_percent
     assert small == pytest.approx(usual, rel=1e-6)
+
+
+@pytest.mark.parametrize("form", ["dual", "signed"])
+@pytest.mark.parametrize(
+    ("loop", "asked", "said"),
+    [("clockwise", "auto", True), ("butterfly", "auto", False), ("clockwise", "dual", False)],
+)
+def test_an_output_that_leads_may_be_an_input(monkeypatch, form, loop, asked, said):
+    """Columns swapped by mistake look like it, whatever form describes them."""
+    monkeypatch.setattr(fit_notes, "loop_of", lambda operator: loop)
+    fitted = SimpleNamespace(
+        form=form, operator=SimpleNamespace(polarity=1), identified=SimpleNamespace(ridge=0.0)
+    )
+    run = SimpleNamespace(input_quantity="stroke", output_quantity="voltage")
+    assert ("swapped by mistake" in fit_notes.of_form(fitted, run, asked)[0]) is said
