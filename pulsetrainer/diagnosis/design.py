@@ -127,6 +127,33 @@ class Bins:
             result[own] = through(columns[own[last]], k, width * step)[at]
         return result
 
+    def short(
+        self, through: Callable[[FloatArray, int, float], FloatArray], dt_s: Sequence[float]
+    ) -> scipy.sparse.csr_array | None:
+        """Return ``filtered`` as a matrix (count, count), where the filter forgets within a few averages.
+
+        Its answer to an impulse, from rest at the first value; None where that lasts, or a bin is missing.
+        """
+        blocks = []
+        for k, (width, step) in enumerate(zip(self.width, dt_s, strict=True)):
+            size = int(np.count_nonzero(self.record == k))
+            impulse = np.zeros((LIMITS.short_filter + 2, 1))
+            impulse[1] = 1.0
+            answer = through(impulse, k, width * step)[1:, 0]
+            last = int(np.flatnonzero(np.abs(answer) > LIMITS.rounding * np.abs(answer).max())[-1])
+            if size <= last + 1 or last == LIMITS.short_filter or not self._is_even(k, width * step):
+                return None
+            kept, lag = answer[: last + 1], np.arange(last + 1)
+            later = scipy.sparse.diags_array(kept, offsets=-lag, shape=(size, size), format="csr")
+            first = (1.0 - np.cumsum(kept), (lag, np.zeros_like(lag)))
+            blocks.append(later + scipy.sparse.csr_array(first, shape=(size, size)))
+        return scipy.sparse.block_diag(blocks, format="csr")
+
+    def _is_even(self, k: int, step_s: float) -> bool:
+        """Whether a record has a bin at every step."""
+        time = self.time_s[self.record == k]
+        return bool(np.array_equal(np.floor(time / step_s), np.arange(time.size)))
+
     def constant(self, along: FloatArray) -> float:
         """Return the offset that belongs to coordinates (k,) along ``free``."""
         upper = self.free.T @ self._starts
@@ -191,9 +218,12 @@ class Design:
         bins: Bins,
         paths: Sequence[Followed],
         smoothing: float,
-        shown: Callable[[FloatArray], FloatArray] | None = None,
+        shown: Callable[[FloatArray], FloatArray] | scipy.sparse.csr_array | None = None,
     ) -> Design:
-        """Average the rows of the inputs that the hysteresis sees, one per record; ``shown`` filters them."""
+        """Average the rows of the inputs that the hysteresis sees, one per record; ``shown`` filters them.
+
+        As a matrix (count, count) it leaves them sparse.
+        """
         packed = scipy.sparse.csr_array((bins.count, plane.n_q))
         for number, path in zip(bins.number, paths, strict=True):
             inside = np.flatnonzero(number >= 0)
@@ -206,6 +236,8 @@ class Design:
             packed = packed + of_samples @ own + of_nodes @ base
         if shown is None:
             return cls(plane, bins, packed, smoothing)
+        if not callable(shown):
+            return cls(plane, bins, shown @ packed, smoothing)
         dense = shown(packed.toarray())
         for first in range(0, bins.count, LIMITS.rows_at_once):
             part = slice(first, first + LIMITS.rows_at_once)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 
 import numpy as np
@@ -202,11 +202,11 @@ def _rows(problem: Problem, terms: Sequence[Term]) -> Design:
     def one(columns: FloatArray, k: int, dt_s: float) -> FloatArray:
         return shown_output(through, columns, replace(problem.frames[k], dt_s=dt_s))
 
-    def shown(columns: FloatArray) -> FloatArray:
-        return problem.bins.filtered(columns, one, [record.step for record in problem.records])
-
-    paths = problem.paths(before)
-    return Design.build(problem.plane, problem.bins, paths, problem.smoothing, shown if through else None)
+    bins, steps = problem.bins, [record.step for record in problem.records]
+    shown = bins.short(one, steps) if through else None
+    if through and shown is None:
+        shown = partial(bins.filtered, through=one, dt_s=steps)
+    return Design.build(problem.plane, bins, problem.paths(before), problem.smoothing, shown)
 
 
 def _difference(quantity: Quantity, value: float) -> float:

@@ -34,6 +34,7 @@ class Thresholds:
     enough_rows: int = 4000  # ... and for so many averages, where there are as many samples
     rows_at_once: int = 2000  # turned from nodes to cells: more take more memory, and no less time
     most_rows: int = 20_000  # averages: longer records get longer averages, so that the fit fits in memory
+    short_filter: int = 60  # averages: a lag that forgets within so many leaves the rows of a fit sparse
     least_rows: int = 100  # averages: fewer tell no causes apart
     start_tau_s: tuple[float, ...] = (0.2, 0.8, 3.2)  # decays fitted from a record's start (decision 040)
     start_share: float = 6.0  # time constants of such a decay that a record must hold: else it is an offset

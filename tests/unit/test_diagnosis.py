@@ -372,6 +372,31 @@ def test_a_record_of_which_hardly_a_sample_counts_is_passed_over(counts):
     np.testing.assert_array_equal(both.bins.filtered(columns, lambda x, _k, _dt: x, steps), columns)
 
 
+@pytest.mark.parametrize(
+    ("name", "values", "short"),
+    [
+        ("delay", (0.0023,), True), ("delay", (0.05,), True), ("output-lag", (0.004,), True),
+        ("output-lag", (0.2,), False), ("resonance", (20.0, 0.2), False),
+    ],
+)  # fmt: skip
+def test_a_filter_that_forgets_soon_is_a_matrix(name, values, short):
+    """It leaves rows sparse, and is the filter itself, from the first average of each record on."""
+    record = _lagging()
+    problem = problem_for([record, replace(record, output=record.output[::-1])], 0.0, 1.5)
+    bins, steps = problem.bins, [record.step, record.step]
+
+    def through(columns, k, dt_s):
+        return library()[name].on_output(columns, values, replace(problem.frames[k], dt_s=dt_s))
+
+    matrix = bins.short(through, steps)
+    assert (matrix is not None) is short
+    if matrix is not None:
+        columns = np.random.default_rng(5).normal(1.0, 1.0, (bins.count, 3))
+        np.testing.assert_allclose(matrix @ columns, bins.filtered(columns, through, steps), atol=1e-10)
+        holes = replace(record, sample_weight=1.0 * (np.arange(record.input.size) % 1000 > 300))
+        assert problem_for([holes], 0.0, 1.5).bins.short(through, steps[:1]) is None
+
+
 def test_a_quick_look_counts_with_what_was_found_only():
     """The steps of a converter are found on the raw data: no cause that was screened takes anything away."""
     record = _lagging()
