@@ -245,6 +245,7 @@ _WORDS_OF_A_TIRED_HAND = {
         *("capture identification -o out.h5 --current-max 1500mA", 2, "got '1500mA'"),
         "write it in A, without the unit: 1.5",
     ),
+    "help of a command": (*("help session", 2, "there is no command 'help'", "pulsetrainer session --help"),),
     "a report that is a command": (
         *("report", 2, "there is no command 'report'", "pulsetrainer evaluate played.h5 --html"),
     ),

@@ -1,4 +1,4 @@
-"""Hands on a session: keys are read and handed on (``steps.steering``), the answers of a quiz among them."""
+"""Hands on a session: joins the screen (``cli.live``) with what its keys change, or answer in a quiz."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Steered:
     decide: Decide
     share: Callable[[float], float] = lambda _s: 0.0  # of the work that is done, at a time in s
     live: Live | None = None
-    by_key: bool = False  # what comes next may change at any moment
+    by_key: bool = False  # a person presses them, and what comes next depends on it
 
 
 class Hands:
@@ -46,22 +46,33 @@ class Hands:
         """
         dark = "a result in JSON has no live view" if screen.as_json else why_not()
         if isinstance(chosen, Blind) and by_key and dark:
+            first = "leave --json out" if screen.as_json else "run it on a terminal"
+            if "small" in dark:
+                first = "make the window larger"
             raise UsageError(
                 f"a quiz is answered by key, and {dark}",
-                hint="run it on a terminal, or give the answers in a file: --answers answers.txt",
+                hint=f"{first}, or give the answers in a file: --answers answers.txt",
             )
         if dark:
             if "small" in dark:
                 screen.note(f"{dark}; there are no keys")
             return Steered(chosen, chosen.share_at)
         if isinstance(chosen, Blind):
-            return self._asked(chosen)
+            return self._asked(chosen, by_key=by_key)
         steering = Steering(chosen, [Pulse(shape).own_bpm for shape in shapes])
-        live = Live(lambda key, _s: steering.press(key), self.names, blind=False)
-        live.status = lambda: "paused" if steering.paused else ""
-        return Steered(steering, chosen.share_at, live, by_key=True)
+        said = ""
 
-    def _asked(self, quiz: Blind) -> Steered:
+        def press(key: str, _s: float) -> None:
+            nonlocal said
+            said = steering.press(key)
+
+        live = Live(press, self.names, blind=False)
+        live.status = lambda: "; ".join(filter(None, ("paused" if steering.paused else "", said)))
+        return Steered(
+            steering, lambda time_s: chosen.share_at(steering.without_pauses(time_s)), live, by_key=True
+        )
+
+    def _asked(self, quiz: Blind, *, by_key: bool) -> Steered:
         """Return a quiz on the screen: a letter answers, Q stops."""
         steering = Steering(quiz, [])
 
@@ -82,4 +93,4 @@ class Hands:
             + (", answered" if self._answers else "")
             + (f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops" if wrong else "")
         )
-        return Steered(steering, quiz.share_at, live)
+        return Steered(steering, quiz.share_at, live, by_key=by_key)

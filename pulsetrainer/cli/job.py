@@ -100,15 +100,19 @@ class Job:
             yield progress
         self.seconds = time.perf_counter() - begun
 
-    def open_device(self, model: Model | None = None) -> Device:
+    def open_device(self, model: Model | None = None, *, by_key: bool = False) -> Device:
         """Open a device, as ``api.open_device``, with the gains that the file of settings has for it.
 
-        It is said where what is to be played was made for another one: with a ``model`` of that.
+        It is said where what is to be played was made for another one: with a ``model`` of that. For
+        a person at the keys, ``by_key``, a bench keeps pace with the clock.
         """
         from pulsetrainer.api import open_device
         from pulsetrainer.device.gains import DELIVERED
+        from pulsetrainer.device.opening import DEFAULT_PORT
+        from pulsetrainer.simulation.options import in_real_time
 
-        device = open_device(self.port, limits=self.limits, tuned=self._settings)
+        port = in_real_time(self.port or DEFAULT_PORT) if by_key else self.port
+        device = open_device(port, limits=self.limits, tuned=self._settings)
         if self._settings is not None and device.gains != DELIVERED:
             self.notes([f"{device.info.serial} plays with the gains that {self._settings} has for it"])
         elif self._settings is not None:

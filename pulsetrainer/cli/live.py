@@ -1,4 +1,4 @@
-"""The screen and the keys of a session on a terminal; in a pipe there are neither."""
+"""The terminal of a session: draws it and reads the keys; in a pipe it does neither."""
 
 from __future__ import annotations
 

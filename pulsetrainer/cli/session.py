@@ -64,7 +64,8 @@ def session(
 ) -> None:
     """Press pulses for as long as you like.
 
-    On a terminal keys change rate, amplitude and pulse, pause and stop. With --quiz the pulses come blind.
+    On a terminal keys change rate, amplitude and pulse, pause and stop; the simulated device then keeps
+    pace with the clock. With --quiz the pulses come blind.
 
     Example: pulsetrainer session --model extended.h5 -o session.h5 --pulses normal,bifid --minutes 2
     """
@@ -138,7 +139,10 @@ def session(
 
     said = "a session that was cut off; its sheet: `pulsetrainer evaluate {left} --html sheet.html`"
     job.left_over(out, pt.Session, said)
-    with job.open_device(loaded) as device, job.working("session", steered.live) as progress:
+    with (
+        job.open_device(loaded, by_key=steered.by_key) as device,
+        job.working("session", steered.live) as progress,
+    ):
 
         def watch(now: Now) -> None:
             if steered.live is not None:
@@ -152,6 +156,6 @@ def session(
         done, questions = session_into(
             out, job.header("Session under way"), header, loaded, device, shapes, steered.decide,
             blind=chosen if isinstance(chosen, Blind) else None, overwrite=overwrite,
-            lead_s=LIVE_LEAD_S if steered.by_key else LEAD_S, watch=watch, **asked,
+            lead_s=LIVE_LEAD_S if steered.by_key and not quiz else LEAD_S, watch=watch, **asked,
         )  # fmt: skip
     say_pressed(job, out, html, done, questions, device.info)

@@ -71,7 +71,7 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
     return (
         _with_or_without_value(error, context, help_)
         if kind == "BadOptionUsage"
-        else _other(str(explain()).rstrip("."), command, getattr(context, "command", None))
+        else _other(str(explain()).rstrip("."), command, getattr(context, "command", None), words)
     )
 
 
@@ -174,7 +174,7 @@ def _columns(table: Path) -> tuple[str, ...]:
     return detect(table).names
 
 
-def _other(said: str, command: str, parsed: Any) -> UsageError:
+def _other(said: str, command: str, parsed: Any, words: Sequence[str]) -> UsageError:
     """What has no words of its own here, but for one argument too many and a command that does not exist."""
     help_ = f"{command} --help"
     if extra := _EXTRA.match(said):
@@ -182,6 +182,8 @@ def _other(said: str, command: str, parsed: Any) -> UsageError:
     unknown = _UNKNOWN.match(said)
     if unknown is None:
         return UsageError(said, hint=help_)
+    if unknown[1] == "help" and (of := [word for word in words if word in parsed.commands]):
+        return UsageError("there is no command 'help'", hint=f"{command} {of[0]} --help")
     if unknown[1] in _NO_COMMAND:
         return UsageError(f"there is no command {unknown[1]!r}", hint=_NO_COMMAND[unknown[1]])
     near = f"did you mean {unknown[2]}? All commands: " if unknown[2] else ""

@@ -203,6 +203,16 @@ def serial_of(port: str) -> str:
     return f"BENCH-{int(number)}" if number.isdecimal() else ""
 
 
+def in_real_time(port: str) -> str:
+    """Return a port with a bench that keeps pace with the clock, unless its text names a speed.
+
+    A person who presses keys cannot follow one that runs as fast as it can.
+    """
+    if not port.startswith("bench:") or "speed" in dict(parse_qsl(port.partition("?")[2])):
+        return port
+    return f"{port}{'&' if '?' in port else '?'}speed=real"
+
+
 def check_port(port: str) -> None:
     """Raise UsageError where a simulated device's port makes no sense; others are tried when they open."""
     if port.startswith("bench:"):

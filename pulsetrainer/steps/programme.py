@@ -114,7 +114,7 @@ class Programme:
 
     def share_at(self, time_s: float) -> float:
         """How much of it is over at a time; where beats are counted, by the one that was given out last."""
-        return self._share(self._number, time_s)
+        return min(self._share(self._number, time_s), 1.0)  # the last beat is under way after the end
 
     def __call__(self, number: int, time_s: float) -> Decision:
         """Return what is played next."""

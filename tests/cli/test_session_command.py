@@ -379,6 +379,9 @@ def test_a_lost_port_keeps_what_was_pressed(tmp_path):
     assert kept.beats.start_s.size >= 3
 
 
+FAST = "bench:?speed=max"  # also where keys are pressed
+
+
 class Terminal:
     """The program on a terminal of its own."""
 
@@ -450,7 +453,7 @@ def test_keys_change_the_beats_and_stop(tmp_path):
 
 def test_the_screen_of_a_session_is_all_there_is(tmp_path):
     """How much is over, in beats too, stands in it: a bar beside it drew into it, and never moved."""
-    terminal = Terminal(tmp_path, *SHORT, "--beats", 30, port="bench:")
+    terminal = Terminal(tmp_path, *SHORT, "--beats", 30, port=FAST)
     assert terminal.end() == 0
     shares = [int(share) for share in re.findall(rb" (\d+) % +[\d.]+ s ", terminal.seen)]
     assert shares[0] < 20
@@ -458,10 +461,58 @@ def test_the_screen_of_a_session_is_all_there_is(tmp_path):
     assert "━".encode() not in terminal.seen
 
 
+def test_a_pause_does_not_eat_the_session(tmp_path):
+    """As many beats as without, never more than 100 %; a key that changes nothing is answered."""
+    terminal = Terminal(tmp_path, *SHORT, "--minutes", 0.5, port=FAST)
+    terminal.until(lambda: b"/min" in terminal.seen)
+    terminal.press(" ")
+    for key, answer in {"x": b"paused; 'x'", ">": b"paused; already 100 %"}.items():
+        terminal.press(key)
+        terminal.until(lambda answer=answer: answer in terminal.seen)
+    terminal.until(lambda: float(re.findall(rb"([\d.]+) s ", terminal.seen)[-1]) > 45.0)
+    terminal.press(" ")
+    assert terminal.end() == 0
+    assert max(map(int, re.findall(rb" (\d+) % +[\d.]+ s ", terminal.seen))) <= 100
+    kept = read(tmp_path / "s.h5", Session)
+    assert kept.time_s[-1] > 60.0
+    assert kept.beats.interval_s.sum() == pytest.approx(30.0, abs=4.0)
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("words", [("--minutes", 5), ("--pulses", "normal,bifid", "--quiz", 2)])
+def test_a_bench_keeps_pace_with_a_person(tmp_path, words):
+    """Where keys are pressed no second of the session is shorter than one of the clock."""
+    begun = time.monotonic()
+    terminal = Terminal(tmp_path, *SHORT, *words, port="bench:")
+    terminal.until(lambda: b"stop" in terminal.seen)
+    shown = time.monotonic()
+    terminal.until(lambda: time.monotonic() > shown + 3.0)
+    terminal.press("Q" if "--quiz" in words else "q")
+    assert terminal.end() == 0
+    assert read(tmp_path / "s.h5", Session).time_s[-1] < time.monotonic() - begun
+
+
+def test_a_bench_is_as_fast_as_it_can_where_a_file_answers(tmp_path):
+    """On a terminal too: nobody presses anything."""
+    (tmp_path / "a.txt").write_text("normal\nbifid\n")
+    begun = time.monotonic()
+    words = ("--pulses", "normal,bifid", "--quiz", 2, "--answers", "a.txt")
+    assert Terminal(tmp_path, *SHORT, *words, port="bench:").end() == 0
+    assert time.monotonic() - begun < read(tmp_path / "s.h5", Session).time_s[-1]
+
+
+def test_a_quiz_in_a_small_window_says_what_to_do(tmp_path):
+    """The window is the trouble: it is a terminal already."""
+    words = ("--pulses", "normal,bifid", "--quiz", 2)
+    terminal = Terminal(tmp_path, *SHORT, *words, port=FAST, size=(24, 40))
+    assert terminal.end() == 2
+    assert "make the window larger" in " ".join(terminal.seen.decode().split())
+
+
 def test_nothing_gives_a_question_away(tmp_path):
     """Blind: neither screen, nor file names, nor the files, nor the time tell what is asked."""
     words = ("--pulses", "bifid,parvus-et-tardus", "--quiz", 2, "--seed", 7)
-    terminal = Terminal(tmp_path, *SHORT, *words, port="bench:")
+    terminal = Terminal(tmp_path, *SHORT, *words, port=FAST)
     terminal.until(lambda: b"question 1 of 2" in terminal.seen)
     terminal.until(lambda: b"Q stop" in terminal.seen)  # before a wrong key, too
     shown = [terminal.seen.count(name) for name in (b"bifid", b"parvus-et-tardus")]

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -17,7 +18,15 @@ from pulsetrainer.device.opening import open_device
 from pulsetrainer.errors import DeviceError, UsageError
 from pulsetrainer.simulation import build
 from pulsetrainer.simulation.bench import Bench
-from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, BenchOptions, Wire, parse_bench, serial_of
+from pulsetrainer.simulation.options import (
+    BREAKS,
+    QEMU_SETTINGS,
+    BenchOptions,
+    Wire,
+    in_real_time,
+    parse_bench,
+    serial_of,
+)
 from wording import raises
 
 
@@ -37,6 +46,15 @@ from wording import raises
 def test_ports_that_make_sense(port, options):
     """The text of a bench port is taken apart."""
     assert parse_bench(port) == options
+    assert parse_bench(in_real_time(port)) == replace(options, speed="real")
+
+
+@pytest.mark.parametrize(
+    "port", ["bench:?speed=max", "bench:?seed=3&speed=max", "qemu:", "/dev/ttyUSB0", "auto"]
+)
+def test_a_port_keeps_the_speed_that_it_names(port):
+    """And a device has its own."""
+    assert in_real_time(port) == port
 
 
 @pytest.mark.parametrize(

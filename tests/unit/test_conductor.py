@@ -197,6 +197,44 @@ def test_a_pause_lets_the_force_go_and_comes_back(model):
     assert sum(g.beat is not None for g in given) >= 5
 
 
+def test_a_pause_by_key_does_not_count(model):
+    """The session of so many minutes has as many beats as without it; how much is over stands still."""
+    beats = []
+    for paused_s in (0.0, 20.0):
+        programme = Programme(NAMES[:1], rate=75.0, minutes=0.2)
+        steering, shares = Steering(programme, [75.0]), []
+
+        def decide(number, time_s, steering=steering, paused_s=paused_s, shares=shares):
+            if steering.paused != (5.0 < time_s < 5.0 + paused_s):
+                steering.press(" ")
+            decided = steering(number, time_s)
+            shares.append(steering.programme.share_at(steering.without_pauses(time_s)))
+            return decided
+
+        conductor, given, _ = _conducted(model, decide)
+        beats.append(sum(piece.beat is not None for piece in given))
+        assert shares == sorted(shares)
+        assert shares[-1] == 1.0 < conductor.time_s / 12.0
+        assert programme.share_at(steering.without_pauses(4.0)) == pytest.approx(4.0 / 12.0)  # before it
+    assert beats[0] == beats[1]
+
+
+@pytest.mark.parametrize("keys", ["x", "\x1b", ">>", "<" * 12, "+" * 60, "-" * 60, "p"])
+def test_a_key_that_changes_nothing_is_answered(keys):
+    """One that is none, one at an end, another pulse where there is one; the others are not."""
+    steering = Steering(lambda number, time_s: Play(0), [75.0])
+    assert not any(steering.press(key) for key in "<>+-  ")
+    assert [steering.press(key) for key in keys][-1]
+
+
+def test_weaker_is_never_stronger():
+    """At a height below the last step: it went up to that."""
+    steering = Steering(lambda number, time_s: Play(0, amplitude=0.05), [75.0])
+    steering(0, 0.0)
+    assert steering.press("<")
+    assert steering(1, 1.0).amplitude == 0.05
+
+
 def test_a_long_session_comes_in_parts_that_end_at_rest(model):
     """No part is longer than the device stays on, and no beat is lost between two."""
     _, given, parts = _conducted(model, Programme(NAMES[:1], beats=15), longest_s=6.0)
