@@ -3,9 +3,9 @@
     python tests/blind/harm.py --first 1200000 --each 2 --unknowns 6 --pairs 8 --triples 4 --controls 6
 
 Each case of ``hidden`` is played twice: the diagnostic signal, and a drawn one with other turns at other
-rates. ``identify``, ``diagnose`` and ``extend`` see the first alone; of what the measurement did, ``correct``
-takes its part out first. Then the plain and the other model predict the second: as the device shows it for
-an extended model, without what the measurement did for a corrected one. A line a case, and all harm counted.
+rates. ``identify``, ``diagnose``, ``extend`` and ``correct`` see the first alone. Then the plain and the
+other model predict the second, as sound instruments show it, and an extended one also with the faults of the first:
+what a sensor cuts off there, a plain model has learned. A line a case, and all harm counted.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import argparse
 import multiprocessing
 import os
 import sys
+from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
 
@@ -91,17 +92,22 @@ def judge(job: tuple[str, int]) -> tuple[str, int, str, str, dict[str, float]]:
     seen = run_of(data.records[0])
     plain = pt.identify(seen)
     found = pt.diagnose(seen, plain)
+    sound = without_the_measurement(case)
+    unseen = {True: run_of(played(case, data.played, value))}
+    unseen[False] = unseen[True] if sound == case else run_of(played(sound, data.played, value))
     ratios = {}
-    for what in ("extended", "corrected"):
+    for what, make, faults in (
+        ("extended", lambda: pt.extend(plain, found), False),
+        ("extended, same faults", lambda: pt.extend(plain, found), True),
+        ("corrected", lambda: pt.identify(pt.correct(seen, found)), False),
+    ):
+        if faults and sound == case:
+            continue
         try:
-            if what == "extended":
-                other, truth = pt.extend(plain, found), case
-            else:
-                other, truth = pt.identify(pt.correct(seen, found)), without_the_measurement(case)
+            other = make()
         except DataError:
             continue
-        unseen = run_of(played(truth, data.played, value))
-        before, after = (one.rms for one in pt.evaluate(unseen, [plain, other]).models)
+        before, after = (one.rms for one in pt.evaluate(unseen[faults], [plain, other]).models)
         ratios[what] = after / before
     names = ",".join(one.cause for one in found.causes if one.found)
     return kind, seed, "+".join(case.causes) or case.outside or "-", f"{found.verdict} ({names})", ratios
@@ -131,7 +137,7 @@ def main() -> None:
     }
     jobs = [(kind, asked.first + k) for kind, count in kinds.items() for k in range(count)]
     jobs = [jobs[k] for k in np.random.default_rng(asked.first).permutation(len(jobs))]
-    all_of: dict[str, list[float]] = {"extended": [], "corrected": []}
+    all_of: dict[str, list[float]] = defaultdict(list)
     with multiprocessing.Pool(asked.processes) as pool:
         for kind, seed, hid, said, ratios in pool.imap_unordered(_job, jobs):
             told = ", ".join(f"{what} {ratio:.2f}" for what, ratio in ratios.items()) or "left as it is"
