@@ -4,8 +4,8 @@
 
 Each case of ``hidden`` is played twice: the diagnostic signal, and a drawn one with other turns at other
 rates. ``identify``, ``diagnose``, ``extend`` and ``correct`` see the first alone. Then the plain and the
-other model predict the second, as sound instruments show it, and an extended one also with the faults of the first:
-what a sensor cuts off there, a plain model has learned. A line a case, and all harm counted.
+other model predict the second, as sound instruments show it, and an extended one also with the faults of the
+first: what a sensor cuts off there, a plain model has learned. A line a case, and all harm counted.
 """
 
 from __future__ import annotations
