@@ -164,7 +164,7 @@ MESSAGES = {
     "stray current": Message("current flows although the reference is zero", ""),
     "current flows on": Message("still flow", "plug", got="{amperes}"),
     "no compiler": Message("C compiler", "pip install ziglang"),
-    "several devices": Message("2 devices", "--port", got="/dev/ttyUSB1, /dev/ttyUSB2"),
+    "several devices": Message("2 devices", "`port`", got="/dev/ttyUSB1, /dev/ttyUSB2"),
     "no device": Message("no device", "bench:", expected="0403:6015", got="/dev/ttyUSB0"),
     "no permission": Message("no permission", "dialout", "{port}"),
     "not a serial port": Message("not a serial port", "pulsetrainer ports", "{port}"),
