@@ -42,7 +42,7 @@ class Hands:
     ) -> Steered:
         """Put screen and keys around who decides, where there is a terminal.
 
-        UsageError where a quiz is to be answered by key, and there is none.
+        UsageError where a quiz is to be answered by key, and there is none; ``by_key``: that is asked.
         """
         dark = "a result in JSON has no live view" if screen.as_json else why_not()
         if isinstance(chosen, Blind) and by_key and dark:
@@ -90,7 +90,11 @@ class Hands:
         live = Live(press, self.names, blind=True)
         live.status = lambda: (
             f"question {min(quiz.question + 1, quiz.questions)} of {quiz.questions}"
-            + (", answered" if self._answers else "")
+            + (
+                ", answered"
+                if self._answers
+                else ": its beats are over; waiting for your answer" * quiz.waits
+            )
             + (f"; {wrong!r} does not count: {choices[0]} to {choices[-1]} answer, Q stops" if wrong else "")
         )
         return Steered(steering, quiz.share_at, live, by_key=by_key)

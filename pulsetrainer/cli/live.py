@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 SMALLEST = (50, 10)  # columns and lines
 _ROWS = 5  # of the trace
 _SHOWN_S = 3.0
+_STILL_A = 0.02  # less is what a converter shows of none
 _DRAWN_EACH_S = 0.08
 LETTERS = string.ascii_lowercase  # the keys that answer, in the order of the choices
 
@@ -72,7 +73,7 @@ class Live:
             f"{100 * self._share:3.0f} %  {now.time_s:7.1f} s  {force[-1]:5.2f} N  {now.current[-1]:5.3f} A"
         )
         if now.resting:
-            said += "  at rest"
+            said += "  at rest" if now.current[-1] < _STILL_A else "  first stroke: no finger yet"
         elif beat is not None:
             rate = 60.0 / now.interval_s
             said += f"  {self._names[beat.pulse]}  {rate:.0f}/min  {100 * beat.amplitude:.0f} %"

@@ -56,6 +56,12 @@ TEXTS: Mapping[str, str] = {
         "with it, it is too small to matter, or does not predict the parts of the recordings that were left "
         "out. So it is not named."
     ),
+    "held": (
+        "it would account for {share:.1f} % of the squared error beyond noise, but the weights of a model "
+        "fitted to these recordings can hold nearly all of such a fault. So it cannot be told how large it "
+        "is, nor whether it is there, and it is not named. A model from another recording tells: identify "
+        "one, and diagnose these with it"
+    ),
     "not repeated": (
         "What is left can be fitted by a learned dependence, but that did not repeat when whole pieces of "
         "the time were left out: it is not taken for a property of the device"

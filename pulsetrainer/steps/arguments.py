@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from inspect import Signature, signature
+from pathlib import Path
 from typing import Any
 
 from pulsetrainer.errors import ArgumentError, UsageError
@@ -69,7 +70,9 @@ def _check_is(kinds: tuple[type, ...], one: object) -> None:
         name = str(one) if isinstance(one, str) or hasattr(one, "__fspath__") else ""
         raise ArgumentError(
             f"expected {' or '.join(map(_a, kinds))}, got {repr(name) if name else _a(type(one))}",
-            hint=f"pt.load({name!r}) gives it" if name else "see its help",
+            hint=f"pt.load({name!r}) gives it"
+            if Path(name).suffix
+            else "its help tells the order of the arguments",
         )
 
 

@@ -62,6 +62,7 @@ class Blind:
         self._answers: list[tuple[str, float]] = []
         self._begun: list[float] = []
         self._first: int  # number of the first beat of the question, once it has begun
+        self._waits = False
 
     @property
     def question(self) -> int:
@@ -72,6 +73,11 @@ class Blind:
     def questions(self) -> int:
         """How many there are."""
         return len(self._asked)
+
+    @property
+    def waits(self) -> bool:
+        """Whether the beats of a question are over, and its answer is still to come."""
+        return self._waits
 
     def share_at(self, _time_s: float) -> float:
         """How much of it is over: an answer may take any time."""
@@ -89,10 +95,12 @@ class Blind:
             self._begun[at] = time_s
         cut_s = self._begun[at] + QUESTION_S
         if time_s < cut_s - _ROUNDING_S:
+            self._waits = False
             return Play(self._asked[at], self._play.amplitude, self._play.bpm, cut_s)
         said = self._answer(at) if time_s >= cut_s + GAP_S - _ROUNDING_S else None
         if said is not None:
             self._answers.append(said)
+        self._waits = said is None
         return Rest()
 
     def told(self, beats: Beats) -> Beats:

@@ -216,3 +216,13 @@ def test_a_line_is_left_free_between_tables():
 def test_what_is_listed_is_public():
     """Completion in a shell shows nothing else."""
     assert set(dir(pt)) == set(pt.__all__)
+
+
+def test_a_name_that_is_no_file_is_not_to_be_loaded():
+    """As where pulse and model are swapped."""
+    with pytest.raises(ArgumentError) as caught:
+        pt.invert(pt.load(KEPT / "model.h5"), "normal")
+    assert "order of the arguments" in caught.value.hint
+    with pytest.raises(ArgumentError) as caught:
+        pt.identify("run.h5")
+    assert "pt.load('run.h5')" in caught.value.hint

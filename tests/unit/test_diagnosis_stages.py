@@ -1447,6 +1447,8 @@ def test_a_slow_fault_that_the_rest_of_the_model_holds_is_none(monkeypatch, name
     after = repetition.stage(state)
     assert after.findings[-1].found is found
     assert after.current.names == ((*names, name) if found else tuple(names))
+    # it may be there all the same
+    assert [(one.kind, one.cause) for one in after.evidence] == ([] if found else [("held", name)])
 
 
 def _refitted(problem, terms, near) -> Fit:

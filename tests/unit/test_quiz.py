@@ -144,6 +144,22 @@ def test_nothing_is_told_before_the_first_answer():
     assert Blind(CHOICES, [0, 1], lambda _q: None, Play(0)).quiz() is None
 
 
+def test_a_question_whose_beats_are_over_waits_for_its_answer():
+    """Which is said on the screen: without an answer nothing happens any more."""
+    said: list[tuple[str, float]] = []
+    blind = Blind(CHOICES, [2, 0], lambda _question: said.pop() if said else None, Play(0))
+    end_s = QUESTION_S + GAP_S
+    blind(0, 0.0)
+    assert not blind.waits
+    blind(20, end_s)
+    assert blind.waits
+    said.append((CHOICES[1], end_s + 30.0))
+    blind(20, end_s + 30.0)
+    assert not blind.waits
+    blind(20, end_s + 30.0 + GAP_S)
+    assert not blind.waits
+
+
 def test_a_beat_is_told_when_its_question_is_answered():
     """Those of an open question stay untold, those of the questions before it are all there."""
     said: list[tuple[str, float]] = []

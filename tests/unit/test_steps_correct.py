@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis.causes import base, library
 from pulsetrainer.errors import DataError
+from pulsetrainer.steps.correct import _instead as instead
 from wording import raises
 
 RATE_HZ = 200.0
@@ -265,3 +267,12 @@ def test_a_part_that_was_not_diagnosed_stays_as_it_is(clean):
     np.testing.assert_allclose(added[3000:5950], 0.1 * np.arange(2950) / RATE_HZ, atol=1e-9)
     assert not added[5950:].any()
     assert short.input.size == 50
+
+
+@pytest.mark.parametrize(("verdict", "goes_on"), [("unknown", True), ("inconclusive", True), ("none", False)])
+def test_what_cannot_be_corrected_is_not_called_sound(verdict, goes_on):
+    """Where something is wrong that has no name, the diagnosis says what to do."""
+    found = SimpleNamespace(verdict=verdict, extended=None, quick=False, next_experiment="Record again.")
+    told = instead(found)
+    assert ("Record again." in told) is goes_on
+    assert ("as it is" in told) is not goes_on

@@ -13,8 +13,8 @@ That which repeats least goes first; the others are then refitted without it and
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
 cent of the span, was not found: it mends the formula of another cause, or nothing. Nor was a slow fault of
 the measurement of which the weights and the causes beside it hold nearly all: it would be taken out as large
-as it was fitted, from a device that never had it. What is left beside it is
-refitted without it, and a step asked again whether it only settles.
+as it was fitted, from a device that never had it. That is said, since it may be there all the same. What is
+left beside it is refitted without it, and a step asked again whether it only settles.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from dataclasses import replace
 
 from pulsetrainer.diagnosis import wear
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
 from pulsetrainer.diagnosis.fitting import Fitted, refit
@@ -61,8 +62,14 @@ def stage(state: State) -> State:
 
 def _without_held(state: State) -> State:
     """Return the state without slow faults of the measurement that weights and other causes hold."""
-    findings = tuple(replace(one, found=one.found and not _is_held(state, one)) for one in state.findings)
-    return _without_what_is_gone(replace(state, findings=findings))
+    held = [one for one in state.findings if one.found and _is_held(state, one)]
+    said = [
+        Evidence("held", one.cause.id, figures={"share": min(one.explains_percent, PERCENT)})
+        for one in held
+        if state.rms_of(one.explains_percent / PERCENT) > LIMITS.told_though_held * state.floor.span
+    ]
+    findings = tuple(replace(one, found=False) if one in held else one for one in state.findings)
+    return _without_what_is_gone(replace(state, findings=findings, evidence=(*state.evidence, *said)))
 
 
 def _without_what_is_gone(state: State) -> State:
