@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from inspect import Signature, signature
-from pathlib import Path
 from typing import Any
 
 from pulsetrainer.errors import ArgumentError, UsageError
@@ -71,7 +70,7 @@ def _check_is(kinds: tuple[type, ...], one: object) -> None:
         raise ArgumentError(
             f"expected {' or '.join(map(_a, kinds))}, got {repr(name) if name else _a(type(one))}",
             hint=f"pt.load({name!r}) gives it"
-            if Path(name).suffix
+            if "." in name
             else "its help tells the order of the arguments",
         )
 
