@@ -25,7 +25,7 @@ BREAKS = (
 QEMU_SETTINGS = {"ambient": (-60.0, 80.0), "supply-sag": (0.0, 5.0), "coil": (0.0, 16777215.0)}
 LONGEST_S = 1e5
 MAX_RATE = 0.1  # of damaged bytes: beyond that no frame comes through
-_SPEEDS = ("max", "real")
+_SPEEDS = ("max", "steady", "real")
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ def parse_bench(port: str) -> BenchOptions:
         elif name == "speed":
             if value not in _SPEEDS:
                 raise UsageError(
-                    f"`port`: the bench speed is max or real, not {value!r}",
+                    f"`port`: the bench speed is max, steady or real, not {value!r}",
                     hint='`port` "bench:?speed=real"',
                 )
             asked = replace(asked, speed=value)
@@ -206,11 +206,12 @@ def serial_of(port: str) -> str:
 def in_real_time(port: str) -> str:
     """Return a port with a bench that keeps pace with the clock, unless its text names a speed.
 
-    A person who presses keys cannot follow one that runs as fast as it can.
+    A person who presses keys cannot follow one that runs as fast as it can. It waits for a busy computer, where
+    a real device takes its host for gone.
     """
     if not port.startswith("bench:") or "speed" in dict(parse_qsl(port.partition("?")[2])):
         return port
-    return f"{port}{'&' if '?' in port else '?'}speed=real"
+    return f"{port}{'&' if '?' in port else '?'}speed=steady"
 
 
 def check_port(port: str) -> None:

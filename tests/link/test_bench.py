@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -46,7 +45,7 @@ from wording import raises
 def test_ports_that_make_sense(port, options):
     """The text of a bench port is taken apart."""
     assert parse_bench(port) == options
-    assert parse_bench(in_real_time(port)) == replace(options, speed="real")
+    assert parse_bench(in_real_time(port)).speed == (options.speed if "speed" in port else "steady")
 
 
 @pytest.mark.parametrize(
@@ -250,6 +249,21 @@ def test_ctrl_c_in_the_terminal_stops_the_device_in_order(host):
     assert int(end[3]) > 300
     assert end[4] == "0"
     assert _gone(pid)
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(("speed", "goes_on"), [("steady", True), ("real", False)])
+def test_a_steady_bench_waits_for_a_busy_computer(speed, goes_on):
+    """A host that is held up for longer than the heartbeat; on a real device it would be gone."""
+    job = HOST.replace("speed=real", f"speed={speed}").replace("60_000", "2_000")
+    process = subprocess.Popen([sys.executable, "-c", job], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(0.35)
+    process.send_signal(signal.SIGCONT)
+    end = process.communicate(timeout=30)[0].splitlines()[-1].split()
+    assert end[:2] == ["END", str(goes_on)]
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="reads processor time from /proc")

@@ -140,9 +140,10 @@ def test_equal_benches_give_equal_numbers(pulse):
     np.testing.assert_array_equal(records[0].current_A, records[1].current_A)
 
 
-def test_real_speed_is_the_wall_clock(pulse):
-    """speed=real plays one second in one second."""
-    with open_device("bench:?speed=real") as device:
+@pytest.mark.parametrize("speed", ["real", "steady"])
+def test_real_speed_is_the_wall_clock(pulse, speed):
+    """One second is played in one second."""
+    with open_device(f"bench:?speed={speed}") as device:
         begun = time.monotonic()
         recording = device.play(pulse[:1000], 1000)
         took_s = time.monotonic() - begun

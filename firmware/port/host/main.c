@@ -1,6 +1,6 @@
 /* The firmware as a process of this computer, on a pty.
  *
- *   firmware [--ideal] [--set NAME=VALUE]... [--speed real|max] [--break WHAT@SECONDS]... [--serial N] [--leash]
+ *   firmware [--ideal] [--set NAME=VALUE]... [--speed max|steady|real] [--break WHAT@SECONDS]... [--serial N] [--leash]
  *   firmware --list          the plant's parameters and what can be broken
  *
  * Prints the pty's path on its first line and serves it until the host program closes it. --leash: also
@@ -175,9 +175,12 @@ int main(int argc, char **argv)
                 return complain("nothing to break", value);
         } else if (strcmp(option, "--speed") == 0 && value != NULL) {
             k++;
-            if (strcmp(value, "real") != 0 && strcmp(value, "max") != 0)
-                return complain("speed is real or max, not", value);
-            speed = strcmp(value, "real") == 0 ? PACE_REAL : PACE_MAX;
+            if (strcmp(value, "real") == 0)
+                speed = PACE_REAL;
+            else if (strcmp(value, "steady") == 0)
+                speed = PACE_STEADY;
+            else if (strcmp(value, "max") != 0)
+                return complain("speed is max, steady or real, not", value);
         } else {
             return complain("unknown option", option);
         }

@@ -1,6 +1,7 @@
 /* Device time against the wall clock.
  *
  * --speed real: ticks follow the wall clock, armed or not.
+ * --speed steady: as max, but never ahead of the wall clock: for a person at the keys, on a computer that may be busy.
  * --speed max: device time runs as fast as computer and link allow, which must not cheat the safety of
  * the device nor a host that is merely slow:
  *   - disarmed, time stands still once the coil has settled: nothing can happen, and two equal captures
@@ -30,6 +31,7 @@ static bool stalled;
 static uint32_t heard;         /* the last heartbeat while stalled */
 static int64_t stalled_ns;     /* since when */
 static int32_t settle_ticks;
+static int64_t next_ns;        /* steady: until then no tick runs */
 
 void pace_init(enum pace_speed chosen, int64_t now_ns)
 {
@@ -40,6 +42,7 @@ void pace_init(enum pace_speed chosen, int64_t now_ns)
     heard = 0;
     stalled_ns = now_ns;
     settle_ticks = 0;
+    next_ns = now_ns;
 }
 
 static bool output_off(void)
@@ -106,9 +109,30 @@ static int32_t max_ticks(int64_t now_ns)
     return due(now_ns);
 }
 
+static int32_t steady_ticks(int64_t now_ns)
+{
+    if (output_off()) {
+        next_ns = now_ns;
+        return max_ticks(now_ns);
+    }
+    if (now_ns < next_ns)
+        return 0;
+    int32_t n = max_ticks(now_ns);
+    int64_t from_ns = now_ns - next_ns > CATCH_UP_NS ? now_ns : next_ns;
+    next_ns = from_ns + n * (int64_t)NS_PER_TICK;
+    return n;
+}
+
 int32_t pace_ticks(int64_t now_ns)
 {
-    return speed == PACE_REAL ? real_ticks(now_ns) : max_ticks(now_ns);
+    switch (speed) {
+    case PACE_REAL:
+        return real_ticks(now_ns);
+    case PACE_STEADY:
+        return steady_ticks(now_ns);
+    default:
+        return max_ticks(now_ns);
+    }
 }
 
 int32_t pace_wait_ms(int64_t now_ns)
@@ -117,6 +141,8 @@ int32_t pace_wait_ms(int64_t now_ns)
         return output_off() ? 20 : 1; /* 20 ms: half a hundred wake-ups a second cost nothing */
     if (output_off())
         return -1;
+    if (speed == PACE_STEADY && !stalled)
+        return 1;
     int64_t ms = (epoch_ns - now_ns) / 1000000;
     return ms > 1 ? (int32_t)ms : 1;
 }

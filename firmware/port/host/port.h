@@ -24,7 +24,7 @@ uint64_t board_ticks(void);                     /* since power-on */
 const struct solenoid *board_world(void);       /* the truth, which the firmware cannot see */
 
 /* pace.c: how many ticks may run now. */
-enum pace_speed { PACE_REAL, PACE_MAX };
+enum pace_speed { PACE_REAL, PACE_MAX, PACE_STEADY };
 void pace_init(enum pace_speed speed, int64_t now_ns);
 int32_t pace_ticks(int64_t now_ns);                    /* may run at once */
 int32_t pace_wait_ms(int64_t now_ns);                  /* when pace_ticks is 0: until it may change; -1: for ever */
