@@ -206,8 +206,8 @@ def serial_of(port: str) -> str:
 def in_real_time(port: str) -> str:
     """Return a port with a bench that keeps pace with the clock, unless its text names a speed.
 
-    A person who presses keys cannot follow one that runs as fast as it can. It waits for a busy computer, where
-    a real device takes its host for gone.
+    A person who presses keys cannot follow one that runs as fast as it can. It waits for a busy computer,
+    where a real device takes its host for gone.
     """
     if not port.startswith("bench:") or "speed" in dict(parse_qsl(port.partition("?")[2])):
         return port
