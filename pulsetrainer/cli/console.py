@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 _PIPE_WIDTH = 110
+_COMMAND = re.compile(r"`[^`]*`|\bpulsetrainer [^,;()`]*")  # what is copied
+_KEPT = "\0"  # a blank between whose words no line ends
 
 
 def plain(value: Any) -> Any:
@@ -40,9 +43,10 @@ def plain(value: Any) -> Any:
 
 
 def say(lead: str, text: str) -> None:
-    """Write a line to stderr, on a terminal folded between words."""
+    """Write a line to stderr, on a terminal folded between words; a command in it stays in one piece."""
     width = shutil.get_terminal_size().columns if sys.stderr.isatty() else None
-    sys.stderr.write(tables.folded(lead, text, width, indent=2) + "\n")
+    whole = _COMMAND.sub(lambda command: command[0].replace(" ", _KEPT), text)
+    sys.stderr.write(tables.folded(lead, whole, width, indent=2).replace(_KEPT, " ") + "\n")
 
 
 @contextmanager

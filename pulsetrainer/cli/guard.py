@@ -148,8 +148,8 @@ def report(problem: PulsetrainerError, *, command: str, as_json: bool) -> None:
     for note in getattr(problem, "__notes__", ()):
         if not note.startswith(TRY):
             say("note: ", note)
-    if hint:  # not folded: a command in it is copied in one piece
-        sys.stderr.write(f"  try: {hint}\n")
+    if hint:
+        say("  try: ", hint)
 
 
 def _problem_of(error: Exception) -> PulsetrainerError:

@@ -19,7 +19,7 @@ from store_examples import header
 import pulsetrainer.cli
 from program import PROGRAM
 from program import pulsetrainer as piped
-from pulsetrainer.cli.console import Screen
+from pulsetrainer.cli.console import Screen, say
 from pulsetrainer.files import store
 
 BIN = Path(sys.executable).parent
@@ -97,6 +97,27 @@ def test_a_note_is_folded_between_words(monkeypatch):
     assert max(map(len, lines)) <= 40
     assert " ".join(" ".join(lines[:-1]).split()) == f"note: {text}"
     assert lines[-1].startswith("warning: ")
+
+
+def test_a_next_step_is_folded_around_its_commands(monkeypatch):
+    """On a narrow terminal between words; what is copied stays in one piece."""
+    terminal = io.StringIO()
+    terminal.isatty = lambda: True
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda: os.terminal_size((40, 24)))
+    say(
+        "  try: ",
+        "give the run it was identified from: `pulsetrainer show model.h5 --json` tells, or name it",
+    )
+    say("  try: ", "pulsetrainer identify run.h5 --form direct -o a-long-name.h5, and then go on")
+    lines = terminal.getvalue().splitlines()
+    kept = (
+        "`pulsetrainer show model.h5 --json`",
+        "pulsetrainer identify run.h5 --form direct -o a-long-name.h5",
+    )
+    assert all(sum(command in line for line in lines) == 1 for command in kept)
+    assert all(len(line) <= 40 or kept[1] in line for line in lines)
+    assert len(lines) > 4
 
 
 def test_the_list_of_commands_is_not_cut(tmp_path):
