@@ -9,8 +9,9 @@ from typer import Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.console import plain
-from pulsetrainer.cli.job import Job, check_ending
+from pulsetrainer.cli.job import Job
 from pulsetrainer.cli.options import AsJson, DryRun, LimitCurrent, LimitForce, Overwrite, Port, positive
+from pulsetrainer.cli.outputs import check_ending
 
 if TYPE_CHECKING:
     from pulsetrainer.steps.tune import Tuned

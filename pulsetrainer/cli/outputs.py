@@ -1,0 +1,51 @@
+"""What a command may write: nothing over what it works on, and under a name that says what it gets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+
+from pulsetrainer.errors import UsageError
+
+_FORMATS = {
+    *(".h5", ".csv", ".tsv", ".txt", ".dat", ".xls", ".xlsx", ".json", ".toml", ".npz", ".mat", ".wav"),
+    *(".png", ".svg", ".pdf", ".html", ".htm"),
+}
+_IN_PLACE = {"refine", "check"}  # what they write takes the place of what they were given
+_WRITE_NO_ARTEFACT = {"compare", "export", "plot"}
+
+
+def check_keeps_inputs(outputs: Sequence[Path], inputs: Sequence[Path], context: typer.Context) -> None:
+    """Refuse to write what a command makes over what it makes that from, which nobody could get back."""
+    if context.info_name in _IN_PLACE:
+        return
+    for path in outputs:
+        if any(path.resolve() == given.resolve() for given in inputs):
+            raise UsageError(
+                f"{path} is what {context.info_name} works on and would be lost: it cannot be the output",
+                hint="name another file",
+            )
+
+
+def check_ending(path: Path, context: typer.Context) -> None:
+    """Refuse an output whose name promises another format than it gets."""
+    command, ending = context.info_name, path.suffix.lower()
+    if str(path) == str(context.params.get("html")):
+        what, right, then = "a page is written as HTML", ".html", "; a browser prints it to PDF"
+    elif command == "tune":
+        what, right, then = "a file of settings is written as TOML", ".toml", ""
+    elif command in _WRITE_NO_ARTEFACT:
+        return
+    else:
+        what, right = f"{command} writes HDF5", ".h5"
+        then = "; then `pulsetrainer export` makes a table of it, `pulsetrainer plot` a figure"
+        if ending == ".html" and "html" in context.params:
+            then = f", and the page with --html {path}"
+    formats = _FORMATS | {""} if right == ".html" else _FORMATS  # a browser goes by the ending
+    if path.is_dir():  # which is told when it is looked at
+        return
+    if ending in formats and not (ending and right.startswith(ending)):  # .htm is a page too
+        got = f"ends in {ending!r}" if ending else "has no such ending"
+        raise UsageError(f"{what}, but {path} {got}", hint=f"name it {path.stem}{right}{then}")
