@@ -17,7 +17,7 @@ from pulsetrainer.steps.check import updated
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 KEPT = DATA / "files-0.1"
-MEASURED = ("bh_ferrite_mnzn_1.csv", pytest.param("davinci_f0p5_torque10.csv", marks=pytest.mark.slow))
+LOOP, TENDON = "bh_ferrite_mnzn_1.csv", "davinci_f0p5_torque10.csv"
 
 
 def same(one: object, other: object, where: str = "") -> None:
@@ -57,7 +57,7 @@ def test_identify(tmp_path):
     same(by_command(tmp_path, "identify", run, *words), stored(model, tmp_path))
 
 
-@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize("name", [LOOP, pytest.param(TENDON, marks=pytest.mark.slow)])
 def test_records_of_other_laboratories(tmp_path, name):
     """Imported, identified, evaluated: a magnetic loop and a tendon."""
     run = pt.read_table(DATA / name, input="u", output="y")
@@ -81,7 +81,7 @@ def test_records_of_other_laboratories(tmp_path, name):
 @pytest.mark.slow
 def test_causes_of_other_laboratories(tmp_path):
     """A tendon diagnosed whole, the delay of its recorder taken out, and nothing to extend its model by."""
-    run = pt.read_table(DATA / MEASURED[1], input="u", output="y")
+    run = pt.read_table(DATA / TENDON, input="u", output="y")
     pt.save(run, tmp_path / "run.h5")
     model = pt.identify(run, levels=16)
     pt.save(model, tmp_path / "model.h5")

@@ -148,6 +148,7 @@ def test_a_second_program_on_the_port(folder, firmware):
         assert device.play([0.1, 0.2], 1000).complete
 
 
+@pytest.mark.slow
 @pytest.mark.realtime
 def test_a_port_that_vanishes_in_mid_capture(folder, firmware):
     """The device pulled out: told as such, what came until then is kept."""

@@ -479,7 +479,10 @@ def test_a_pause_does_not_eat_the_session(tmp_path):
 
 
 @pytest.mark.realtime
-@pytest.mark.parametrize("words", [("--minutes", 5), ("--pulses", "normal,bifid", "--quiz", 2)])
+@pytest.mark.parametrize(
+    "words",
+    [("--minutes", 5), pytest.param(("--pulses", "normal,bifid", "--quiz", 2), marks=pytest.mark.slow)],
+)
 def test_a_bench_keeps_pace_with_a_person(tmp_path, words):
     """Where keys are pressed no second of the session is shorter than one of the clock."""
     begun = time.monotonic()

@@ -111,7 +111,7 @@ CASES = {
 }  # fmt: skip
 
 
-QUICK = ("capture", "play", "session")
+QUICK = ("session",)
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,7 @@ def test_what_is_no_rail_is_none(seed):
     assert {name: _gate(u, y + noise, clean) for name, y in others.items()} == dict.fromkeys(others)
 
 
+@pytest.mark.slow
 def test_a_clipped_record_is_named_corrected_and_costs_the_model_nothing():
     """Refitted weights describe a clipped record as they describe a device: only the model as given tells."""
     rng = np.random.default_rng(7)

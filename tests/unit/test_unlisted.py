@@ -233,6 +233,7 @@ def test_another_model_is_refused(dipping):
         pt.extend(replace(model, offset=model.offset + 1.0), found)
 
 
+@pytest.mark.slow
 def test_nothing_is_learned_where_all_that_counts_lies_in_one_piece(dipping):
     """The memory becomes known near the end: no other piece could show that a dependence repeats."""
     model, _ = dipping
