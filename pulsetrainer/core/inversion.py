@@ -157,7 +157,12 @@ def invert(
     for parent, rise in zip(path.parent[1:].tolist(), rises[1:].tolist(), strict=True):
         value.append(branches.reach(value[parent], abs(rise), rising=rise > 0))
     rise = path.value - path.node_value[path.anchor]
-    u = branches.reach_all(np.asarray(value)[path.anchor], np.abs(rise), rise > 0)
+    nodes = np.asarray(value)
+    u = branches.reach_all(nodes[path.anchor], np.abs(rise), rise > 0)
+    # an extreme that the output has not passed the input must not pass by rounding: that would wipe it out
+    extreme, inner = nodes[path.parent[path.anchor]], path.anchor > 0
+    u = np.where(inner & (rise > 0), np.minimum(u, extreme), u)
+    u = np.where(inner & (rise < 0), np.maximum(u, extreme), u)
     remembered = np.asarray(branches.inputs_of(path.final.extremes))
     final = trace_after(remembered, u[-1:], operator.plane.low, operator.plane.high).final
     return Inverse(u, clipped, final)

@@ -107,6 +107,14 @@ def test_split_and_resume(drawn, cut):
     )
 
 
+def test_a_loop_that_is_closed_but_for_rounding_wipes_nothing_out():
+    """An input beyond the extreme by one rounding would follow the wide branch: 1.2e-15 off, of 1e-3."""
+    plane = Plane(np.asarray([0.0, 0.001, 0.002, 0.003]))
+    operator = Preisach(plane, np.asarray([0.0, 0.0, 0.0, 0.0, 1000.0, 0.0]), 0.0, "continuous", polarity=-1)
+    target = np.asarray([0.0, 1e-7, 2.2250738585072014e-308])
+    assert operator(invert(operator, target).input) == pytest.approx(target, rel=0, abs=1e-18)
+
+
 @given(wanted())
 def test_final_state_gives_the_last_target(drawn):
     """From the final state, resting at its present input, the output stays at the last target."""
