@@ -1550,18 +1550,23 @@ def test_what_both_fits_leave_room_for_nothing_of_is_in_doubt(cosine, in_doubt):
 
 
 @pytest.mark.parametrize(
-    ("after", "free", "said"),
-    [(9.81, True, None), (9.82, True, "no gain"), (10.01, True, "under way"), (10.01, False, "no better")],
-)
-def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, free, said):
+    ("after", "free", "tau", "said"),
+    [
+        (9.81, True, 3.0, None), (9.82, True, 3.0, "no gain"), (10.01, True, 3.0, "under way"),
+        (10.01, False, 3.0, "no better"), (10.01, True, 0.01, "no better"),
+    ],
+)  # fmt: skip
+def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, free, tau, said):
     """By three fifths of the 6 that its causes gain in the search: else nothing is added, and it is said why.
 
-    What is worse, and described its records only with a free beginning, was under way before them.
+    What is worse, and described its records only with a free beginning, was under way before them, unless it
+    is over at once.
     """
     monkeypatch.setattr(extension, "extended_model", lambda state, model: "extended")
     monkeypatch.setattr(extension, "rms_of", lambda state, model, known: after if model == "extended" else 10)
     begun = SimpleNamespace(bins=SimpleNamespace(begins_free=free))
-    state = _state(replace(_fit(500.0, "creep"), problem=begun))
+    creep = (Term(CAUSE["creep"], (0.1, tau)),)
+    state = _state(replace(_fit(500.0), terms=creep, problem=begun))
     state = replace(state, repeated=state.current, question=replace(state.question, given=Given("given")))
     found = extension.stage(state)
     assert found.extended == (None if said else "extended")
@@ -1569,7 +1574,6 @@ def test_an_extended_model_predicts_its_own_records_better(monkeypatch, after, f
     assert bool(found.extensions) is (said is None)
     waits = advice.stage(replace(found, verdict="creep")).advice
     assert (waits.kind == "rest first") is (said == "under way")
-    tau = max(state.current.terms[0].values)
     assert waits.figures.get("rest", 5.0 * tau) == pytest.approx(5.0 * tau)
 
 

@@ -46,19 +46,22 @@ def _extended(state: State, given: Model) -> State:
         return replace(state, extended=extended)
     figures = {"given": PERCENT * before / state.scale.span, "extended": PERCENT * after / state.scale.span}
     names = tuple(term.cause.id for term in state.extensions)
-    said = Evidence(_why_not(state, before, after), figures=figures | _rest(state), names=names)
+    rest = _rest(state)
+    said = Evidence(_why_not(state, after <= before, rest), figures=figures | {"rest": rest}, names=names)
     return replace(state, repeated=None, evidence=(*state.evidence, said))
 
 
-def _why_not(state: State, before: float, after: float) -> str:
-    """Which evidence says why nothing is added, by the errors of the model as given and extended."""
+def _why_not(state: State, better: bool, rest: float) -> str:
+    """Which evidence says why nothing is added, where that needs so long a ``rest`` to settle."""
     assert state.repeated is not None
-    if after <= before:
+    if better:
         return "no gain"
-    return "under way" if state.repeated.problem.bins.begins_free else "no better"
+    # what is over within the shortest hold was not under way
+    free = state.repeated.problem.bins.begins_free
+    return "under way" if free and rest >= LIMITS.hold_s else "no better"
 
 
-def _rest(state: State) -> dict[str, float]:
+def _rest(state: State) -> float:
     """How long the device must rest before a record, so that nothing is under way when it begins."""
     assert state.repeated is not None
     times = [
@@ -67,7 +70,7 @@ def _rest(state: State) -> dict[str, float]:
         for quantity, value in zip(term.cause.quantities(state.problem.frames[0]), term.values, strict=True)
         if quantity.unit == "s"
     ]
-    return {"rest": LIMITS.settled_times * max(times, default=0.0)}
+    return LIMITS.settled_times * max(times, default=0.0)
 
 
 def _without_contrast(state: State) -> State:
