@@ -132,18 +132,25 @@ class Gram:
 
     def _factor(self, index: IntArray) -> Factor:
         if self._factored is None or not np.array_equal(self._factored[0], index):
-            ridge = _RELATIVE_RIDGE * self.scale
-            while True:
-                block = self.matrix[np.ix_(index, index)]
-                block[np.diag_indices_from(block)] += ridge
-                try:
-                    factor = scipy.linalg.cho_factor(block, lower=True, check_finite=False)
-                except scipy.linalg.LinAlgError:
-                    ridge *= 10.0  # cells the data cannot tell apart: share their mass
-                    continue
-                break
-            self._factored = index, factor
+            # cells the data cannot tell apart share their mass
+            ridge = np.full(index.size, _RELATIVE_RIDGE * self.scale)
+            self._factored = index, factor_of(self.matrix[np.ix_(index, index)], ridge)
         return self._factored[1]
+
+
+def factor_of(matrix: FloatArray, ridge: FloatArray) -> Factor:
+    """Cholesky factor of a matrix (k, k) with a ridge (k,) on its diagonal, for ``scipy.linalg.cho_solve``.
+
+    The ridge, positive, grows tenfold until there is a factor: what the data do not tell is rounding there,
+    and may be negative.
+    """
+    while True:
+        raised = matrix.copy()
+        raised[np.diag_indices_from(raised)] += ridge
+        try:
+            return scipy.linalg.cho_factor(raised, lower=True, check_finite=False, overwrite_a=True)
+        except scipy.linalg.LinAlgError:
+            ridge = 10.0 * ridge
 
 
 def _exchange(problem: _Problem, passive: NDArray[np.bool_] | None, max_iterations: int) -> NonNegative:

@@ -14,6 +14,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 from numpy.typing import NDArray
 
+from pulsetrainer.core.nnls import SMALLEST_DIAGONAL, factor_of
 from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.smoothing import blocks
 from pulsetrainer.diagnosis import residual
@@ -107,10 +108,13 @@ class HeldOut:
         for own, part in zip(test.T, parts, strict=True):
             left = total - (1.0 - told) * part
             normal = share * smooth + left[:-1, :-1]
-            normal[np.diag_indices(size)] *= 1.0 + LIMITS.ridge_held_out
-            normal[np.diag_indices(size)] += TINY
-            factor = scipy.linalg.cho_factor(normal, lower=True, check_finite=False, overwrite_a=True)
-            change = scipy.linalg.cho_solve(factor, left[:-1, -1] - share * pull, check_finite=False)
+            diagonal = np.diagonal(normal)
+            ridge = LIMITS.ridge_held_out * diagonal + TINY
+            # a cell that is on throughout is an offset as well: its own entry is rounding, of either sign
+            ridge[: free.size] += SMALLEST_DIAGONAL * float(diagonal.max())
+            change = scipy.linalg.cho_solve(
+                factor_of(normal, ridge), left[:-1, -1] - share * pull, check_finite=False
+            )
             yield fitted.residual[own] - rows.output(change)[own], change[free.size : free.size + extra]
 
 

@@ -387,6 +387,19 @@ def test_errors_of_folds_are_those_of_as_many_fits(name, values, whole, by_rate)
         np.testing.assert_allclose(error, (fitted.residual - columns @ change)[fold_of == fold], atol=2e-6)
 
 
+def test_a_cell_that_is_on_throughout_is_no_crash():
+    """It is an offset as well: beside one its entry of the sums is rounding, of either sign."""
+    u = 0.6 + 0.6 * np.tile(_loops(), 4)
+    rng = np.random.default_rng(3)
+    problem = problem_for([Record(u, 3.0 * u + 0.01 * rng.standard_normal(u.size), dt_s=0.01)], 0.0, 1.5)
+    fitted = refit(problem, (Term(CAUSE["field-lag"], (0.02,)),), None, rounds=2)
+    fitted = replace(fitted, passive=np.ones_like(fitted.passive))
+    usual = HeldOut(problem).jackknife(fitted)
+    assert usual is not None
+    assert np.all(np.isfinite(usual))
+    assert np.all(usual > 0.0)
+
+
 class _Fit:
     """A fit that is the same as itself only."""
 
