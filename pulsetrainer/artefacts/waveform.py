@@ -80,6 +80,11 @@ class Waveform(Shown):
         return float(np.abs(self.target[self.scored]).max())
 
     @property
+    def predicted_peak(self) -> float:
+        """Largest absolute output that the model expects, in the strokes before the pulse or in it."""
+        return float(np.abs(self.predicted).max())
+
+    @property
     def predicted_max_error_percent(self) -> float:
         """Largest error that the model expects for the compensated drive, of the full force."""
         error = np.abs(self.predicted - self.target)[self.scored]

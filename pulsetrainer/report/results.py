@@ -19,6 +19,7 @@ from pulsetrainer.report.names import digits, split, told
 from pulsetrainer.report.tables import picked
 from pulsetrainer.report.tables import text as shown
 
+_MORE_BEFORE = 1.05  # times the full force, in the strokes before the pulse: said
 _SMALL = 0.1  # of a unit: three decimals would not tell a range of less
 
 _VERDICT: Final = {True: "better", False: "worse", None: ""}
@@ -115,12 +116,16 @@ def inverted(out: Path, drive: Waveform) -> Said:
         "seconds": seconds,
         "force_range": force,
         "current_range": current,
-        **picked(drive, "clipped_samples", "predicted_max_error_percent", "input_unit", "output_unit"),
+        **picked(drive, "clipped_samples", "predicted_max_error_percent", "predicted_peak"),
+        **picked(drive, "input_unit", "output_unit"),
     }
+    before = ""
+    if drive.predicted_peak > _MORE_BEFORE * drive.full_force:
+        before = f"; before it up to {drive.predicted_peak:.3f} {drive.output_unit}, by the model"
     but = ", which lacks what was learnt" if drive.inversion == "transferred" else ""
     rows = {
         "length": f"{length}, {drive.time_s.size} samples",
-        made: _range_words(force, drive.output_unit),
+        made: _range_words(force, drive.output_unit) + before,
         given: _range_words(current, drive.input_unit),
         "out of reach": f"{drive.clipped_samples} samples",
         "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model{but}",

@@ -40,6 +40,8 @@ class Plan:
     rate_Hz: float
     peak_current_A: float
     rms_current_A: float
+    peak_force_N: float  # by the model, in the strokes before the pulse or in it
+    pulse_force_N: float  # in the pulse
 
     @classmethod
     def of(cls, drive: Waveform, currents: FloatArray, plays: int) -> Plan:
@@ -50,6 +52,8 @@ class Plan:
             rate_Hz=drive.rate_Hz,
             peak_current_A=float(np.abs(currents).max()),
             rms_current_A=root_mean_square(currents),
+            peak_force_N=drive.predicted_peak,
+            pulse_force_N=drive.full_force,
         )
 
 

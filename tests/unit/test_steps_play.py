@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import report_examples
 import store_examples as examples
 
+import pulsetrainer as pt
 from pulsetrainer.errors import PulsetrainerError
+from pulsetrainer.report.planned import to_be_played
+from pulsetrainer.report.results import inverted
 from pulsetrainer.steps.play import ErrorsSoFar, plan
+
+KEPT = Path(__file__).parents[1] / "data" / "files-0.1"
 
 
 def test_the_plan_of_a_play():
@@ -27,6 +33,21 @@ def test_the_plan_of_a_play():
     assert planned.peak_current_A == pytest.approx(0.8)
     both = np.concatenate((compensated, scaled))
     assert planned.rms_current_A == pytest.approx(np.sqrt(np.mean(both**2)))
+
+
+def test_a_small_pulse_is_told_with_the_strokes_before_it():
+    """They go around the major loop: a drive of 3 N begins with the largest force of the device."""
+    model = pt.load(KEPT / "model.h5")
+    drive = pt.invert("normal", model, force_min=2.0, force_max=3.0)
+    largest = float(model.predict(np.asarray([0.0, model.edges[-1]]), 0.001)[-1])
+    planned = plan(drive, repeats=1)
+    assert (planned.pulse_force_N, planned.peak_force_N) == pytest.approx((3.0, largest), rel=1e-3)
+    assert f"{largest:.2f} N at most" in to_be_played(planned, 1)["force"]
+    payload, _, rows = inverted(Path("drive.h5"), drive)
+    assert payload["predicted_peak"] == planned.peak_force_N
+    assert rows["force"] == f"2.000 .. 3.000 N; before it up to {largest:.3f} N, by the model"
+    whole = pt.invert("normal", model)
+    assert "before" not in inverted(Path("drive.h5"), whole)[2]["force"]
 
 
 def test_no_repeat_is_no_play():
