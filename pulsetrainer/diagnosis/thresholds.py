@@ -191,6 +191,7 @@ class Thresholds:
     rival_screened: float = 0.5  # of the found cause's gain: rivals that score less are not refitted
     rival_gain: float = 0.005  # of that gain: as good, if no farther behind than the largest of this,
     rival_relevant: float = 0.3  # ... of the relevant fall of squares,
+    rival_late: float = 0.5  # of what is left above the quick noise: as good, among lags
     own_error: float = 1.5  # times what is left: other kinds of plant reach 1.25, true causes fall to 1.54
     once_in_twenty: float = 1.645  # standard deviations of their difference under noise as it is
     finer: float = 2.0  # times that doubt: a parameter that is not there would move the others

@@ -848,14 +848,25 @@ def test_the_interval_of_equal_loops_is_kept(monkeypatch):
 
 
 # --- rivals, verdict
+LOUD = replace(FLOOR, sampled=4.0, white=2.0)  # four in mean square, and no more is left
+
+
 def _rivals(
-    monkeypatch, squares: float, *, gain=200.0, current=400.0, lacks=(), scores=("delay",), name="field-lag"
+    monkeypatch,
+    squares: float,
+    *,
+    gain=200.0,
+    current=400.0,
+    lacks=(),
+    scores=("delay",),
+    name="field-lag",
+    **more,
 ):
     fits = {frozenset({one}): squares for one in scores}
     asked = _refitting(monkeypatch, rivals, squares=fits)
     monkeypatch.setattr(rivals, "ranked", lambda *_fits: tuple(_score(one, gain) for one in scores))
     without = {name: _fit(current + 400.0)}
-    state = _state(_fit(current, name), without=without, lacks=lacks)
+    state = _state(_fit(current, name), without=without, lacks=lacks, **more)
     found = rivals.rivals(state, state.current.terms[0])
     return found, asked
 
@@ -872,9 +883,19 @@ def _rivals(
 )
 def test_a_rival_comes_as_close_as_two_fits_may_differ(monkeypatch, current, squares, gain, found):
     """The largest of the margins counts."""
-    rival, asked = _rivals(monkeypatch, squares, gain=gain, current=current)
+    more = {"floor": LOUD} if current == 400.0 else {}
+    rival, asked = _rivals(monkeypatch, squares, gain=gain, current=current, **more)
     assert rival == found
     assert all(rounds == 2 for _, rounds, _ in asked)
+
+
+@pytest.mark.parametrize(
+    ("name", "squares", "found"),
+    [("delay", 549.0, ("delay",)), ("delay", 551.0, ()), ("viscous", 549.0, ())],
+)
+def test_beside_what_the_model_may_lack_lags_are_alike(monkeypatch, name, squares, found):
+    """Half of the 300 that are left above the noise from sample to sample; other causes differ by more."""
+    assert _rivals(monkeypatch, squares, scores=(name,))[0] == found
 
 
 @pytest.mark.parametrize(("gain", "found"), [(200.0, ("viscous",)), (199.9, ())])

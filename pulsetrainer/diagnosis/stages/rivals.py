@@ -160,9 +160,14 @@ def _equal_loops(state: State) -> bool:
 
 
 def rivals(state: State, term: Term) -> tuple[str, ...]:
-    """Causes that repair the data as well as ``term``, within the noise of the comparison."""
+    """Causes that repair the data as well as ``term``, within the noise of the comparison.
+
+    Lags in another place differ little: one is as good too if it is no farther behind than a share of what is
+    left above the noise from sample to sample, which may be the model's own error.
+    """
     fitted, without, floor = state.current, state.without[term.cause.id], state.floor
     gain = without.squares - fitted.squares
+    structure = fitted.squares - floor.quick.squares
     margin = max(
         LIMITS.rival_gain * gain,
         LIMITS.rival_relevant * floor.relevant,
@@ -175,8 +180,9 @@ def rivals(state: State, term: Term) -> tuple[str, ...]:
     close += [score for score in others if both_late(score, term) and score not in close]
     for score in close:
         terms = (*without.terms, in_place(term, score))
-        trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds, goal=fitted.squares + margin)
-        if trial.squares - fitted.squares < max(margin, doubt(fitted, trial, state.scores.noise)):
+        near = max(margin, LIMITS.rival_late * structure) if both_late(score, term) else margin
+        trial = refit(state.problem, terms, without, rounds=LIMITS.rival_rounds, goal=fitted.squares + near)
+        if trial.squares - fitted.squares < max(near, doubt(fitted, trial, state.scores.noise)):
             found.append(score.cause.id)
     if residual.RATES in state.lacks and term.cause.widens:
         alike = [c.id for c in library().values() if c.widens and c is not term.cause]
