@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # its parts load when they are first used
 
-from pulsetrainer.core import nnls
+from pulsetrainer.core import input_noise, nnls
 from pulsetrainer.core.equations import normal_equations
-from pulsetrainer.core.input_noise import white
 from pulsetrainer.core.plane import BoolArray, FloatArray, Plane
 from pulsetrainer.core.record import Record, levelled
 from pulsetrainer.core.smoothing import smoothed
@@ -38,6 +37,9 @@ _SIGMAS = 8.0  # a peak of noise with exponential tails is higher once in 100 00
 _BOTH = 2.5  # times the steps near by: a stroke of one sample makes two, up and down
 _HELD = 0.2  # of all steps are zero: the samples are those of a coarse converter ...
 _FLICKER = 1.5  # ... and a peak of one of its steps is a flicker
+_REAL_TURN = 0.02  # of the range of the input: smaller turns may be noise
+_AFTER_TURN = 6  # samples that a jump at a turn may be seen in
+_CHANCE = 1e-4  # that as many wild samples lie at turns
 _LOOKS = 6  # each without what the one before it found
 _MIDDLE = 1.5  # times the steps of the medians: a median is slower than the signal near a turn
 _FAST = 80.0  # percentile of the steps near by
@@ -103,6 +105,21 @@ def off(
     return found
 
 
+def by_chance(found: BoolArray, inputs: FloatArray, span: float) -> BoolArray:
+    """Return the samples ``found`` (n,), without those at turns of the input (n,) if chance puts fewer there.
+
+    Wild samples come at any time. What comes at turns more often than that is the device, whose output jumps
+    there, as a force does that follows the speed. ``span`` is the range of the input.
+    """
+    at_turn = np.zeros(found.size, dtype=bool)
+    for turn in input_noise.real_turns(inputs, _REAL_TURN * span):
+        at_turn[max(turn - 1, 0) : turn + _AFTER_TURN] = True
+    there, count = int(np.count_nonzero(found & at_turn)), int(np.count_nonzero(found))
+    if there == 0 or scipy.special.bdtrc(there - 1, count, float(at_turn.mean())) > _CHANCE:
+        return found
+    return found & ~at_turn
+
+
 def _jumps_beside(values: FloatArray) -> FloatArray:
     """How much larger than usual the steps (n,) before and after the neighbours of a sample are.
 
@@ -144,7 +161,7 @@ def _peaks(values: FloatArray, motion: FloatArray) -> BoolArray:
     # noise may go with the level: fourth differences, which hold no motion, tell it near by
     rough = np.abs(before2 - 4.0 * before + 6.0 * here - 4.0 * after + after2)
     near_by = scipy.ndimage.median_filter(rough, size=_AROUND, mode="mirror") * _OF_FOURTH
-    noise = _SIGMAS * np.maximum(white(values), near_by)
+    noise = _SIGMAS * np.maximum(input_noise.white(values), near_by)
     around = np.stack((before, after, 2.0 * before - before2, 2.0 * after - after2))
     beyond = np.maximum(here - around.max(axis=0), around.min(axis=0) - here)
     both = np.abs(here - before) + np.abs(here - after)

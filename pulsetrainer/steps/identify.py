@@ -189,6 +189,7 @@ def _without_wild(
     masked = list(sure)  # those that are wild by themselves, or beside a fit
     for number in range(_ROUNDS):
         off = wild.off(raw, fitted.predicted, span, masks)
+        off = [wild.by_chance(o, run.input, reach[1] - reach[0]) for o, run in zip(off, runs, strict=True)]
         masked = [before | now for before, now in zip(masked, off, strict=True)]
         remembered = number == 0 and fitted.form == "dual" and any(map(np.any, masks))
         if not remembered and all(map(np.array_equal, masked, masks)):

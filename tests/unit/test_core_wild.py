@@ -247,6 +247,36 @@ def test_what_is_far_off_sample_by_sample(seed):
     assert found.tolist() == ((expected & doubt) | alone).tolist()
 
 
+TURNING = np.interp(np.arange(2000), np.arange(0, 2040, 40), np.arange(51) % 2)  # a turn every 40 samples
+
+
+@pytest.mark.parametrize(
+    ("found", "left"),
+    [
+        ([1, 42, 81, 120, 200, 444], []),  # at a turn, or just after one
+        ([*range(40, 400, 40), 420, 460], [420, 460]),  # two of them between turns
+        ([20, 60, 100, 140, 200], [20, 60, 100, 140, 200]),  # one of five, as chance has it
+        ([42, 81], [42, 81]),  # two are no more than chance
+    ],
+)
+def test_what_comes_at_turns_is_not_wild(found, left):
+    """Where it does so more often than chance has it; a share of 7 in 40 of all samples is at a turn."""
+    mask = np.zeros(TURNING.size, dtype=bool)
+    mask[found] = True
+    assert np.flatnonzero(wild.by_chance(mask, TURNING, 1.0)).tolist() == left
+
+
+def test_a_kick_after_every_turn_is_not_wild():
+    """A fifth of the span, and over within a few samples: of 60 turns, some 170 samples were left out."""
+    rng = np.random.default_rng(4)
+    after = np.arange(3000) % 50
+    ends = np.concatenate(([0.0, 1.0], np.resize((0.1, 0.9), 59) + rng.uniform(-0.1, 0.1, 59)))
+    u = np.interp(np.arange(3000), np.arange(0, 3050, 50), ends)
+    y = devices.bump_plane(rng)(u)
+    kick = 0.2 * np.exp(-after / 2.0) + rng.normal(0.0, 0.002, u.size)
+    assert fitted(u, y / np.ptp(y) + kick).fit.masked_samples < 20
+
+
 @pytest.mark.parametrize(("n", "level", "told"), [(50, 0.49, True), (49, 0.49, False), (50, 0.51, False)])
 def test_a_fit_that_tells_nothing_returns_what_was_doubtful(n, level, told):
     """Fewer than fifty samples, or a residual of more than a twentieth of the span."""
