@@ -584,6 +584,20 @@ def test_where_only_noise_is_left_without_it_little_need_be_predicted(monkeypatc
     assert elimination.stage(replace(state, held_out=HeldOut(0.32))).current.names == kept
 
 
+@pytest.mark.parametrize(
+    ("without", "in_step", "kept"),
+    [(801.0, False, ("periodic",)), (799.0, False, ()), (801.0, True, ())],
+)
+def test_a_strong_line_need_not_predict_much(monkeypatch, without, in_step, kept):
+    """More than half of what is left without it, and not in step with the input."""
+    _refitting(monkeypatch, fitting, squares={frozenset({"step"}): without, frozenset({"periodic"}): 900.0})
+    monkeypatch.setattr(screened, "stage", lambda state: state)
+    monkeypatch.setattr(type(CAUSE["periodic"]), "in_step", lambda *_: in_step)
+    known = {"p_values": {"periodic": 0.006, "step": 0.007}, "held_out": HeldOut(0.32, (1.0, 2.0, 3.0))}
+    state = _state(_fit(400.0, "periodic", "step"), _fit(1900.0), **known)
+    assert elimination.stage(state).current.names == kept
+
+
 @pytest.mark.parametrize(("gain", "kept"), [(-0.01, ("creep", "unlisted")), (0.32, ("creep", "unlisted"))])
 def test_beside_a_learned_curve_nothing_is_dropped_for_predicting_little(monkeypatch, gain, kept):
     """The curve can do what a listed cause does: that is then no better, and may yet be true."""

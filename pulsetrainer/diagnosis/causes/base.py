@@ -153,6 +153,7 @@ class Cause:
     drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
     moves_zero: bool = False  # as well as the gain: so may what settles and looks like it
     sudden: ClassVar[bool] = False  # a change at a moment, its last parameter
+    line: ClassVar[bool] = False  # of the spectrum: what is like no error of a model where it is strong
 
     def gate(self, raw: Raw) -> Firing | None:
         """Return what the raw data of a record show of a cause of stage ``record``."""

@@ -50,6 +50,7 @@ class Periodic(Cause):
     )
     lasting = False
     corrects = True
+    line = True
     texts: ClassVar[Mapping[str, str]] = {
         "background": ("a hum at {frequency:.4g} Hz, no larger than the noise: it is told, but is no verdict")
     }

@@ -5,8 +5,9 @@ difference, or less than a five hundredth of that of all together (the formulas 
 exact), it is dropped. So is one without which time that was left out is predicted better: it was accepted
 before the others, and does harm beside them. So is one that takes away less than a third of what can be
 lowered on blocks that were left out, where more than noise is left beside it or without it: it fits a device
-that is no Preisach operator, as anything does. A single cause has proved itself against the baseline, and
-goes only for the last two reasons.
+that is no Preisach operator, as anything does. But not a line of the spectrum that is most of what is left
+without it: no error of a model is so, however badly blocks that were left out are predicted for other
+reasons. A single cause has proved itself against the baseline, and goes only for the last two reasons.
 """
 
 from __future__ import annotations
@@ -58,12 +59,23 @@ def _of_little_use(state: State, current: Fitted, without: Sequence[Fitted]) -> 
     Where only noise is left without it too, what was left out is noise for the most part, and nothing
     predicts that.
     """
-    without = [fewer for fewer in without if not (state.is_whole(current) and state.is_whole(fewer))]
+    without = [
+        fewer
+        for fewer in without
+        if not (state.is_whole(current) and state.is_whole(fewer)) and not _is_a_line(state, current, fewer)
+    ]
     if not without:
         return None
     gains = [state.held_out.gain(fewer, current, state.floor) for fewer in without]
     least = int(np.argmin(gains))  # NaN where it cannot be told: that is the least, and no reason
     return without[least] if gains[least] < LIMITS.held_out_kept else None
+
+
+def _is_a_line(state: State, current: Fitted, fewer: Fitted) -> bool:
+    """Whether what one model has more is a line of the spectrum, and most of what the other leaves."""
+    (term,) = (term for term in current.terms if term.cause.id not in fewer.names)
+    strong = fewer.squares - current.squares > LIMITS.half * fewer.squares
+    return term.cause.line and strong and not term.cause.in_step(term.values, state.problem.frames)
 
 
 def _harmful(state: State, current: Fitted, without: Sequence[Fitted]) -> Fitted | None:
