@@ -10,7 +10,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import Cause, Frame, Quantity, Taken, Values
 
 _TRIED = (1e-5, 1e-4)  # a good crystal's, a bad one's
-_SLIP = 0.5  # time steps over the longest record: with less, one is merely sampled after the other
+_SLIP = 1.0  # time steps over the longest record: half of it, its mean, is what moments of sampling do
 
 
 class ClockSkew(Cause):

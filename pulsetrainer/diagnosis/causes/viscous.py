@@ -1,8 +1,13 @@
-"""the output has a part proportional to the speed of the input: y + c LP(u'; tau)."""
+"""the output has a part that follows the speed of the input: y + c LP(sgn(u') abs(u')^p; tau).
+
+In proportion to it as in a fluid (p = 1), to its root as excess losses (1/2), or to its square as at an
+orifice (2): each is tried.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +15,7 @@ from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis.causes.base import (
     Cause,
     Frame,
+    OfKinds,
     Quantity,
     Values,
     low_pass,
@@ -21,14 +27,17 @@ from pulsetrainer.diagnosis.causes.base import (
 _TRIED = 0.01  # of the span at the usual speed
 _FILTERS = (0.25, 2.0)  # time steps: a force that follows the speed at once, and one that trails it
 _NO_SPEED = 1e-12  # ranges a second: an input at rest
+_LINEAR = 1.0  # power of the speed ...
+_ROOT = 0.5  # ... or this ...
+_SQUARE = 2.0  # ... or this
 
 
-class Viscous(Cause):
-    """A term proportional to the rate of the input, which may trail it."""
+class Viscous(OfKinds):
+    """A term that follows the rate of the input, or a power of it, and may trail it."""
 
     id = "viscous"
-    title = "the {output} has a part proportional to the speed of the {input}"
-    formula = "y + c LP(u'; tau)"
+    title = "the {output} has a part that follows the speed of the {input}"
+    formula = "y + c LP(sgn(u') abs(u')^p; tau), p = 1, 1/2 or 2"
     signature = "the output jumps when the rate changes at equal input, with no tail beyond its filter"
     excitation = "changes of rate at equal input"
     source = "Bouc, Acustica 24, 1971; Ikhouane and Rodellar, 2007"
@@ -36,23 +45,29 @@ class Viscous(Cause):
     order = 90
     family = "viscous"
     widens = True
+    number = "exponent"
+    meant = "power of the speed (1: in proportion to it)"
+    tried = (_LINEAR, _ROOT, _SQUARE)
     common = True
     parameters = (
-        Quantity("coefficient", "{y} s/{u}", -1e6, 1e6, 1e-5, "{output} per speed of the {input}"),
+        Quantity(
+            "coefficient", "{y} s/{u}", -1e6, 1e6, 1e-5, "{output} per speed of the {input}, to its power"
+        ),
         Quantity("filter", "s", 0.0, 0.05, 1e-4, "time by which it trails the speed"),
     )
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         coefficient, trailing = self.parameters
-        return coefficient, *sampled((trailing,), frame)
+        unit = coefficient.unit if self.kind == _LINEAR else f"{{y}} (s/{{u}})^{self.kind:g}"
+        return replace(coefficient, unit=unit), *sampled((trailing,), frame)
 
     def restored(self, values: Values) -> tuple[Cause, Values]:
         """Return the cause and its parameters; models were once kept without the filter."""
-        return self, (values[0], *(values[1:] or (0.0,)))
+        return super().restored(values if len(values) > 1 else (*values, 0.0))
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         speed = max(float(np.std(np.gradient(f.input, f.dt_s))) for f in frames)
-        force = _TRIED * frames[0].span / max(speed, _NO_SPEED)
+        force = _TRIED * frames[0].span / max(speed, _NO_SPEED) ** self.kind
         return [[(force, steps * frames[0].dt_s)] for steps in _FILTERS]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
@@ -60,8 +75,12 @@ class Viscous(Cause):
         before = remembered(frame.past, self.id, frame.input[:1])
         remember(frame.past, self.id, frame.input[-1:])
         speed = np.diff(frame.input, prepend=before) / frame.dt_s
-        return y + values[0] * low_pass(speed, values[1], frame.dt_s, frame.past, self.id)
+        return y + values[0] * low_pass(self._power(speed), values[1], frame.dt_s, frame.past, self.id)
 
     def variants(self, y: FloatArray, values: Values, frame: Frame) -> list[FloatArray]:
         around = np.gradient(frame.input, frame.dt_s)
-        return [y + values[0] * low_pass(around, values[1], frame.dt_s)]
+        return [y + values[0] * low_pass(self._power(around), values[1], frame.dt_s)]
+
+    def _power(self, speed: FloatArray) -> FloatArray:
+        """Power of the speed (n,), of its sign."""
+        return speed if self.kind == _LINEAR else np.sign(speed) * np.abs(speed) ** self.kind
