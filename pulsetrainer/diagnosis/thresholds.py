@@ -252,6 +252,7 @@ class Thresholds:
     hold_noise: float = 10.0  # ... or within so many standard deviations of its noise
     short_s: float = 20.0  # a shorter record is called short
     given_worse: float = 2.5  # times what refitted weights leave: more is told of the model as given
+    no_turn: float = 0.01  # of the range of the input: half of the smallest wiggle that is a turn
     first_stroke_most: float = 0.25  # of a record: more is no first stroke, and is not given up for one
 
     # Words

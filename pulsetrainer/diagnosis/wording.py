@@ -97,6 +97,17 @@ TEXTS: Mapping[str, str] = {
         "to these recordings {refitted:.2f} %. It does not carry over: the device, its zero or its sensor "
         "was not the same when it was identified, or the device is none that such a model describes"
     ),
+    "given worse, own": (
+        "The model as given leaves {given:.2f} % of the span (rms of single samples), and weights refitted "
+        "to these recordings {refitted:.2f} %, though it was identified from them. Smooth weights do not "
+        "follow what free ones do: that may be something else than hysteresis, as a slow drift. A model from "
+        "another recording would tell"
+    ),
+    "one stroke": (
+        "The model as given leaves {given:.2f} % of the span, but the {input} never turns in these "
+        "recordings: a first stroke is unlike all later ones, so it cannot be told whether the device has "
+        "changed"
+    ),
     "crossed": (
         "All branches of the loop cross in one point, where the {input} is about {at:.3g}{in_u}, as those of "
         "a butterfly do. Weights of either sign leave more of it than noise, so the device is of another "
@@ -223,6 +234,10 @@ ADVICE: Mapping[str, str] = {
         "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
     ),
     "other model, both": "A Preisach model does not suit this device: use a model of a damper and a spring.",
+    "strokes": (
+        "Record the same condition again, over the whole range three times at least and with smaller loops, "
+        "and diagnose that."
+    ),
     "identify anew": (
         "Identify the device again in this condition (a new run, then pulsetrainer identify), and "
         "diagnose with the new model."

@@ -1655,12 +1655,15 @@ def _given(
     polarity=1,
     single=0.0,
     warning="",
+    inputs=(0.0, 1.0, 0.0),
+    fitted=(),
     **more,
 ):
     """Judge a model that predicts this of a ramp from 0 to 10; the search leaves ``left``."""
-    fit = SimpleNamespace(warning=warning)
+    fit = SimpleNamespace(warning=warning, output=np.asarray(fitted))
     speed = velocity.Comparison(1.0, 0.5 if wrong is None else wrong, 100.0 if wrong is None else 10.0)
-    judged = given_model.Judged([1], [RAMP - predicted], RAMP, predicted, speed, polarity)
+    played = SimpleNamespace(input=np.asarray(inputs), output=RAMP, counts=np.ones(RAMP.size, dtype=bool))
+    judged = given_model.Judged([played], [RAMP - predicted], RAMP, predicted, speed, polarity)
     monkeypatch.setattr(given_model, "judge", lambda state, given: judged)
     monkeypatch.setattr(given_model, "_drifted", lambda *_: None)  # test_diagnosis_given_drift
     monkeypatch.setattr(velocity, "compare", lambda *_: velocity.Comparison(1.0, direction, 10.0))
@@ -1668,7 +1671,11 @@ def _given(
     state = _state(_fit(1.0))
     state = replace(
         state,
-        question=replace(state.question, given=Given(SimpleNamespace(fit=fit))),
+        question=replace(
+            state.question,
+            given=Given(SimpleNamespace(fit=fit, polarity=-1)),
+            records=[SimpleNamespace(output=RAMP, timed=True)],
+        ),
         findings=findings,
         verdict="creep",
         evidence=(Evidence("static"), Evidence("tested", "creep"), *map(Evidence, ("extended", "not whole"))),
@@ -1817,7 +1824,7 @@ def test_causes_that_bring_the_given_model_near_are_no_change_of_the_device(
             return [RAMP]
 
     current = SimpleNamespace(rms=0.01, terms=(_term("creep"),), simulator=Simulator())
-    record = SimpleNamespace(counts=np.ones(RAMP.size, dtype=bool))
+    record = SimpleNamespace(input=np.asarray([0.0, 1.0, 0.0]), counts=np.ones(RAMP.size, dtype=bool))
     judged = given_model.Judged
     monkeypatch.setattr(given_model, "Judged", lambda _, *rest: judged([record], *rest))
     findings = (replace(_finding("creep", 20.0), doubts=doubts),)
@@ -1831,7 +1838,7 @@ def test_a_learned_curve_is_known_but_for_a_constant(monkeypatch, name, changed)
     cause = Unlisted() if name == "unlisted" else CAUSE[name]
     simulator = SimpleNamespace(full=lambda terms: [RAMP], inner=lambda terms: [RAMP])
     current = SimpleNamespace(rms=0.01, terms=(SimpleNamespace(cause=cause),), simulator=simulator)
-    record = SimpleNamespace(counts=np.ones(RAMP.size, dtype=bool))
+    record = SimpleNamespace(input=np.asarray([0.0, 1.0, 0.0]), counts=np.ones(RAMP.size, dtype=bool))
     judged = given_model.Judged
     monkeypatch.setattr(given_model, "Judged", lambda _, *rest: judged([record], *rest))
     found = (Finding(cause, found=True),)
@@ -1850,6 +1857,29 @@ def test_a_model_that_does_not_carry_over_is_told_where_nothing_else_is(monkeypa
         assert told == []
     else:
         assert told == [{"given": pytest.approx(10.0 * times * 0.01), "refitted": pytest.approx(0.1)}]
+
+
+@pytest.mark.parametrize(
+    ("fitted", "own"), [((), False), (-RAMP[3::2], True), (RAMP[3::2], False), (-RAMP[::-2], False)]
+)
+def test_a_model_of_the_very_record_is_not_of_another_condition(monkeypatch, fitted, own):
+    """Its fit keeps samples of the record, in their order and not turned over; free weights hold more."""
+    error = 0.03 * (-1.0) ** np.arange(RAMP.size)
+    after = _given(monkeypatch, RAMP + error, left=0.001, verdict="none", fitted=fitted)
+    told = [one.kind for one in after.evidence if one.kind.startswith("given worse")]
+    assert told == ["given worse, own" if own else "given worse"]
+
+
+@pytest.mark.parametrize(("back", "told"), [(0.019, "inconclusive"), (0.021, "condition-change")])
+def test_a_first_stroke_tells_no_other_condition(monkeypatch, back, told):
+    """Nor where the input wiggles: it was said to be certain."""
+    inputs = (0.0, 0.5, 0.5 - back, 1.0)
+    after = _given(monkeypatch, RAMP + 5.0, verdict="none", findings=(), inputs=inputs)
+    assert after.verdict == told
+    assert (after.evidence[0].kind == "one stroke") is (told == "inconclusive")
+    if told == "inconclusive":
+        assert _found(after) == []
+        assert advice.stage(after).advice.kind == "strokes"
 
 
 @pytest.mark.parametrize(("left", "kind"), [(0.24, "shifted"), (0.26, "changed")])

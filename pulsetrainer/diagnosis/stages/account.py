@@ -41,10 +41,9 @@ def stage(state: State) -> State:
                 np.sqrt(state.current.squares - state.floor_left.squares) / np.sqrt(state.floor.count)
             )
             said.append(Evidence("not whole", figures={"rest": percent * rest}, names=state.current.names))
-    if state.verdict in ("none", "inconclusive") and state.detectable:
-        said.append(
-            Evidence("would have shown", figures={k: PERCENT * v for k, v in state.detectable.items()})
-        )
+    shown = {k: PERCENT * v for k, v in state.detectable.items() if v < 1.0}  # larger ones are none
+    if state.verdict in ("none", "inconclusive") and shown:
+        said.append(Evidence("would have shown", figures=shown))
     if state.verdict in ("none", "inconclusive", "unknown") and state.current.squares > state.floor.squares:
         said += _largest(state)
     if state.verdict in ("none", "inconclusive", "unknown") and state.floor.slow > LIMITS.slow_noise:

@@ -28,6 +28,7 @@ _ANOTHER_MODEL = {
     "shifted": "identify anew",
     "changed": "identify anew",
     "reversed": "identify anew",
+    "one stroke": "strokes",
 }
 _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 

@@ -13,6 +13,7 @@ records.
   else it is `none`, whatever the coarser levels could have shown.
 - If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), and a
   drift of the zero brings it near, that is the finding: refitted weights hide a drift that is over soon.
+- If it is far off where no input ever turned, nothing can be told: a first stroke is unlike all later ones.
 - If it is far off without that, the device is in another condition: `condition-change` comes first. Where
   that is all but a thousandth of the squared error, other causes would only repair the rest of it, and are
   withdrawn. It is none where the causes found, added to what the model as given says, bring it near; nor
@@ -32,8 +33,10 @@ from dataclasses import replace
 import numpy as np
 
 from pulsetrainer.core.metrics import root_mean_square
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import given_drift, velocity
 from pulsetrainer.diagnosis.causes import condition_change, library
+from pulsetrainer.diagnosis.causes.base import settled
 from pulsetrainer.diagnosis.causes.condition_change import (
     Change,
     against_model,
@@ -78,8 +81,8 @@ def stage(state: State) -> State:
         if state.verdict == "none" and _unexplained(state, judged):
             state = replace(state, verdict="unknown")
     changed = _changed(state, judged, noise)
-    if changed is not None and not _brought_near(state, judged, noise):
-        state, more = _drifted(state, judged, changed, noise) or _far_off(state, judged, changed, noise)
+    if changed is not None:
+        state, more = _of_a_change(state, judged, changed, noise)
         said += more
     said += _not_carried(state, judged) if changed is None else []
     if any(one.found and one.seen is None for one in state.findings if one.cause.id == _CHANGED):
@@ -100,6 +103,26 @@ def _changed(state: State, judged: Judged, noise_rms: float) -> Change | None:
     return None if changed is not None and changed.kind == "shifted" and outside else changed
 
 
+def _of_a_change(
+    state: State, judged: Judged, changed: Change, noise_rms: float
+) -> tuple[State, list[Evidence]]:
+    """Tell what a change of the device against the model as given may be."""
+    if all(_is_one_stroke(one.input) for one in judged.records):
+        given = left_by(judged.measured, judged.predicted, noise_rms) / changed.span
+        nothing = state.verdict == "none"
+        said = Evidence("one stroke", figures={"given": PERCENT * given})
+        return (replace(state, verdict="inconclusive") if nothing else state), [said]
+    if _brought_near(state, judged, noise_rms):
+        return state, []
+    return _drifted(state, judged, changed, noise_rms) or _far_off(state, judged, changed, noise_rms)
+
+
+def _is_one_stroke(u: FloatArray) -> bool:
+    """Whether an input (n,) never turns."""
+    way = np.sign(np.diff(settled(u, LIMITS.no_turn * float(np.ptp(u)))))
+    return bool(np.ptp(way[way != 0.0]) == 0.0) if way.any() else True
+
+
 def _not_carried(state: State, judged: Judged) -> list[Evidence]:
     """Say where nothing was found that the model as given leaves much more than refitted weights do."""
     refitted = state.scale.span * state.baseline.rms
@@ -107,7 +130,19 @@ def _not_carried(state: State, judged: Judged) -> list[Evidence]:
         return []
     left = {"given": root_mean_square(judged.measured - judged.predicted), "refitted": refitted}
     percent = PERCENT / float(np.ptp(judged.measured))
-    return [Evidence("given worse", figures={name: percent * size for name, size in left.items()})]
+    kind = "given worse, own" if _is_its_own(state) else "given worse"
+    return [Evidence(kind, figures={name: percent * size for name, size in left.items()})]
+
+
+def _is_its_own(state: State) -> bool:
+    """Whether the model as given was identified from these very records."""
+    assert state.question.given is not None
+    model = state.question.given.model
+    if model.fit is None or not model.fit.output.size:
+        return False
+    # records have polarity 1; those of the fit are thinned, and what came before their first end is left out
+    own = iter(np.concatenate([model.polarity * one.output for one in state.question.records]).tolist())
+    return all(value in own for value in model.fit.output.tolist())
 
 
 def _each_against(judged: Judged) -> Iterator[Evidence]:
