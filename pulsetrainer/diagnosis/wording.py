@@ -25,12 +25,12 @@ TEXTS: Mapping[str, str] = {
         "of short averages). Noise and the number of levels alone would leave {floor:.3f} %."
     ),
     "tested": (
-        "noise alone would look like it with a probability of {p:.3f}. It accounts for {explains:.1f} % of "
-        "the squared error beyond noise. {signature}."
+        "noise alone would look like it with a probability of at most {p:.4f}. It accounts for "
+        "{explains:.1f} % of the squared error beyond noise. {signature}."
     ),
     "tested, small": (
-        "noise alone would look like it with a probability of {p:.3f}. What share of the error it causes "
-        "cannot be told: the whole error is no more than noise and levels may leave. {signature}."
+        "noise alone would look like it with a probability of at most {p:.4f}. What share of the error it "
+        "causes cannot be told: the whole error is no more than noise and levels may leave. {signature}."
     ),
     "extended": "With these causes in the model, {left:.3f} % of the span remains (rms of short averages).",
     "would have shown": (
@@ -192,6 +192,11 @@ ADVICE: Mapping[str, str] = {
     "inconclusive": (
         "These recordings could not have shown {names} of {matters:.2g} % of the span. "
         f"To see it, {AGAIN}"
+    ),
+    "extend, or late": (
+        "Is the recorder late, or the device? They look exactly alike. If it is the device, extend the model "
+        "with what was found; if it is the recorder, give pulsetrainer correct its delay, to take that out. "
+        "Then test the model on another recording, which was not fitted: pulsetrainer evaluate."
     ),
     "extend": (
         "Extend the model with what was found, then test it on another recording, which was not fitted: "

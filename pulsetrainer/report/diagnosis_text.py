@@ -26,7 +26,8 @@ ERRORS = (
 COLUMNS = {
     "explains": "share of the squared error beyond noise that goes with this cause in the model; shares of "
     "causes that look alike overlap; of one that was not found, a first estimate without a refit",
-    "held-out share": "the same share, on parts of the recordings that were left out of the fit",
+    "held-out share": "what the cause takes away of the squared error beyond noise that the model leaves "
+    "without it, on parts of the recordings that were left out of the fit",
 }
 
 
@@ -35,7 +36,7 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     how = ("quick screen",) * found.quick + ("in doubt",) * in_doubt(found)
     yield Facts(f"verdict: {found.verdict}" + (f" ({', '.join(how)})" if how else ""), {})
     for one in found.found:
-        yield Facts(f"found: {one.cause}, {one.text}", _said(one))
+        yield Facts(f"{'in doubt' if one.doubts else 'found'}: {one.cause}, {one.text}", _said(one))
     yield Table(
         "error that is left, rms, % of the span of the output",
         ("left by", "single samples", "short averages"),
@@ -124,7 +125,7 @@ def _said(one: Cause) -> dict[str, str]:
     return {
         **parameters(one.parameters),
         **({"or": f"could equally be {' or '.join(one.confounded_with)}"} if one.confounded_with else {}),
-        **({"in doubt": "; ".join(one.doubts)} if one.doubts else {}),
+        **({"why in doubt": "; ".join(one.doubts)} if one.doubts else {}),
     }
 
 

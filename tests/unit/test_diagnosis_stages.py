@@ -1323,7 +1323,7 @@ def test_each_cause_found_brings_its_evidence(monkeypatch):
     ]  # fmt: skip
     assert found[1].figures == {"p": 0.005, "explains": 20.0}
     assert found[-1].names == ("rates",)
-    assert "not all in these recordings: relaxation" in wording.sentence(found[1], {})
+    assert "not all in these recordings: the output goes on" in wording.sentence(found[1], {})
 
 
 def test_what_the_records_show_is_cited_as_seen(monkeypatch):
@@ -1343,6 +1343,8 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
         ({"verdict": "none"}, "none"),
         ({"verdict": "unknown"}, "unknown"),
         ({"verdict": "creep", "extended": "a model"}, "extend"),
+        ({"verdict": "delay", "extended": "a model"}, "extend, or late"),
+        ({"verdict": "delay"}, "again"),
         ({"verdict": "creep"}, "again"),
         ({"verdict": "current-tracking"}, "repair"),
         ({"verdict": "out-of-range", "lacks": ("rates",)}, "out of range"),

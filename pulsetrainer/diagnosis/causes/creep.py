@@ -36,7 +36,7 @@ class Creep(OfKinds):
     id = "creep"
     title = "the {output} creeps on under a constant {input}"
     formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau, or tau/10 to 10 tau, or tau"
-    signature = "relaxation towards a new value during holds, over several decades of time"
+    signature = "the output goes on towards a new value while the input rests"
     excitation = "holds of three time constants after reversals, on several levels"
     source = "Kuhnen and Krejci, IEEE Trans. Automatic Control 54, 2009: creep as a bank of low-passes"
     stage = "output"

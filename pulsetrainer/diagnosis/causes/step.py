@@ -37,7 +37,7 @@ class Step(Cause):
     strengths = 2
     parameters = (
         Quantity("offset", "{y}", -1e6, 1e6, 1e-4, "added to the {output} from then on"),
-        Quantity("gain", "1", -0.9, 0.9, 1e-4, "change of the gain, as a share of it"),
+        Quantity("gain", "1", -0.9, 0.9, 1e-4, "change of the gain, as a share of what it was"),
         Quantity("time", "s", 0.0, 1e6, 0.01, "of the change, since the first sample"),
     )
     sudden = True

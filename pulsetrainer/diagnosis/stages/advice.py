@@ -15,6 +15,7 @@ import numpy as np
 
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
+from pulsetrainer.diagnosis.causes.delay import Delay
 from pulsetrainer.diagnosis.causes.out_of_range import OutOfRange
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.experiment import best_experiment
@@ -82,7 +83,8 @@ def _after_verdict(state: State) -> Evidence:
         return Evidence(_TO_REPAIR.get(state.verdict, "repair"))
     if state.extended is not None and state.correctable:
         return Evidence("extend, correct", names=tuple(state.correctable))
-    return Evidence("extend" if state.extended is not None or state.question.quick else "again")
+    extend = "extend, or late" if state.verdict == Delay.id else "extend"
+    return Evidence(extend if state.extended is not None or state.question.quick else "again")
 
 
 def _to_see_more(state: State) -> Evidence:
