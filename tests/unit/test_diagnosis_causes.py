@@ -293,25 +293,33 @@ def test_a_hum_is_no_noise_of_single_samples():
     assert noise_beside_hum(hum[:900], np.ones(900)) == noise_of(hum[:900])
 
 
-def _piled(at: int, inside: int) -> np.ndarray:
-    """Noise far below, and so many samples at a rail and just inside it."""
+def _piled(at: int, inside: int, values: int = 9) -> np.ndarray:
+    """Noise far below, and so many samples at a rail and at a few values just inside it."""
     low = np.round(5.0 * np.random.default_rng(2).random(3000), 2)
-    return np.concatenate((low, np.full(at, 10.0), 10.0 - 0.01 * (1 + np.arange(inside) % 9)))
+    return np.concatenate((low, np.full(at, 10.0), 10.0 - 0.01 * (1 + np.arange(inside) % values)))
 
 
 @pytest.mark.parametrize(
-    ("at", "inside", "fires"), [(21, 0, True), (20, 0, False), (40, 33, True), (40, 34, False)]
+    ("at", "inside", "values", "fires"),
+    [
+        (21, 0, 9, True),
+        (20, 0, 9, False),
+        (40, 33, 1, True),
+        (40, 34, 1, False),
+        (40, 90, 9, False),
+        (41, 90, 9, True),
+    ],
 )
-def test_a_cut_off_output_piles_up_at_its_end(at, inside, fires):
-    """More than twenty samples, more than 1.2 times as many as just inside."""
-    y = np.random.default_rng(3).permutation(_piled(at, inside))
+def test_a_cut_off_output_piles_up_at_its_end(at, inside, values, fires):
+    """More than twenty samples, more than 1.2 times as many as just inside, or 4 times any value there."""
+    y = np.random.default_rng(3).permutation(_piled(at, inside, values))
     assert _fires("saturation", y) is fires
 
 
 def test_what_is_next_to_the_rail_is_left_out_too():
     """Three samples on each side in time; a flat top without noise is no cut."""
     y = np.concatenate(
-        (np.round(5.0 * np.random.default_rng(2).random(3000), 2), np.full(30, 10.0), np.zeros(50))
+        (np.round(5.0 * np.random.default_rng(2).random(3000), 2), np.full(30, 10.0), np.full(50, 2.5))
     )
     firing = CAUSE["saturation"].gate(_raw(y))
     assert np.flatnonzero(firing.mask[2990:3040]).tolist() == list(range(7, 43))

@@ -21,6 +21,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, UNIFORM
 
 _LEAST = 20  # samples at the rail: fewer may be chance
 _PILE = 1.2  # times the samples just inside: noise makes a tail at the end of a distribution, a rail a pile
+_TOWERS = 4.0  # times any single value just inside: the turn of a smooth signal reaches 2.4
 _AT = 0.5  # converter steps: nearer than that is at the rail
 _INSIDE = 10.5  # converter steps beside the rail that are compared with it ...
 _INSIDE_SPAN = 0.02  # ... but no more than this share of the span
@@ -150,6 +151,6 @@ def _clipped(y: FloatArray, step: float) -> bool:
     """Whether the largest values of ``y`` (n,) are a rail."""
     below = float(y.max()) - y
     at = below <= _AT * step
-    inside = (below <= _INSIDE * step) & ~at & (below < _INSIDE_SPAN * np.ptp(y))
-    count = np.count_nonzero(at)
-    return bool(count > _LEAST and count > _PILE * np.count_nonzero(inside))
+    inside = below[(below <= _INSIDE * step) & ~at & (below < _INSIDE_SPAN * np.ptp(y))]
+    count, most = np.count_nonzero(at), np.bincount(np.rint(inside / step).astype(int), minlength=1).max()
+    return bool(count > _LEAST and (count > _PILE * inside.size or count > _TOWERS * most))
