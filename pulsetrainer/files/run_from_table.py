@@ -5,8 +5,9 @@ Time stamps are taken as they are. What a file says about its time, and what was
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,6 +33,7 @@ _EXACT = 0.02  # of a step: what rounding of large stamps may be off by
 _SLOW_S, _MANY = 1.0, 100  # a step of so much is rare in many rows, and usual for ms taken as seconds
 _SUBTRACT = "steps of time are rounded (subtract the first stamp from all, or give `rate_Hz`)"
 _USUAL_STEP = 1.0  # times the usual step: so far another step may be off
+_SAME_RATE = 0.01  # of a rate: less may be rounding, or a clock
 _COUNTED = 16  # rows; of fewer nobody can tell that they are merely counted
 _BLOCK = 1 << 18  # samples at a time where a copy of a long record would be in the way
 
@@ -73,13 +75,12 @@ def run_from_table(
     """
     check_timing(time, rate_Hz, no_time=no_time)
     wanted = [name for name in (input, output, reference) if name is not None]
-    automatic = rate_Hz is None and not no_time
-    table = read_table(
-        path,
-        lambda head: _needed(head, wanted, time, automatic=automatic),
-        bad_rows=skip_bad_rows,
-        remedy=_LEAVE_OUT,
-    )
+    read = partial(read_table, path, bad_rows=skip_bad_rows, remedy=_LEAVE_OUT)
+    if rate_Hz is None:
+        table = read(lambda head: _needed(head, wanted, time, automatic=not no_time))
+        contradicted: tuple[str, ...] = ()
+    else:
+        table, contradicted = _read_at_rate(read, wanted, rate_Hz)
     _check_distinct(table, input=input, output=output, reference=reference)
     notes: tuple[str, ...] = ()
     whole = table
@@ -107,7 +108,39 @@ def run_from_table(
     notes = (*notes, *_other_units(table, meanings))
     if reference is not None:
         meanings["reference"] = (reference, run.input_unit)
-    return TableRun(run, (*notes, *when.notes), _read_as(table, when.words, meanings))
+    return TableRun(run, (*notes, *contradicted, *when.notes), _read_as(table, when.words, meanings))
+
+
+def _read_at_rate(
+    read: Callable[[Callable[[Table], set[int]]], Table], wanted: Sequence[str], rate_Hz: float
+) -> tuple[Table, tuple[str, ...]]:
+    """Return the table without a time, and a note where the time or the rate that it has is another one."""
+    try:
+        table = read(lambda head: _needed(head, wanted, None, automatic=True))
+    except DataError:  # its time, which nobody asked for, may be what is damaged
+        table = read(lambda head: _needed(head, wanted, None, automatic=False))
+    used = {table.index(name) for name in wanted}
+    place = _own_column(table, used)
+    alone = replace(table, columns={table.names[k]: table.columns[table.names[k]] for k in used})
+    told_Hz, where = (table.rate_Hz,) * 2, "the file itself"
+    if place is not None and table.names[place] in table.columns:
+        told_Hz, where = _rates_of(table, table.names[place]), f"the column {table.names[place]!r}"
+    if any(told is None or abs(told / rate_Hz - 1.0) < _SAME_RATE for told in told_Hz):
+        return alone, ()
+    said = f"{where} of {table.path} says {told_Hz[0]:.6g} Hz, and `rate_Hz` {rate_Hz:g}"
+    return alone, (f"{said}: taken as {rate_Hz:g} Hz",)
+
+
+def _rates_of(table: Table, name: str) -> tuple[float | None, float | None]:
+    """Return the rate of a column of time, Hz, by its median step and by its length; None: it is no time."""
+    stamps = table.columns[name]
+    unit = _unit_of_time(table, name)
+    increasing = bool(stamps.size > 1 and np.all(np.isfinite(stamps)) and np.all(np.diff(stamps) >= 0))
+    if unit not in SECONDS or not increasing or stamps[-1] == stamps[0]:
+        return None, None
+    median, mean = float(np.median(np.diff(stamps))), float(stamps[-1] - stamps[0]) / (stamps.size - 1)
+    # stamps that are rounded repeat themselves: the mean alone tells
+    return 1.0 / (SECONDS[unit] * (median or mean)), 1.0 / (SECONDS[unit] * mean)
 
 
 class _Time(NamedTuple):

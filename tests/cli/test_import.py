@@ -80,6 +80,25 @@ def test_a_rate_replaces_the_time_column(run, tmp_path):
     assert done.json["facts"]["rate_Hz"] == pytest.approx(200.0)
 
 
+def test_a_rate_that_contradicts_the_file_is_said(run, tmp_path):
+    """The rate that is given counts; a time that is damaged is not missed."""
+    rows = [f"{2 * k};{k % 7};{k % 5}\n" for k in range(30)]
+    (tmp_path / "scope.csv").write_text("Zeit [ms];u;y\n" + "".join(rows))
+    (tmp_path / "damaged.csv").write_text("Zeit [ms];u;y\n" + "".join(rows) + "none;1;2\n")
+
+    def said(name, rate):
+        done = run(
+            "import", name, "--input", "u", "--output", "y", "--rate", rate, "-o", "r.h5", "--overwrite"
+        )
+        assert done.code == 0, done
+        return " ".join(done.err.split())
+
+    told = "note: the column 'Zeit [ms]' of scope.csv says 500 Hz, and --rate 50: taken as 50 Hz"
+    assert told in said("scope.csv", 50)
+    assert "says" not in said("scope.csv", 500)
+    assert "says" not in said("damaged.csv", 50)
+
+
 def test_a_column_that_is_not_there_offers_the_nearest(run, tmp_path):
     """Exit 3, and the names that are there."""
     (tmp_path / "a.csv").write_text("t_s,current_A,force_N\n0,0,0\n1,1,1\n")
