@@ -37,6 +37,7 @@ _MINUS = "\N{MINUS SIGN}"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
 
+_ALIKE = 16  # rows with as many decimals: those of the last are no chance
 _Line = tuple[int, str]  # its number, from 1, and its text
 
 
@@ -398,11 +399,30 @@ def _columns(rows: list[list[str]], delimiter: str | None, last: list[str]) -> l
 
 def _last_lines(path: Path, encoding: str) -> list[str]:
     """Return the whole lines in the last few kilobytes of a file."""
+    return [line for line in _tail(path, encoding).splitlines() if line.strip()]
+
+
+def _tail(path: Path, encoding: str) -> str:
+    """Return the text in the last few kilobytes of a file, from the beginning of a line on."""
     with path.open("rb") as stream:
         start = max(path.stat().st_size - _LAST_BYTES, 0)
         stream.seek(start)
         text = stream.read().decode("utf-16-le" if encoding.startswith("utf-16") else "utf-8", "replace")
-    return [line for line in text.splitlines()[1 if start else 0 :] if line.strip()]
+    return text[text.find("\n") + 1 if start else 0 :]
+
+
+def ends_in_a_number(path: Path, dialect: Dialect) -> bool:
+    """Whether a file was cut within its last number: no line end, and fewer decimals than in all rows before.
+
+    OSError where it cannot be read.
+    """
+    text = _tail(path, dialect.encoding)
+    rows = [dialect.split(line) for line in text.splitlines() if line.strip()][-_ALIKE:]
+    if text.endswith(("\n", "\r")) or len(rows) < _ALIKE:
+        return False
+    sign = "," if dialect.decimal_comma else "."
+    *before, last = [len(cells[-1].partition(sign)[2]) for cells in rows]
+    return len(set(before)) == 1 and last < before[0] and all(_is_number(cells[-1]) for cells in rows)
 
 
 def _cut_settings(rows: list[list[str]]) -> float | None:

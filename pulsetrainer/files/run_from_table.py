@@ -82,10 +82,11 @@ def run_from_table(
     else:
         table, contradicted = _read_at_rate(read, wanted, rate_Hz)
     _check_distinct(table, input=input, output=output, reference=reference)
-    notes: tuple[str, ...] = ()
+    table, notes = _without_cut_row(table)
     whole = table
     if skip_bad_rows:
-        table, notes = _without_bad_rows(table, counted=rate_Hz is not None)
+        table, bad = _without_bad_rows(table, counted=rate_Hz is not None)
+        notes = (*notes, *bad)
     columns = {name: np.ascontiguousarray(table.check_finite(name, remedy=_LEAVE_OUT)) for name in wanted}
     if table.rows < 2:
         raise DataError(
@@ -252,6 +253,16 @@ def _check_distinct(table: Table, **meanings: str | None) -> None:
                 hint=f"name another column; the others are {', '.join(others) or 'none'}",
             )
         places[place] = meaning
+
+
+def _without_cut_row(table: Table) -> tuple[Table, tuple[str, ...]]:
+    """Return a table without a last row that the end of the file cuts, and a note of it."""
+    if not table.cut:
+        return table, ()
+    note = (
+        f"{table.path} ends within {table.place(table.rows - 1)}: its last value is cut, the row was left out"
+    )
+    return replace(table, columns={name: column[:-1] for name, column in table.columns.items()}), (note,)
 
 
 def _without_bad_rows(table: Table, *, counted: bool) -> tuple[Table, tuple[str, ...]]:

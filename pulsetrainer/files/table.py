@@ -24,7 +24,7 @@ from pulsetrainer.artefacts.units import split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
-from pulsetrainer.files.csv_dialect import Dialect, column_words, detect
+from pulsetrainer.files.csv_dialect import Dialect, column_words, detect, ends_in_a_number
 from pulsetrainer.files.csv_rows import parse
 from pulsetrainer.files.input_file import unreadable
 
@@ -48,6 +48,7 @@ class Table:
     shifts: Sequence[tuple[int, int]] = ()
     rate_Hz: float | None = None  # where the file itself says one
     layout: str = ""  # of a text, in words: what separates its columns, and its decimal sign
+    cut: bool = False  # a text that ends within its last number
 
     @property
     def rows(self) -> int:
@@ -191,6 +192,7 @@ def read_table(
         table = _head(path, dialect)
         kept = sorted(set(keep(table))) if keep else list(range(len(table.names)))
         rows = parse(path, dialect, kept)
+        table = replace(table, cut=ends_in_a_number(path, dialect))
     except OSError as error:
         raise unreadable(path, error) from error
     except UnicodeError as error:

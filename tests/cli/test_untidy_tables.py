@@ -86,6 +86,17 @@ def test_a_table_of_bad_rows_is_refused_with_the_option_too(tmp_path):
     assert not (tmp_path / "a.h5").exists()
 
 
+@pytest.mark.parametrize(("end", "left_out"), [("0.05,1.0", True), ("0.05,1.0000", False), ("0.05,1", True)])
+def test_a_file_that_was_cut_within_a_number_loses_that_row(tmp_path, end, left_out):
+    """A row without a line end is whole where it has as many decimals as all others."""
+    rows = "".join(f"{k / 100:.2f},{k % 7 / 3:.4f}\n" for k in range(30))
+    (tmp_path / "a.csv").write_text(f"u,y\n{rows}{end}")
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
+    assert done.code == 0, done
+    assert ("a.csv ends within line 32" in done.err) == left_out
+    assert store.read(tmp_path / "a.h5", Run).input.size == 31 - left_out
+
+
 def test_thousands_are_never_left_out(tmp_path):
     """Every large value has the separator: without these rows it would be another record."""
     _with_bad_rows(tmp_path / "a.csv", {50: '1e-6,"1,021.5",1'})
