@@ -59,6 +59,7 @@ CODES = {
     5: "a fit or an inverse did not converge",
     70: "a bug of ours: `--debug` shows where",
     130: "you stopped it",
+    141: "who reads the output went away, as `head` does: what was not printed yet is lost, and may not be done",
 }
 SETTINGS_WORDS = """\
 What stands in `pulsetrainer.toml` need not be typed. The file is that in the folder where you work, or the one that

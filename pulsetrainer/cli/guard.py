@@ -30,6 +30,7 @@ _IN_LETTERS = str.maketrans(
     {"µ": "u", "μ": "u", "Ω": "Ohm", "°": "deg", "·": "*", "×": "x", "±": "+-", "−": "-"}
 )
 _NOWHERE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_READER_GONE = 141  # as a shell tells SIGPIPE
 _STOPPED = "stopped by you; what was not finished was not written"
 _DEBUG_HINT = "run it again with --debug for the whole traceback, and report it"
 
@@ -54,9 +55,9 @@ def funnel(program: Callable[..., Any], argv: Sequence[str]) -> int:
         problem = Interrupted(_STOPPED)
         for note in getattr(error, "__notes__", ()):
             problem.add_note(note)
-    except BrokenPipeError:  # the reader of our output went away: its business
+    except BrokenPipeError:  # no failure, nor all of it done: what comes after the printing is not
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return _READER_GONE
     except Exception as error:  # noqa: BLE001 - the last resort, which is the point of this function
         if type(error).__name__ == "NoArgsIsHelpError":  # a bare command is not wrong: this is its help
             sys.stdout.write(f"{error}\n")
@@ -77,7 +78,12 @@ def _command_in(words: Sequence[str]) -> str:
 
 
 def _run(program: Callable[..., Any], words: Sequence[str]) -> Any:
-    code = program(args=words, standalone_mode=False, prog_name="pulsetrainer")
+    try:
+        code = program(args=words, standalone_mode=False, prog_name="pulsetrainer")
+    except SystemExit as end:  # what the parser makes of a reader that went away: 1, which is a quality gate
+        if isinstance(end.__context__, BrokenPipeError):
+            raise end.__context__ from None
+        raise
     if code == Interrupted.exit_code:  # what the parser makes of Ctrl-C
         raise KeyboardInterrupt
     return code

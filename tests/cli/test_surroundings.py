@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -107,3 +108,17 @@ def test_a_full_disk_behind_the_results_is_no_bug():
     assert done.returncode == 3, done.stderr
     assert "bug" not in done.stderr
     assert "try: " in done.stderr
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_goes_away_is_no_quality_gate(unbuffered):
+    """Neither at the end, where all is printed at once, nor in the middle: 141, as of any program."""
+    with subprocess.Popen(
+        [*PROGRAM, "ports"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+    ) as running:
+        running.stdout.close()
+        assert running.stderr.read() == b""
+        assert running.wait() == 141
