@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +25,7 @@ from pulsetrainer.steps.progress import Progress, silent
 from pulsetrainer.steps.quiz import Blind
 from pulsetrainer.steps.recording import Watch, decimation_for, record
 from pulsetrainer.steps.session import perform
+from pulsetrainer.steps.steering import Steering
 from pulsetrainer.steps.stopped import kept_in, raise_if_stopped
 
 
@@ -141,6 +143,8 @@ def session_into(
                 error.message += f"; no beat was pressed, so {out} was not written"
                 error.hint = error.hint or "run the command again"
                 raise
+        if isinstance(decide, Steering):
+            done = replace(done, notes=(*done.notes, *decide.notes))
         quiz = blind.quiz(out.stem) if blind else None
         recorder.keep(done.fields | {"quiz": quiz}, header())
         recorder.finish(complete=not done.fault, dropped_samples=done.dropped_samples)

@@ -14,6 +14,7 @@ from pulsetrainer.artefacts.shown import Shown
 # A finger tells two forces apart that differ by 7 %: X. D. Pang, H. Z. Tan, N. I. Durlach, Manual
 # discrimination of force using active finger motion, Perception & Psychophysics 1991, 49, 531-540.
 WEBER_FRACTION = 0.07
+BY_KEY = "stopped by key"  # what the note begins with that says so
 FIGURES = (
     "rate_cv_percent", "amplitude_cv_percent", "beat_timing_max_ms", "mean_abs_error_percent",
     "max_abs_error_percent", "nrmse", "augmentation_index_error_percent",
@@ -146,6 +147,11 @@ class Session(Shown):
     def error_jnd(self) -> float:
         """Mean absolute error in just-noticeable differences of the mean force."""
         return self.mean_abs_error_percent / 100.0 * self.full_force / (WEBER_FRACTION * self.mean_force)
+
+    @property
+    def ended_early(self) -> str:
+        """Why it ended before its time: the fault, or where it was stopped by key; empty: it did not."""
+        return self.fault or next((note for note in self.notes if note.startswith(BY_KEY)), "")
 
     def figures(self) -> dict[str, float]:
         """Main figures by name."""

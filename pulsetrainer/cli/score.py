@@ -38,7 +38,8 @@ def say_stored(job: Job, path: Path, html: Path | None, session: pt.Session) -> 
         sheet(job, html, session, store.read_header(path))
     quizzed, right = _quizzed(session.quiz)
     said = {"beats": int(session.beats.start_s.size), **session.figures(), "underruns": session.underruns}
-    job.screen.result(said | {"complete": session.complete, "fault": session.fault, "html": html, **quizzed})
+    said |= picked(session, "complete", "fault", "ended_early")
+    job.screen.result(said | {"html": html, **quizzed})
     job.screen.facts(f"{path}: session", {k: v for k, v in facts(session).items() if v is not None} | right)
     job.wrote(html)
 

@@ -183,7 +183,7 @@ def _session(session: Session) -> dict[str, Any]:
         **_temperatures(session.temperature_K),
         "underruns": session.underruns,
         "complete": session.complete,
-        **({"ended early": session.fault} if session.fault else {}),
+        **({"ended early": session.ended_early} if session.ended_early else {}),
         "dropped_samples": session.dropped_samples,
         "right": None if quiz is None else f"{quiz.right} of {len(quiz.asked)}",
     }

@@ -39,7 +39,7 @@ def course(session: Session) -> Figure:
     panels.trace(above, session.time_s[near], session.output[near], **COMPENSATED, label="measured")
     above.set_ylabel(label("force", session.output_unit))
     above.set_xlabel(label("time", "s"))
-    stopped = "" if session.complete else ", stopped early"
+    stopped = ", stopped early" if session.ended_early else ""
     above.set_title(f"Session: {SHOWN_S:g} seconds from its middle{stopped}")
     panels.headroom(above)
     beats = session.beats

@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from pulsetrainer.artefacts.session import BY_KEY
 from pulsetrainer.core.heartbeat import FASTEST_BPM, SLOWEST_BPM
 from pulsetrainer.steps.conductor import Decide, Decision, Play, Rest
+from pulsetrainer.steps.quiz import Blind
 
 RATE_STEP_BPM = 5.0
 AMPLITUDE_STEP = 0.1
@@ -59,6 +61,17 @@ class Steering:
         if isinstance(decided, Play):
             decided = self._played = self._changed(decided)
         return decided
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What there is to say of a stop: that it was one, and where in a quiz."""
+        quiz = self.programme
+        if not self.stopped:
+            return ()
+        if not isinstance(quiz, Blind):
+            return (f"{BY_KEY} before its end",)
+        left = quiz.question < quiz.questions
+        return (f"{BY_KEY} in question {quiz.question + 1} of {quiz.questions}",) * left
 
     def _changed(self, play: Play) -> Play:
         return replace(

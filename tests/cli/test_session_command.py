@@ -492,7 +492,9 @@ def test_a_bench_keeps_pace_with_a_person(tmp_path, words):
     terminal.until(lambda: time.monotonic() > shown + 3.0)
     terminal.press("Q" if "--quiz" in words else "q")
     assert terminal.end() == 0
-    assert read(tmp_path / "s.h5", Session).time_s[-1] < time.monotonic() - begun
+    kept = read(tmp_path / "s.h5", Session)
+    assert kept.time_s[-1] < time.monotonic() - begun
+    assert kept.ended_early.startswith("stopped by key")
 
 
 def test_a_bench_is_as_fast_as_it_can_where_a_file_answers(tmp_path):
@@ -539,6 +541,22 @@ def test_nothing_gives_a_question_away(tmp_path):
     kept = read(tmp_path / "s.h5", Session)
     assert kept.quiz.answered == ("bifid", "parvus-et-tardus")
     assert np.isfinite(kept.quiz.response_s).all()
+
+
+def test_a_quiz_that_was_stopped_says_so(tmp_path, run):
+    """On the screen, in the file, on the sheet: one answer of six is not all that was asked."""
+    words = ("--pulses", "normal,bifid", "--quiz", 6, "--html", "s.html")
+    terminal = Terminal(tmp_path, *SHORT, *words, port=FAST)
+    terminal.until(lambda: b"question 1 of 6" in terminal.seen)
+    terminal.press("a")
+    terminal.until(lambda: b"question 2 of 6" in terminal.seen)
+    terminal.press("Q")
+    assert terminal.end() == 0
+    said = "stopped by key in question 2 of 6"
+    assert f"note: {said}" in terminal.seen.decode()
+    assert said in (tmp_path / "s.html").read_text()
+    assert said in run("show", "s.h5").out
+    assert run("evaluate", "s.h5", "--json").json["ended_early"] == said
 
 
 def test_a_terminal_that_is_too_small_has_no_view(tmp_path):
