@@ -59,7 +59,9 @@ def say_pressed(
         raise_if_stopped(done.fault, done.remedy, "the session")
     except PulsetrainerError as error:
         error.message += kept_in(out, done.beats.start_s.size, "beat")
-        error.hint = error.hint or "evaluate what there is, or press another one into another file"
+        error.message += f", the score sheet in {html}" if html is not None else ""
+        sheet_made = "" if html is not None else f"`pulsetrainer evaluate {out} --html sheet.html`, or "
+        error.hint = error.hint or f"{sheet_made}press another one into another file with -o"
         raise
     quizzed, right = _quizzed(quiz)
     kelvins = [] if done.temperature_K is None else done.temperature_K.tolist()

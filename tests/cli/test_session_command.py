@@ -94,10 +94,15 @@ def test_a_dry_run_tells_how_hard_low_pulses_press(run):
     assert 0.35 < plan["pulse_force_N"] / plan["peak_force_N"] < 0.5
 
 
-def test_a_dry_run_of_a_quiz_by_key_needs_the_keys_too(run):
-    """Where there is no terminal, both are refused."""
+def test_a_dry_run_of_a_quiz_by_key_needs_no_keys(run):
+    """It says what the quiz itself is refused for where there is no terminal."""
     words = (*SHORT, "--pulses", "normal,bifid", "--quiz", 2)
-    refusal(run(*words, "--dry-run", "--json"), 2, "a quiz without a terminal")
+    refusal(run(*words, "--json"), 2, "a quiz without a terminal")
+    done = run(*words, "--dry-run")
+    assert done.code == 0, done
+    assert "a quiz is answered by key, and there is no terminal; to press it" in done.err
+    assert "--answers" in done.err
+    assert "would press a session" in done.out
 
 
 def test_a_session_in_a_file_has_its_sheet_made_again(run, tmp_path):
@@ -362,6 +367,7 @@ def test_stopped_by_a_signal_nothing_is_lost(tmp_path):
             process.send_signal(number)
             _, err = process.communicate(timeout=60)
             assert process.returncode == 130, err
+            assert b"try: `pulsetrainer evaluate s.h5 --html sheet.html`" in err
     for folder in stopped:
         kept = read(folder / "s.h5", Session)
         assert not kept.complete
@@ -557,6 +563,16 @@ def test_a_quiz_that_was_stopped_says_so(tmp_path, run):
     assert said in (tmp_path / "s.html").read_text()
     assert said in run("show", "s.h5").out
     assert run("evaluate", "s.h5", "--json").json["ended_early"] == said
+
+
+def test_a_session_that_was_interrupted_names_its_sheet(tmp_path):
+    """It is written all the same."""
+    terminal = Terminal(tmp_path, *SHORT, "--minutes", 5, "--html", "s.html", port=FAST, size=(24, 200))
+    terminal.until(lambda: float((re.findall(rb"([\d.]+) s ", terminal.seen) or [b"0"])[-1]) > 10.0)
+    terminal.press("\x03")
+    assert terminal.end() == 130
+    assert b"(complete=false), the score sheet in s.html" in terminal.seen
+    assert "stopped early: interrupted" in (tmp_path / "s.html").read_text()
 
 
 def test_a_terminal_that_is_too_small_has_no_view(tmp_path):
