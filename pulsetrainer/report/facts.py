@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
+from pulsetrainer.artefacts.model import Extension
 from pulsetrainer.artefacts.time_steps import gaps_of, steps_of
 from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core import input_noise
@@ -129,7 +131,24 @@ def _model(model: Model) -> dict[str, Any]:
         "coverage_percent": fit.coverage_percent if fit else None,
         **({"masked_samples": fit.masked_samples} if fit and fit.masked_samples else {}),
         "extensions": [extension.cause for extension in model.extensions],
+        **{f"with {extension.cause}": _with(extension) for extension in model.extensions},
     }
+
+
+def extension_words(one: Extension) -> dict[str, str]:
+    """Return the parameters of an extension by name; of a single time constant without a word of several."""
+    alone = [p for p in one.parameters if p.meaning.endswith("(1: it is the only one)") and p.value == 1.0]
+    shown = [
+        replace(p, meaning=p.meaning.removesuffix("; of several, the middle one")) if alone else p
+        for p in one.parameters
+        if p not in alone
+    ]
+    return parameters(shown)
+
+
+def _with(one: Extension) -> str:
+    plain = replace(one, parameters=tuple(replace(p, meaning="") for p in one.parameters if not p.chosen))
+    return ", ".join(map(" ".join, extension_words(plain).items()))
 
 
 def _waveform(waveform: Waveform) -> dict[str, Any]:

@@ -283,7 +283,7 @@ def extended(
 
 def _apart(found: Diagnosis, model: Model) -> dict[str, str]:
     """Say how the extended model differs from what the diagnosis told."""
-    added = {one.cause: [p.value for p in one.parameters] for one in model.extensions}
+    added = {one.cause: {p.name: p.value for p in one.parameters} for one in model.extensions}
     rows = {
         f"left out {one.cause}": "comes from the measurement: pulsetrainer correct"
         if one.cause in found.correctable
@@ -291,9 +291,10 @@ def _apart(found: Diagnosis, model: Model) -> dict[str, str]:
         for one in found.found
         if one.cause not in added
     }
-    told = {one.cause: [p.value for p in one.parameters] for one in found.found}
-    if any(len(told[name]) == len(now) and told[name] != now for name, now in added.items() if name in told):
-        rows["parameters"] = "fitted again as the model is used: from rest"
+    told = {(one.cause, p.name): p.value for one in found.found for p in one.parameters}
+    now = {(cause, name): value for cause, several in added.items() for name, value in several.items()}
+    if any(told.get(which, value) != value for which, value in now.items()):
+        rows["parameters"] = "fitted again as the model is used: from rest; intervals: of the diagnosis"
     return rows
 
 
