@@ -66,4 +66,10 @@ def read_pulse(name: str) -> Shape:
             f"{path}: the comment `beats:` is {said['beats']!r}, expected the times at which beats begin, s",
             hint="write `# beats: 0 0.8` for two beats, or leave it out for one",
         ) from error
-    return Shape(path.stem, time_s, value, said.get("source") or path.name, feet_s)
+    note = ""
+    if len(columns.names) > 2:
+        note = (
+            f"of the {len(columns.names)} columns of {path} the second is played, {columns.names[1]}: write "
+            "another one into a table of its own, time and value"
+        )
+    return Shape(path.stem, time_s, value, said.get("source") or path.name, feet_s, note)

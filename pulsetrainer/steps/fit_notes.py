@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Model, Run
+from pulsetrainer.artefacts.units import with_unit
 from pulsetrainer.core.fit import Fitted
 from pulsetrainer.core.forms import SMALLEST, leaves_more_than_noise
 from pulsetrainer.core.input_noise import white
@@ -93,6 +94,20 @@ def of_guessed_turns(model: Model) -> list[str]:
         "error does not count. Identify on a record with loops within the major one"
     )
     return [said]
+
+
+def of_noisy_ends(model: Model) -> list[str]:
+    """Say, before a model is inverted, that the ends of its input lie in the noise of the measured one.
+
+    Of our own device nothing is said: its firmware keeps the current within its range.
+    """
+    fit = model.fit
+    if fit is None or model.captured or model.form == "dual" or not fit.false_reversals:
+        return []
+    ends = with_unit(f"{model.edges[0]:.4g} and {model.edges[-1]:.4g}", model.input_unit)
+    noise = with_unit(f"{fit.input_noise:.2g}", model.input_unit)
+    said = f"the drive goes to the ends of the record, {ends}, which hold its noise of {noise}"
+    return [f"{said}: an amplifier that ends so little before them may cut the drive off there"]
 
 
 def warning(fitted: Fitted, runs: Sequence[Run], asked: str, minor_percent: float) -> str:

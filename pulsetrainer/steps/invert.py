@@ -108,14 +108,14 @@ def invert(
     >>> drive.inversion, bool(drive.predicted_max_error_percent < 0.1)
     ('continuous', True)
     """
-    notes: list[str] = []
+    notes = [pulse.note] if pulse.note else []
     shape = one_beat(pulse, beat, notes)
     own_Hz = DEVICE_RATE_HZ if rate_Hz is None else rate_Hz  # of what comes before and after the beats
     rate_Hz = _rate_for(shape, model, notes) if rate_Hz is None else rate_Hz
     _check_sampled(shape, rate_Hz)
     _check_length(shape, model, periods)
     _check_describes(model, name, despite_warning=despite_warning)
-    notes += fit_notes.of_guessed_turns(model)
+    notes += fit_notes.of_guessed_turns(model) + fit_notes.of_noisy_ends(model)
     chosen = _method(method, model, name)
     part = invertible(model, own_Hz)
     if model.form == "signed":

@@ -55,3 +55,16 @@ def test_a_beat_that_is_not_there_is_exit_3(small_chain, tmp_path):
     words = ["invert", RECORD, "--beat", "9", "--model", small_chain / "model.h5", "-o", "drive.h5"]
     refusal(pulsetrainer(tmp_path, *words, "--json"), 3, "no such beat")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("columns", [2, 3])
+def test_a_table_of_several_columns_says_which_one_is_played(small_chain, tmp_path, columns):
+    """A whole record, given by mistake, plays its input."""
+    t, p = np.loadtxt(RECORD, delimiter=",", skiprows=1).T
+    table = np.stack([t, p, 2 * p], axis=1)[:, :columns]
+    heading = ",".join(["t_s", "u", "y"][:columns])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=heading, comments="")
+    words = ["invert", "a.csv", "--beat", "2", "--model", small_chain / "model.h5", "-o", "drive.h5"]
+    done = pulsetrainer(tmp_path, *words)
+    assert done.code == 0, done
+    assert ("of the 3 columns of a.csv the second is played, u" in done.err) == (columns == 3)

@@ -140,3 +140,13 @@ def test_a_model_of_one_loop_says_that_turns_within_it_are_a_guess():
     tells(said, "no minor loops")
     with pytest.raises(AssertionError):
         tells(silent, "no minor loops")
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_ends_in_the_noise_of_the_input_are_told(noise):
+    """An amplifier of 0 to 100 V does not go to -0.07 V."""
+    u = 100.0 * np.abs((np.arange(6000) / 1000 + 1.0) % 2.0 - 1.0)
+    u += noise * np.random.default_rng(3).standard_normal(u.size)
+    record = pt.Run(time_s=np.arange(u.size) / 500, input=u, output=0.1 * u, input_unit="V", output_unit="um")
+    drive = pt.invert("normal", pt.identify(record, levels=8))
+    assert any("hold its noise of 0.02 V" in note for note in drive.notes) is bool(noise)
