@@ -190,15 +190,35 @@ def session(  # noqa: D103
 def read_table(
     paths: Path | str | Sequence[Path | str],
     *,
+    input: str | None = None,  # noqa: A002 - the name of the run's field
+    output: str | None = None,
+    time: str | None = None,
+    reference: str | None = None,
+    input_unit: str | None = None,
+    output_unit: str | None = None,
+    rate_Hz: float | None = None,
+    no_time: bool = False,
     resample: float | Literal["even"] | None = None,
-    **columns: Any,
+    skip_bad_rows: bool = False,
 ) -> Run:
     """Return the run in a table from any bench: CSV and its relatives, .npz, .npy, .mat or .wav.
 
-    Several files are parts of one run. ``columns`` are those of ``files.run_from_table.run_from_table``:
-    ``input`` and ``output`` (names of columns), and ``time``, ``reference``, ``input_unit``, ``output_unit``,
-    ``rate_Hz`` or ``no_time`` where the file does not say it; with
-    ``skip_bad_rows=True`` rows with blank cells or text are left out. ``resample`` makes the time steps even.
+    Several files are parts of one run. How a text is laid out, its separator and decimal sign for instance,
+    is recognised.
+
+    Parameters
+    ----------
+    input, output, time, reference
+        Names of columns. The first two are needed; without a time it is the column that is named so, or the
+        first one.
+    input_unit, output_unit
+        Where the headings do not say them.
+    rate_Hz, no_time
+        In the place of a column of time: samples a second, or only the order of the samples.
+    resample
+        Makes the time steps even: at a rate, Hz, or at the median step, "even".
+    skip_bad_rows
+        Leaves out rows with blank cells or text.
 
     Raises
     ------
@@ -218,12 +238,27 @@ def read_table(
     (7833, 'N')
     """
     several = [paths] if isinstance(paths, str | Path) else paths
-    if missing := [name for name in ("input", "output") if columns.get(name) is None]:
+    if input is None or output is None:
+        missing = [name for name, column in (("input", input), ("output", output)) if column is None]
         raise ArgumentError(
             f"read_table needs the name of a column for {' and for '.join(missing)}",
             hint=f'such as pt.read_table("{several[0]}", input="u", output="y")',
         )
-    parts = [run_from_table(path, **columns).run for path in several]
+    parts = [
+        run_from_table(
+            path,
+            input=input,
+            output=output,
+            time=time,
+            reference=reference,
+            input_unit=input_unit,
+            output_unit=output_unit,
+            rate_Hz=rate_Hz,
+            no_time=no_time,
+            skip_bad_rows=skip_bad_rows,
+        ).run
+        for path in several
+    ]
     return import_parts(parts, resample=resample).run
 
 

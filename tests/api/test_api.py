@@ -178,6 +178,12 @@ def test_what_is_of_another_kind_is_refused_with_what_was_expected(call, said):
     assert caught.value.hint
 
 
+def test_a_keyword_that_is_none_is_told_of_the_function_that_was_called():
+    """Not of one behind it, which is on no page."""
+    with pytest.raises(TypeError, match=r"^read_table\(\) got an unexpected keyword argument 'separator'"):
+        pt.read_table("x.csv", input="u", output="y", separator=";")
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [
