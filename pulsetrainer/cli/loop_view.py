@@ -71,6 +71,6 @@ class LoopView:
 
         loop = [f"│{line}" for line in self._dots.lines()]
         axis = f"└{'─' * self._size[0]}"
-        ends = f"up to {self._ends[0]:.3g} A and {self._ends[1]:.3g} N"
+        ends = f"axes: 0 to {self._ends[0]:.3g} A, 0 to {self._ends[1]:.3g} N"
         said = f"{self._label}: {100.0 * self._share:.0f} %, {ends}"
         return Text("\n".join([*loop, axis, said, self.figures]), no_wrap=True, overflow="crop")

@@ -109,6 +109,7 @@ def test_every_sample_is_a_dot_where_it_belongs():
     nan = np.nan
     view.take(np.array([0.0, 2.0, 9.0, nan, 1.0]), np.array([0.0, 10.0, 99.0, 3.0, nan]))
     loop = [line[1:] for line in view.text().plain.splitlines() if line.startswith("│")]
+    assert "axes: 0 to 2 A, 0 to 10 N" in view.text().plain
     dots = {(row, column) for row, line in enumerate(loop) for column, c in enumerate(line) if c != "\u2800"}
     assert dots == {(len(loop) - 1, 0), (0, len(loop[0]) - 1)}
 
