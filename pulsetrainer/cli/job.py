@@ -237,11 +237,11 @@ class Job:
         from pulsetrainer.device.opening import DEFAULT_PORT
         from pulsetrainer.device.schemes import redact
 
-        where, out = redact(self.port or DEFAULT_PORT), self._parameters["out"]
+        port, out = self.port or DEFAULT_PORT, self._parameters["out"]
         current = f"{plan.peak_current_A:.3f} A at most, {plan.rms_current_A:.3f} A rms"
         self.show(
-            besides | plain(plan) | {"port": where, "output": out, "dry_run": True},
-            f"would {what} on {where}{f' and write {out}' if out else ''}; nothing was done",
+            besides | plain(plan) | {"port": redact(port), "output": out, "dry_run": True},
+            f"would {what} on {port}{f' and write {out}' if out else ''}; nothing was done",
             {**rows, "current": current},
         )
 

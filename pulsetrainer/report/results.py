@@ -78,12 +78,14 @@ def identified(out: Path, model: Model, seconds: float) -> Said:
 def captured(out: Path, signal: str, got: Any, info: Any) -> Said:
     """Say what a device recorded."""
     payload = {"output": out, "signal": signal, **got._asdict(), **picked(info, "serial", "firmware")}
+    several = got.parts > 1  # a new stroke leads to where each goes on, so the file holds more reversals
     rows = {
-        "samples": f"{got.samples} in {got.seconds:.1f} s, {got.rate_Hz:g} a second",
+        "samples": f"{got.samples} in {got.seconds:.1f} s, {got.rate_Hz:g} a second"
+        + ", pauses between its parts included" * several,
         "current": "{:.3f} .. {:.3f} A".format(*got.current_range_A),
         "force": "{:.3f} .. {:.3f} N".format(*got.force_range_N),
-        "reversals": got.reversals,
-        **({"parts": got.parts} if got.parts > 1 else {}),
+        "reversals": f"{got.reversals} of the signal itself" if several else got.reversals,
+        **({"parts": got.parts} if several else {}),
         "cells switched": f"{got.coverage_percent:.1f} %",
     }
     return payload, f"{out}: {signal} on {info.serial}, firmware {info.firmware}", rows

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -121,6 +122,8 @@ def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
     assert "--resume" in refused.err.partition("try: ")[2]  # not only how to replace it
     done = pulsetrainer(tmp_path, *words, "--resume")
     assert done.code == 0, done
+    assert re.search(r"reversals +\d+ of the signal itself", done.out)
+    assert "pauses between its parts included" in done.out
     run = read(tmp_path / "run.h5", Run)
     assert run.complete
     assert np.array_equal(run.output[: cut.size], cut)
@@ -134,6 +137,14 @@ def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
     away = np.where(np.arange(1000) < 700, 0.0, 0.01)  # and of one with it
     cut_off = replace(cut_off, reference=cut_off.reference - away)
     assert samples_played(cut_off, Course(one, 1)) == 700
+
+
+def test_a_dry_run_names_the_port_as_it_was_typed(tmp_path):
+    """In real time a capture takes as long as it says; a script gets what files keep of the port."""
+    words = ("capture", "identification", "--port", "bench:?speed=real&creep=0.05", "--dry-run", "-o", "x.h5")
+    said = pulsetrainer(tmp_path, *words).out
+    assert "would play identification on bench:?speed=real&creep=0.05 and write x.h5" in said
+    assert pulsetrainer(tmp_path, *words, "--json").json["port"] == "bench:"
 
 
 @pytest.mark.realtime
