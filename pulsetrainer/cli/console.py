@@ -103,6 +103,7 @@ class Screen:
     def end(self, failed: QualityError | None) -> None:
         """Exit with the code of a quality gate that failed, after everything was said; None: none did."""
         if failed is not None:
+            sys.stdout.flush()  # in a pipe what is wrong would come before what was found
             typer.echo(f"error: {failed.message}\n  try: {failed.hint}", err=True)
             raise typer.Exit(failed.exit_code)
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
 
-from program import pulsetrainer
+from program import PROGRAM, pulsetrainer
 from pulsetrainer import doctor
 from pulsetrainer.simulation import build
 from wording import tells
@@ -94,6 +95,13 @@ def test_an_absent_port_is_a_problem_with_a_fix(run):
     assert "link" not in done.out
     found = [re.match(r"\S+ +\S.*?  +", line) for line in done.out.splitlines() if line[:1].isalpha()]
     assert len({one.end() for one in found if one}) == 1  # below one another
+
+
+def test_in_one_pipe_what_was_found_comes_before_what_is_wrong():
+    """The count of the problems stood above the list of them."""
+    words = [*PROGRAM, "doctor", "--port", "/dev/ttyNOWHERE"]
+    done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    assert done.stdout.index("PROBLEM  device") < done.stdout.index("error: ")
 
 
 def test_a_parameter_of_another_port_is_told_as_it_is_typed(run):
