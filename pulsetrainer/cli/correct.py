@@ -58,4 +58,6 @@ def correct(
     }
     if not most and masked == int((~measured.counts).sum()):
         job.notes(["nothing tells what lies between the steps: the output is as it was"])
+    lasting = "a run that the model is tested on may have the same fault: diagnose and correct it too"
+    job.notes([lasting])
     job.show(payload, f"{out}: corrected run", rows)

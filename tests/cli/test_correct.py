@@ -48,8 +48,9 @@ def test_it_says_what_was_corrected_and_masks_the_rest(folder):
     assert done.code == 0, done
     assert done.json["corrected"] == ["outliers", "offset-drift"]
     assert done.json["masked_samples"] == 5
-    said = pulsetrainer(folder, *words[:-1], "--overwrite").out
-    assert "largest change    0.2 N" in said, said  # the drift's, not the wild samples' 3
+    said = pulsetrainer(folder, *words[:-1], "--overwrite")
+    assert "largest change    0.2 N" in said.out, said  # the drift's, not the wild samples' 3
+    assert "a run that the model is tested on may have the same fault" in said.err
     corrected, clean = pt.load(folder / "corrected.h5"), pt.load(folder / "other.h5")
     assert np.flatnonzero(corrected.masked).tolist() == [100, 200, 300, 400, 500]
     np.testing.assert_allclose(corrected.output, clean.output, atol=0.01)
