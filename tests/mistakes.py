@@ -404,6 +404,17 @@ INSIDE = {
         ),
         *(3, "'Volts' is not a known unit", "did you mean 'V'?"),
     ),
+    "a unit in words, with a prefix": Mistake(
+        (
+            *("import", "wide.csv", "--input", "Spannung", "--output", "Kraft", "--input-unit", "kilovolts"),
+            *("-o", "out.h5"),
+        ),
+        *(3, "'kilovolts' is not a known unit", "did you mean 'kV'?"),
+    ),
+    "a word that is nearly one of a choice": Mistake(
+        ("identify", "run.h5", "-o", "out.h5", "--form", "dula"),
+        *(2, "--form 'dula' is not one of", "did you mean dual?"),
+    ),
     "no such bench parameter": Mistake(
         ("capture", "identification", "-o", "out.h5", "--port", "bench:?crep=1"), 2
     ),

@@ -46,9 +46,17 @@ _SPELLED = {
         "A": "amp amps ampere amperes",
         "N": "newton newtons",
         "T": "tesla",
+        "m": "metre metres meter meters",
+        "Pa": "pascal pascals",
         "ohm": "ohm ohms",
     }.items()
     for word in words.split()
+}
+_SPELLED |= {
+    f"{word}{long}": prefix + short
+    for word, prefix in {"mega": "M", "kilo": "k", "milli": "m", "micro": "u", "nano": "n"}.items()
+    for long, short in _SPELLED.items()
+    if short in _PREFIXED
 }
 _NO_UNIT_ALONE = frozenset(["min", "second"])  # the least, the next one
 SECONDS = {"": 1.0, "s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "d": 86400.0, "ns": 1e-9}

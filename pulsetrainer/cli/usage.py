@@ -85,7 +85,7 @@ def _bad_value(parameter: Any, context: Any, must: str, help_: str) -> UsageErro
             f"the variable {parameter.envvar} (for {_named(parameter)}) {must}",
             hint=f"correct it, or take it away: unset {parameter.envvar}",
         )
-    hint = _as_a_number(parameter, must) or _without(parameter, help_)
+    hint = _as_a_number(parameter, must) or _choice(parameter, must) or _without(parameter, help_)
     return UsageError(f"{_named(parameter)} {must}", hint=hint)
 
 
@@ -246,6 +246,13 @@ def _as_a_number(parameter: Any, must: str) -> str:
     if said and unit == f"m{said[1]}":
         return f"write it in {said[1]}, without the unit: {float(number) / 1000:g}"
     return f"write the number alone: {_meaning(parameter)}"  # what is typed in ms must not be taken for s
+
+
+def _choice(parameter: Any, must: str) -> str:
+    """Which of the words that an option takes is meant; else empty."""
+    given, choices = re.match("'(.*?)' is not one of", must), getattr(parameter.type, "choices", ())
+    near = difflib.get_close_matches(given[1].lower(), list(choices), n=1) if given else []
+    return f"did you mean {near[0]}?" if near else ""
 
 
 def _without(parameter: Any, help_: str) -> str:
