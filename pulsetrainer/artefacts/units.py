@@ -124,6 +124,11 @@ def _with_micro(unit: str) -> str:
     return _MICRO.sub("\N{MICRO SIGN}", unit)
 
 
+def quantity_in_words(quantity: str) -> str:
+    """Return a quantity as it stands in a sentence: what a heading says is no English word, so in quotes."""
+    return quantity if quantity in ("current", "force", "input", "output") else f"'{quantity}'"
+
+
 def symbol_of(text: str) -> str:
     """Return the symbol of a unit that is spelled out, any other text as it is."""
     return _SPELLED.get(text.lower(), text)

@@ -58,10 +58,8 @@ def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high
 
 def left_out_words(samples: int) -> str:
     """Say that a first stroke of so many samples is left out."""
-    return (
-        "the first stroke is unlike all later ones from the same end, as of a device that was not cycled "
-        f"before; its {samples} samples are not counted, so the result does not suffer"
-    )
+    why = "it is unlike all later ones, as of a device that was not cycled before"
+    return f"the first stroke ({samples} samples) is left out: {why}"
 
 
 def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
-from pulsetrainer.artefacts.units import with_seconds, with_unit
+from pulsetrainer.artefacts.units import quantity_in_words, with_seconds, with_unit
 from pulsetrainer.report.facts import loop_words, minor_words, run_facts, span_words, warmth_words
 from pulsetrainer.report.names import digits, split, told
 from pulsetrainer.report.tables import picked
@@ -59,14 +59,15 @@ def identified(out: Path, model: Model, seconds: float) -> Said:
         "seconds": seconds,
     }
     share, band = fit.smoothing, fit.output_uncertainty
+    edges = quantity_in_words(model.edges_quantity)
     rows = {
         "fit": f"{fit.rms_percent:.3f} % rms, {fit.max_percent:.2f} % max, of the span",
         "fit rms": with_unit(f"{fit.rms:.4g}", unit),
         "offset y0": with_unit(f"{model.offset:.4g}", model.offset_unit),
         "cells switched": f"{fit.coverage_percent:.1f} %",
         "told apart by minor loops": minor_words(fit.minor_percent, fit.coverage_percent)
-        + f", on the plane of the {model.edges_quantity}" * (model.form == "dual"),
-        "smoothing": f"{share:.3g} of the range of the {model.edges_quantity}" if share else "none",
+        + f", on the plane of the {edges}" * (model.form == "dual"),
+        "smoothing": f"{share:.3g} of the range of the {edges}" if share else "none",
         "loop": loop_words(model),
         "form": model.form,
         **({"output known within": with_unit(f"{band:.2g}", unit) + " (90 % band)"} if band else {}),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pulsetrainer.artefacts import BoolArray, Model, Run
-from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.artefacts.units import quantity_in_words, with_unit
 from pulsetrainer.core.fit import Fitted
 from pulsetrainer.core.forms import SMALLEST, leaves_more_than_noise
 from pulsetrainer.core.input_noise import white
@@ -27,9 +27,14 @@ TOLD_APART = (
 UNEXPLAINED = 0.5  # of the output's standard deviation: what leaves more explains next to nothing
 
 
+def _named(of: Run | Model) -> tuple[str, str]:
+    """Return output and input as they stand in a sentence."""
+    return quantity_in_words(of.output_quantity), quantity_in_words(of.input_quantity)
+
+
 def of_form(fitted: Fitted, run: Run, asked: str) -> list[str]:
     """Say what was done where the form is not the direct one, and why where nobody asked for it."""
-    output, given = run.output_quantity, run.input_quantity
+    output, given = _named(run)
     if fitted.form == "dual":
         how = f"fitted with the roles exchanged, {given} over {output} (dual form)"
         loop = loop_of(fitted.operator)
@@ -75,10 +80,11 @@ def of_no_minor_loops(fitted: Fitted, run: Run, minor_percent: float) -> list[st
     """Say that the signed form is a guess between the recorded reversals where hardly a minor loop was."""
     if fitted.form != "signed" or minor_percent >= TOLD_APART:
         return []
+    output, given = _named(run)
     said = (
         f"minor loops tell only {minor_percent:.0f} % of the cells apart: with weights of either sign the "
-        f"{run.output_quantity} is a guess after any reversal of the {run.input_quantity} that this record "
-        "does not hold. Record loops within the major one too"
+        f"{output} is a guess after any reversal of the {given} that this record does not hold. "
+        "Record loops within the major one too"
     )
     return [said]
 
@@ -90,7 +96,7 @@ def of_guessed_turns(model: Model) -> list[str]:
         return []
     said = (
         f"the record of this model has hardly any minor loops (cells told apart: {fit.minor_percent:.0f} %): "
-        f"where the {model.output_quantity} turns within its range the drive is a guess, which the expected "
+        f"where the {_named(model)[0]} turns within its range the drive is a guess, which the expected "
         "error does not count. Identify on a record with loops within the major one"
     )
     return [said]
@@ -124,12 +130,12 @@ def warning(fitted: Fitted, runs: Sequence[Run], asked: str, minor_percent: floa
         return velocity.warning(compared, first.input_quantity, first.output_quantity)
     if not leaves_more_than_noise(residuals, span) and left <= UNEXPLAINED * float(np.std(output)):
         return ""
+    name, given = _named(first)
     what = "No static form (direct, dual, signed)" if asked == "auto" else f"The {asked} form does not"
     verb = " describes this record" if asked == "auto" else " describe this record"
     return (
         f"{what}{verb}: the best fit leaves {100 * left / span:.1f} % of the span. The "
-        f"{first.output_quantity} may depend on the speed, on a second input, or hardly on the "
-        f"{first.input_quantity}"
+        f"{name} may depend on the speed, on a second input, or hardly on the {given}"
         + ("" if asked == "auto" else ". With no form named, the one that suits is found")
     )
 
@@ -139,7 +145,7 @@ def _of_loops_that_differ(fitted: Fitted, run: Run, span: float) -> str:
     found = rivals(fitted.records, fitted.operator.low, fitted.operator.high)
     if found is None or found.congruent(SMALLEST * span):
         return ""
-    output, given = run.output_quantity, run.input_quantity
+    output, given = _named(run)
     return (
         f"No static form (direct, dual, signed) describes this record: the same swing of the {given} changes "
         f"the {output} differently from place to place (its minor loops are not congruent). A curve over a "

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
-from pulsetrainer.artefacts.units import same_units, shown, units_of, with_unit
+from pulsetrainer.artefacts.units import quantity_in_words, same_units, shown, units_of, with_unit
 from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
 from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
 from pulsetrainer.core.dual import exchanged
@@ -153,7 +153,8 @@ def identify(
     little = fit_notes.of_no_minor_loops(fitted, measured[0], minor_percent)
     notes += little if warning else [*fit_notes.of_rest(fitted), *little]
     if way := _only_way(measured):
-        notes.append(f"the {measured[0].input_quantity} only {way}: a loop, if there is one, is not seen")
+        given = quantity_in_words(measured[0].input_quantity)
+        notes.append(f"the {given} only {way}: a loop, if there is one, is not seen")
     progress(1.0)
     first = wild_ones[0]
     said = {

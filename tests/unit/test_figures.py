@@ -559,6 +559,8 @@ def test_smoothing_is_a_share_of_the_range_of_the_plane(form, of):
     model = replace(model, form=form, fit=replace(model.fit, smoothing=0.1))
     rows = identified(Path("m.h5"), model, 1.0)[2]
     assert rows["smoothing"] == f"0.1 of the range of the {of}"
+    rows = identified(Path("m.h5"), replace(model, input_quantity="I", output_quantity="I"), 1.0)[2]
+    assert rows["smoothing"] == "0.1 of the range of the 'I'"  # a heading is no English word
 
 
 def test_the_title_of_a_loop_stays_within_its_figure():
