@@ -109,9 +109,12 @@ def _of_session(job: Job, path: Path, session: pt.Session, html: Path | None, *,
 def show_tables(screen: Screen, evaluation: pt.Evaluation) -> None:
     """Print the figures of an evaluation beside those of the published device."""
     from pulsetrainer.artefacts.evaluation import PUBLISHED
+    from pulsetrainer.report.results import full_force
     from pulsetrainer.report.text import tables_of
 
     screen.parts(tables_of(evaluation, screen.width))
+    if said := full_force(evaluation):
+        screen.line("full force: ", said)
     if any("#" in w.inversion for w in evaluation.told_apart().waveforms):
         screen.line("#2: ", "the second playback of that pulse and inversion, in the order given")
     if len(evaluation.models) > 1:

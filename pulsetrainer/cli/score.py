@@ -77,7 +77,8 @@ def say_pressed(
         **picked(info, "serial", "firmware"),
         **quizzed,
     }
-    rows = pressed(done.figures, payload["beats"], done.parts, payload["force_range_N"], kelvins)
+    told = done.figures | {"full_force": done.full_force}
+    rows = pressed(told, payload["beats"], done.parts, payload["force_range_N"], kelvins)
     rows["underruns"] = done.underruns
     job.show(payload, f"{out}: a session on {info.serial}", rows | right)
     job.wrote(html)

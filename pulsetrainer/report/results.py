@@ -162,7 +162,7 @@ def played(out: Path, made: Playback, serial: str, firmware: str) -> Said:
 def pressed(
     figures: Mapping[str, float], beats: int, parts: int, reach_N: tuple[float, float], warmth_K: list[float]
 ) -> dict[str, Any]:
-    """Say what a session pressed, by its main figures; ``warmth_K`` is empty where heat was not tracked."""
+    """Say what a session pressed, by figures with its full force; no ``warmth_K``: heat was not tracked."""
     spread = [
         f"{what} within {figures[name]:.2g} %"
         for what, name in (("rate", "rate_cv_percent"), ("height", "amplitude_cv_percent"))
@@ -174,7 +174,7 @@ def pressed(
     return {
         "beats": f"{beats} in {parts} part{'s' if parts > 1 else ''}",
         "force": f"{reach_N[0]:.2f} .. {reach_N[1]:.2f} N at full amplitude",
-        "error": f"{error}, of full force",
+        "error": f"{error}, of full force ({figures['full_force']:.2f} N)",
         "timing": f"beats begin within {figures['beat_timing_max_ms']:.2g} ms of their time",
         **({"as asked": f"{', '.join(spread)} (standard deviation)"} if spread else {}),
         **({"coil": warmth_words(warmth_K)} if warmth_K else {}),
@@ -195,6 +195,13 @@ def evaluated(evaluation: Evaluation) -> dict[str, Any]:
     ]
     models = [picked(m, "name", *MODEL_METRICS, "start", "outside_percent") for m in evaluation.models]
     return ({"waveforms": waveforms} if waveforms else {}) | ({"models": models} if models else {})
+
+
+def full_force(evaluation: Evaluation) -> str:
+    """Say what errors of played waveforms are given in percent of; empty where there are none."""
+    named = {with_unit(f"{w.full_force:.4g}", w.output_unit): w.name for w in evaluation.waveforms}
+    told = named if len(named) == 1 else [f"{value} ({name})" for value, name in named.items()]
+    return f"{', '.join(told)}, the top of the pulse that was asked for" if named else ""
 
 
 def as_csv(files: Sequence[Path], metrics: Mapping[str, Sequence[float | None]]) -> str:

@@ -110,6 +110,15 @@ def test_a_broken_bound_is_exit_1_and_names_the_metric(built_small):
     assert not (built_small / "unknown.h5").exists()
 
 
+def test_full_force_is_told_in_newton(built_small):
+    """That of a drive is the top of its pulse, not what the device can press."""
+    playbacks = [f"played-{name}-continuous.h5" for name in ("normal", "bifid")]
+    done = pulsetrainer(built_small, "evaluate", *playbacks)
+    (told,) = [line for line in done.out.splitlines() if line.startswith("full force: ")]
+    for one in pulsetrainer(built_small, "evaluate", *playbacks, "--json").json["waveforms"]:
+        assert f"{one['full_force']:.4g} N" in told
+
+
 def test_the_report_shows_what_the_file_holds(built_small):
     """The numbers in the page are those of evaluation.h5, and the page fetches nothing."""
     page = (built_small / "continuous.html").read_text(encoding="utf-8")

@@ -110,6 +110,7 @@ def test_a_session_in_a_file_has_its_sheet_made_again(run, tmp_path):
     done = run(*SHORT, "--beats", 3, "--variability", 4, "--html", "s.html")
     assert (done.code, done.out.splitlines()[-1]) == (0, "wrote s.html")
     assert "vary by 4 %" in (tmp_path / "s.html").read_text()
+    assert f"of full force ({read(tmp_path / 's.h5', Session).full_force:.2f} N)" in done.out
     done = run("evaluate", "s.h5", "--html", "again.html", "--json")
     assert (done.code, done.json["beats"], done.json["complete"]) == (0, 3, True)
     assert (tmp_path / "again.html").read_text() == (tmp_path / "s.html").read_text()
