@@ -21,6 +21,8 @@ from pulsetrainer.core.record import Record
 from pulsetrainer.errors import DataError, UsageError
 
 LEVELS = 48  # of the plane whose coverage is reported, over the record's own range
+_JUMP, _FEW_JUMPS = 0.5, 3  # share of the range, and how many of them: more are how it was driven
+_EVEN = 0.05  # of the range: no other step is larger
 _LEAST = 2  # samples between two gaps: of fewer there is no step to resample
 
 
@@ -70,6 +72,7 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
     """
     run, notes = joined(parts)
     report = report_of(run, resampled=resample is not None)
+    notes = (*notes, *_jumps(run))
     if run.gap_words:
         notes = (*notes, f"{run.signal}: {run.gap_words}")
     if resample is not None:
@@ -126,6 +129,25 @@ def _still(name: str, report: Report) -> list[str]:
     if high > low:
         return []
     return [f"the input of {name} never moves: it is {with_unit(f'{low:g}', report.input_unit)} throughout"]
+
+
+def _jumps(run: Run) -> list[str]:
+    """Say where an input that moves evenly jumps and stays there, as where a piece of a record is missing."""
+    reach = float(np.ptp(run.input))
+    found: list[int] = []
+    for part in run.slices:
+        step = np.abs(np.diff(run.input[part]))
+        at = np.flatnonzero(step > _JUMP * reach)
+        lonely = at.size <= _FEW_JUMPS and np.all(np.diff(at) > 1)  # else a staircase, or a wild sample
+        if not lonely or np.delete(step, at).max(initial=0.0) > _EVEN * reach:
+            return []
+        found += [(part.start or 0) + int(k) + 1 for k in at]
+    if not found:
+        return []
+    places = [f"sample {k + 1}" if run.time_s is None else with_seconds(float(run.time_s[k])) for k in found]
+    share = 100.0 * abs(float(run.input[found[0]] - run.input[found[0] - 1])) / reach
+    said = f"the input of {run.signal} jumps by {share:.0f} % of its range from one sample to the next, at "
+    return [f"{said}{', '.join(places)}: if the device was not driven so, a piece of the record is missing"]
 
 
 def _notes_on_time(name: str, report: Report) -> list[str]:

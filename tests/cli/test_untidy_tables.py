@@ -156,6 +156,23 @@ def test_one_loop_is_said_to_be_one_loop(tmp_path):
     assert report["input_unit"] == "kOhm"
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda u: np.append(u[:151], u[200:]), "at 3.02 s: if the device"),  # a stroke is missing
+        (lambda u: np.where(np.arange(u.size) == 150, 0.0, u), ""),  # a wild sample
+        (lambda u: 50.0 * (u > 25.0), ""),  # a square wave
+    ],
+)
+def test_an_input_that_jumps_once_is_told_with_the_place(tmp_path, change, said):
+    """Wild samples, and what is driven by jumps, are not meant."""
+    _written(tmp_path / "a.csv", [[k * 0.02, u, u] for k, u in enumerate(change(np.tile(TRIANGLE, 3)))])
+    done = pulsetrainer(tmp_path, "import", "a.csv", *COLUMNS, "-o", "a.h5")
+    assert done.code == 0, done
+    assert ("jumps by" in done.err) is bool(said)
+    assert said in done.err
+
+
 def test_an_input_that_never_moves_is_said_to(tmp_path):
     """A column mixed up: nothing can be learnt from such a record, and the reader must know."""
     _written(tmp_path / "a.csv", [[row[0], 1.0, row[2]] for row in _rows()])
