@@ -12,6 +12,8 @@ from pulsetrainer.core.memory import turning_points
 from pulsetrainer.core.plane import FloatArray, Plane, finite_vector
 from pulsetrainer.errors import ArgumentError
 
+_LITTLE = 0.1  # of the cells
+
 
 @dataclass(frozen=True, slots=True)
 class Gap:
@@ -43,6 +45,15 @@ class Gap:
         more = f"; {100 * rest:.0f} % more lies elsewhere" if rest >= 0.005 else ""
         share = f"{100 * self.share:.0f}" if self.share < 0.995 or not parts else f"{100 * self.share:.1f}"
         return f"never switched: {which} ({share} % of the plane{more})"
+
+
+def little_words(share: float) -> str:
+    """Say what a record is good for that switches this share of the cells; empty where it switches more."""
+    if share >= _LITTLE:
+        return ""
+    what = f"only {100 * share:.1f} % of the cells are switched"
+    good = "a model of this record holds for its own strokes"
+    return f"{what}: {good}. Record the whole range down and up, with loops within it"
 
 
 def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:

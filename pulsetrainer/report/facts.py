@@ -108,7 +108,11 @@ def warmth_words(kelvin: Sequence[float] | FloatArray) -> str:
 def minor_words(percent: float, switched_percent: float) -> str:
     """Say how many cells minor loops tell apart, and what of the others is known."""
     nothing = ", or nothing" if switched_percent < _ALL else ""
-    rest = f"; the rest only the major loop has switched{nothing}" if percent < _HARDLY else ""
+    rest = (
+        f"; the rest only the major loop has switched{nothing}: loops within it would tell"
+        if percent < _HARDLY
+        else ""
+    )
     return f"{percent:.0f} % of the cells{rest}"
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from pulsetrainer.artefacts import LARGEST, BoolArray, Fit, Model, Run
 from pulsetrainer.artefacts.units import quantity_in_words, same_units, shown, units_of, with_unit
 from pulsetrainer.core import input_noise, metrics, turns, uncertainty, wild
-from pulsetrainer.core.coverage import coverage, largest_gap, minor_coverage
+from pulsetrainer.core.coverage import coverage, largest_gap, little_words, minor_coverage
 from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
 from pulsetrainer.core.forms import Form
@@ -155,6 +155,8 @@ def identify(
     if way := _only_way(measured):
         given = quantity_in_words(measured[0].input_quantity)
         notes.append(f"the {given} only {way}: a loop, if there is one, is not seen")
+    elif few := little_words(float(np.mean(covered))):
+        notes.append(few)
     progress(1.0)
     first = wild_ones[0]
     said = {

@@ -13,7 +13,7 @@ from pulsetrainer.artefacts.run import seam_of
 from pulsetrainer.artefacts.time_steps import GAP, gaps_of, steps_of
 from pulsetrainer.artefacts.units import same_units, units_of, with_seconds, with_unit
 from pulsetrainer.core import input_noise
-from pulsetrainer.core.coverage import coverage, minor_coverage
+from pulsetrainer.core.coverage import coverage, little_words, minor_coverage
 from pulsetrainer.core.excitations import MOST_SAMPLES
 from pulsetrainer.core.identification import CLEAR, correlation_of
 from pulsetrainer.core.plane import Plane
@@ -73,6 +73,8 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
     run, notes = joined(parts)
     report = report_of(run, resampled=resample is not None)
     notes = (*notes, *_jumps(run))
+    if (said := little_words(report.coverage_percent / 100.0)) and not _still(run.signal, report):
+        notes = (*notes, f"{run.signal}: {said}")
     if run.gap_words:
         notes = (*notes, f"{run.signal}: {run.gap_words}")
     if resample is not None:

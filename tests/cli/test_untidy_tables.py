@@ -156,6 +156,16 @@ def test_one_loop_is_said_to_be_one_loop(tmp_path):
     assert report["input_unit"] == "kOhm"
 
 
+@pytest.mark.parametrize(("rows", "little"), [(53, True), (300, False)])
+def test_a_single_stroke_says_what_it_is_good_for(tmp_path, rows, little):
+    """By import, and by the fit, which looks perfect."""
+    _written(tmp_path / "a.csv", [[k * 0.02, u, u] for k, u in enumerate(np.roll(TRIANGLE, 50)[:rows] / 5)])
+    for words in (("import", "a.csv", *COLUMNS, "-o", "a.h5"), ("identify", "a.h5", "-o", "m.h5")):
+        done = pulsetrainer(tmp_path, *words)
+        assert done.code == 0, done
+        assert ("% of the cells are switched: a model of this record holds for its own" in done.err) is little
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
