@@ -123,12 +123,13 @@ def _read_at_rate(
     used = {table.index(name) for name in wanted}
     place = _own_column(table, used)
     alone = replace(table, columns={table.names[k]: table.columns[table.names[k]] for k in used})
-    told_Hz, where = (table.rate_Hz,) * 2, "the file itself"
+    told_Hz, where = (table.rate_Hz,) * 2, f"{table.path} itself"
     if place is not None and table.names[place] in table.columns:
-        told_Hz, where = _rates_of(table, table.names[place]), f"the column {table.names[place]!r}"
+        name = table.names[place]
+        told_Hz, where = _rates_of(table, name), f"the column {name!r} of {table.path}"
     if any(told is None or abs(told / rate_Hz - 1.0) < _SAME_RATE for told in told_Hz):
         return alone, ()
-    said = f"{where} of {table.path} says {told_Hz[0]:.6g} Hz, and `rate_Hz` {rate_Hz:g}"
+    said = f"{where} says {told_Hz[0]:.6g} Hz, and `rate_Hz` {rate_Hz:g}"
     return alone, (f"{said}: taken as {rate_Hz:g} Hz",)
 
 
@@ -137,7 +138,7 @@ def _rates_of(table: Table, name: str) -> tuple[float | None, float | None]:
     stamps = table.columns[name]
     unit = _unit_of_time(table, name)
     increasing = bool(stamps.size > 1 and np.all(np.isfinite(stamps)) and np.all(np.diff(stamps) >= 0))
-    if unit not in SECONDS or not increasing or stamps[-1] == stamps[0]:
+    if not unit or unit not in SECONDS or not increasing or stamps[-1] == stamps[0]:
         return None, None
     median, mean = float(np.median(np.diff(stamps))), float(stamps[-1] - stamps[0]) / (stamps.size - 1)
     # stamps that are rounded repeat themselves: the mean alone tells

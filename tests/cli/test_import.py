@@ -86,10 +86,11 @@ def test_a_rate_that_contradicts_the_file_is_said(run, tmp_path):
     (tmp_path / "scope.csv").write_text("Zeit [ms];u;y\n" + "".join(rows))
     (tmp_path / "damaged.csv").write_text("Zeit [ms];u;y\n" + "".join(rows) + "none;1;2\n")
 
+    (tmp_path / "counted.csv").write_text("n;u;y\n" + "".join(rows))
+
     def said(name, rate):
-        done = run(
-            "import", name, "--input", "u", "--output", "y", "--rate", rate, "-o", "r.h5", "--overwrite"
-        )
+        words = ("--input", "u", "--output", "y", "--rate", rate, "-o", "r.h5", "--overwrite")
+        done = run("import", name, *words)
         assert done.code == 0, done
         return " ".join(done.err.split())
 
@@ -97,6 +98,7 @@ def test_a_rate_that_contradicts_the_file_is_said(run, tmp_path):
     assert told in said("scope.csv", 50)
     assert "says" not in said("scope.csv", 500)
     assert "says" not in said("damaged.csv", 50)
+    assert "says" not in said("counted.csv", 50)  # no unit: it may be anything
 
 
 def test_a_column_that_is_not_there_offers_the_nearest(run, tmp_path):
@@ -214,6 +216,8 @@ def test_a_recording_of_sound_needs_no_time_column(run, tmp_path):
     wavfile.write(tmp_path / "r.wav", 8000, both)
     done = run("import", "r.wav", "--input", "channel1", "--output", "channel2", "-o", "run.h5", "--json")
     assert done.json["runs"][0]["report"]["rate_Hz"] == pytest.approx(8000.0)
+    done = run("import", "r.wav", "--input", "channel1", "--output", "channel2", "-o", "r.h5", "--rate", 100)
+    assert "r.wav itself says 8000 Hz, and --rate 100" in done.err
 
 
 def test_several_files_are_parts_of_one_run_or_runs_of_their_own(run, tmp_path, columns):
