@@ -262,6 +262,10 @@ DOUBTS: Mapping[str, str] = {
         "on parts of the recordings that were left out it explains less than half of what could be "
         "explained, as any cause may where the model cannot follow a device of this kind"
     ),
+    "imitates": (
+        "on parts of the recordings that were left out it predicts less than three quarters of what the "
+        "model leaves without it: something else that the device does as it moves may look like it"
+    ),
     "spans zero": "its strength may be nothing, as the interval spans zero",
     "no equal loops": "only a minor loop traced three times in equal time would show it; there is none",
     "at bound": "a parameter, or the interval of one, is at the end of the range that was searched",

@@ -979,6 +979,31 @@ def test_what_speaks_against_a_cause_is_written_beside_it(
 
 
 @pytest.mark.parametrize(
+    ("name", "left", "gain", "doubted"),
+    [
+        ("viscous", 168.0, 0.74, True),
+        ("viscous", 168.0, 0.76, False),
+        ("viscous", 165.0, 0.74, False),  # two fifths of it are more than the quick noise of 100
+        ("field-lag", 168.0, 0.74, False),
+    ],
+)
+def test_what_only_imitates_a_force_by_speed_predicts_little(monkeypatch, name, left, gain, doubted):
+    """Five of five false ones of 120 blind cases predicted at most 0.7, true ones 0.89 and more."""
+    monkeypatch.setattr(rivals, "rivals", lambda state, term: ())
+    current = replace(_fit(left), terms=(Term(CAUSE[name], (0.02, 0.01)[: len(CAUSE[name].parameters)]),))
+    state = _state(
+        current,
+        without={name: _fit(800.0)},
+        p_values={name: 0.006},
+        estimates={name: (TAU,)},
+        held_out=HeldOut(gain),
+    )
+    (found,) = rivals.stage(state).findings
+    assert (found.doubts == ("imitates",)) is doubted
+    assert found.in_doubt is doubted
+
+
+@pytest.mark.parametrize(
     ("name", "lacks", "left", "squares", "doubted"),
     [
         ("creep", (*POOR, "quick noise"), 120.0, 389.0, False),

@@ -150,6 +150,7 @@ class Cause:
     jagged: ClassVar[bool] = False  # leaves what no refit can take away: then what is left is its own
     common: ClassVar[bool] = False  # most devices have some of it: a record that cannot show it says little
     widens: ClassVar[bool] = False  # at one single rate it is just a wider loop, like all others of that kind
+    imitates: ClassVar[bool] = False  # whatever a device does as it moves
     drifts: ClassVar[bool] = False  # slower than any loop: what wanders at random looks like it
     moves_zero: bool = False  # as well as the gain: so may what settles and looks like it
     sudden: ClassVar[bool] = False  # a change at a moment, its last parameter

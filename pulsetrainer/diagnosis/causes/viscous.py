@@ -45,6 +45,7 @@ class Viscous(OfKinds):
     order = 90
     family = "viscous"
     widens = True
+    imitates = True
     number = "exponent"
     meant = "power of the speed (1: in proportion to it)"
     tried = (_LINEAR, _ROOT, _SQUARE)

@@ -16,6 +16,8 @@ What speaks against a cause that was found is written beside it:
 - it is slow, and what is left still wanders from one tenth of the time to the next;
 - it is slow and of the record, and all causes together take away less than half of what can be lowered on
   blocks that were left out: a device of another kind leaves as much;
+- it follows the speed, as whatever a device does as it moves: more than the noise from sample to sample is
+  left, and of what the model leaves without it less than three quarters are predicted on blocks left out;
 - only equal loops would show it, and there are none;
 - a gain that wears off with time or with the way of the input fits as well; of a step: whatever settles from
   the beginning of the record;
@@ -45,6 +47,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little", "no equal loops"
 OWN_ERROR, STRONGEST, AT_BOUND, LEAVES_MORE = "own error", "strength at bound", "at bound", "leaves more"
 MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, IN_STEP = "spans zero", "may be wear", "settles", "in step"
+IMITATES = "imitates"
 
 
 def stage(state: State) -> State:
@@ -78,8 +81,7 @@ def _finding(state: State, term: Term) -> Finding:
 def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]:
     """Yield what speaks against a cause that was found: it is told, but with these words beside it."""
     cause, known = term.cause, state.estimates[term.cause.id]
-    if gain < 0 and cause.id not in state.by_contrast:  # the weights hold that: it predicts as well without
-        yield WORSE
+    yield from _of_its_prediction(state, cause, gain)
     if cause.by_contrast and not _equal_loops(state):
         yield NO_LOOPS
     if cause.drifts:
@@ -99,6 +101,16 @@ def _doubts(state: State, term: Term, gain: float, fall: float) -> Iterator[str]
         yield AT_BOUND
         if cause.lasting and fall < state.current.squares:
             yield LEAVES_MORE
+
+
+def _of_its_prediction(state: State, cause: Cause, gain: float) -> Iterator[str]:
+    """Yield what parts that were left out say against a cause."""
+    if gain < 0 and cause.id not in state.by_contrast:  # the weights hold that: it predicts as well without
+        yield WORSE
+    left = state.current.squares
+    slow = left - state.floor.quick.squares > LIMITS.slow_share * left  # much more than quick noise is left
+    if cause.imitates and slow and gain < PERCENT * LIMITS.learned_predicts:
+        yield IMITATES
 
 
 def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
