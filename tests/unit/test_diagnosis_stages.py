@@ -1432,7 +1432,8 @@ def _asked_again(monkeypatch, shares):
     monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
     names = ("creep", "thermal-drift", "output-lag", "step")
     findings = tuple(_finding(name, 20.0) for name in names)
-    return repetition.stage(_state(_fit(500.0, *names), findings=findings))
+    state = _state(_fit(500.0, *names), findings=findings, without={"step": _fit(700.0)})
+    return repetition.stage(state)
 
 
 def test_what_repeats_least_goes_first(monkeypatch):
@@ -1507,11 +1508,21 @@ def test_a_slow_fault_that_the_rest_of_the_model_holds_is_none(monkeypatch, name
     others = [] if beside is None else [_finding(beside, 80.0)]
     names = [one.cause.id for one in others]
     state = _state(_fit(500.0, *names, name), findings=(*others, _finding(name, 10.0)))
-    after = repetition.stage(state)
+    after = repetition.stage(replace(state, without={name: _fit(600.0)}))
     assert after.findings[-1].found is found
     assert after.current.names == ((*names, name) if found else tuple(names))
     # it may be there all the same
     assert [(one.kind, one.cause) for one in after.evidence] == ([] if found else [("held", name)])
+
+
+def test_a_step_below_what_the_levels_leave_is_not_held(monkeypatch):
+    """Beside coarse steps the floor is above all that is left, so shares of what is above it tell nothing."""
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    monkeypatch.setattr(repetition, "squares_added", lambda *_: 100.0)
+    finding, floor = _finding("step", 100.0), replace(FLOOR, white=10.0)
+    state = _state(_fit(200.0, "step"), _fit(300.0), findings=(finding,), floor=floor)
+    after = repetition.stage(replace(state, without={"step": _fit(300.0)}))
+    assert after.findings == (finding,)
 
 
 def _refitted(problem, terms, near) -> Fit:
@@ -1527,7 +1538,8 @@ def test_a_step_beside_what_is_gone_is_asked_again_whether_it_settles(monkeypatc
     monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: settles and len(state.current.terms) == 1)
     findings = (_finding("step", 2.0), _finding("thermal-drift", 9.0, doubts=(rivals.MAY_BE_NOTHING,)))
-    after = repetition.stage(_state(_fit(500.0, "step", "thermal-drift"), findings=findings))
+    state = _state(_fit(500.0, "step", "thermal-drift"), findings=findings, without={"step": _fit(520.0)})
+    after = repetition.stage(state)
     assert [one.found for one in after.findings] == [True, False]
     assert after.findings[0].doubts == ((rivals.SETTLES,) if settles else ())
     assert after.findings[0].explains_percent == pytest.approx(30.0)

@@ -116,7 +116,7 @@ def _is_held(state: State, finding: Finding) -> bool:
     term = next((one for one in state.current.terms if one.cause is finding.cause), None)
     if term is None or not (term.cause.drifts and term.cause.corrects):
         return False
-    fall = finding.explains_percent / PERCENT * state.floor.reducible(state.baseline)
+    fall = state.without[finding.cause.id].squares - state.current.squares
     return fall < LIMITS.held_by_the_rest * squares_added(state, term)
 
 
