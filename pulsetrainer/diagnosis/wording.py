@@ -66,7 +66,7 @@ TEXTS: Mapping[str, str] = {
         "What is left can be fitted by a learned dependence, but that did not repeat when whole pieces of "
         "the time were left out: it is not taken for a property of the device"
     ),
-    "largest": "The remaining error is largest {place}, {times:.1f} times its smallest value.",
+    "largest": "The remaining error is largest {place}: {times:.1f} times the error where it is smallest.",
     "quick": (
         "Quick screen: no cause was fitted together with the model, so strengths are rough: off by a tenth "
         "or more."
