@@ -1909,6 +1909,13 @@ def test_a_model_of_the_very_record_is_not_of_another_condition(monkeypatch, fit
     assert told == ["given worse, own" if own else "given worse"]
 
 
+def test_a_model_of_the_very_record_that_is_far_off_is_unknown(monkeypatch):
+    """Nothing can have changed since: an output that accommodates was called `condition-change`."""
+    after = _given(monkeypatch, RAMP + 5.0, verdict="none", findings=(), fitted=-RAMP[3::2])
+    assert (after.verdict, _found(after)) == ("unknown", [])
+    assert after.evidence[0].kind == "given worse, own"
+
+
 @pytest.mark.parametrize(("back", "told"), [(0.019, "inconclusive"), (0.021, "condition-change")])
 def test_a_first_stroke_tells_no_other_condition(monkeypatch, back, told):
     """Nor where the input wiggles: it was said to be certain."""
@@ -2057,6 +2064,10 @@ def test_what_settles_speaks_against_a_step_and_wear_against_heat(monkeypatch, s
     doubts = tuple(rivals._doubts(state, state.current.terms[0], 1.0, 1.0))
     assert said in doubts
     assert replace(_finding(sudden, 1.0), doubts=(said,)).in_doubt is (sudden == "step")
+    monkeypatch.setattr(rivals, "rivals", lambda state, term: ("creep",))
+    state = replace(state, without={sudden: _fit(2.0)}, p_values={sudden: 0.006})
+    tied = rivals.stage(state).findings[0].confounded_with  # a gain that wears off is what accommodates
+    assert tied == (("creep",) if sudden == "step" else ("creep", "accommodation"))
 
 
 @pytest.mark.parametrize(

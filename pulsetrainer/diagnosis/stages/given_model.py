@@ -14,6 +14,7 @@ records.
 - If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), and a
   drift of the zero brings it near, that is the finding: refitted weights hide a drift that is over soon.
 - If it is far off where no input ever turned, nothing can be told: a first stroke is unlike all later ones.
+- If it is far off though it was identified from these very records, nothing changed, and that is `unknown`.
 - If it is far off without that, the device is in another condition: `condition-change` comes first. Where
   that is all but a thousandth of the squared error, other causes would only repair the rest of it, and are
   withdrawn. It is none where the causes found, added to what the model as given says, bring it near; nor
@@ -112,6 +113,10 @@ def _of_a_change(
         nothing = state.verdict == "none"
         said = Evidence("one stroke", figures={"given": PERCENT * given})
         return (replace(state, verdict="inconclusive") if nothing else state), [said]
+    if _is_its_own(state):  # nothing can have changed since
+        nothing = state.verdict in ("none", "inconclusive")
+        state = replace(state, verdict="unknown") if nothing else state
+        return state, _not_carried(state, judged)
     if _brought_near(state, judged, noise_rms):
         return state, []
     return _drifted(state, judged, changed, noise_rms) or _far_off(state, judged, changed, noise_rms)

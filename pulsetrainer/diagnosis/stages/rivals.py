@@ -19,7 +19,8 @@ What speaks against a cause that was found is written beside it:
 - it follows the speed, as whatever a device does as it moves: more than the noise from sample to sample is
   left, and of what the model leaves without it less than three quarters are predicted on blocks left out;
 - only equal loops would show it, and there are none;
-- a gain that wears off with time or with the way of the input fits as well; of a step: whatever settles from
+- a gain that wears off with time or with the way of the input fits as well, so that it could equally be
+  `accommodation`; of a step: whatever settles from
   the beginning of the record;
 - the record has one rate and no rest, where any cause looks like what a model lacks of the device, and the
   cause explains little more than what is left and slow, or that is more than noise.
@@ -34,6 +35,7 @@ import numpy as np
 
 from pulsetrainer.diagnosis import residual, wear
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.accommodation import Accommodation
 from pulsetrainer.diagnosis.causes.base import Cause, Quantity
 from pulsetrainer.diagnosis.congruency import loops_of
 from pulsetrainer.diagnosis.doubt import doubt
@@ -66,15 +68,19 @@ def _finding(state: State, term: Term) -> Finding:
     name = term.cause.id
     without = state.without[name]
     gain = PERCENT * state.held_out.gain(without, state.current, state.floor)
+    doubts = tuple(_doubts(state, term, gain, without.squares - state.current.squares))
+    tied = () if name in state.by_contrast else rivals(state, term)
+    if MAY_BE_WEAR in doubts and Accommodation.id not in (*tied, *state.current.names):
+        tied = (*tied, Accommodation.id)
     return Finding(
         term.cause,
         found=True,
         p_value=state.p_values[name],
         explains_percent=state.explains(without.squares - state.current.squares),
         parameters=state.estimates[name],
-        confounded_with=() if name in state.by_contrast else rivals(state, term),
+        confounded_with=tied,
         held_out_gain_percent=gain,
-        doubts=tuple(_doubts(state, term, gain, without.squares - state.current.squares)),
+        doubts=doubts,
     )
 
 
