@@ -13,6 +13,7 @@ from pulsetrainer.core.plane import FloatArray, Plane, finite_vector
 from pulsetrainer.errors import ArgumentError
 
 _LITTLE = 0.1  # of the cells
+_MISSING = 0.05  # of the range: smooth weights go on so far
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,13 @@ def little_words(share: float) -> str:
     what = f"only {100 * share:.1f} % of the cells are switched"
     good = "a model of this record holds for its own strokes"
     return f"{what}: {good}. Record the whole range down and up, with loops within it"
+
+
+def covers_range(inputs: Sequence[FloatArray], low: float, high: float) -> bool:
+    """Tell whether inputs (n,) together come near both ends of [low, high]: within a twentieth of it."""
+    slack = _MISSING * (high - low)
+    lowest, highest = min(float(u.min()) for u in inputs), max(float(u.max()) for u in inputs)
+    return lowest <= low + slack and highest >= high - slack
 
 
 def coverage(plane: Plane, inputs: Sequence[ArrayLike]) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from pulsetrainer.artefacts import (
     Recorded,
 )
 from pulsetrainer.artefacts.units import unit_of, with_unit
-from pulsetrainer.core.coverage import coverage
+from pulsetrainer.core.coverage import coverage, covers_range
 from pulsetrainer.core.initial_state import estimated_start
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
@@ -28,7 +28,7 @@ from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
-from pulsetrainer.diagnosis.forms import static_behind
+from pulsetrainer.diagnosis.forms import completed, static_behind
 from pulsetrainer.diagnosis.learned import learned
 from pulsetrainer.diagnosis.prediction import operator_of
 from pulsetrainer.diagnosis.raw import noise_of
@@ -258,7 +258,10 @@ def _profiles(state: State, words: Words) -> tuple[Profile, ...]:
 
 
 def extended_model(state: State, model: Model) -> Model:
-    """Return the model with the causes that repeat, its static part identified again from what they leave."""
+    """Return the model with the causes that repeat, its static part identified again from what they leave.
+
+    Where the records leave out a part of the model's range, its cells there stay as they were given.
+    """
     lasting = state.extensions
     assert state.question.given is not None
     assert state.repeated is not None
@@ -272,11 +275,15 @@ def extended_model(state: State, model: Model) -> Model:
     behind = static_behind(state.repeated, known, model, scale)
     found = behind.identified.operator
     remembered = [one.output if model.form == "dual" else one.input for one in behind.records]
+    covered = coverage(found.plane, remembered)
+    if not covers_range([one.input for one in state.problem.records], 0.0, 1.0):
+        found = completed(found, covered, operator_of(model), remembered)
+        covered = covered | model.covered if found.weights.size == covered.size else model.covered
     return Model(
         edges=found.plane.edges,
         weights=found.weights,
         offset=found.offset,
-        covered=coverage(found.plane, remembered),
+        covered=covered,
         form=model.form,
         weights_unit=model.weights_unit,
         input_unit=model.input_unit,

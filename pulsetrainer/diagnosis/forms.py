@@ -13,16 +13,19 @@ would have given.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
 from pulsetrainer.artefacts import Model
 from pulsetrainer.core import input_noise
+from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.fit import Fitted as StaticFit
 from pulsetrainer.core.fit import fit
 from pulsetrainer.core.forms import Form
-from pulsetrainer.core.plane import FloatArray
+from pulsetrainer.core.operator import Preisach
+from pulsetrainer.core.plane import BoolArray, FloatArray
 from pulsetrainer.diagnosis.extended import Term, seen_input
 from pulsetrainer.diagnosis.fitting import Fitted
 from pulsetrainer.diagnosis.prediction import operator_of
@@ -69,3 +72,19 @@ def static_behind(found: Fitted, known: Sequence[Term], model: Model, scale: Sca
         kept.append(record.counts)
     operator, form = operator_of(model), cast("Form", model.form)
     return fit(signals, operator.low, operator.high, model.levels, form=form, kept=kept)
+
+
+def completed(
+    found: Preisach, covered: BoolArray, given: Preisach | Dual, inputs: Sequence[FloatArray]
+) -> Preisach:
+    """Return a static part whose cells that inputs (n,) never ``covered`` (q,) are those of the one given.
+
+    Those cells stay as they are in the records, so they only shift the output, which the offset undoes. On
+    other levels cells cannot be exchanged: the one given is kept whole.
+    """
+    own = given.inner if isinstance(given, Dual) else given
+    if not np.array_equal(found.plane.edges, own.plane.edges):
+        return own
+    both = replace(found, weights=np.where(covered, found.weights, own.weights))
+    shift = float(np.mean(np.concatenate([found(u) - both(u) for u in inputs])))
+    return replace(both, offset=both.offset + shift)

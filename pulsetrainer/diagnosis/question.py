@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Model, Run
-from pulsetrainer.artefacts.units import same_units, units_of
+from pulsetrainer.artefacts.units import same_units, units_of, with_unit
+from pulsetrainer.core.coverage import covers_range
 from pulsetrainer.core.initial_state import first_stroke_words, known_from
 from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.core.record import Record
@@ -51,12 +52,22 @@ def question_of(
             notes.append(f"{name}: {run.gap_words}")
         if not run.complete:
             notes.append(f"{name} is incomplete; diagnosing the {run.input.size} samples it has")
+    if not covers_range([one.input for one in records], low, high):
+        notes.append(_outside_words(records, model_name, model.input_unit, low, high))
     ours = all(
         run.reference is not None and (run.input_quantity, run.output_quantity) == ("current", "force")
         for run in runs
     )
     given = Given(model, runs[0].input_quantity, runs[0].output_quantity, ours, tuple(fingerprints))
     return Question(records, low, high, rng, quick, progress, given, tuple(notes), stamps, corrected)
+
+
+def _outside_words(records: Sequence[Record], model_name: str, unit: str, low: float, high: float) -> str:
+    """Say that records leave out a part of a model's range, and what comes of it."""
+    inputs = np.concatenate([one.input for one in records])
+    reached = with_unit(f"{inputs.min():.4g} .. {inputs.max():.4g}", unit)
+    whole = with_unit(f"{low:.4g} .. {high:.4g}", unit)
+    return f"the input covers {reached} of the {whole} of {model_name}, whose weights beyond stay as they are"
 
 
 def _check_fits(name: str, run: Run, model_name: str, model: Model) -> None:

@@ -231,14 +231,15 @@ def _check(drive: Waveform, repeats: int) -> None:
     if repeats < 1:
         raise ArgumentError(f"repeats must be at least 1, got {repeats}", hint="5 is usual")
     check_size(repeats, 2 * drive.compensated.size)
-    check_current(drive)
+    check_drive(drive)
 
 
-def check_current(drive: Waveform) -> None:
-    """Raise DataError where the input of a drive is not in A."""
-    if drive.input_unit != "A":
+def check_drive(drive: Waveform) -> None:
+    """Raise DataError where a drive is not of a current in A that is to give a force in N."""
+    if (drive.input_unit, drive.output_unit) != ("A", "N"):
         raise DataError(
-            f"the drive {drive.name} is in {drive.input_unit}; the device takes a current in A",
+            f"the drive {drive.name} is of a device from {drive.input_unit} to {drive.output_unit}; this one "
+            "takes a current in A and gives a force in N",
             hint="identify and invert a run that was captured on the device",
         )
 

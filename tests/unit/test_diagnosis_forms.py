@@ -12,11 +12,13 @@ from scipy.signal import lfilter
 
 import pulsetrainer as pt
 from pulsetrainer.artefacts import Extension, Parameter
+from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.extended import Extended
+from pulsetrainer.diagnosis.forms import completed
 from pulsetrainer.errors import DataError
 
 RATE_HZ, NOISE = 100.0, 0.003
@@ -201,3 +203,22 @@ def test_a_pulse_that_moves_less_than_the_output_wanders_is_refused():
     wandering = replace(model, extensions=(Extension("creep", parameters),))
     with pytest.raises(DataError):
         pt.invert("normal", wandering)
+
+
+@pytest.mark.parametrize("polarity", [1, -1])
+def test_what_records_never_reach_stays_as_it_was_given(polarity):
+    """Up to 0.6 the one found holds, beyond that given: its cells there had lost their weight."""
+    plane, rng = Plane.uniform(0.0, 1.0, 10), np.random.default_rng(7)
+    given = Preisach(plane, rng.uniform(1.0, 2.0, plane.areas.size), 0.5, polarity=polarity)
+    u = np.interp(np.linspace(0.0, 6.0, 601), np.arange(7), [0.0, 0.6, 0.0, 0.5, 0.2, 0.6, 0.0])
+    covered = coverage(plane, [u])
+    found = replace(given, weights=np.where(covered, 1.1 * given.weights, 0.0), offset=0.3)
+    both = completed(found, covered, given, [u])
+    np.testing.assert_allclose(both(u), found(u), atol=1e-12)
+    stroke = np.linspace(0.6, 1.0, 41)
+    rises = [np.diff(one(np.append(0.0, stroke))[1:]) for one in (both, given)]
+    assert np.all(polarity * rises[0] > 0.0)
+    np.testing.assert_array_equal(both.weights[~covered], given.weights[~covered])
+    other = Preisach(Plane.uniform(0.0, 1.0, 8), np.ones(36), 0.5, polarity=polarity)
+    assert completed(found, covered, other, [u]) is other
+    np.testing.assert_array_equal(completed(found, covered, Dual(given), [u])(u), both(u))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,10 @@ import report_examples
 import store_examples as examples
 
 import pulsetrainer as pt
-from pulsetrainer.errors import PulsetrainerError
+from pulsetrainer.errors import DataError, PulsetrainerError
 from pulsetrainer.report.planned import to_be_played
 from pulsetrainer.report.results import inverted
-from pulsetrainer.steps.play import ErrorsSoFar, plan
+from pulsetrainer.steps.play import ErrorsSoFar, check_drive, plan
 
 KEPT = Path(__file__).parents[1] / "data" / "files-0.1"
 
@@ -48,6 +49,15 @@ def test_a_small_pulse_is_told_with_the_strokes_before_it():
     assert rows["force"] == f"2.000 .. 3.000 N; before it up to {largest:.3f} N, by the model"
     whole = pt.invert("normal", model)
     assert "before" not in inverted(Path("drive.h5"), whole)[2]["force"]
+
+
+@pytest.mark.parametrize("units", [("V", "N"), ("A", "mT")])
+def test_a_drive_of_another_device_is_not_played(units):
+    """Nor refined: 9 mT were pressed as 9 N."""
+    drive = replace(examples.waveform(400), input_unit=units[0], output_unit=units[1])
+    for verb in (partial(plan, repeats=1), check_drive):
+        with pytest.raises(DataError, match=f"from {units[0]} to {units[1]}"):
+            verb(drive)
 
 
 def test_no_repeat_is_no_play():
