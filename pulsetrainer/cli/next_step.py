@@ -71,7 +71,9 @@ def next_step(problem: PulsetrainerError) -> str:
         return f"restore it from a copy, or make it again {how}"
     if isinstance(problem, NotAnArtefactError):
         if problem.path.suffix.lower() in _TABLES:
-            return f"import the table first: pulsetrainer import {shlex.quote(str(problem.path))} -o run.h5"
+            table = shlex.quote(str(problem.path))
+            columns = "--input COLUMN --output COLUMN"
+            return f"import the table first: pulsetrainer import {table} {columns} -o run.h5"
         elsewhere = "a recording from elsewhere comes in with `pulsetrainer import`"
         return f"give a file that pulsetrainer wrote; {elsewhere}"
     return problem.hint

@@ -11,7 +11,7 @@ from matplotlib.ticker import NullFormatter, StrMethodFormatter
 from pulsetrainer.artefacts import Cause, Dependence, Diagnosis, FloatArray, Profile
 from pulsetrainer.core.plane import BoolArray
 from pulsetrainer.report import panels
-from pulsetrainer.report.diagnosis_text import answer, explains
+from pulsetrainer.report.diagnosis_text import answer, explains, in_doubt
 from pulsetrainer.report.style import (
     BLUE,
     COLUMN_IN,
@@ -46,7 +46,8 @@ def course(found: Diagnosis) -> Figure:
     above.set_ylabel(label(found.output_quantity or panels.quantity_of(found.output_unit), found.output_unit))
     causes = [one.cause for one in found.found]
     verdict = ", ".join(causes) if found.verdict in causes else found.verdict
-    above.set_title(f"verdict: {verdict}{' (quick screen)' if found.quick else ''}", wrap=True)
+    how = " (quick screen)" if found.quick else " (in doubt)" if in_doubt(found) else ""
+    above.set_title(f"verdict: {verdict}{how}", wrap=True)
     panels.headroom(above)
     panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="without causes")
     if found.extended_percent < found.static_percent:

@@ -29,6 +29,9 @@ def render_diagnosis(found: Diagnosis, *, commands: Sequence[str] = (), **header
 
 def headline(found: Diagnosis) -> str:
     """Return the verdict in few words; what each cause found means stands below them."""
+    if found.verdict in ("none", "inconclusive") and found.found:
+        shown = ", ".join(dict.fromkeys(one.cause for one in found.found))
+        return f"No verdict: {shown} can be seen, but it is in doubt or no larger than the noise."
     if found.verdict == "none":
         limits = ", but they could not have shown everything: see what they lack" if found.lacks else ""
         return f"These recordings show nothing wrong with the model{limits}."

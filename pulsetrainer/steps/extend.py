@@ -50,14 +50,14 @@ def extend(
     """
     model_name, diagnosis_name = named(names, ("the model", "the diagnosis"))
     extended = diagnosis.extended
-    if extended is None:
-        raise _nothing_in(diagnosis, diagnosis_name)
     if diagnosis.model not in ("", model.fingerprint):  # files of 0.1 do not name theirs
         raise DataError(
             f"{model_name} is not the model that {diagnosis_name} is of",
             hint="give the model that was diagnosed, which pulsetrainer show DIAGNOSIS.h5 tells, or diagnose "
             "this one: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o new-diagnosis.h5",
         )
+    if extended is None:
+        raise _nothing_in(diagnosis, diagnosis_name)
     # the levels of a dual model lie on the output, and a refit moves them
     ends = model.edges[[0, -1]]
     same_range = model.form == "dual" or np.allclose(extended.edges[[0, -1]], ends, atol=1e-8 * np.ptp(ends))
