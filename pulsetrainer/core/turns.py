@@ -107,8 +107,6 @@ def _span(signals: Sequence[FloatArray]) -> float:
 def _ends_lie_at_samples(u: FloatArray, tips: FloatArray) -> bool:
     """Whether most turns at the ends of an input (n,) lie at one value as measured, fewer at their tips."""
     turns = turning_points(u)[:-1]
-    if turns.size == 0:
-        return False
     step = np.maximum(np.abs(u[turns] - u[turns - 1]), np.abs(u[turns + 1] - u[turns]))
     near = [turns[u[turns] > u.max() - step], turns[u[turns] < u.min() + step]]
     told = [own for own in near if own.size >= _AGAIN]

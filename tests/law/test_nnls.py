@@ -121,6 +121,16 @@ def test_kkt_violation_tells_right_from_wrong(problem):
     assert nnls.kkt_violation(gram, rhs, at_work) == pytest.approx(expected, rel=1e-9)
 
 
+def _hardly_different(seed, empty=()):
+    """Twice cumulated columns, some of them empty, and a right side that they make but for noise."""
+    rng = np.random.default_rng(seed)
+    rows, columns = int(rng.integers(20, 60)), int(rng.integers(20, 60))
+    matrix = np.cumsum(np.cumsum(rng.normal(size=(rows, columns)), axis=1), axis=0)
+    matrix *= 10.0 ** rng.uniform(-3, 0, columns)
+    matrix[:, list(empty)] = 0.0
+    return matrix, matrix @ np.maximum(rng.normal(size=columns), 0.0) + 1e-3 * rng.normal(size=rows)
+
+
 @pytest.mark.parametrize("seed", [10047, 10069, 10125, 10250, 10417, 10505, 10627])
 def test_cells_that_hardly_differ_settle(monkeypatch, seed):
     """Twice cumulated columns, fewer samples than cells: descent that only puts to zero what falls stalls.
@@ -128,11 +138,8 @@ def test_cells_that_hardly_differ_settle(monkeypatch, seed):
     A ridge would settle it at another point: the conditions hold to rounding, after few systems. No step of
     the descent leaves the non-negative, or climbs.
     """
-    rng = np.random.default_rng(seed)
-    rows, columns = int(rng.integers(20, 60)), int(rng.integers(20, 60))
-    matrix = np.cumsum(np.cumsum(rng.normal(size=(rows, columns)), axis=1), axis=0)
-    matrix *= 10.0 ** rng.uniform(-3, 0, columns)
-    right = matrix @ np.maximum(rng.normal(size=columns), 0.0) + 1e-3 * rng.normal(size=rows)
+    matrix, right = _hardly_different(seed)
+    columns = matrix.shape[1]
     gram, rhs = matrix.T @ matrix, matrix.T @ right
     ways, is_lower = [], nnls._Problem.is_lower
     monkeypatch.setattr(
@@ -147,6 +154,23 @@ def test_cells_that_hardly_differ_settle(monkeypatch, seed):
     _, norm = optimize.nnls(matrix, right, maxiter=10_000)
     left = np.sum((matrix @ found.x - right) ** 2)
     assert left <= norm**2 + 1e-12 * (right @ right)
+
+
+@pytest.mark.parametrize("seed", [10047, 10069, 10125, 10250, 10417, 10505, 10627])
+def test_systems_are_counted_and_no_more_are_solved_than_may_be(monkeypatch, seed):
+    """By exchanges and by descent together; one system fewer leaves the end to the active set."""
+    matrix, right = _hardly_different(seed)
+    gram, rhs = matrix.T @ matrix, matrix.T @ right
+    solved, minimise = [], nnls.Gram.minimise
+    monkeypatch.setattr(
+        nnls.Gram, "minimise", lambda own, rhs, free: solved.append(free) or minimise(own, rhs, free)
+    )
+    found = nnls.solve(gram, rhs)
+    assert found.iterations == len(solved)
+    for most in (found.iterations, found.iterations - 1):
+        solved.clear()
+        nnls.solve(gram, rhs, max_iterations=most)
+        assert len(solved) == most
 
 
 @pytest.mark.parametrize("rounding", [1e-15, 1e-12, 1e-9])
@@ -171,12 +195,7 @@ def test_twins_are_not_exchanged_for_one_another_by_rounding(seed):
 @pytest.mark.parametrize(("seed", "systems"), [(10250, 13), (10417, 9), (10505, 9)])
 def test_where_nothing_settles_a_ridge_ends_it(monkeypatch, seed, systems):
     """The same kind of columns and an empty one: near the minimum, after fewer systems."""
-    rng = np.random.default_rng(seed)
-    rows, columns = int(rng.integers(20, 60)), int(rng.integers(20, 60))
-    matrix = np.cumsum(np.cumsum(rng.normal(size=(rows, columns)), axis=1), axis=0)
-    matrix *= 10.0 ** rng.uniform(-3, 0, columns)
-    matrix[:, 3] = 0.0
-    right = matrix @ np.maximum(rng.normal(size=columns), 0.0) + 1e-3 * rng.normal(size=rows)
+    matrix, right = _hardly_different(seed, empty=[3])
     gram, rhs = matrix.T @ matrix, matrix.T @ right
     monkeypatch.setattr(optimize, "nnls", _out_of_iterations)
     found = nnls.solve(gram, rhs, max_iterations=systems)

@@ -56,6 +56,13 @@ def test_recorded_pulses(name, count, length):
     assert 0.85 * height < np.ptp(mean.value) <= height
 
 
+@pytest.mark.parametrize(("n", "first"), [(5, 1), (6, 0)])
+def test_a_record_as_long_as_the_smoothing_is_read_as_it_is(n, first):
+    """A spike, samples 5 ms apart: its foot is beside it; parabolas over 20 ms move it where more is read."""
+    value = (np.arange(n) == 2).astype(float)
+    assert find_beats(Shape("spike", 0.005 * np.arange(n), value)).feet[0] == first
+
+
 @given(
     beats=st.integers(2, 9),
     rate=st.integers(60, 500),

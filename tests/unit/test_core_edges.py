@@ -49,6 +49,17 @@ def test_edges_crowd_where_the_loop_is_steep():
     assert np.array_equal(edges.plane_for([gentle], 0.0, 1.0, 20).edges, np.linspace(0.0, 1.0, 21))
 
 
+@pytest.mark.parametrize("jump", [0.501, 0.999])
+def test_edges_crowd_within_the_192nd_of_the_range_that_holds_a_jump(jump):
+    """No finer: half of the edges, and one in 192 of the others, lie there at even steps."""
+    u = np.concatenate(([0.0, jump - 1e-6, jump + 1e-6, 1.0], [jump + 1e-6, jump - 1e-6, 0.0]))
+    edges_there = edges.plane_for([Record(u, np.where(u > jump, 1.0, 0.0))], 0.0, 1.0, 384).edges
+    first = np.floor(192 * jump) / 192
+    inside = edges_there[(edges_there >= first - 1e-9) & (edges_there <= first + 1 / 192 + 1e-9)]
+    assert abs(inside.size - 193) <= 1
+    assert np.diff(inside) == pytest.approx(1 / 192 / 193, rel=1e-6)
+
+
 def test_a_thinned_plane_crowds_alike():
     """Every other edge of an even number; a plane that is small enough stays what it is."""
     plane = Plane(np.cumsum(np.arange(1.0, 14.0)))

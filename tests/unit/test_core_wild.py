@@ -91,13 +91,15 @@ def test_coarse_steps_are_not_wild():
     assert not (found.wild_input | found.wild_output).any()
 
 
-def test_a_rare_flicker_of_a_coarse_converter_is_not_wild():
-    """Twenty steps of 500 samples; some samples read the next step. What reads the fourth is wild."""
+@pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
+def test_a_rare_flicker_of_a_coarse_converter_is_not_wild(unit):
+    """Twenty steps of 500 samples; some read the next step. What is further off is wild, in any unit."""
     held = np.repeat(np.arange(20.0), 500)
     flicker = held + (np.arange(held.size) % 125 == 60)
-    assert not wild.isolated(flicker).any()
-    flicker[4321] += 4.0
-    assert np.flatnonzero(wild.isolated(flicker)).tolist() == [4321]
+    assert not wild.isolated(unit * flicker).any()
+    for far, found in ((1.4, []), (1.6, [4321]), (4.0, [4321])):
+        flicker[4321] = held[4321] + far
+        assert np.flatnonzero(wild.isolated(unit * flicker)).tolist() == found
 
 
 @pytest.mark.parametrize("far", [0.0, 10.0])
@@ -260,10 +262,14 @@ TURNING = np.interp(np.arange(2000), np.arange(0, 2040, 40), np.arange(51) % 2) 
     ],
 )
 def test_what_comes_at_turns_is_not_wild(found, left):
-    """Where it does so more often than chance has it; a share of 7 in 40 of all samples is at a turn."""
+    """Where it does so more often than chance has it; a share of 7 in 40 of all samples is at a turn.
+
+    The unit of the input does not matter.
+    """
     mask = np.zeros(TURNING.size, dtype=bool)
     mask[found] = True
-    assert np.flatnonzero(wild.by_chance(mask, TURNING, 1.0)).tolist() == left
+    for unit in (1.0, 0.01, 100.0):
+        assert np.flatnonzero(wild.by_chance(mask, unit * TURNING, unit)).tolist() == left
 
 
 def test_a_kick_after_every_turn_is_not_wild():
