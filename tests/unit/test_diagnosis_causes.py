@@ -577,10 +577,22 @@ def test_short_ramps_between_rests_are_no_jumps(rest):
 def test_jumps_below_the_noise_and_short_records_show_nothing():
     """Seven standard deviations of the difference of two means of six samples; twenty such means."""
     deviation = 7.0 * np.sqrt(2.0 / 6.0) * 0.01
-    assert _fires("stick-slip", *_stairs(30, 0.5, 1.6 * deviation, 0.01))
-    assert not _fires("stick-slip", *_stairs(30, 0.5, 0.5 * deviation, 0.01))
+    assert _fires("stick-slip", *_stairs(30, 0.5, 1.2 * deviation, 0.01))
+    assert not _fires("stick-slip", *_stairs(30, 0.5, 0.8 * deviation, 0.01))
     y, u = _stairs(30, 0.5)
     assert not _fires("stick-slip", y[:119], u[:119])
+
+
+@pytest.mark.parametrize(("deviations", "fires"), [(5.0, False), (9.0, True)])
+def test_slow_noise_at_rest_tells_how_large_jumps_must_be(deviations, fires):
+    """Eight ramps with rests: there two means of six samples differ by noise that single samples hide."""
+    n = np.arange(500)
+    u = np.concatenate([0.25 * k + np.append(5e-4 * n, np.full(500, 0.25)) for k in range(8)])
+    noise = np.convolve(np.random.default_rng(5).standard_normal(u.size + 39), np.full(40, 1 / 40), "valid")
+    mean = np.convolve(noise, np.full(6, 1 / 6), "valid")
+    jumps = np.ravel([1000 * k + np.arange(100, 401, 75) for k in range(8)])
+    y = deviations * np.std(mean[6:] - mean[:-6]) * np.searchsorted(jumps, np.arange(u.size), side="right")
+    assert _fires("stick-slip", y + noise, u) is fires
 
 
 def test_gates_do_not_see_what_blinds_them():
@@ -591,6 +603,7 @@ def test_gates_do_not_see_what_blinds_them():
     y[100::300] += 50.0
     fired = {one.cause: one for one in gates.check(_raw(y, u).record, 0.0, 3.0)}
     assert set(fired) == {"outliers", "stick-slip"}
+    assert fired["stick-slip"].figures["count"] == 30
     piled = np.concatenate((y, np.random.default_rng(3).permutation(_piled(60, 0)) + 100.0))
     u = np.concatenate((u, np.full(3060, 2.0)))
     names = [one.cause for one in gates.check(_raw(piled, u).record, 0.0, 3.0)]

@@ -400,6 +400,18 @@ def test_a_cell_that_is_on_throughout_is_no_crash():
     assert np.all(usual > 0.0)
 
 
+def test_a_parameter_that_changes_nothing_stays_what_it_is():
+    """Whatever is left out: it has no variance, and the others have theirs."""
+    u = np.tile(_loops(), 4)
+    rng = np.random.default_rng(3)
+    problem = problem_for([Record(u, 3.0 * u + 0.01 * rng.standard_normal(u.size), dt_s=0.01)], 0.0, 1.5)
+    fitted = refit(problem, (Term(CAUSE["field-lag"], (0.02,)),), None, rounds=2)
+    more = replace(fitted)
+    vars(more)["slopes"] = np.hstack((fitted.slopes, np.zeros_like(fitted.slopes)))
+    (usual,) = HeldOut(problem).jackknife(fitted)
+    assert HeldOut(problem).jackknife(more) == pytest.approx([usual, 0.0], rel=1e-9)
+
+
 class _Fit:
     """A fit that is the same as itself only."""
 

@@ -2139,3 +2139,17 @@ def test_what_the_model_says_of_its_record_is_told_once():
     assert answered._said(model, ["F follows the velocity.", "more."]) == ("F follows the velocity.", "more.")
     assert answered._said(model, ["more."]) == ("Of the model as given: F follows the velocity.", "more.")
     assert answered._said(SimpleNamespace(fit=None), ["more."]) == ("more.",)
+
+
+@pytest.mark.parametrize(
+    ("found", "extends", "gain"), [(True, True, 90.0), (False, True, None), (True, False, None)]
+)
+def test_all_causes_together_have_a_gain_where_they_extend_the_model(found, extends, gain):
+    """In per cent; no number where nothing was found, or where the model is not extended by it."""
+    baseline = _fit(500.0)
+    current = _fit(300.0) if found else baseline
+    state = SimpleNamespace(
+        baseline=baseline, current=current, extends=extends, held_out=HeldOut(0.9), floor=None
+    )
+    told = answered._held_out_gain(state)
+    assert np.isnan(told) if gain is None else told == pytest.approx(gain)
