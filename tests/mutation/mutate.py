@@ -81,7 +81,7 @@ PACKAGES = {  # the tests that answer for a package
     ),
     "artefacts": (
         *(f"{UNIT}{one}*.py" for one in ("artefacts", "diagnosis_text", "figures", "file", "quiz")),
-        *(f"{UNIT}{one}*.py" for one in ("series", "store", "table", "unlisted", "units")),
+        *(f"{UNIT}{one}*.py" for one in ("series", "store", "table", "unlisted", "units", "unseen_turns")),
         "tests/api",
     ),
     "steps": (

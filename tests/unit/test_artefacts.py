@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import demo
 import numpy as np
 import pytest
 import report_examples
@@ -12,6 +13,7 @@ import store_examples as examples
 
 from pulsetrainer.artefacts import Model, ModelEvaluation, Run, Waveform
 from pulsetrainer.artefacts.data import LARGEST, beyond_all_quantities
+from pulsetrainer.artefacts.evaluation import PUBLISHED
 from pulsetrainer.artefacts.time_steps import steps_of
 from pulsetrainer.core.record import Record
 from pulsetrainer.errors import DataError
@@ -76,10 +78,13 @@ def test_the_median_step_of_a_run():
 def test_what_nobody_says_is_nothing():
     """An artefact that is made with the least of arguments has lost nothing and changed nothing."""
     assert (examples.run().dropped_samples, examples.run().complete) == (0, True)
+    drive = examples.waveform()
+    assert (drive.kept, drive.passes, drive.notes, drive.model) == (0, (), (), None)
     played = examples.playback()
     assert (played.dropped_samples, played.complete, played.fault) == (0, True, "")
     session = examples.session()
     assert (session.dropped_samples, session.complete, session.fault) == (0, True, "")
+    assert (session.underruns, session.clipped_samples, session.notes) == (0, 0, ())
     fit = read(FOLDER / "model.h5", Model).fit  # its file has none of these
     assert (fit.masked_samples, fit.false_reversals, fit.stiffness, fit.offsets) == (0, 0, 0.0, ())
     assert (fit.spacing, fit.warning, fit.loop, fit.notes) == ("even", "", "", ())
@@ -127,6 +132,13 @@ def test_the_short_name_of_a_model(name):
     assert ModelEvaluation(name, 0.0, 0.0, 0.0, 0.0, None, np.zeros(1), np.zeros(1)).short_name == "best"
 
 
+def test_a_waveform_has_a_rate():
+    """Of one sample nothing is known of it: two are the fewest."""
+    assert examples.waveform(2).rate_Hz == pytest.approx(100.0)
+    with pytest.raises(DataError):
+        examples.waveform(1)
+
+
 def test_errors_of_a_drive_are_of_its_scored_force():
     """In percent of the largest target, either sign; what is not scored does not count."""
     target, scored = np.array([9.0, -4.0, 2.0, 0.0]), np.array([False, True, True, True])
@@ -158,3 +170,16 @@ def test_the_band_of_a_bootstrap_is_told_by_half_its_width():
     banded = replace(fit, predicted_lower=fit.predicted - 0.2, predicted_upper=fit.predicted + 0.4)
     assert banded.output_uncertainty == pytest.approx(0.3)
     assert replace(fit, predicted_lower=None, predicted_upper=None).output_uncertainty is None
+
+
+def test_an_error_is_told_in_differences_that_a_finger_notices():
+    """Seven per cent of the mean force: 3 % of 7 N beside a mean of 1.5 N are two of them."""
+    session = replace(examples.session(), mean_abs_error_percent=3.0, full_force=7.0, mean_force=1.5)
+    assert session.error_jnd == pytest.approx(2.0)
+
+
+def test_the_published_device_is_the_same_in_a_report_and_in_the_readme():
+    """Carneiro, Abreu, Restivo: what the demo's table compares with is what an evaluation compares with."""
+    assert {
+        pulse: {metric: row[pulse] for metric, row in demo.PUBLISHED.items()} for pulse in demo.PULSES
+    } == PUBLISHED
