@@ -12,6 +12,7 @@ from link_wire import within
 from pulsetrainer.device import player
 from pulsetrainer.device.codes import CURRENT_UNIT_A, PARAMETERS
 from pulsetrainer.device.device import Device
+from pulsetrainer.device.limits import check_peak
 from pulsetrainer.device.messages import GetParam
 from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.schemes import redact
@@ -175,6 +176,16 @@ def test_what_cannot_be_played_is_refused_before_arming(device, reference, rate_
         device.play(reference, rate_Hz)
     assert device._status().session == 0
     assert device.play([-0.000045, 0.1, 1.500045], 1000).complete  # nearer than half a count
+
+
+@pytest.mark.parametrize(
+    ("limit_A", "peak_A", "may_rise"), [(1.0, 1.2, True), (1.0, 1.6, False), (1.5, 1.6, False)]
+)
+def test_only_a_limit_that_was_lowered_can_be_raised(limit_A, peak_A, may_rise):
+    """And only as far as the device allows: a current beyond that needs another drive."""
+    with pytest.raises(ArgumentError) as caught:
+        check_peak(np.array([0.0, peak_A]), limit_A)
+    assert ("`limit_current_A`" in caught.value.hint) is may_rise
 
 
 def test_decimation_is_checked(device):

@@ -102,6 +102,22 @@ def test_a_fault_that_was_cleared_is_not_that_of_the_next_play():
     assert (trace.underrun, trace.fault_code) == (False, 0)
 
 
+@pytest.mark.parametrize("first", [Fault.UNDERRUN, Fault.HEARTBEAT])
+def test_a_play_is_known_by_its_first_fault(first):
+    """An underrun is what began it, whatever was worse on the way to rest."""
+    script = ScriptedDevice()
+    with script.open() as device:
+
+        def answer(command, usual):
+            if isinstance(command, m.Start):
+                script.status = {"state": State.FAULT, "fault": first, "worst": Fault.STRAY_CURRENT}
+            return usual
+
+        script.answer = answer
+        trace = device.play(np.full(100, 0.1), 1000)
+    assert (trace.underrun, trace.fault_code) == (first == Fault.UNDERRUN, first)
+
+
 def test_a_fault_of_the_last_play_is_cleared_by_the_next(device):
     """It was told when the play ended."""
     device.set_parameter("current_trip", 4000)

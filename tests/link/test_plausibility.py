@@ -165,10 +165,10 @@ def test_too_little_is_not_judged():
 )
 def test_how_far_the_current_moves_before_a_force_must_follow(rms_A, moves_s, slope, dead):
     """A tenth of an ampere within a second, half of it within five; half a newton per ampere is enough."""
-    time_s = np.arange(5000) / 1000
-    moves = np.sin(2 * np.pi * 5 * time_s) * (time_s >= 5.0 - moves_s)
+    time_s = np.arange(10_000) / 1000
+    moves = np.sin(2 * np.pi * 5 * time_s) * (time_s >= 10.0 - moves_s)
     current = 0.2 + np.sqrt(2.0) * rms_A * moves
-    force = 1.0 + slope * current + 1e-4 * (np.arange(5000) % 2)
+    force = 1.0 + slope * current + 1e-4 * (np.arange(10_000) % 2)
     assert ("does not follow" in judge_force(time_s, current, force)) is dead
 
 

@@ -46,6 +46,14 @@ def test_the_device_is_listed_first(monkeypatch):
     assert listed[0].status == "absent"
 
 
+def test_a_port_says_what_it_is(monkeypatch):
+    """Description and serial number, where the system knows them."""
+    _computer(monkeypatch, ("/dev/ttyS0", None, None), ("/dev/ttyS1", None, None))
+    known = ports.serial_ports.comports()[1]
+    known.description, known.serial_number = "a bridge", "DK0F3"
+    assert [(p.description, p.serial) for p in list_ports()] == [("", ""), ("a bridge", "DK0F3")]
+
+
 def test_one_device_is_found_by_itself(monkeypatch):
     """Auto-detection takes the one port with our USB id."""
     _computer(monkeypatch, ("/dev/ttyUSB0", 0x1A86, 0x7523), ("/dev/ttyUSB7", *OURS))
@@ -78,6 +86,19 @@ def test_a_busy_port(wire):
     path = wire("bench:").bench.path
     with raises(DeviceError, "port is busy", port=path):
         SerialTransport(path)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        OSError(errno.EBUSY, "Device or resource busy"),
+        OSError(errno.EAGAIN, "Resource temporarily unavailable"),
+        OSError("Could not exclusively lock port"),
+    ],
+)
+def test_a_busy_port_is_told_by_a_number_or_by_words(error):
+    """Systems and libraries differ in which of them they give."""
+    told(ports.cannot_open("/dev/ttyUSB0", error), "port is busy", port="/dev/ttyUSB0")
 
 
 def test_a_busy_port_is_listed_as_busy(monkeypatch, wire):
