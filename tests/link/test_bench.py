@@ -93,6 +93,7 @@ def test_ports_that_do_not(port):
         ("bench:?creep=", "creep= is not a number from 0 to 0.5", ""),
         ("bench:?seed=3,creep=0.1", "seed=3,creep=0.1 is not", "put & between"),
         ("bench:?break=leg@1", "cannot break 'leg@1'", "current-rail"),
+        ("bench:?break=reset@1&break=leg@1", "cannot break 'leg@1'", "current-rail"),
         ("bench:?break=reset@soon", "cannot break 'reset@soon'", "WHAT@SECONDS"),
     ],
 )

@@ -56,6 +56,23 @@ def test_every_kind_of_damage_happens_at_the_stated_rate():
     ]
 
 
+def test_what_each_kind_of_damage_adds_or_takes():
+    """One to eight bytes before, one to 160 of the last ones again, none in place of a lost one."""
+    line, more = NoisyLine(0.2, 3), {kind: set() for kind in KINDS}
+    for k in range(60_000):
+        own, before = bytes((k % 256,)), line.damaged.copy()
+        line.push(own, float(k))  # no cut or delay lasts for a second
+        came = line.pull(k + 0.5)
+        for kind in line.damaged - before:
+            more[kind].add(len(came) - 1)
+            assert came.startswith(own) or kind not in ("duplicate", "delay")
+            assert came.endswith(own) or kind != "insert"
+            assert came != own or kind != "flip"
+    assert more.pop("insert") == set(range(1, 9))
+    assert more.pop("duplicate") == set(range(1, 161))
+    assert more == {"drop": {-1}, "cut": {-1}, "flip": {0}, "delay": {0}}
+
+
 def test_delayed_bytes_keep_their_order():
     """What is late holds back what comes behind it."""
     line = NoisyLine(1.0, 4)

@@ -16,9 +16,10 @@ import pytest
 from pulsetrainer import doctor
 from pulsetrainer.device.opening import open_device
 from pulsetrainer.errors import DeviceError, UsageError
-from pulsetrainer.simulation import build
+from pulsetrainer.resources import firmware_dir
+from pulsetrainer.simulation import build, emulator
 from pulsetrainer.simulation.build import DEBIAN_PACKAGES
-from pulsetrainer.simulation.options import QemuOptions, Wire, parse_qemu
+from pulsetrainer.simulation.options import BREAKS, QEMU_SETTINGS, QemuOptions, Wire, parse_qemu
 from wording import raises
 
 RANGE_A = 1.5
@@ -81,6 +82,19 @@ def test_parameters_that_make_no_sense_teach(port, says, hint):
     """The plant of the image has no parameters, the bench's has; the rest is explained."""
     with raises(UsageError, "no such emulator", said=says, hint=hint):
         open_device(port)
+
+
+def test_breaks_and_settings_are_put_where_the_firmware_looks_for_them():
+    """Words of four bytes, as board.c has them from where mps2.ld says on; a tick more, as 0 is never."""
+    source = (firmware_dir() / "port" / "mps2" / "board.c").read_text(encoding="utf-8")
+    kept = source.partition("struct retained {")[2].partition("}")[0]
+    place = 0x2000_0000 + 4 * kept.partition("break_tick")[0].removesuffix("uint32_t ").count("uint32_t")
+    port = "qemu:?coil=3&" + "&".join(f"break={what}@{k}.5" for k, what in enumerate(BREAKS))
+    ticks = [5_001 + 10_000 * k for k in range(len(BREAKS))]
+    words = [(place + 4 * k, tick) for k, tick in enumerate(ticks)]
+    words.append((place + 4 * len(BREAKS) + 12 + 4 * [*QEMU_SETTINGS].index("coil"), 0x4040_0000))  # 3.0
+    told = emulator._loads(parse_qemu(port))
+    assert told[1::2] == [f"loader,addr={at:#x},data={data:#x},data-len=4" for at, data in words]
 
 
 def test_parameters_that_make_sense():
