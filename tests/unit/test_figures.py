@@ -273,6 +273,7 @@ def test_a_thinned_loop_keeps_its_outermost_points():
     x, y = rng.normal(size=(2, 20_000))
     kept = path(x, y, most=100)
     assert kept.size <= 100
+    assert (kept[0], kept[-1]) == (0, x.size - 1)
     for series in (x, y):
         assert series[kept].min() == series.min()
         assert series[kept].max() == series.max()
@@ -309,6 +310,15 @@ def test_playback_draws_every_repeat_and_shades_the_lead_in():
     assert shaded[0].get_x() + shaded[0].get_width() == pytest.approx(0.8)
 
 
+def test_what_is_not_scored_is_shaded_and_named_once():
+    """The lead-in has the name; what does not count later looks the same."""
+    drive, axes = examples.waveform(), Figure().subplots()
+    scored = np.arange(drive.time_s.size) % (drive.time_s.size // 2) > 3
+    panels.unscored(axes, replace(drive, scored=scored))
+    first, _ = axes.patches
+    assert axes.get_legend_handles_labels() == ([first], ["not scored"])
+
+
 def test_the_temperature_is_drawn_where_heat_was_tracked():
     """A point for each repeat of a play, a curve for a session; without it the figure is as before."""
     played, session = examples.playback(repeats=3), stored.session()
@@ -323,6 +333,8 @@ def test_the_temperature_is_drawn_where_heat_was_tracked():
         (drawn,) = (line for line in axes.lines if line.get_label()[0] != "_")
         np.testing.assert_array_equal(drawn.get_ydata(), kelvin)
         assert len(drawn.get_xdata()) == size
+        (guide,) = (line for line in axes.lines if line is not drawn)
+        assert set(guide.get_ydata()) == {0.0}  # as warm as at calibration
         assert encode(after, "png").startswith(b"\x89PNG")
 
 
@@ -411,6 +423,14 @@ def test_a_run_shows_which_way_its_loop_goes():
     assert len(turns(u)) == 5  # four strokes
 
 
+def test_an_arrow_lies_in_the_middle_of_its_stroke():
+    """From 44 to 56 % of the way, however its samples are spaced and however soon the next stroke is over."""
+    x = np.array([0.0, *np.linspace(0.3, 1.0, 71), 0.0])
+    axes = Figure().subplots()
+    directions(axes, x, x)
+    assert (axes.texts[0].xyann[0], axes.texts[0].xy[0]) == pytest.approx((0.44, 0.56), abs=0.011)
+
+
 def test_an_input_that_only_rises_has_one_arrow():
     """And one that stands still has none."""
     for u, count in ((np.linspace(0.0, 1.0, 50), 1), (np.zeros(50), 0)):
@@ -485,6 +505,8 @@ def test_the_main_figures_of_a_run_and_its_heat():
     """By hand: how long, how fast, how many reversals; the temperature from the lowest to the highest."""
     found = run_facts(Run(np.arange(6) / 2.0, np.array([0.0, 1.0, 2.0, 0.5, 1.0, 1.0]), np.zeros(6)))
     assert (found["samples"], found["seconds"], found["rate_Hz"], found["reversals"]) == (6, 2.5, 2.0, 2)
+    alone = run_facts(Run(np.zeros(1), np.ones(1), np.ones(1)))
+    assert (alone["samples"], alone["seconds"], alone["rate_Hz"], alone["gaps"]) == (1, None, None, None)
     assert warmth_words([-0.04, 3.0, 5.06]).startswith("+0.0 to +5.1 K")
     assert warmth_words([0.6, 0.5]).startswith("+0.5 to +0.6 K")  # no range upside down
 

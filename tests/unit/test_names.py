@@ -16,7 +16,7 @@ from pulsetrainer.artefacts import Evaluation
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
 from pulsetrainer.artefacts.session import FIGURES
 from pulsetrainer.artefacts.waveform import RefinePass
-from pulsetrainer.report import figures, html
+from pulsetrainer.report import figures, html, results, tables
 from pulsetrainer.report.facts import facts, run_facts
 from pulsetrainer.report.names import FORCE, NAMES, headed, split
 from pulsetrainer.report.tables import label, text
@@ -153,3 +153,28 @@ def test_reversals_are_counted_as_import_counts_them():
     u = np.abs(np.mod(np.linspace(0.0, 6.0, 3000), 2.0) - 1.0) + rng.normal(0.0, 0.003, 3000)
     run = pt.Run(time_s=np.arange(3000) / 100, input=u, output=u)
     assert run_facts(run)["reversals"] == report_of(run).reversals == 5
+
+
+def test_what_was_played_took_both_drives_as_often_as_they_were_repeated():
+    """To the last sample of each, without the pauses between them."""
+    playback = store_examples.playback(n=20, repeats=3)
+    told, _, _ = results.played(Path("played.h5"), playback, "serial", "firmware")
+    assert told["seconds"] == pytest.approx(0.19 * 3 * 2)
+
+
+def test_a_range_has_three_decimals_or_as_many_as_tell_its_ends_apart():
+    """Narrower than a tenth it would read as one number."""
+    assert results._range_words((1.0, 1.11), "A") == "1.000 .. 1.110 A"
+    assert results._range_words((1.0, 1.0004), "A") == "1 .. 1.0004 A"
+
+
+def test_a_list_is_aligned_by_the_longest_of_its_headings():
+    """That of the names is none of them: each name has a line of its own."""
+    lines = list(tables.listed("title", ["the name", "long one", "b"], [["x", 1, 2]]))
+    assert lines == ["title", "  x", "    long one  1", "    b         2"]
+
+
+@pytest.mark.parametrize(("width", "said"), [(12, "t\n  ab  c\n"), (11, "t\n  ab\n    c\n")])
+def test_figures_stand_beside_their_names_where_there_is_room(width, said):
+    """Twice the longest name and eight letters are room; else they stand below."""
+    assert tables.rendered(tables.Facts("t", {"ab": "c"}), width) == said
