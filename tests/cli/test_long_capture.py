@@ -137,6 +137,16 @@ def test_a_capture_that_a_fault_ended_is_resumed(tmp_path):
     away = np.where(np.arange(1000) < 700, 0.0, 0.01)  # and of one with it
     cut_off = replace(cut_off, reference=cut_off.reference - away)
     assert samples_played(cut_off, Course(one, 1)) == 700
+    rest = one.value[:20]  # behind the end of the course it looks like its begin, and is no more of it
+    longer = replace(
+        run,
+        time_s=np.append(run.time_s, run.time_s[-1] + np.arange(1, 21) / 1000.0),
+        reference=np.append(run.reference, rest),
+        seam=np.append(run.seam, np.zeros(20, bool)),
+        input=np.append(run.input, rest),
+        output=np.append(run.output, rest),
+    )
+    assert samples_played(longer, Course(one, 1)) == samples_played(run, Course(one, 1)) == one.value.size
 
 
 def test_a_dry_run_names_the_port_as_it_was_typed(tmp_path):

@@ -201,6 +201,7 @@ def test_samples_outside_the_model_are_counted():
             [note for note in evaluate(_run(0.0 * WAVE, u), MODEL).notes if "outside the range" in note]
         )
     assert [len(one) for one in said] == [0, 1]
+    assert said[1][0].startswith("0.1 % of the input")
 
 
 def test_a_long_prediction_is_thinned_for_the_figures():

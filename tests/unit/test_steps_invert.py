@@ -42,6 +42,16 @@ def test_a_pulse_of_another_time_scale_is_followed_like_one_of_a_second(period_s
     assert len(drive.notes) == len(usual.notes) + 1
 
 
+def test_what_a_cause_adds_to_a_drive_is_slow():
+    """Beside the inverse without it little lies above 30 Hz, although the pulse has edges."""
+    share = np.arange(ROWS) / ROWS
+    edged = Shape("edged", 1.2 * share, np.sin(np.pi * share) ** 2 + 0.5 * ((share > 0.3) & (share < 0.6)))
+    drive, without = (pt.invert(edged, _model(lag_s=lag)).compensated for lag in (0.012, 0.0))
+    power = np.abs(np.fft.rfft((drive - without) * np.hanning(drive.size))) ** 2
+    fast = np.fft.rfftfreq(drive.size, 1e-3) > 45.0
+    assert power[fast].sum() < 0.1 * power.sum()
+
+
 @pytest.mark.parametrize(("period_s", "captured"), [(0.06, False), (1.0, False), (99.0, False), (0.03, True)])
 def test_usual_pulses_and_our_own_device_keep_their_rate(period_s, captured):
     """A thousand samples a second, wherever they serve, and always on our own device."""
