@@ -87,7 +87,17 @@ def test_an_existing_output_is_refused_and_kept(ready):
     refused(ready, ["capture", "identification", "-o", "model.h5"], 2, "exists", file="model.h5")
     refused(ready, ["play", "drive.h5", "-o", "model.h5"], 2, "exists", file="model.h5")
     refused(ready, ["plot", "run.h5", "-o", "model.h5"], 2, "no such figure", file="model.h5")
+    for words in (("identify", "run.h5"), ("capture", "identification")):  # only a recording can go on
+        done = pulsetrainer(ready, *words, "-o", "model.h5")
+        assert ("--resume" in done.err) is (words[0] == "capture")
     assert (ready / "model.h5").read_bytes() == before
+
+
+def test_a_number_without_an_upper_end_is_told_its_lower_one(ready):
+    """What it must be, and what it was."""
+    done = pulsetrainer(ready, "identify", "run.h5", *OUT, "--seed", "-1")
+    assert done.code == 2
+    assert "--seed must be a whole number, 0 or more, got -1" in " ".join(done.err.split())
     page = ["evaluate", "played.h5", "-o", "x.h5", "--html", "./x.h5", "--overwrite"]
     refused(ready, page, 2, "two outputs", file="x.h5")
     assert (

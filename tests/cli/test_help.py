@@ -13,6 +13,7 @@ import typer
 
 import pulsetrainer
 from pulsetrainer.cli.app import app as program
+from pulsetrainer.cli.help_text import Folded
 from pulsetrainer.cli.next_step import as_options
 
 COMMANDS = (
@@ -99,3 +100,10 @@ def test_the_short_help_is_the_long_one(run):
     """-h as everywhere."""
     assert run("-h").out == run("--help").out
     assert run("play", "-h").out == run("play", "--help").out
+
+
+@pytest.mark.parametrize(("columns", "width"), [(1, 16), (18, 16), (19, 17), (79, 77), (80, 78), (200, 78)])
+def test_help_is_as_wide_as_the_terminal_less_two_letters(monkeypatch, columns, width):
+    """But no narrower than 16, and no wider than is easily read."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert Folded().width == width
