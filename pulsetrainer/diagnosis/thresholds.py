@@ -253,6 +253,7 @@ class Thresholds:
     short_s: float = 20.0  # a shorter record is called short
     given_worse: float = 2.5  # times what refitted weights leave: more is told of the model as given
     no_turn: float = 0.01  # of the range of the input: half of the smallest wiggle that is a turn
+    worth_recording: float = 1.5  # times as far apart as here: an experiment that gains less is not advised
     first_stroke_most: float = 0.25  # of a record: more is no first stroke, and is not given up for one
 
     # Words

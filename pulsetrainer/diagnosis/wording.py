@@ -170,9 +170,9 @@ ADVICE: Mapping[str, str] = {
         "{here:.2g} %. Then diagnose that recording.{command}"
     ),
     "tied, no better": (
-        "We know of no recording that would tell {names} apart better than this one, on which they differ "
-        "by {here:.2g} % of the span (rms, after the best fit of the model), but for a longer one of the "
-        "same kind, as noise averages out."
+        "We know of no recording that would tell {names} apart much better than this one, on which they "
+        "differ by {here:.2g} % of the span (rms, after the best fit of the model), but for a longer one of "
+        "the same kind, as noise averages out."
     ),
     "lacks": f"To see what this recording cannot show, {AGAIN}",
     "unknown": (

@@ -63,7 +63,7 @@ def _of_the_causes(state: State) -> Evidence:
             "here": percent * best.distance_here,
             "faster": best.faster,
         }
-        if best.distance <= best.distance_here:
+        if best.distance <= LIMITS.worth_recording * best.distance_here:
             return Evidence("tied, no better", figures=figures, names=names)
         return Evidence("tied", figures=figures, names=(best.name, *names))
     if state.verdict == "inconclusive":
