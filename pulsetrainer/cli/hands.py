@@ -38,32 +38,24 @@ class Hands:
         return self._answers.pop(0) if self._answers else None
 
     def steer(
-        self,
-        screen: Screen,
-        chosen: Programme | Blind,
-        shapes: Sequence[Shape],
-        *,
-        by_key: bool,
-        dry_run: bool = False,
+        self, screen: Screen, chosen: Programme | Blind, shapes: Sequence[Shape], *, by_key: bool
     ) -> Steered:
         """Put screen and keys around who decides, where there is a terminal.
 
-        UsageError where a quiz is to be answered by key, and there is none; ``by_key``: that is asked. A
-        ``dry_run`` needs no answer, and says it only.
+        UsageError where a quiz is to be answered by key, and there is none; ``by_key``: that is asked.
         """
         dark = "a result in JSON has no live view" if screen.as_json else why_not()
         if isinstance(chosen, Blind) and by_key and dark:
             first = "leave --json out" if screen.as_json else "run it on a terminal"
             if "small" in dark:
                 first = "make the window larger"
-            said = f"a quiz is answered by key, and {dark}"
-            remedy = f"{first}, or give the answers in a file: --answers answers.txt"
-            if not dry_run:
-                raise UsageError(said, hint=remedy)
-            screen.note(f"{said}; to press it, {remedy}")
-        elif dark and "small" in dark:
-            screen.note(f"{dark}; there are no keys")
+            raise UsageError(
+                f"a quiz is answered by key, and {dark}",
+                hint=f"{first}, or give the answers in a file: --answers answers.txt",
+            )
         if dark:
+            if "small" in dark:
+                screen.note(f"{dark}; there are no keys")
             return Steered(chosen, chosen.share_at)
         if isinstance(chosen, Blind):
             return self._asked(chosen, by_key=by_key)

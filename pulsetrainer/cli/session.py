@@ -122,7 +122,7 @@ def session(
         "track_heat": track_heat,
     }
     shapes = [read_pulse(name) for name in names]
-    steered = hands.steer(job.screen, chosen, shapes, by_key=answers is None, dry_run=dry_run)
+    steered = hands.steer(job.screen, chosen, shapes, by_key=answers is None)
     if dry_run:
         job.check_device()
         with job.working("rehearsing") as progress:

@@ -94,15 +94,10 @@ def test_a_dry_run_tells_how_hard_low_pulses_press(run):
     assert 0.35 < plan["pulse_force_N"] / plan["peak_force_N"] < 0.5
 
 
-def test_a_dry_run_of_a_quiz_by_key_needs_no_keys(run):
-    """It says what the quiz itself is refused for where there is no terminal."""
+def test_a_dry_run_of_a_quiz_by_key_needs_the_keys_too(run):
+    """Where there is no terminal, both are refused."""
     words = (*SHORT, "--pulses", "normal,bifid", "--quiz", 2)
-    refusal(run(*words, "--json"), 2, "a quiz without a terminal")
-    done = run(*words, "--dry-run")
-    assert done.code == 0, done
-    assert "a quiz is answered by key, and there is no terminal; to press it" in done.err
-    assert "--answers" in done.err
-    assert "would press a session" in done.out
+    refusal(run(*words, "--dry-run", "--json"), 2, "a quiz without a terminal")
 
 
 def test_a_session_in_a_file_has_its_sheet_made_again(run, tmp_path):
