@@ -277,8 +277,7 @@ def extended_model(state: State, model: Model) -> Model:
     remembered = [one.output if model.form == "dual" else one.input for one in behind.records]
     covered = coverage(found.plane, remembered)
     if not covers_range([one.input for one in state.problem.records], 0.0, 1.0):
-        found = completed(found, covered, operator_of(model), remembered)
-        covered = covered | model.covered if found.weights.size == covered.size else model.covered
+        found, covered = completed(found, covered, model, remembered)
     return Model(
         edges=found.plane.edges,
         weights=found.weights,

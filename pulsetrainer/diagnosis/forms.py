@@ -75,16 +75,17 @@ def static_behind(found: Fitted, known: Sequence[Term], model: Model, scale: Sca
 
 
 def completed(
-    found: Preisach, covered: BoolArray, given: Preisach | Dual, inputs: Sequence[FloatArray]
-) -> Preisach:
-    """Return a static part whose cells that inputs (n,) never ``covered`` (q,) are those of the one given.
+    found: Preisach, covered: BoolArray, model: Model, inputs: Sequence[FloatArray]
+) -> tuple[Preisach, BoolArray]:
+    """Return a static part with the cells of a model where inputs (n,) never ``covered`` it (q,), and those.
 
     Those cells stay as they are in the records, so they only shift the output, which the offset undoes. On
-    other levels cells cannot be exchanged: the one given is kept whole.
+    other levels cells cannot be exchanged: the static part of the model is kept whole.
     """
+    given = operator_of(model)
     own = given.inner if isinstance(given, Dual) else given
     if not np.array_equal(found.plane.edges, own.plane.edges):
-        return own
+        return own, model.covered
     both = replace(found, weights=np.where(covered, found.weights, own.weights))
     shift = float(np.mean(np.concatenate([found(u) - both(u) for u in inputs])))
-    return replace(both, offset=both.offset + shift)
+    return replace(both, offset=both.offset + shift), covered | model.covered

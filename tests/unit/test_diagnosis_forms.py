@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 import pulsetrainer as pt
-from pulsetrainer.artefacts import Extension, Parameter
+from pulsetrainer.artefacts import Extension, Model, Parameter
 from pulsetrainer.core.coverage import coverage
 from pulsetrainer.core.dual import Dual
 from pulsetrainer.core.operator import Preisach
@@ -213,12 +213,19 @@ def test_what_records_never_reach_stays_as_it_was_given(polarity):
     u = np.interp(np.linspace(0.0, 6.0, 601), np.arange(7), [0.0, 0.6, 0.0, 0.5, 0.2, 0.6, 0.0])
     covered = coverage(plane, [u])
     found = replace(given, weights=np.where(covered, 1.1 * given.weights, 0.0), offset=0.3)
-    both = completed(found, covered, given, [u])
+    told = np.arange(covered.size) == 0
+    model = Model(plane.edges, given.weights, given.offset, told, polarity=polarity)
+    both, known = completed(found, covered, model, [u])
+    np.testing.assert_array_equal(known, covered | told)
     np.testing.assert_allclose(both(u), found(u), atol=1e-12)
     stroke = np.linspace(0.6, 1.0, 41)
     rises = [np.diff(one(np.append(0.0, stroke))[1:]) for one in (both, given)]
     assert np.all(polarity * rises[0] > 0.0)
     np.testing.assert_array_equal(both.weights[~covered], given.weights[~covered])
-    other = Preisach(Plane.uniform(0.0, 1.0, 8), np.ones(36), 0.5, polarity=polarity)
-    assert completed(found, covered, other, [u]) is other
-    np.testing.assert_array_equal(completed(found, covered, Dual(given), [u])(u), both(u))
+    crowded = replace(model, edges=plane.edges**2)  # as many cells, on other levels
+    kept, known = completed(found, covered, crowded, [u])
+    np.testing.assert_array_equal(kept.plane.edges, crowded.edges)
+    np.testing.assert_array_equal(kept.weights, given.weights)
+    assert known is crowded.covered
+    dual, _ = completed(found, covered, replace(model, form="dual"), [u])
+    np.testing.assert_array_equal(dual(u), both(u))

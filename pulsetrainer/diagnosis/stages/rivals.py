@@ -20,8 +20,7 @@ What speaks against a cause that was found is written beside it:
   left, and of what the model leaves without it less than three quarters are predicted on blocks left out;
 - only equal loops would show it, and there are none;
 - a gain that wears off with time or with the way of the input fits as well, so that it could equally be
-  `accommodation`; of a step: whatever settles from
-  the beginning of the record;
+  `accommodation`; of a step: whatever settles from the beginning of the record;
 - the record has one rate and no rest, where any cause looks like what a model lacks of the device, and the
   cause explains little more than what is left and slow, or that is more than noise.
 """
