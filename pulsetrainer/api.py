@@ -144,14 +144,10 @@ def check_device(port: str | None, *, limits: Limits | None = None, tuned: Path 
 
 def _known_gains(tuned: Path | str | None) -> dict[str, Gains]:
     entries = {} if tuned is None else read_tuned(tuned)
-    return {serial: _gains(tuned, entry) for serial, entry in entries.items()}
-
-
-def _gains(path: Path | str | None, entry: dict[str, Any]) -> Gains:
     try:
-        return Gains.of(entry)
+        return {serial: Gains.of(entry) for serial, entry in entries.items()}
     except ArgumentError as error:
-        raise UsageError(f"{path}: {error.message}", hint=error.hint) from error
+        raise UsageError(f"{tuned}: {error.message}", hint=error.hint) from error
 
 
 def _as(verb: Callable[..., Any]) -> Callable[[F], F]:

@@ -157,9 +157,10 @@ def _signed(
 ) -> Identified:
     """Fit weights of either sign."""
     if reading != "continuous" or method != "joint" or not fits_dense(plane):
+        most_dense = int(np.sqrt(2.0 * np.sqrt(DENSE_BYTES / (8 * _DENSE_COPIES))))
         raise ArgumentError(
             f"signed weights are fitted jointly, in the continuous reading, on planes of at most "
-            f"{_most_dense()} levels, got {method}, {reading} and {plane.n_h}",
+            f"{most_dense} levels, got {method}, {reading} and {plane.n_h}",
             hint="leave method and reading out, and use fewer levels",
         )
     upright, zero = levelled(records)
@@ -195,11 +196,6 @@ def _kept_in_range(
         if lowest >= measured.min() - beyond and highest <= measured.max() + beyond:
             break
     return operator, ridge
-
-
-def _most_dense() -> int:
-    """Most levels whose dense matrices stay within ``DENSE_BYTES``."""
-    return int(np.sqrt(2.0 * np.sqrt(DENSE_BYTES / (8 * _DENSE_COPIES))))
 
 
 def _span(records: Sequence[Record]) -> float:
@@ -313,8 +309,7 @@ def _fit_large(
             f"{DENSE_BYTES / 1e9:.0f} GB",
             hint="use the joint method: it ends at the same point",
         )
-    found = large.solve(node_sums(plane, records, reading), smoothing)
-    return found.masses, found.offset, found.iterations, found.kkt
+    return large.solve(node_sums(plane, records, reading), smoothing)
 
 
 def _alternate(

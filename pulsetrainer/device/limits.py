@@ -174,10 +174,7 @@ class Rehearsal:
             tick_rate_Hz=codes.TICK_RATE_HZ,
         )
         current = codes.CURRENT_UNIT_A * wire.astype(float)
-        waits_s = wait_s(self._heat, current, rate_Hz)
-        if math.isinf(waits_s):
-            raise too_hot_ever(current, rate_Hz)
-        if waits_s > 0:
+        if _bearable_wait_s(self._heat, current, rate_Hz) > 0:
             raise DeviceError(
                 f"the coil would be too hot: at {100 * self._heat:.0f} % of its limit by then",
                 hint="play fewer repeats, or at a lower current",
@@ -210,20 +207,22 @@ def less_current(than: str) -> str:
     )
 
 
-def too_hot_ever(current_A: FloatArray, rate_Hz: float) -> ArgumentError:
-    """Return the refusal of a current (n,) that heats even a cold coil beyond its limit."""
-    share = 100.0 * float(course(0.0, current_A, rate_Hz).max())
-    return ArgumentError(
-        f"this reference heats even a cold coil to {math.ceil(share)} % of the heat that it bears",
-        hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher `speed`), "
-        "or at a lower current",
-    )
+def _bearable_wait_s(heat: float, reference_A: FloatArray, rate_Hz: float) -> float:
+    """Return ``heat.wait_s``; ArgumentError for a reference (n,) that even a cold coil does not bear."""
+    seconds = wait_s(heat, reference_A, rate_Hz)
+    if math.isinf(seconds):
+        share = 100.0 * float(course(0.0, reference_A, rate_Hz).max())
+        raise ArgumentError(
+            f"this reference heats even a cold coil to {math.ceil(share)} % of the heat that it bears",
+            hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher "
+            "`speed`), or at a lower current",
+        )
+    return seconds
 
 
 def check_ever_cool(reference_A: FloatArray, rate_Hz: float) -> None:
     """Raise ArgumentError for a reference (n,) in A that even a cold coil does not bear."""
-    if math.isinf(wait_s(0.0, reference_A, rate_Hz)):
-        raise too_hot_ever(reference_A, rate_Hz)
+    _bearable_wait_s(0.0, reference_A, rate_Hz)
 
 
 def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed: bool) -> None:
@@ -232,9 +231,7 @@ def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed:
     ArgumentError where even a cold coil would be too hot; DeviceError where this one is, as far as is known
     where that is ``assumed``.
     """
-    seconds = wait_s(heat, reference_A, rate_Hz)
-    if math.isinf(seconds):
-        raise too_hot_ever(reference_A, rate_Hz)
+    seconds = _bearable_wait_s(heat, reference_A, rate_Hz)
     if seconds > 0:
         raise DeviceError(
             f"the coil is too hot for this: it is at {100 * heat:.0f} % of its limit"

@@ -128,7 +128,8 @@ def playback(played: Playback) -> Figure:
     ):
         panels.repeats(force, played.time_s, drive.output, name, style)
         panels.repeats(current, played.time_s, drive.input, name, style)
-        panels.current_error(error, played.time_s, drive, played.input_range, style)
+        missed = 100.0 * (drive.input - drive.reference) / played.input_range
+        panels.repeats(error, played.time_s, missed, "", style)
     force.set_ylabel(label("force", played.scaled.output_unit))
     force.set_title(panels.titled(asked) + ("" if played.complete else ", incomplete"))
     current.set_ylabel(label(panels.quantity_of(played.scaled.input_unit), played.scaled.input_unit))

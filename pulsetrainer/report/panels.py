@@ -16,7 +16,6 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pulsetrainer.artefacts import (
-    DrivePlayback,
     Fit,
     FloatArray,
     Model,
@@ -394,10 +393,3 @@ def repeats(axes: Axes, time_s: FloatArray, rows: FloatArray, name: str, style: 
     for k, row in enumerate(rows):
         named = f"{name}, {len(rows)} repeats" if name and k == 0 else None
         trace(axes, time_s, row, **thin, label=named)
-
-
-def current_error(
-    axes: Axes, time_s: FloatArray, drive: DrivePlayback, input_range: float, style: dict[str, Any]
-) -> None:
-    """Draw how far the measured current is from the one asked for, in percent of the range."""
-    repeats(axes, time_s, 100.0 * (drive.input - drive.reference) / input_range, "", style)

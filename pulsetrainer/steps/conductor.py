@@ -252,12 +252,10 @@ class Conductor:
 
     # --- a beat ------------------------------------------------------------------------------------
 
-    def _in_record(self, play: Play, place: _Place) -> int:
-        return (place.in_record + 1) % self._pulses[play.pulse].beats if play.pulse == place.pulse else 0
-
     def _interval(self, play: Play, place: _Place) -> tuple[int, float, float]:
         """Which beat of the record it is, how long it lasts in s, and how strong it is."""
-        pulse, at = self._pulses[play.pulse], self._in_record(play, place)
+        pulse = self._pulses[play.pulse]
+        at = (place.in_record + 1) % pulse.beats if play.pulse == place.pulse else 0
         timing = self._rhythm.timing(place.number, place.start_s)
         own = pulse.own_interval_s(at) * (pulse.own_bpm / play.bpm if play.bpm else 1.0)
         return at, own * timing.interval, timing.strength
