@@ -107,14 +107,13 @@ def real_turns(values: FloatArray, band: float) -> IntArray:
     return places[np.asarray(turns, dtype=np.int64)]
 
 
-def clean(values: ArrayLike, sigma: float | None = None) -> Cleaned:
+def clean(values: ArrayLike) -> Cleaned:
     """Return the input (n,) without reversals that are smaller than its own noise.
 
-    ``sigma`` is the standard deviation of the noise, input unit; None to read it off the record.
     ArgumentError if the input is no finite vector.
     """
     u = finite_vector("input", values)
-    noise = estimate(u) if sigma is None else sigma
+    noise = estimate(u)
     reversals = turning_points(u)[:-1].size
     if not noise > 0:
         return Cleaned(u, noise, 0.0, 0, reversals)

@@ -82,57 +82,24 @@ def bending(plane: Plane, usable: NDArray[np.bool_]) -> scipy.sparse.csr_array:
     i, j = plane.cell_indices
     cell = np.full((n, n), -1, dtype=np.int64)
     cell[i, j] = np.where(usable, np.arange(plane.n_q), -1)
-    size = np.full(n, 1.0 / n)
-    middle = (np.arange(n) + 0.5) / n
-    per_mass = np.ones(plane.n_q)  # density per mass
-    per_mass[i != j] = 1.0 / (size[i] * size[j])[i != j]
-    per_mass[i == j] = 1.0 / size
-    inside = np.tril(np.ones((n, n), dtype=bool), -1)
-    off = np.where(inside, cell, -1)
-    diagonal = np.diagonal(cell)
-
-    second = _second_differences(middle)  # (n - 2, 3)
-    column = np.broadcast_to(size, (max(n - 2, 0), n))
-    along_alpha = (off[:-2], off[1:-1], off[2:])
-    along_beta = (off.T[:-2], off.T[1:-1], off.T[2:])
-    share = np.sqrt(size[1:-1, None] * column)  # root of the area each difference stands for
+    off = np.where(np.tril(np.ones((n, n), dtype=bool), -1), cell, -1)
+    # n^2 of steps 1 / n, times a density for a mass, times the root of the area or length that each stands for
+    weight, along_diagonal = float(n) ** 3, np.sqrt(_DIAGONAL) * float(n) ** 2.5
     pieces = [
-        _rows(along_alpha, second[:, None, :], share, per_mass, plane.n_q),
-        _rows(along_beta, second[:, None, :], share, per_mass, plane.n_q),
-        _rows(
-            (diagonal[:-2], diagonal[1:-1], diagonal[2:]),
-            second,
-            np.sqrt(_DIAGONAL * size[1:-1]),
-            per_mass,
-            plane.n_q,
-        ),
+        _second_differences(off, weight, plane.n_q),
+        _second_differences(off.T, weight, plane.n_q),
+        _second_differences(np.diagonal(cell), along_diagonal, plane.n_q),
     ]
     return scipy.sparse.vstack(pieces, format="csr")
 
 
-def _second_differences(x: FloatArray) -> FloatArray:
-    """Coefficients (n - 2, 3) of the second derivative at the inner points of uneven ``x`` (n,)."""
-    left, right = x[1:-1] - x[:-2], x[2:] - x[1:-1]
-    both = left + right
-    return np.stack((2.0 / (left * both), -2.0 / (left * right), 2.0 / (right * both)), axis=-1)
-
-
-def _rows(
-    cells: tuple[IntArray, IntArray, IntArray],
-    second: FloatArray,
-    share: FloatArray,
-    per_mass: FloatArray,
-    n_q: int,
-) -> scipy.sparse.csr_array:
-    """One row for each triple of cells that exist, of second differences of density times ``share``."""
-    triple = np.stack(cells, axis=-1)
-    exists = np.all(triple >= 0, axis=-1)
-    chosen = triple[exists]
-    coefficient = (second * share[..., None])[exists] * per_mass[chosen]
-    pointer = 3 * np.arange(chosen.shape[0] + 1)
-    return scipy.sparse.csr_array(
-        (coefficient.ravel(), chosen.ravel(), pointer), shape=(chosen.shape[0], n_q)
-    )
+def _second_differences(cells: IntArray, weight: float, n_q: int) -> scipy.sparse.csr_array:
+    """One row for each three neighbours that exist along the first axis of ``cells`` (n, ...); -1: none."""
+    triple = np.stack((cells[:-2], cells[1:-1], cells[2:]), axis=-1)
+    chosen = triple[np.all(triple >= 0, axis=-1)]
+    values = np.tile(weight * np.array([1.0, -2.0, 1.0]), len(chosen))
+    pointer = 3 * np.arange(len(chosen) + 1)
+    return scipy.sparse.csr_array((values, chosen.ravel(), pointer), shape=(len(chosen), n_q))
 
 
 def penalty(plane: Plane, diagonal: FloatArray, smoothing: float) -> scipy.sparse.csr_array:

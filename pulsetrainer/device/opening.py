@@ -9,7 +9,7 @@ import time
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import Limits
 from pulsetrainer.device.ports import find_device_port
-from pulsetrainer.device.schemes import Clock, OpenPort, Sleep, find_opener, redact
+from pulsetrainer.device.schemes import OpenPort, find_opener, redact
 from pulsetrainer.device.transport import SerialTransport
 
 _LOG = logging.getLogger(__name__)
@@ -17,21 +17,15 @@ PORT_VARIABLE = "PULSETRAINER_PORT"
 DEFAULT_PORT = "bench:"
 
 
-def open_device(
-    port: str | None,
-    *,
-    limits: Limits | None = None,
-    monotonic: Clock = time.monotonic,
-    sleep: Sleep = time.sleep,
-) -> Device:
+def open_device(port: str | None, *, limits: Limits | None = None) -> Device:
     """Open a device and greet it; without a port the environment's ``PULSETRAINER_PORT``, else the bench.
 
     UsageError if the port's text makes no sense; ArgumentError if a limit is beyond the device's own;
     DeviceError if the port is absent, busy or not permitted, nobody answers, or the protocol differs.
     """
-    opened = _open_port(port or os.environ.get(PORT_VARIABLE) or DEFAULT_PORT, monotonic)
+    opened = _open_port(port or os.environ.get(PORT_VARIABLE) or DEFAULT_PORT)
     try:
-        device = Device(opened, monotonic=monotonic, sleep=sleep)
+        device = Device(opened)
         _LOG.info(
             "%s: %s, firmware %s, protocol %s, limits %g A and %g N",
             *(opened.name, device.info.serial, device.info.firmware, device.info.protocol),
@@ -44,9 +38,9 @@ def open_device(
         raise
 
 
-def _open_port(port: str, monotonic: Clock) -> OpenPort:
+def _open_port(port: str) -> OpenPort:
     opener = find_opener(port)
     if opener is not None:
-        return opener(port, monotonic)
+        return opener(port, time.monotonic)
     name = find_device_port() if port == "auto" else port
     return OpenPort(SerialTransport(name), redact(name))
