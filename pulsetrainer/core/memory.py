@@ -88,7 +88,7 @@ class Trace:
     final: State
 
     def along_tree(self, steps: FloatArray) -> FloatArray:
-        """Sum ``steps`` (m, ...) from the root to each node, in log2(depth) vectorised passes."""
+        """Sum ``steps`` (m,) from the root to each node, in log2(depth) vectorised passes."""
         total = steps.copy()
         jump = self.parent.copy()
         while jump.any():

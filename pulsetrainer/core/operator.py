@@ -235,7 +235,7 @@ def outputs(
 ) -> FloatArray:
     """Outputs (b, n) of one input under many weight vectors (b, n_q) and offsets (b,) at once.
 
-    The memory is followed once; every weight vector then costs one sparse product.
+    The memory is followed once.
 
     ArgumentError where the input is not a finite vector, the weights do not fit the plane or are negative, or
     weights or offsets are not finite.
@@ -246,13 +246,8 @@ def outputs(
             f"weights must have shape (b, {plane.n_q}) and offsets (b,), got {mu.shape} and {y0.shape}",
             hint="one row of weights for each offset",
         )
-    for row in mu:
-        plane.check_weights(row)
     finite_vector("offsets", y0, at_least=0)
+    operators = [Preisach(plane, row, offset, reading) for row, offset in zip(mu, y0.tolist(), strict=True)]
     path = follow(plane, values, start, reading)
-    nodes = plane.everett_nodes(mu * plane.areas)  # (b, n_q)
-    step = steps(plane, path.node_value, path.node_value[path.parent])
-    turning = path.along_tree(step @ nodes.T)  # (m, b)
-    own = steps(plane, path.value, path.node_value[path.anchor])
-    total = nodes[:, -plane.n_h]  # node (n_h, 0) is the whole plane
-    return ((own @ nodes.T) + turning[path.anchor]).T - total[:, None] + y0[:, None]
+    bands = plane.bands(path.value)
+    return np.stack([operator.traced(path, bands) for operator in operators])
