@@ -83,7 +83,7 @@ def bending(plane: Plane, usable: NDArray[np.bool_]) -> scipy.sparse.csr_array:
     cell = np.full((n, n), -1, dtype=np.int64)
     cell[i, j] = np.where(usable, np.arange(plane.n_q), -1)
     off = np.where(np.tril(np.ones((n, n), dtype=bool), -1), cell, -1)
-    # n^2 of steps 1 / n, times a density for a mass, times the root of the area or length that each stands for
+    # n^2 of steps 1 / n, times a density for a mass, times the root of the area or length each stands for
     weight, along_diagonal = float(n) ** 3, np.sqrt(_DIAGONAL) * float(n) ** 2.5
     pieces = [
         _second_differences(off, weight, plane.n_q),
