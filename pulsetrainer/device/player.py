@@ -142,15 +142,13 @@ class Player:
         self.received.append(block)
         self.samples += block.count
 
-    def _request(self, command: m.Message) -> m.Ack:
+    def _request(self, command: m.Message) -> None:
         """Ask; once the play is to be stopped nothing but STOP is still waited for."""
         self._tick_at_send = self._tick
         urgent = isinstance(command, m.Stop)
-        reply: m.Ack = self._exchange.request(command, None if urgent else self._stop.is_set)
-        self._ack = reply
-        if reply.session == self._play_session:
-            self._tick = max(self._tick, reply.tick)
-        return reply
+        self._ack = self._exchange.request(command, None if urgent else self._stop.is_set)
+        if self._ack.session == self._play_session:
+            self._tick = max(self._tick, self._ack.tick)
 
     def _status(self) -> m.StatusReply:
         status: m.StatusReply = self._exchange.request(m.Status())

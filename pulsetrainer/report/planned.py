@@ -21,29 +21,25 @@ def to_be_captured(plan: Any, limit_N: float | None) -> dict[str, Any]:
 
 def to_be_played(plan: Any, repeats: int) -> dict[str, str]:
     """Say how a drive would be played."""
-    return {
-        "repeats": f"{repeats} of each drive, {plan.seconds:.1f} s in all",
-        "samples": f"{plan.samples} a repeat, {plan.rate_Hz:g} a second",
-        "force": _force_words(plan),
-    }
+    return {"repeats": f"{repeats} of each drive, {plan.seconds:.1f} s in all"} | _of_a_drive(plan)
 
 
 def to_be_refined(plan: Any, passes: int) -> dict[str, str]:
     """Say how a drive would be refined."""
     return {
         "passes": f"at most {passes}, {plan.seconds:.1f} s in all",
-        "samples": f"{plan.samples} a repeat, {plan.rate_Hz:g} a second",
-        "force": _force_words(plan),
+        **_of_a_drive(plan),
         "rehearsed": "the first pass, which plays the drive as it is; what it shows decides the others",
     }
 
 
-def _force_words(plan: Any) -> str:
-    """Say how hard a drive presses: before its pulse harder than in it, where the pulse is a small one."""
-    return (
-        f"{plan.peak_force_N:.2f} N at most, by the model, as each repeat begins; "
-        f"{plan.pulse_force_N:.2f} N in the pulse"
-    )
+def _of_a_drive(plan: Any) -> dict[str, str]:
+    """Say how long a drive is, and how hard it presses: before a small pulse harder than in it."""
+    return {
+        "samples": f"{plan.samples} a repeat, {plan.rate_Hz:g} a second",
+        "force": f"{plan.peak_force_N:.2f} N at most, by the model, as each repeat begins; "
+        f"{plan.pulse_force_N:.2f} N in the pulse",
+    }
 
 
 def to_be_tuned(plan: Any) -> dict[str, str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, Final, ParamSpec, TypeVar
+from typing import Any, Final, ParamSpec
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
@@ -17,7 +17,6 @@ from matplotlib.figure import Figure
 from pulsetrainer.artefacts.units import shown
 
 P = ParamSpec("P")
-R = TypeVar("R")
 
 INK: Final = "#1b1f24"
 MUTED: Final = "#6b7480"
@@ -100,15 +99,14 @@ SETTINGS: Final[Any] = {
 }
 
 
-def styled(drawing: Callable[P, R]) -> Callable[P, R]:
+def styled(drawing: Callable[P, Figure]) -> Callable[P, Figure]:
     """Decorate a function that draws: it draws in the house style and leaves matplotlib's settings alone."""
 
     @wraps(drawing)
-    def in_style(*args: P.args, **kwargs: P.kwargs) -> R:
+    def in_style(*args: P.args, **kwargs: P.kwargs) -> Figure:
         with rc_context(SETTINGS):
             drawn = drawing(*args, **kwargs)
-            if isinstance(drawn, Figure):
-                drawn.align_ylabels()  # of panels one below the other
+            drawn.align_ylabels()  # of panels one below the other
             return drawn
 
     return in_style

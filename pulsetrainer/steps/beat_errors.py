@@ -136,12 +136,12 @@ class Ledger:
         return {
             "rate_cv_percent": _cv_percent(pressed[joined]),
             "amplitude_cv_percent": _cv_percent(gain),
-            "beat_timing_max_ms": 1e3 * _finite(np.abs(late), np.max),
+            "beat_timing_max_ms": 1e3 * _largest(np.abs(late)),
             "mean_abs_error_percent": 100.0 * self._absolute / self._count / self._high,
             "max_abs_error_percent": 100.0 * self._largest / self._high,
             "nrmse": float(np.sqrt(self._square / self._count)) / (self._high - self._low),
-            "augmentation_index_error_percent": _finite(
-                np.asarray([one.index_error_percent() for one in self._means.values()]), np.max
+            "augmentation_index_error_percent": _largest(
+                np.asarray([one.index_error_percent() for one in self._means.values()])
             ),
         }
 
@@ -188,6 +188,6 @@ def _cv_percent(values: FloatArray) -> float:
     return 100.0 * float(there.std() / there.mean()) if there.size > 1 else np.nan
 
 
-def _finite(values: FloatArray, reduce: np.ufunc | object) -> float:
+def _largest(values: FloatArray) -> float:
     there = values[np.isfinite(values)]
-    return float(reduce(there)) if there.size else np.nan  # type: ignore[operator]
+    return float(there.max()) if there.size else np.nan

@@ -88,7 +88,6 @@ def import_parts(parts: Sequence[Run], *, resample: float | Literal["even"] | No
 
 def report_of(whole: Run, *, resampled: bool = False) -> Report:
     """Return what a run holds, in numbers."""
-    timed = whole.time_s is not None
     steps = steps_of(whole.time_s) if whole.time_s is not None else None
     gaps = gaps_of(whole.time_s, whole.seam)
     low, high = float(whole.input.min()), float(whole.input.max())
@@ -108,7 +107,7 @@ def report_of(whole: Run, *, resampled: bool = False) -> Report:
         longest_step_s=steps.longest if steps else None,
         gaps=gaps.number if steps else None,
         longest_gap_s=gaps.longest_s if steps else None,
-        resampled=resampled and timed,
+        resampled=resampled and steps is not None,
         input_unit=whole.input_unit,
         input_range=(low, high),
         output_unit=whole.output_unit,
