@@ -12,8 +12,6 @@ spline that takes its steps off. The inverse of a model with extensions iterates
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -21,7 +19,7 @@ import numpy as np
 import scipy  # its parts load when they are first used
 from numpy.typing import ArrayLike, NDArray
 
-from pulsetrainer.core.memory import State, negative_saturation, trace, trace_after
+from pulsetrainer.core.memory import State, Trace, negative_saturation, trace, trace_after
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import FloatArray, IntArray, ascending, finite_vector, positive
 from pulsetrainer.errors import ArgumentError
@@ -41,7 +39,7 @@ class _Branches:
 
     Along a branch the rise at edge l is (1 - t) R[k, l] + t R[k + 1, l], for a turn at the fraction t
     of band k, with R twice the Everett function, continued symmetrically. It never falls (sums of masses,
-    rounded monotonically), and is linear between edges. ``reach`` and ``reach_all`` round alike.
+    rounded monotonically), and is linear between edges.
     """
 
     def __init__(self, operator: Preisach) -> None:
@@ -51,37 +49,9 @@ class _Branches:
             for k, row in enumerate(self.rises):
                 row[k:] = np.maximum.accumulate(row[k:])
                 row[k::-1] = np.maximum.accumulate(row[k::-1])
-        self.rows: list[list[float]] = self.rises.tolist()
-        self.edges: list[float] = operator.plane.edges.tolist()
 
-    def reach(self, origin: float, need: float, *, rising: bool) -> float:
-        """Input at which the branch from ``origin`` has moved by ``need``; where it is flat, the nearest."""
-        edges, n_h = self.edges, self.plane.n_h
-        k = bisect_right(edges, origin, 1, n_h) - 1
-        t = (origin - edges[k]) / (edges[k + 1] - edges[k])
-        near, far = self.rows[k], self.rows[k + 1]
-        first, step, last = (k + 1, 1, n_h - k - 1) if rising else (k, -1, k)
-
-        def rise(steps: int) -> float:
-            edge = first + step * steps
-            return (1.0 - t) * near[edge] + t * far[edge]
-
-        need = min(need, rise(last))
-        begin, end = 0, last  # the first edge at which the rise is enough
-        while begin < end:
-            middle = (begin + end) // 2
-            if rise(middle) >= need:
-                end = middle
-            else:
-                begin = middle + 1
-        after, beyond = rise(begin), edges[first + step * begin]
-        before, u = (rise(begin - 1), edges[first + step * (begin - 1)]) if begin else (0.0, origin)
-        if after > before:
-            u += (need - before) / (after - before) * (beyond - u)
-        return min(u, beyond) if rising else max(u, beyond)
-
-    def reach_all(self, origin: FloatArray, need: FloatArray, rising: NDArray[np.bool_]) -> FloatArray:
-        """The same for many samples (n,) at once, by bisection of all of them."""
+    def reach(self, origin: FloatArray, need: FloatArray, rising: NDArray[np.bool_]) -> FloatArray:
+        """Inputs (n,) at which branches from ``origin`` have moved by ``need``; where flat, the nearest."""
         edges, n_h = self.plane.edges, self.plane.n_h
         k, t = self.plane.bands(origin)
         near = self.rises.ravel()
@@ -109,13 +79,6 @@ class _Branches:
         gap = after - before
         u += np.divide(need - before, gap, out=np.zeros_like(u), where=gap > 0) * (beyond - u)
         return np.where(rising, np.minimum(u, beyond), np.maximum(u, beyond))
-
-    def inputs_of(self, heights: Sequence[float]) -> list[float]:
-        """Inputs at the remembered extremes of a memory given as outputs."""
-        inputs = [self.plane.low]
-        for before, height in pairwise(heights):
-            inputs.append(self.reach(inputs[-1], abs(height - before), rising=height > before))
-        return inputs
 
 
 def invert(
@@ -152,20 +115,28 @@ def invert(
     # the memory in terms of outputs turns where the memory of inputs turns
     path = trace_after(_heights(operator, start), y, -operator.total, operator.total)
     branches = _Branches(operator)
-    value = [operator.plane.low]
+    nodes = np.full(path.parent.size, operator.plane.low)
     rises = path.node_value - path.node_value[path.parent]
-    for parent, rise in zip(path.parent[1:].tolist(), rises[1:].tolist(), strict=True):
-        value.append(branches.reach(value[parent], abs(rise), rising=rise > 0))
+    for level in _levels(path):  # parents first
+        nodes[level] = branches.reach(nodes[path.parent[level]], np.abs(rises[level]), rises[level] > 0)
     rise = path.value - path.node_value[path.anchor]
-    nodes = np.asarray(value)
-    u = branches.reach_all(nodes[path.anchor], np.abs(rise), rise > 0)
+    u = branches.reach(nodes[path.anchor], np.abs(rise), rise > 0)
     # an extreme that the output has not passed the input must not pass by rounding: that would wipe it out
     extreme, inner = nodes[path.parent[path.anchor]], path.anchor > 0
     u = np.where(inner & (rise > 0), np.minimum(u, extreme), u)
     u = np.where(inner & (rise < 0), np.maximum(u, extreme), u)
-    remembered = np.asarray(branches.inputs_of(path.final.extremes))
-    final = trace_after(remembered, u[-1:], operator.plane.low, operator.plane.high).final
+    remembered = [int(path.anchor[-1])]  # the turns before the last sample, the latest first
+    while remembered[-1]:
+        remembered.append(int(path.parent[remembered[-1]]))
+    final = trace_after(nodes[remembered[::-1]], u[-1:], operator.plane.low, operator.plane.high).final
     return Inverse(u, clipped, final)
+
+
+def _levels(path: Trace) -> list[IntArray]:
+    """Turning points by how many lie before them in the memory: those after one, then after two, ..."""
+    depth = path.along_tree((np.arange(path.parent.size) > 0).astype(np.float64))
+    order = np.argsort(depth, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(depth[order])) + 1)[1:]
 
 
 def _check_not_empty(operator: Preisach) -> None:
