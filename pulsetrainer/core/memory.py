@@ -11,12 +11,16 @@ points; a sample needs to know only the node it moves away from, its anchor.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 from pulsetrainer.core.plane import FloatArray, IntArray, ascending, float_array
 from pulsetrainer.errors import ArgumentError
+
+_Steps = TypeVar("_Steps")  # an array, or a sparse one
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +91,12 @@ class Trace:
     parent: IntArray  # (m,)
     final: State
 
-    def along_tree(self, steps: FloatArray) -> FloatArray:
-        """Sum ``steps`` (m,) from the root to each node, in log2(depth) vectorised passes."""
-        total = steps.copy()
-        jump = self.parent.copy()
+    def along_tree(self, steps: _Steps) -> _Steps:
+        """Sum ``steps`` (m, ...) from the root, whose own is zero, to each node, in log2(depth) passes."""
+        total: Any = copy(steps)
+        jump = self.parent
         while jump.any():
-            total += total[jump]
+            total = total + total[jump]
             jump = jump[jump]
         return total
 

@@ -78,20 +78,8 @@ def rows(plane: Plane, path: Trace) -> Rows:
 
 
 def base_rows(plane: Plane, path: Trace) -> scipy.sparse.csr_array:
-    """Rows (m, n_q) of all turning points: each is its parent's row plus one step.
-
-    The ancestors of all nodes are listed by doubling: log2(depth) sparse products.
-    """
-    step = steps(plane, path.node_value, path.node_value[path.parent])
-    count = path.parent.size
-    jump, total = path.parent.copy(), step
-    while np.any(jump != 0):
-        take = scipy.sparse.csr_array(
-            (np.ones(count), jump, np.arange(count + 1, dtype=np.int64)), shape=(count, count)
-        )
-        total = total + take @ total  # row 0 is empty, so the root adds nothing
-        jump = jump[jump]
-    return total.tocsr()
+    """Rows (m, n_q) of all turning points: each is its parent's row plus one step."""
+    return path.along_tree(steps(plane, path.node_value, path.node_value[path.parent]))
 
 
 @dataclass(frozen=True)
