@@ -204,5 +204,4 @@ class Model(Shown):
         """
         # what a model predicts is the business of a floor above, which knows the causes
         prediction = import_module("pulsetrainer.diagnosis.prediction")
-        predicted: FloatArray = prediction.predict(self, np.asarray(inputs, dtype=np.float64), dt_s)
-        return predicted
+        return prediction.predict(self, np.asarray(inputs, dtype=np.float64), dt_s)

@@ -29,8 +29,7 @@ class Shown:
 
     def plot(self) -> Axes:
         """Draw the artefact and return the first axes of its figure; ``axes.figure`` is the whole."""
-        axes: Axes = _notebook().plot(self)
-        return axes
+        return _notebook().plot(self)
 
 
 def _notebook() -> Any:

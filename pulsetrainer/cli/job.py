@@ -153,8 +153,7 @@ class Job:
 
     def load(self, path: Path, kind: type[K]) -> K:
         """Return the artefact of this kind in an input file; raises as ``store.read``."""
-        noun: K = self.load_any(path, kind)
-        return noun
+        return self.load_any(path, kind)
 
     def load_any(self, path: Path, *kinds: type) -> Any:
         """Return the artefact in an input file, of any of these kinds; no kind named: of whatever kind."""

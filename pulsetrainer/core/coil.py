@@ -118,8 +118,7 @@ def simulated(coil: Coil, duty: FloatArray, dt_s: float) -> FloatArray:
 
 def _filter(dt_s: float) -> tuple[FloatArray, FloatArray]:
     """Coefficients of the filter at the ticks."""
-    numerator, denominator = scipy.signal.butter(_FILTER_ORDER, FILTER_HZ, fs=1.0 / dt_s)
-    return np.asarray(numerator), np.asarray(denominator)
+    return scipy.signal.butter(_FILTER_ORDER, FILTER_HZ, fs=1.0 / dt_s)
 
 
 def identify_coil(holds: Sequence[Hold], dt_s: float, start: Coil | None = None) -> Coil:

@@ -169,8 +169,7 @@ class Device:
             return self._exchange.request(command)
 
     def _status(self) -> m.StatusReply:
-        status: m.StatusReply = self._ask(m.Status())
-        return status
+        return self._ask(m.Status())
 
     def set_parameter(self, name: str, value: int) -> int:
         """Set a parameter of the firmware in device units and return what the device now holds.

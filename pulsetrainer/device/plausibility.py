@@ -150,8 +150,7 @@ def least_force(current_A: FloatArray, rate_Hz: float) -> FloatArray:
 
 def settled_least(current_A: FloatArray) -> FloatArray:
     """Return the same for currents (n,) that have stood: no current that peaks there gives a higher one."""
-    force: FloatArray = _LEAST_GAIN * np.interp(current_A, _CURRENT_A, _RISING_N) - _OFFSET_N
-    return force
+    return _LEAST_GAIN * np.interp(current_A, _CURRENT_A, _RISING_N) - _OFFSET_N
 
 
 def judge_against(time_s: FloatArray, expected_N: FloatArray, force_N: FloatArray) -> str:

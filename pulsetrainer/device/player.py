@@ -151,8 +151,7 @@ class Player:
             self._tick = max(self._tick, self._ack.tick)
 
     def _status(self) -> m.StatusReply:
-        status: m.StatusReply = self._exchange.request(m.Status())
-        return status
+        return self._exchange.request(m.Status())
 
     # --- the steps of a play ---------------------------------------------------------------------
 

@@ -98,8 +98,7 @@ def read(path: Path | str, kind: type[K]) -> K:
 
     DataError where the file is absent, unreadable, damaged, of another kind, or of a newer format.
     """
-    artefact: K = read_one_of(path, kind)
-    return artefact
+    return read_one_of(path, kind)
 
 
 def read_one_of(path: Path | str, *kinds: type) -> Any:

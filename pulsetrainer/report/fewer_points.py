@@ -36,8 +36,7 @@ def extremes(values: FloatArray, most: int = MOST_POINTS) -> IntArray:
         starts + np.argmax(np.where(hole, -np.inf, table), axis=1),
         gap[hole.any(axis=1) & (gap < n)],
     )
-    kept: IntArray = np.unique(np.concatenate(picked))
-    return kept
+    return np.unique(np.concatenate(picked))
 
 
 def path(x: FloatArray, y: FloatArray, most: int = 2 * MOST_POINTS) -> IntArray:
@@ -80,5 +79,4 @@ def path(x: FloatArray, y: FloatArray, most: int = 2 * MOST_POINTS) -> IntArray:
     picked.append(starts[wild] + np.nanargmax(off[wild], axis=1))
     breaks = np.flatnonzero(lost & ~np.concatenate((np.array([False]), lost[:-1])))
     picked.append(breaks[: starts.size])
-    kept: IntArray = np.unique(np.concatenate(picked))
-    return kept
+    return np.unique(np.concatenate(picked))
