@@ -44,6 +44,7 @@ MESSAGES = {
     "wrong kind": Message("", "pulsetrainer {verb}", "{file}", "expected {expected}", "got {got}"),
     "absent": Message("does not exist", "files here: {near}", "{file}"),
     "not an output": Message("{said}", ""),
+    "no room for an output": Message("No space left", "free some space", "{file}"),
     "two outputs": Message("named for two outputs", "another file", "{file}"),
     "a folder": Message("is a folder", "", "{file}", "expected a file"),
     "exists": Message("already exists", "another file, such as", "{file}"),

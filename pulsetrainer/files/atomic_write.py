@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import re
 import secrets
@@ -15,18 +16,21 @@ from pulsetrainer.files.file_lock import Lease, create_locked, sweep
 from pulsetrainer.files.input_file import check_no_option
 
 _LONGEST_STEM = 180  # of 255 bytes; the rest is for the unique part
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
 
 def check_output(path: Path | str, overwrite: bool = False) -> None:
     """Raise UsageError BEFORE the work that would be lost, where an output cannot be written.
 
     It exists and ``overwrite`` is not set, or its folder is missing or not writable, or it is an option.
+    DataError where the disk has no room for another file.
     """
     path = Path(path)
     check_no_option(path)
     try:
         folder = path.resolve().parent if path.is_symlink() else path.parent
         _check_target(path, folder, overwrite=overwrite)
+        _check_new_file(path, folder)
     except (OSError, RuntimeError) as error:  # a name too long, a forbidden folder, a link to itself
         reason = getattr(error, "strerror", None) or error
         raise UsageError(
@@ -53,6 +57,22 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
             f"the output {path} cannot be written: the folder {folder} is not writable",
             hint="write to another folder, or change its permissions",
         )
+
+
+def _check_new_file(path: Path, folder: Path) -> None:
+    """Make a file beside the output and take it away: permissions tell nothing to root, nor of /proc."""
+    try:
+        temporary, lease = _claim(path.resolve())
+    except OSError as error:
+        if error.errno in _NO_ROOM:
+            raise cannot_write(path, error) from error
+        raise UsageError(
+            f"the output {path} cannot be written: no file can be made in {folder} ({error.strerror})",
+            hint="write to another folder",
+        ) from error
+    with contextlib.suppress(OSError):
+        temporary.unlink(missing_ok=True)
+    lease.end()
 
 
 @contextlib.contextmanager

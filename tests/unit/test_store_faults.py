@@ -355,6 +355,31 @@ def test_outputs_that_cannot_be(tmp_path, monkeypatch):
         check_output(tmp_path / "a.h5")
 
 
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="no /proc, where not even root makes files")
+def test_a_folder_where_nobody_makes_files(tmp_path):
+    """Its permissions allow it, or root may do anything: told before the work, not after it."""
+    with raises(UsageError, "not an output", said="no file can be made in /proc"):
+        check_output("/proc/a.h5")
+    (tmp_path / "astray.h5").symlink_to("/proc/a.h5")
+    with raises(UsageError, "not an output", said="no file can be made in /proc"):
+        check_output(tmp_path / "astray.h5")
+
+
+def test_looking_whether_an_output_can_be_written_leaves_nothing(tmp_path, monkeypatch):
+    """What is tried is taken away; a full disk is told as such."""
+    (tmp_path / "a.h5").write_text("kept")
+    check_output(tmp_path / "a.h5", overwrite=True)
+    check_output(tmp_path / "b.h5")
+    assert [(entry.name, entry.read_text()) for entry in tmp_path.iterdir()] == [("a.h5", "kept")]
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(atomic_write, "create_locked", full)
+    with raises(DataError, "no room for an output", file=tmp_path / "b.h5"):
+        check_output(tmp_path / "b.h5")
+
+
 @pytest.mark.parametrize(
     "error", [RuntimeError("bug"), KeyboardInterrupt(), OSError(28, "No space left on device")]
 )
