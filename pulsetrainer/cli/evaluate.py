@@ -109,7 +109,7 @@ def _of_session(job: Job, path: Path, session: pt.Session, html: Path | None, *,
 def show_tables(screen: Screen, evaluation: pt.Evaluation) -> None:
     """Print the figures of an evaluation beside those of the published device."""
     from pulsetrainer.artefacts.evaluation import PUBLISHED
-    from pulsetrainer.report.results import full_force
+    from pulsetrainer.report.results import full_force, worse
     from pulsetrainer.report.text import tables_of
 
     screen.parts(tables_of(evaluation, screen.width))
@@ -119,5 +119,7 @@ def show_tables(screen: Screen, evaluation: pt.Evaluation) -> None:
         screen.line("#2: ", "the second playback of that pulse and inversion, in the order given")
     if len(evaluation.models) > 1:
         screen.line("improvement: ", "how much less rms error than by the first model")
+    for said in worse(evaluation):
+        screen.line("worse: ", said)
     if any(w.name in PUBLISHED for w in evaluation.waveforms):
         screen.line("published: ", "the device of Carneiro, Abreu, Restivo, Sensors 2018, 18(5), 1631")

@@ -30,6 +30,7 @@ from pulsetrainer.report.diagnosis_text import of_a_curve
 from pulsetrainer.report.facts import loop_drawn
 from pulsetrainer.report.names import NAMES, OVERVIEW, beyond_rounding, digits
 from pulsetrainer.report.render import inline_svg
+from pulsetrainer.report.results import worse
 from pulsetrainer.report.style import label
 
 _UNIT = re.compile(r"(?<=\d) (?=%|[A-Za-z]{1,2}\b)")
@@ -143,6 +144,8 @@ def render_evaluation(
         model_title=f"Model{last}",
         predicted=evaluation.models,
         model_stems=evaluation.stems[len(played) :],
+        worse=worse(evaluation),
+        notes=evaluation.notes,
     )
 
 

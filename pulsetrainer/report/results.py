@@ -197,6 +197,17 @@ def evaluated(evaluation: Evaluation) -> dict[str, Any]:
     return ({"waveforms": waveforms} if waveforms else {}) | ({"models": models} if models else {})
 
 
+def worse(evaluation: Evaluation) -> list[str]:
+    """Say which models predict the run worse than the first one: a negative improvement is easily missed."""
+    first = evaluation.models[:1]
+    return [
+        f"{m.name} predicts it worse than {one.name}: its rms error is {digits(-m.gain_percent)} % larger"
+        for one in first
+        for m in evaluation.models
+        if m.gain_percent < 0
+    ]
+
+
 def full_force(evaluation: Evaluation) -> str:
     """Say what errors of played waveforms are given in percent of; empty where there are none."""
     rows = [

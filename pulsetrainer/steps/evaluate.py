@@ -29,6 +29,7 @@ from pulsetrainer.diagnosis.prediction import operator_of, predict
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.steps.arguments import check_measured, named, several
 from pulsetrainer.steps.identify import SHORTEST_PART, TRACE_SAMPLES, to_their_tips
+from pulsetrainer.steps.misfit import misfit_words
 from pulsetrainer.steps.one_thread import one_thread
 
 _REPEATED = re.compile(r"#\d+(?=\.)")  # the number of a name that is there again
@@ -148,6 +149,7 @@ def _drive_error(playback: Playback, drive: DrivePlayback) -> DriveError:
 def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[str]) -> Evaluation:
     found: list[ModelEvaluation] = []
     notes = [f"{name}: {run.gap_words}"] if run.gap_words else []
+    misfits: list[str] = []
     for title, model in zip(model_names, models, strict=True):
         if not same_units((model.input_unit, model.output_unit), (run.input_unit, run.output_unit)):
             raise DataError(
@@ -174,8 +176,9 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
             said = first_stroke_words(part.input, part.output, operator.low, operator.high)
             if said and f"{name}: {said}" not in notes:
                 notes.append(f"{name}: {said}")
+        misfits += filter(None, [misfit_words(one, name, run)])
         found.append(one)
-    return Evaluation(models=tuple(found), model=models[-1], notes=tuple(notes))
+    return Evaluation(models=tuple(found), model=models[-1], notes=(*misfits, *notes))
 
 
 def _is_fitted_to(model: Model, run: Run) -> bool:

@@ -64,6 +64,18 @@ def test_a_model_alone_has_no_improvement():
     assert [any("improvement" in head for head in columns) for columns in heads] == [False, True]
 
 
+def test_a_negative_improvement_is_told_in_words():
+    """On the screen and on the page: that the model is worse, and by how much; a better one is not."""
+    first, better = examples.model_comparison().models
+    worse = replace(better, name="worse", gain_percent=-12.5)
+    told = Evaluation(models=(first, better, worse))
+    said = f"worse predicts it worse than {first.name}: its rms error is 12.50 % larger"
+    assert results.worse(told) == [said]
+    header = {"title": "t", "created": "c", "provenance_json": "{}"}
+    assert said in html.render_evaluation(told, **header).replace("\N{NO-BREAK SPACE}", " ")
+    assert results.worse(Evaluation(models=(first, better))) == []
+
+
 @pytest.mark.parametrize(
     ("dotted", "owner", "words"),
     [

@@ -154,6 +154,28 @@ def test_a_second_model_gains_on_the_first():
     assert second.gain_percent > 0
 
 
+@pytest.mark.parametrize(
+    ("of", "said"),
+    [
+        (lambda u, y: (u, -y), "the other way"),
+        (lambda u, y: (u, 10.0 * y), "varies 10 times as much"),
+        (lambda u, y: (u, y + 5.0 * np.ptp(y)), "an offset of +"),
+        (lambda u, y: (u, np.sin(np.arange(u.size)) - 5.0), "of another device"),
+        (lambda u, y: (5.0 + u, y), "outside the range"),
+    ],
+)
+def test_a_model_that_does_not_describe_the_run_is_told_first(of, said):
+    """With the likely reason: sign, gain, zero, range, else another device; nothing of one that does."""
+    sound = _run(0.01 * WAVE)
+    u, y = of(sound.input, sound.output)
+    other = replace(sound, input=u, output=y, output_quantity="force", output_unit="N")
+    model = replace(MODEL, output_unit="N")
+    first, *rest = evaluate(other, [model], names=["a"], model_names=["m"]).notes
+    assert first.startswith("warning: m does not describe a at all: its rms error is ")
+    assert said in first
+    assert not any("at all" in note for note in (*rest, *evaluate(sound, MODEL).notes))
+
+
 def test_over_a_model_without_any_error_no_gain_can_be_told():
     """As on a record that the first model itself made."""
     model, other = examples.model(), replace(examples.model(), offset=examples.model().offset + 0.5)
