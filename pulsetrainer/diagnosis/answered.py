@@ -26,6 +26,7 @@ from pulsetrainer.diagnosis import residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
+from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Estimate, Finding
 from pulsetrainer.diagnosis.forms import completed, static_behind
@@ -60,6 +61,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         given.input_quantity,
         given.output_quantity,
         (float(inputs.min()), float(inputs.max())),
+        model.output_unit,
     )
     sign, words = model.polarity, _words(given) | bench.numbers()
     dependences = learned(state, words)
@@ -77,7 +79,7 @@ def diagnosis_of(state: State) -> Diagnosis:
             one for finding in state.findings for one in _causes(state, finding, words, dependences)
         ),
         evidence=_said(model, [wording.sentence(one, words) for one in state.evidence]),
-        next_experiment=wording.advice(state.advice, bench),
+        next_experiment=wording.advice(_advice(state), bench),
         profiles=_profiles(state, words),
         time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
         input=scale.inputs(problem.bins.average([r.input for r in problem.records]))[thin],
@@ -96,7 +98,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         lacks=state.lacks,
         whole=state.is_whole(extended) and state.verdict != "unknown",
         dependences=dependences,
-        notes=state.question.notes,
+        notes=tuple(_by_name(note, given.names) for note in state.question.notes),
         model=model.fingerprint,
         records=tuple(
             Recorded(
@@ -109,6 +111,29 @@ def diagnosis_of(state: State) -> Diagnosis:
         as_measured=True,
         empty=float(scale.outputs(np.asarray(extended.simulator.frames[0].zero))),
     )
+
+
+def _advice(state: State) -> Evidence:
+    """Return the advice, in words of its own for a quick screen and for what was seen and is not named."""
+    one, tried = state.advice, state.scores.scores[:1]
+    if state.question.quick and one.kind.startswith("extend"):
+        return replace(one, kind="extend, quick")
+    seen = tuple(dict.fromkeys(finding.cause.id for finding in state.findings if finding.found))
+    if one.kind == "none" and seen:
+        return Evidence("none, seen", names=seen)
+    if one.kind == "none" and tried and tried[0].p_value <= LIMITS.p_max:
+        small = "none, small, quick" if state.question.quick else "none, small"
+        return Evidence(small, names=(tried[0].cause.id,))
+    return one
+
+
+def _by_name(note: str, names: Sequence[str]) -> str:
+    """Return a note with the name of the record that it is about: stages know records by their number."""
+    for k, name in enumerate(names):
+        called = f"{wording.recording(k, {})}: "
+        if note.startswith(called):
+            return f"{name}: {note.removeprefix(called)}"
+    return note
 
 
 def _said(model: Model, evidence: Sequence[str]) -> tuple[str, ...]:
@@ -134,6 +159,7 @@ def _words(given: Given) -> Words:
         "y": unit,
         "in_y": with_unit("", unit),
         "in_u": with_unit("", of_input),
+        **{wording.recording(k, {}): name for k, name in enumerate(given.names)},
     }
 
 

@@ -27,20 +27,25 @@ def question_of(
     quick: bool,
     progress: Callable[[float], None],
     names: Sequence[str],
+    named: bool = False,
 ) -> Question:
     """Return the question that runs ask of a model; ``names`` of the runs and of the model are for messages.
+
+    Where a person ``named`` the runs, evidence calls the records so too; else they are numbered.
 
     DataError where runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is
     too short, or has too few samples with a number.
     """
     low, high = input_range(model)
     *called, model_name = names
-    records, notes, fingerprints = [], [], []
+    records, notes, fingerprints, titles = [], [], [], []
     stamps: list[FloatArray | None] = []
     corrected: list[tuple[str, ...]] = []
     for name, run in zip(called, runs, strict=True):
         _check_fits(name, run, model_name, model)
-        for part in run.parts(LIMITS.least_samples):
+        parts = list(run.parts(LIMITS.least_samples))
+        titles += [name] if len(parts) == 1 else [f"{name}, part {k}" for k in range(1, len(parts) + 1)]
+        for part in parts:
             record, times = measured_of(name, part, model.polarity, low, high)
             records.append(record)
             fingerprints.append(part.fingerprint)
@@ -58,7 +63,8 @@ def question_of(
         run.reference is not None and (run.input_quantity, run.output_quantity) == ("current", "force")
         for run in runs
     )
-    given = Given(model, runs[0].input_quantity, runs[0].output_quantity, ours, tuple(fingerprints))
+    quantities = (runs[0].input_quantity, runs[0].output_quantity)
+    given = Given(model, *quantities, ours, tuple(fingerprints), tuple(titles) if named else ())
     return Question(records, low, high, rng, quick, progress, given, tuple(notes), stamps, corrected)
 
 

@@ -35,6 +35,7 @@ class Given:
     output_quantity: str = "output"
     ours: bool = False  # recorded by this program, which can play the experiments that it proposes
     fingerprints: tuple[str, ...] = ()  # of the records
+    names: tuple[str, ...] = ()  # of the records, as a person knows them; empty: they are numbered
 
 
 @dataclass(frozen=True)

@@ -181,6 +181,21 @@ ADVICE: Mapping[str, str] = {
         "acts on it: vary one thing at a time, such as temperature, load or amplitude."
     ),
     "none": "Nothing was found on this recording beyond what is taken for noise.",
+    "none, seen": (
+        "Nothing was found on this recording that asks for another model: {names} can be seen, but in doubt "
+        "or no larger than the noise."
+    ),
+    "none, small": (
+        "Nothing that matters was found on this recording: noise alone would hardly look like {names}, but "
+        "it is too small to matter, or does not predict what was left out of the fit."
+    ),
+    "none, small, quick": (
+        "Nothing that matters was found on this recording: noise alone would hardly look like {names}, but "
+        "it is too small to matter."
+    ),
+    "extend, quick": (
+        "Run the full diagnosis, which fits what was found: a quick screen has no model to extend by it."
+    ),
     "too noisy": (
         "These recordings could not have shown {names} of {matters:.2g} % of the span. Record the same for "
         "{times:.2g} times as long, or with less noise, and diagnose that."
@@ -280,7 +295,14 @@ DOUBTS: Mapping[str, str] = {
         "what is left is nearly as large, or is more than noise"
     ),
 }
-OURS = " The diagnostic signal does all of it: pulsetrainer capture diagnostic -o diagnostic.h5."
+OURS = (
+    " The diagnostic signal does all of it: pulsetrainer capture diagnostic --current-max {highest} "
+    "-o diagnostic-2.h5."
+)
+TABLE = (
+    " Write a table with columns of {columns}; pulsetrainer import makes a recording of it, "
+    "as of those that were diagnosed."
+)
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``Bench.numbers``
 LACKS: Mapping[str, str] = {
     "rates": "nearly all of it was run at one rate",
@@ -326,6 +348,7 @@ class Bench:
     input: str = "input"  # what was measured, in words
     output: str = "output"
     reached: tuple[float, float] = (0.0, 1.0)  # by the input, shares of the range: none is asked for beyond
+    unit_of_output: str = "1"
 
     def numbers(self, faster: float = 1.0) -> dict[str, str]:
         """Levels, rates and times of the experiments, so much faster, to be set on that bench."""
@@ -344,6 +367,17 @@ class Bench:
             "second": "second" if self.timed else "sample",
             "seconds": "s" if self.timed else "samples",
             **{name: self._level(share) for name, share in shares.items()},
+            "highest": self._number(1.0),
+            "columns": _joined(
+                [
+                    f"{name} in {shown(unit)}" if shown(unit) else name
+                    for name, unit in (
+                        ("time", "s"),
+                        (self.input, self.unit),
+                        (self.output, self.unit_of_output),
+                    )
+                ]
+            ),
             "levels": self._levels(experiment.LEVELS[1:-1]),
             "biases": self._levels(experiment.BIASES),
             "width": with_unit(figure(experiment.WIDTH * self.scale.reach), self.unit),
@@ -411,8 +445,14 @@ def text(one: Evidence, words: Mapping[str, str] | None = None) -> str:
     if one.kind == "largest":
         figures["way"] = WAYS.get(one.figures["at"], "")
         figures["place"] = PLACES[one.names[0]].format(**{**figures, "at": figure(one.figures["at"])})
-    where = f"record {one.record + 1}: " if one.record is not None else ""
+    where = f"{recording(one.record, known)}: " if one.record is not None else ""
     return where + (TEXTS[one.kind] if own is None else own).format(**figures)
+
+
+def recording(number: int, words: Mapping[str, str]) -> str:
+    """Return what a record is called: as ``words`` have it under ``record 1``, else that."""
+    called = f"record {number + 1}"
+    return words.get(called, called)
 
 
 def cause_text(finding: Finding, words: Mapping[str, str]) -> str:
@@ -434,7 +474,7 @@ def advice(one: Evidence, bench: Bench) -> str:
         experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
         lasting=bench.lasting(one.names[0], faster) if tied else "",
         missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),
-        command=OURS if bench.ours else "",
+        command=(OURS if bench.ours else TABLE).format(**numbers),
         **{name: bench.time(value) if name == "rest" else value for name, value in one.figures.items()},
     )
 

@@ -8,7 +8,7 @@ from typing import Any
 from pulsetrainer.artefacts import Diagnosis
 from pulsetrainer.report import diagnosis_text
 from pulsetrainer.report.diagnosis_figures import ranked
-from pulsetrainer.report.diagnosis_text import in_doubt
+from pulsetrainer.report.diagnosis_text import in_doubt, too_little, unnamed
 from pulsetrainer.report.html import page
 
 
@@ -31,7 +31,12 @@ def headline(found: Diagnosis) -> str:
     """Return the verdict in few words; what each cause found means stands below them."""
     if found.verdict in ("none", "inconclusive") and found.found:
         shown = ", ".join(dict.fromkeys(one.cause for one in found.found))
-        return f"No verdict: {shown} can be seen, but it is in doubt or no larger than the noise."
+        return f"No verdict: {shown} can be seen, but in doubt or no larger than the noise."
+    if seen := unnamed(found):
+        small = f"{seen} shows, but it is {too_little(found)}"
+        short = bool(found.lacks) or found.verdict == "inconclusive"
+        limits = " These recordings could not have shown everything that is common." * short
+        return f"Nothing that matters was found: {small}.{limits}"
     if found.verdict == "none":
         limits = ", but they could not have shown everything: see what they lack" if found.lacks else ""
         return f"These recordings show nothing wrong with the model{limits}."

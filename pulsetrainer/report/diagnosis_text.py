@@ -35,6 +35,8 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     """Yield what there is to say, in the order in which a person would ask."""
     how = ("quick screen",) * found.quick + ("in doubt",) * in_doubt(found)
     yield Facts(f"verdict: {found.verdict}" + (f" ({', '.join(how)})" if how else ""), {})
+    if seen := unnamed(found):
+        yield Facts(f"seen, but not named: {seen}, which is {too_little(found)}", {})
     for one in found.found:
         yield Facts(f"{'in doubt' if one.doubts else 'found'}: {one.cause}, {one.text}", _said(one))
     yield Table(
@@ -61,6 +63,19 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
 def in_doubt(found: Diagnosis) -> bool:
     """Tell whether something speaks against the cause that the verdict names."""
     return any(one.cause == found.verdict and bool(one.doubts) for one in found.found)
+
+
+def unnamed(found: Diagnosis) -> str:
+    """Return the strongest cause that noise alone hardly looks like, where none was found; else nothing."""
+    if found.verdict not in ("none", "inconclusive") or found.found:
+        return ""
+    seen = (one.cause for one in found.causes if one.p_value is not None and one.p_value <= LIMITS.p_max)
+    return next(seen, "")
+
+
+def too_little(found: Diagnosis) -> str:
+    """Say why the cause that was seen is not named."""
+    return "too small to matter" + ("" if found.quick else " or not confirmed by the refit")
 
 
 def stands(found: Diagnosis, fields: Sequence[str]) -> bool:

@@ -70,6 +70,8 @@ def diagnose(
             "diagnose needs at least one run", hint="pulsetrainer capture diagnostic -o diagnostic.h5"
         )
     rng = np.random.default_rng(seed)
-    names = named(names, [*(f"run {k}" for k in range(1, len(whole) + 1)), "the model"])
-    question = question_of(whole, model, rng=rng, quick=quick, progress=progress, names=names)
+    called = named(names, [*(f"run {k}" for k in range(1, len(whole) + 1)), "the model"])
+    question = question_of(
+        whole, model, rng=rng, quick=quick, progress=progress, names=called, named=bool(names)
+    )
     return diagnosis_of(procedure.diagnose(question))

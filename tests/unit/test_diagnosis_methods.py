@@ -16,6 +16,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import (
+    answered,
     experiment,
     floor,
     intervals,
@@ -835,7 +836,7 @@ def test_every_kind_of_evidence_and_advice_has_words():
             said = wording.advice(Evidence(kind, figures=figures, names=names), bench)
             assert "{" not in said
             assert ("delay, creep and step" in said) is (
-                kind.startswith("tied")
+                kind.startswith(("tied", "none, "))
                 or kind in ("inconclusive", "too noisy", "far too noisy", "correct")
                 or kind in ("extend, correct", "correct, extend")
             )
@@ -958,6 +959,68 @@ def test_where_an_error_is_largest_is_told_with_its_quantity():
     late = Evidence("largest", figures={"at": 1890.0, "times": 3.0}, names=("time",))
     assert "about 1890 s after" in wording.sentence(late, words)
     assert "creep 270." in wording.sentence(Evidence("would have shown", figures={"creep": 270.0}), words)
+
+
+def test_evidence_calls_a_record_by_its_name_where_it_has_one():
+    """Nobody counts files to know which one is meant; so do notes that stages made without names."""
+    seen = Evidence("gate", "outliers", {"count": 3.0, "limit": 0.5}, record=1)
+    assert wording.sentence(seen, {"record 2": "b.h5"}).startswith("outliers: b.h5: 3 ")
+    notes = ("record 2: left out", "record 3: left out", "b.h5: left out")
+    told = [answered._by_name(note, ("a.h5", "b.h5")) for note in notes]
+    assert told == ["b.h5: left out", "record 3: left out", "b.h5: left out"]
+
+
+def test_the_records_of_a_question_are_called_as_the_runs_were_named():
+    """Parts of one run are counted behind its name; where nobody named them they have none."""
+    run = _run(np.arange(200) * 0.01)
+    seam = np.zeros(200, dtype=bool)
+    seam[100] = True
+    runs = [run, replace(run, seam=seam)]
+
+    def names(**more):
+        asked = {"rng": np.random.default_rng(0), "quick": False, "progress": lambda _: None}
+        return question.question_of(runs, _model(), names=["a.h5", "b.h5", "m"], **asked, **more).given.names
+
+    assert names(named=True) == ("a.h5", "b.h5, part 1", "b.h5, part 2")
+    assert names() == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "quick", "found", "p", "told"),
+    [
+        ("extend", True, (), None, "extend, quick"),
+        ("extend, or late", True, (), None, "extend, quick"),
+        ("extend", False, (), None, "extend"),
+        ("none", False, ("periodic",), None, "none, seen"),
+        ("none", False, (), 0.5 * LIMITS.p_max, "none, small"),
+        ("none", True, (), 0.5 * LIMITS.p_max, "none, small, quick"),
+        ("none", False, (), 2.0 * LIMITS.p_max, "none"),
+        ("lacks", True, (), 0.5 * LIMITS.p_max, "lacks"),
+    ],
+)
+def test_advice_contradicts_neither_a_quick_screen_nor_what_was_seen(kind, quick, found, p, told):
+    """It sent to extend a model that there was not, and said that nothing was found where something was."""
+    state = SimpleNamespace(
+        advice=Evidence(kind),
+        question=SimpleNamespace(quick=quick),
+        findings=[Finding(CAUSE[name], True) for name in found],
+        scores=SimpleNamespace(
+            scores=[] if p is None else [SimpleNamespace(p_value=p, cause=CAUSE["creep"])]
+        ),
+    )
+    one = answered._advice(state)
+    assert one.kind == told
+    if told.startswith("none, "):
+        assert one.names == (found or ("creep",))
+
+
+def test_advice_to_record_again_says_how():
+    """By us: the whole command, up to where the input went; elsewhere: the columns of the table."""
+    lacks = Evidence("lacks", names=("holds",))
+    ours = wording.advice(lacks, wording.Bench(Scale(0.0, 1.5), "A", ours=True, reached=(0.0, 0.6)))
+    assert ours.endswith("pulsetrainer capture diagnostic --current-max 0.9 -o diagnostic-2.h5.")
+    bench = wording.Bench(Scale(), "A/m", input="H", output="strain", unit_of_output="1")
+    assert "columns of time in s, H in A/m and strain; pulsetrainer import" in wording.advice(lacks, bench)
 
 
 @pytest.mark.parametrize("name", sorted(CAUSE))

@@ -12,6 +12,7 @@ from pulsetrainer.artefacts import Cause, Parameter
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report import tables
 from pulsetrainer.report.diagnosis_figures import course, ranked, ranking
+from pulsetrainer.report.diagnosis_html import headline
 from pulsetrainer.report.diagnosis_text import answer, explains, parameters, sections
 
 NAN = float("nan")
@@ -41,6 +42,27 @@ def test_a_cause_that_was_not_found_says_why():
     assert len(set(said)) == len(said)
     assert [one.startswith("no") for one in said] == [False, False, *[True] * 6]
     assert answer(_cause(LIMITS.p_max), whole) == said[2]  # the limit itself is significant
+
+
+@pytest.mark.parametrize("verdict", ["none", "inconclusive"])
+def test_what_is_seen_but_too_small_to_be_named_is_said_beside_the_verdict(verdict):
+    """A verdict of none, and below it a cause that noise does not look like, contradicted each other."""
+    small, large = _cause(0.1 * LIMITS.p_max), _cause(10.0 * LIMITS.p_max)
+    told = replace(store_examples.diagnosis(), verdict=verdict, causes=(large, small))
+    quick = replace(told, quick=True)
+    titles = [[part.title for part in sections(one)][1] for one in (told, quick)]
+    assert titles == [
+        "seen, but not named: creep, which is too small to matter or not confirmed by the refit",
+        "seen, but not named: creep, which is too small to matter",
+    ]
+    assert ("creep" in headline(told), "nothing wrong" in headline(told)) == (True, False)
+    assert "could not have shown everything" in headline(replace(told, lacks=("holds",)))
+    for other in (
+        replace(told, causes=(large,)),
+        replace(told, verdict="unknown"),
+        replace(told, causes=(small, replace(small, cause="delay", found=True))),
+    ):
+        assert not any(part.title.startswith("seen") for part in sections(other))
 
 
 def test_columns_that_would_be_empty_are_left_out():
