@@ -29,8 +29,8 @@ def import_(
         ),
     ],
     out: Annotated[Path, Option("-o", "--out", help="File to write; '{name}.h5' makes a run of each file.")],
-    input_column: Annotated[str, Option("--input", help="Column of the input, a current for instance.")],
-    output_column: Annotated[str, Option("--output", help="Column of the output, a force for instance.")],
+    input_column: Annotated[str, Option("--input", help="Column of the input, by its heading or number.")],
+    output_column: Annotated[str, Option("--output", help="Column of the output, by its heading or number.")],
     time_column: Annotated[
         str | None, Option("--time", help="Column of the time; default: the first one.")
     ] = None,

@@ -106,7 +106,7 @@ def run_from_table(
         signal=table.path.name,
     )
     meanings = {"input": (input, run.input_unit), "output": (output, run.output_unit)}
-    notes = (*notes, *_other_units(table, meanings))
+    notes = (*notes, *_times_asked_for(table, meanings), *_other_units(table, meanings))
     if reference is not None:
         meanings["reference"] = (reference, run.input_unit)
     return TableRun(run, (*notes, *contradicted, *when.notes), _read_as(table, when.words, meanings))
@@ -166,9 +166,9 @@ def _time(
     if time is None:
         place = _own_column(table, {table.index(name) for name in wanted})
         if place is None:
-            return _counted(
-                table, f"{table.path} has no time column", "give `time` or `rate_Hz`", whole=table is whole
-            )
+            other = "other " * any(_is_called_time(table.names[table.index(name)]) for name in wanted)
+            lack = f"{table.path} has no {other}time column"
+            return _counted(table, lack, "give `time` or `rate_Hz`", whole=table is whole)
         time = table.names[place]
         # no row is counted in ms; the licensed t_s of seconds does count rows
         if _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s"):
@@ -322,6 +322,20 @@ def _other_units(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[
     ]
 
 
+def _times_asked_for(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[str]:
+    """Say which columns look like the time of the record, by name and numbers, and were given a meaning."""
+    return [
+        f"the column {heading!r} of {table.path} looks like the time, and was asked for as the {meaning}"
+        for meaning, (column, _) in meanings.items()
+        if _is_called_time(heading := table.names[table.index(column)])
+        and bool(np.all(np.diff(table.columns[heading]) > 0))
+    ]
+
+
+def _is_called_time(heading: str) -> bool:
+    return split_unit(heading)[0].rpartition(".")[2].lower() in _TIME_NAMES
+
+
 def _needed(table: Table, wanted: Sequence[str], time_column: str | None, *, automatic: bool) -> set[int]:
     """Return the places of the columns that a run is made of."""
     places = {table.index(name) for name in wanted}
@@ -336,7 +350,7 @@ def _own_column(table: Table, used: Collection[int]) -> int | None:
     if table.rate_Hz is not None:
         return None
     words = [split_unit(name)[0].rpartition(".")[2].lower() for name in table.names]
-    candidates = [k for k, word in enumerate(words) if word in _TIME_NAMES]
+    candidates = [k for k, name in enumerate(table.names) if _is_called_time(name)]
     if table.shifts:  # of a text, where columns have an order: the first, or behind a row's number or date
         passed = words[0] in _ROW_NAMES or table.names[0] in table.text_names
         candidates = [*candidates, 0] if passed else [0]

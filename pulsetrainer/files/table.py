@@ -117,6 +117,8 @@ class Table:
     def index(self, name: str) -> int:
         """Return the place of a column of numbers; ``force_N`` is the heading ``force [N]`` too.
 
+        Where no heading is a number, ``2`` is the second column.
+
         DataError where there is no such column (similar names are offered), or it holds text.
         """
         exact = [split_unit(own)[0] for own in self.names]
@@ -130,6 +132,8 @@ class Table:
             [bool(unit) and pair == (wanted.lower(), unit) for pair in zip(bare, units, strict=True)],
         )
         k = next((which.index(True) for which in alike if which.count(True) == 1), None)
+        if k is None:
+            k = {str(number): place for place, number in enumerate(range(1, len(self.names) + 1))}.get(name)
         if k is None:
             near = [own for own in self.names if name.lower() in own.lower()]
             near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)

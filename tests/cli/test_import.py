@@ -112,6 +112,14 @@ def test_a_column_that_is_not_there_offers_the_nearest(run, tmp_path):
     assert "did you mean 'current_A'" in done.err
 
 
+def test_columns_may_be_given_by_their_numbers(run, tmp_path):
+    """The first is the time; what was taken for what is said by the headings."""
+    (tmp_path / "a.csv").write_text("Zeit;Strom [A];Kraft [N]\n0;0;0\n1;1;1\n2;0;1\n")
+    done = run("import", "a.csv", "--input", "2", "--output", "3", "-o", "run.h5")
+    assert done.code == 0, done
+    assert "time from Zeit (no unit: taken as s), input from Strom [A], output from Kraft [N]" in done.out
+
+
 def test_a_column_like_none_gets_no_suggestion(run, tmp_path):
     """Exit 3; the columns that are there are listed once."""
     (tmp_path / "a.csv").write_text("Zeit;Spannung;Weg\n0;0;0\n1;1;1\n")

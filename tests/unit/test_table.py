@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -632,6 +633,34 @@ def test_a_column_that_does_not_exist_offers_the_nearest(table):
         DataError, "nearest column", asked="curent", has="t_s, current_A, force_N", near="'current_A'"
     ):
         table("t_s,current_A,force_N\n0,1,2\n").column("curent")
+
+
+def test_a_column_has_a_number_where_no_heading_is_one(table):
+    """From one on, as headings that are missing are numbered; a heading that is a number comes first."""
+    read = table("Zeit;Strom [A];Kraft [N]\n0;1;2\n1;3;4\n")
+    assert [read.index(name) for name in ("1", "2", "3")] == [0, 1, 2]
+    for name in ("0", "4", "-1", "2.0", "9" * 5000):
+        with raises(DataError, "nearest column", asked=name, has="Zeit, Strom [A], Kraft [N]", near=""):
+            read.index(name)
+    headed = replace(read, names=("t", "3", "2"), columns={}, units={})
+    assert (headed.index("2"), headed.index("3"), headed.index("1")) == (2, 1, 0)
+
+
+def test_a_time_that_is_asked_for_as_input_or_output_is_told(table):
+    """By its name, where it only rises: the table was said to have no time."""
+    rows = "".join(f"{k};{k % 5};{k % 3}\n" for k in range(20))
+    read = table(f"Zeit;Strom;T\n{rows}")
+
+    def told(**columns):
+        return [note for note in run_from_table(read.path, **columns).notes if "looks like the time" in note]
+
+    assert [said.partition("and")[2] for said in told(input="Zeit", output="T")] == [
+        " was asked for as the input"
+    ]
+    assert ["'Zeit'" in said for said in told(input="Strom", output="Zeit", rate_Hz=10.0)] == [True]
+    assert told(input="Strom", output="T") == []  # a torque that rises and falls is no time
+    notes = run_from_table(read.path, input="Zeit", output="T").notes
+    assert any("no other time column" in note for note in notes)
 
 
 @settings(max_examples=300, deadline=None)
