@@ -225,7 +225,11 @@ def _short_capture(device: Device) -> Iterator[Finding]:
         return
     if lost := recording.dropped_samples:
         cable = "use a shorter or shielded cable, another USB port, no hub"
-        yield _finding("link", f"{lost} of {reference.size} samples were lost on the wire", warning=cable)
+        yield _finding(
+            "link",
+            f"{lost} of {reference.size} samples {'was' if lost == 1 else 'were'} lost on the wire",
+            warning=cable,
+        )
     else:
         yield _finding("link", f"{recording.tick.size} samples, none lost")
     range_A, span_N = device.info.current_limit_A, float(np.ptp(recording.force_N))

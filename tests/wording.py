@@ -64,7 +64,7 @@ MESSAGES = {
     # --- tables ------------------------------------------------------------------------------------------
     "no such column": Message("no column", "name one of these", "{file}", "force_N", "t_s, current_A"),
     "column not named": Message("--input is missing", "--input 'Drive (V)'", "piezo.csv", "{has}"),
-    "not finite": Message("lack a number", "remove", "{file}", got="{value} in column {column}, line {line}"),
+    "not finite": Message(" a number: ", "remove", "{file}", got="{value} in column {column}, line {line}"),
     "separator of thousands": Message(
         "not a number", "separator of thousands", got="{cell!r} in column {column}, line {line}"
     ),

@@ -255,6 +255,14 @@ def units_of(measured: Measured) -> str:
     return " and ".join(unit or "no unit" for unit in units) if any(units) else "no units"
 
 
+def counted(number: int, noun: str, one: str = "", more: str = "") -> str:
+    """Return a number of things, of one in the singular: ``1 sample``, ``2 samples``.
+
+    Behind it stands ``one``, such as a verb, or ``more``: ``1 sample was``, ``2 samples were``.
+    """
+    return f"{number} {noun} {one}".rstrip() if number == 1 else f"{number} {noun}s {more}".rstrip()
+
+
 def with_unit(number: str, unit: str) -> str:
     """Return ``1.5 A``; a pure number, whose unit is 1, stays alone."""
     return f"{number} {shown(unit)}".rstrip()

@@ -64,6 +64,7 @@ def capture(
     if resume:
         check_resumable(out)
     from pulsetrainer.artefacts import Run
+    from pulsetrainer.artefacts.units import counted
     from pulsetrainer.core.course import Course
     from pulsetrainer.steps.capture import excitation, plan
     from pulsetrainer.steps.recording import samples_played
@@ -108,7 +109,7 @@ def capture(
                 earlier.check_device(info.serial)
                 job.uses(earlier.path)
                 ancestors, share = [earlier.header], 100.0 * at / course.size
-                done = f"{earlier.run.input.size} samples, {share:.0f} % of the signal"
+                done = f"{counted(earlier.run.input.size, 'sample')}, {share:.0f} % of the signal"
                 job.notes([f"continuing {earlier.path} after {done}"])
             got = capture_into(
                 out, job.header(f"{played.name} on {info.serial}", info, ancestors=ancestors), course, device,
@@ -116,7 +117,8 @@ def capture(
                 progress=progress, watch=view.take if view else None,
             )  # fmt: skip
     if got.dropped_samples:
-        job.notes([f"{got.dropped_samples} samples were lost on the wire; the rest is right"])
+        lost = counted(got.dropped_samples, "sample", "was", "were")
+        job.notes([f"{lost} lost on the wire; the rest is right"])
     from pulsetrainer.report.results import captured
 
     job.show(*captured(out, played.name, got, info))

@@ -37,6 +37,7 @@ def compare(
     job = Job(context, inputs=evaluations, outputs=(out,))
     with job.working("comparing"):
         loaded = [job.load_any(path, pt.Evaluation, pt.Session) for path in evaluations]
+        from pulsetrainer.artefacts.units import counted
         from pulsetrainer.files import store
         from pulsetrainer.report.results import as_csv, labels_of, side_by_side
         from pulsetrainer.steps.compare import differing_quizzes, differing_units
@@ -63,7 +64,7 @@ def compare(
     differ = ["difference"] if learners and len(loaded) == 2 else []  # of a class it would say nothing
     rows = side_by_side(metrics, verdicts=not learners, change=bool(differ) or not learners)
     head = ["", "unit", *labels, *(differ if learners else ["change", ""])]
-    job.screen.table(f"{len(labels)} {loaded[0].kind}s", head, rows)
+    job.screen.table(counted(len(labels), loaded[0].kind), head, rows)
     if not learners:
         judged = any(m.better is not None for m in metrics)
         unsure = "; one within the spread between repeats gets no verdict" * judged

@@ -86,7 +86,8 @@ def evaluate(
     job.wrote(out, html)
     job.screen.end(failed)
     if limits:
-        job.screen.whole(f"all {len(limits)} bounds of {bounds} hold")
+        hold = "the one bound" if len(limits) == 1 else f"all {len(limits)} bounds"
+        job.screen.whole(f"{hold} of {bounds} {'holds' if len(limits) == 1 else 'hold'}")
 
 
 def _of_session(job: Job, path: Path, session: pt.Session, html: Path | None, *, alone: bool) -> None:

@@ -38,6 +38,8 @@ def export(
     artefact = job.load_any(file)
     with job.working(f"exporting {file.name}"):
         columns = job.table(out, artefact, file)
+    from pulsetrainer.artefacts.units import counted
+
     rows = next(iter(columns.values())).size
     payload = {"output": out, "kind": artefact.kind, "columns": list(columns), "rows": rows}
-    job.show(payload, f"wrote {out}: {artefact.kind}, {rows} rows", {"columns": list(columns)})
+    job.show(payload, f"wrote {out}: {artefact.kind}, {counted(rows, 'row')}", {"columns": list(columns)})

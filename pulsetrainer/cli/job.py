@@ -257,10 +257,11 @@ class Job:
 
     def left_over(self, out: Path, kind: type, said: str) -> None:
         """Say what programs that were killed left beside an output, of this kind: ``said`` names it."""
+        from pulsetrainer.artefacts.units import counted
         from pulsetrainer.files.recorder import interrupted
 
         for left, samples in interrupted(out, kind):
-            self.notes([f"{left} holds {samples} samples of {said.format(left=left)}"])
+            self.notes([f"{left} holds {counted(samples, 'sample')} of {said.format(left=left)}"])
 
     def notes(self, lines: Sequence[str]) -> None:
         """Say what a verb has to tell, a line each, on stderr."""

@@ -91,8 +91,10 @@ def play(
         stopped.hint = stopped.hint or "evaluate what there is, or play all of it again with --overwrite"
         raise stopped
     if played.dropped_samples:
-        lost = f"{played.dropped_samples} samples were lost on the wire"
-        job.notes([f"{lost}; they are left out of all errors"])
+        from pulsetrainer.artefacts.units import counted
+
+        lost = counted(played.dropped_samples, "sample", "was", "were")
+        job.notes([f"{lost} lost on the wire, and left out of all errors"])
     job.show(*said_of(out, played, info.serial, info.firmware))
 
 

@@ -59,13 +59,16 @@ def refine(
     title = f"{refined.name} refined on {info.serial}"
     job.save(out, refined, title, info)
     if stopped is not None:
-        stopped.message += f"; the best of {len(refined.passes)} passes was kept in {out}"
+        all_of = "1 pass" if len(refined.passes) == 1 else f"{len(refined.passes)} passes"
+        stopped.message += f"; the best of {all_of} was kept in {out}"
         raise stopped
     job.notes(refined.notes[len(waveform.notes) :])
+    from pulsetrainer.artefacts.units import counted
+
     rows = {
         f"pass {number}{', kept' if number == refined.kept else ''}": (
             f"mean {one.mean_abs_error_percent:.3f} %, max {one.max_abs_error_percent:.2f} % of full force, "
-            f"{one.repeats} repeats"
+            + counted(one.repeats, "repeat")
         )
         for number, one in enumerate(refined.passes, 1)
     }

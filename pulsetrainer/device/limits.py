@@ -85,9 +85,10 @@ def to_wire(reference_A: ArrayLike, *, limit_A: float) -> NDArray[np.int16]:
     half = codes.CURRENT_UNIT_A / 2
     out = np.flatnonzero((reference < -half) | (reference > limit_A + half))
     if out.size:
+        are = "is" if out.size == 1 else "are"
         raise ArgumentError(
             f"sample {out[0]} of the reference is {reference[out[0]]:g} A; "
-            f"the device plays 0..{limit_A:g} A ({out.size} of {reference.size} samples are outside)",
+            f"the device plays 0..{limit_A:g} A ({out.size} of {reference.size} samples {are} outside)",
             hint="scale the waveform into the range",
         )
     return np.rint(reference / codes.CURRENT_UNIT_A).astype(np.int16)

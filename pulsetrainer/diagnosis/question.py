@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import Model, Run
-from pulsetrainer.artefacts.units import same_units, units_of, with_unit
+from pulsetrainer.artefacts.units import counted, same_units, units_of, with_unit
 from pulsetrainer.core.coverage import covers_range
 from pulsetrainer.core.initial_state import first_stroke_words, known_from
 from pulsetrainer.core.plane import FloatArray
@@ -120,7 +120,7 @@ def measured_of(
         good &= np.isfinite(run.reference)
     if good.sum() < LIMITS.least_samples:
         raise DataError(
-            f"{name} has only {good.sum()} samples with numbers in them, too few to tell causes apart",
+            f"{name} has numbers in {counted(int(good.sum()), 'sample')} only, too few to tell causes apart",
             hint="record longer",
         )
     u = run.input[good]

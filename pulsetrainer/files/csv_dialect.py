@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pulsetrainer.artefacts.units import is_unit, split_unit, symbol_of
+from pulsetrainer.artefacts.units import counted, is_unit, split_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import time_stamps as stamps
 
@@ -337,7 +337,7 @@ def _with_header(
     unremarked = len(names) == len(first) + 1 and names[-1].lower() in _REMARK_HEADINGS
     if len(names) != len(first) and not unremarked:
         raise DataError(
-            f"{path} has {len(names)} column name{'s' * (len(names) != 1)}, but {len(first)} columns in line "
+            f"{path} has {counted(len(names), 'column name')}, but {counted(len(first), 'column')} in line "
             f"{begin.number}",
             hint="correct the header; decimal commas need another delimiter, such as a semicolon",
         )

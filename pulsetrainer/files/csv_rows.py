@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from pulsetrainer.artefacts import FloatArray
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.csv_dialect import Dialect, column_words, has_thousands, number, readable
 
@@ -170,8 +171,8 @@ class _Reader:
                 cells += [""] * (len(dialect.names) - len(cells))  # no remark
             if len(cells) != len(dialect.names):
                 self.misfit = self.misfit or (
-                    f"{self.path} has {len(cells)} columns in line {count}, expected {len(dialect.names)}: "
-                    f"{', '.join(dialect.names)}"
+                    f"{self.path} has {counted(len(cells), 'column')} in line {count}, "
+                    f"expected {len(dialect.names)}: {', '.join(dialect.names)}"
                 )
                 continue
             for k, cell in enumerate(cells):

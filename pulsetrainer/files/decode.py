@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DamagedFileError, DataError
 from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
 
@@ -107,7 +108,9 @@ def _dataset(dataset: h5py.Dataset, plan: FieldPlan, origin: Origin, lengths: di
         raise origin.fault(where, f"has the shape {shape}, expected {expected}")
     for axis, length in zip(plan.dims, shape, strict=True):
         if length != lengths.setdefault(axis, length):
-            raise origin.fault(where, f"has {length} values along {axis}, expected {lengths[axis]}")
+            raise origin.fault(
+                where, f"has {counted(length, 'value')} along {axis}, expected {lengths[axis]}"
+            )
     _check_size(dataset, origin)
     values = np.asarray(dataset[()]).astype(plan.type)
     if said := plan.fault_in(values):

@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DataError
 from pulsetrainer.files.provenance import clean
 from pulsetrainer.files.schema import TIME, FieldPlan, plan_of
@@ -99,7 +100,8 @@ def _put_dataset(group: h5py.Group, plan: FieldPlan, values: Mapping[str, Any], 
         scale = _scale(group, axes, axis, array.shape[k])
         if scale.shape[0] != array.shape[k]:
             raise DataError(
-                f"{plan.name!r} has {array.shape[k]} values along {axis}, expected {scale.shape[0]}",
+                f"{plan.name!r} has {counted(array.shape[k], 'value')} along {axis}, "
+                f"expected {scale.shape[0]}",
                 hint=_WRITE_AGAIN,
             )
         dataset.dims[k].attach_scale(scale)

@@ -15,7 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pulsetrainer.artefacts import FloatArray, Run
-from pulsetrainer.artefacts.units import SECONDS, check_unit, claimed_unit, same_units, split_unit, symbol_of
+from pulsetrainer.artefacts.units import (
+    SECONDS,
+    check_unit,
+    claimed_unit,
+    counted,
+    same_units,
+    split_unit,
+    symbol_of,
+)
 from pulsetrainer.errors import DataError, UsageError
 from pulsetrainer.files.csv_dialect import column_words
 from pulsetrainer.files.table import Table, read_table
@@ -90,7 +98,8 @@ def run_from_table(
     columns = {name: np.ascontiguousarray(table.check_finite(name, remedy=_LEAVE_OUT)) for name in wanted}
     if table.rows < 2:
         raise DataError(
-            f"{table.path} has {table.rows} row, a run needs two or more", hint="export the record again"
+            f"{table.path} has {counted(table.rows, 'row')}, a run needs two or more",
+            hint="export the record again",
         )
     when = _Time(None, "no time") if no_time else _time(table, wanted, time, rate_Hz, whole)
     _check_distinct(table, input=input, output=output, reference=reference, time=time)
@@ -275,7 +284,8 @@ def _without_bad_rows(table: Table, *, counted: bool) -> tuple[Table, tuple[str,
     bad = table.bad_rows()
     if bad.size == 0:
         return table, ()
-    said = f"{bad.size} of {table.rows} rows of {table.path} lack a number"
+    lack, were = ("lacks", "was") if bad.size == 1 else ("lack", "were")
+    said = f"{bad.size} of {table.rows} rows of {table.path} {lack} a number"
     if table.mostly(bad):
         raise DataError(
             f"{said}: too many to leave them out ({table.places(bad)})",
@@ -288,7 +298,7 @@ def _without_bad_rows(table: Table, *, counted: bool) -> tuple[Table, tuple[str,
         )
     kept = np.delete(np.arange(table.rows), bad)
     columns = {name: column[kept] for name, column in table.columns.items()}
-    note = f"{said} and were left out: {table.places(bad)}"
+    note = f"{said} and {were} left out: {table.places(bad)}"
     return replace(table, columns=columns, shifts=_shifts_of(table, kept)), (note,)
 
 
@@ -412,7 +422,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
             other = ", or give a `rate_Hz` instead of the time"
         raise DataError(
             f"the time in {table.path}, {column_words(name)}, does not increase at {table.place(row)}: "
-            f"{this} after {before} ({back.size} such rows)",
+            f"{this} after {before} ({counted(back.size, 'such row')})",
             hint=hint + other * of_record,
         )
     return time_s

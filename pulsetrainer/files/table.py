@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pulsetrainer.artefacts import FloatArray, beyond_all_quantities
-from pulsetrainer.artefacts.units import split_unit, symbol_of
+from pulsetrainer.artefacts.units import counted, split_unit, symbol_of
 from pulsetrainer.errors import ArgumentError, DataError
 from pulsetrainer.files.array_files import Columns, reader_of
 from pulsetrainer.files.atomic_write import replacing
@@ -107,7 +107,7 @@ class Table:
             value = missing if np.isnan(values[bad[0]]) else values[bad[0]]
             raise DataError(
                 f"{self.path} has {value} in {column_words(name)}, {self.place(int(bad[0]))} "
-                f"({bad.size} of {values.size} rows lack a number: {self.places(bad)})",
+                f"({_lacking(bad.size, values.size)}: {self.places(bad)})",
                 hint=f"remove those rows, or {_AGAIN if self.mostly(bad) else remedy}",
             )
         if said := beyond_all_quantities(values):
@@ -150,6 +150,10 @@ class Table:
                 "01.05.2024 12:34:56",
             )
         return k
+
+
+def _lacking(bad: int, rows: int) -> str:
+    return f"{bad} of {counted(rows, 'row')} {'lacks' if bad == 1 else 'lack'} a number"
 
 
 def numbered(names: Sequence[str]) -> tuple[str, ...]:
@@ -210,7 +214,7 @@ def read_table(
     if rows.misfit and not bad_rows:
         bad = table.bad_rows()
         raise DataError(
-            f"{rows.misfit} ({bad.size} of {table.rows} rows lack a number: {table.places(bad)})",
+            f"{rows.misfit} ({_lacking(bad.size, table.rows)}: {table.places(bad)})",
             hint=f"correct or remove {'that line' if bad.size == 1 else 'those lines'}, or "
             f"{_AGAIN if table.mostly(bad) else remedy}",
         )

@@ -11,7 +11,7 @@ import numpy as np
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, Playback, Run, Session, Waveform
 from pulsetrainer.artefacts.model import Extension
 from pulsetrainer.artefacts.time_steps import gaps_of, steps_of
-from pulsetrainer.artefacts.units import with_unit
+from pulsetrainer.artefacts.units import counted, with_unit
 from pulsetrainer.core import input_noise
 from pulsetrainer.core.loop import drawn
 from pulsetrainer.core.plane import FloatArray
@@ -172,7 +172,7 @@ def _waveform(waveform: Waveform) -> dict[str, Any]:
 def _refined(waveform: Waveform) -> dict[str, Any]:
     kept = waveform.passes[waveform.kept - 1]
     return {
-        "refined": f"pass {waveform.kept} of {len(waveform.passes)}, {kept.repeats} repeats",
+        "refined": f"pass {waveform.kept} of {len(waveform.passes)}, {counted(kept.repeats, 'repeat')}",
         "mean_abs_error_percent": kept.mean_abs_error_percent,
         "max_abs_error_percent": kept.max_abs_error_percent,
     }

@@ -23,7 +23,7 @@ from pulsetrainer.artefacts import (
     Waveform,
     WaveformEvaluation,
 )
-from pulsetrainer.artefacts.units import shown
+from pulsetrainer.artefacts.units import counted, shown
 from pulsetrainer.core.metrics import beats
 from pulsetrainer.report.fewer_points import extremes, path
 from pulsetrainer.report.names import digits
@@ -391,5 +391,5 @@ def repeats(axes: Axes, time_s: FloatArray, rows: FloatArray, name: str, style: 
     """Draw every repeat of one measurement, thin, in one colour; only the first is named, if there is one."""
     thin = style | {"linewidth": 0.8, "alpha": 0.6, "linestyle": "-"}
     for k, row in enumerate(rows):
-        named = f"{name}, {len(rows)} repeats" if name and k == 0 else None
+        named = f"{name}, {counted(len(rows), 'repeat')}" if name and k == 0 else None
         trace(axes, time_s, row, **thin, label=named)

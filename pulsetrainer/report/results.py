@@ -13,7 +13,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
-from pulsetrainer.artefacts.units import quantity_in_words, with_seconds, with_unit
+from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
 from pulsetrainer.report.facts import loop_words, minor_words, run_facts, span_words, warmth_words
 from pulsetrainer.report.names import digits, split, told
 from pulsetrainer.report.tables import picked
@@ -71,7 +71,7 @@ def identified(out: Path, model: Model, seconds: float) -> Said:
         "loop": loop_words(model),
         "form": model.form,
         **({"output known within": with_unit(f"{band:.2g}", unit) + " (90 % band)"} if band else {}),
-        "took": f"{seconds:.2f} s, {fit.iterations} iterations",
+        "took": f"{seconds:.2f} s, {counted(fit.iterations, 'iteration')}",
     }
     return payload, f"{out}: Preisach model of {model.levels} levels, {model.weights.size} cells", rows
 
@@ -130,7 +130,7 @@ def inverted(out: Path, drive: Waveform) -> Said:
         "length": f"{length}, {drive.time_s.size} samples",
         made: _range_words(force, drive.output_unit) + before,
         given: _range_words(current, drive.input_unit),
-        "out of reach": f"{drive.clipped_samples} samples",
+        "out of reach": counted(drive.clipped_samples, "sample"),
         "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model{but}",
     }
     return payload, f"{out}: {drive_title(drive)}", rows
@@ -153,7 +153,7 @@ def played(out: Path, made: Playback, serial: str, firmware: str) -> Said:
     rows = {
         "repeats": f"{repeats} of each drive, {seconds:.1f} s in all",
         "samples": f"{drive.time_s.size} a repeat",
-        "lost": f"{made.dropped_samples} samples",
+        "lost": counted(made.dropped_samples, "sample"),
         **({"coil": warmth_words(kelvin)} if kelvin is not None and kelvin.size else {}),
     }
     return payload, f"{out}: {drive_title(drive)} on {serial}", rows
@@ -172,7 +172,7 @@ def pressed(
         f"{figures['mean_abs_error_percent']:.2f} % mean, {figures['max_abs_error_percent']:.2f} % at most"
     )
     return {
-        "beats": f"{beats} in {parts} part{'s' if parts > 1 else ''}",
+        "beats": f"{beats} in {counted(parts, 'part')}",
         "force": f"{reach_N[0]:.2f} .. {reach_N[1]:.2f} N at full amplitude",
         "error": f"{error}, of full force ({figures['full_force']:.2f} N)",
         "timing": f"beats begin within {figures['beat_timing_max_ms']:.2g} ms of their time",
@@ -340,7 +340,8 @@ def imported(run: Run, report: Any) -> dict[str, Any]:
     shown = run_facts(run, report.reversals)
     if report.false_reversals:
         noise = with_unit(f"{report.input_noise:.2g}", report.input_unit)
-        shown["noise in the input"] = f"{noise}; {report.false_reversals} more reversals are noise"
+        more = counted(report.false_reversals, "more reversal", "is", "are")
+        shown["noise in the input"] = f"{noise}; {more} noise"
     direction = "unclear, identify tries both" if report.polarity == "unclear" else report.polarity
     shown["loop"] = f"{direction} (correlation {report.correlation:+.2f})"
     shown["coverage_percent"] = report.coverage_percent

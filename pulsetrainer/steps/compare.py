@@ -10,7 +10,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Evaluation, Session
 from pulsetrainer.artefacts.evaluation import HEADLINES
-from pulsetrainer.artefacts.units import shown
+from pulsetrainer.artefacts.units import counted, shown
 from pulsetrainer.errors import DataError
 from pulsetrainer.steps.arguments import check_several, named, several
 from pulsetrainer.steps.quiz import score
@@ -105,7 +105,7 @@ def differing_quizzes(compared: Sequence[Evaluation | Session], names: Sequence[
     if len({(len(quiz.asked), *sorted(quiz.choices)) for quiz in quizzes.values()}) < 2:
         return []
     said = [
-        f"{name} has {len(quiz.asked)} questions on {len(quiz.choices)} pulses "
+        f"{name} has {counted(len(quiz.asked), 'question')} on {len(quiz.choices)} pulses "
         f"({100 * score(quiz).chance:.0f} % by guessing)"
         for name, quiz in quizzes.items()
     ]

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pulsetrainer.artefacts import Model, Waveform
-from pulsetrainer.artefacts.units import with_seconds, with_unit
+from pulsetrainer.artefacts.units import counted, with_seconds, with_unit
 from pulsetrainer.core import inversion
 from pulsetrainer.core.learning import BAND_HZ
 from pulsetrainer.core.operator import Preisach
@@ -174,7 +174,7 @@ def _rate_for(shape: Shape, model: Model, notes: list[str]) -> float:
     own = int(np.clip(shape.time_s.size, *_OWN))
     period = with_seconds(shape.period_s)
     notes.append(
-        f"one period of {shape.name} lasts {period}: the drive has {own} samples in it, "
+        f"one period of {shape.name} lasts {period}: the drive has {counted(own, 'sample')} in it, "
         f"one every {with_seconds(shape.period_s / own)}"
     )
     return own / shape.period_s
@@ -197,8 +197,9 @@ def _check_length(shape: Shape, model: Model, periods: int) -> None:
     longest_s = ON_TIME_S - _AROUND_S
     if model.input_unit == "A" and model.captured and periods * shape.period_s > longest_s:
         most = int(longest_s / shape.period_s)
+        last = counted(periods, "period", f"of {shape.name} lasts", f"of {shape.name} last")
         raise ArgumentError(
-            f"{periods} periods of {shape.name} last {periods * shape.period_s:.5g} s; the device stays on "
+            f"{last} {periods * shape.period_s:.5g} s; the device stays on "
             f"for at most {ON_TIME_S:g} s at a time",
             hint=f"give `periods` at most {most}; pulsetrainer session presses for as long as you like"
             if most
@@ -243,7 +244,8 @@ def _of_clipped(samples: int, error: str, *, slight: bool) -> list[str]:
     """Say what it costs that the drive stays at an end of its range; nothing where it never has to."""
     if not samples:
         return []
-    found = f"for {samples} samples the drive would have to leave the model's range, and stays at its end"
+    left = counted(samples, "sample")
+    found = f"for {left} the drive would have to leave the model's range, and stays at its end"
     matters = (
         f"this does not matter, the model expects errors of at most {error}"
         if slight

@@ -210,7 +210,7 @@ def test_a_bad_first_row_is_a_bad_row(table, header, first):
         read_run(path, **COLUMNS)
     assert f"line {line}" in caught.value.message
     read = run_from_table(path, skip_bad_rows=True, **COLUMNS)
-    assert read.notes == (f"1 of 30 rows of {path} lack a number and were left out: line {line}",)
+    assert read.notes == (f"1 of 30 rows of {path} lacks a number and was left out: line {line}",)
     assert (read.run.input_unit, read.run.output_unit) == ("V", "N")
     np.testing.assert_array_equal(read.run.time_s, np.arange(1, 30) / 100)
 
@@ -579,6 +579,7 @@ def test_missing_values_are_nan_until_they_are_needed(table, missing):
         ("t,u,y\n0,1,2\n1,2\n", ["2 columns in line 3", "expected 3"]),
         ("t,u\n0,1\n1,2,3\n", ["3 columns in line 3", "expected 2"]),
         ("t,u\n0,1,2\n1,2,3\n", ["2 column names", "3 columns in line 2"]),
+        ("t,u\n0,1\n1,2\n3\n", ["1 column in line 4", "1 of 3 rows lacks a number"]),
         (
             "t;u\n0;1,5\n1;2.5\n",
             ["mixes decimal signs", "'2.5' in column u, line 3", "'1,5' in column u, line 2"],

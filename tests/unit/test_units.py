@@ -12,6 +12,7 @@ import pulsetrainer as pt
 from pulsetrainer.artefacts.units import (
     SECONDS,
     check_unit,
+    counted,
     is_unit,
     same_units,
     shown,
@@ -83,6 +84,16 @@ QUANTITIES = [
     "A/B",
     "coil I",
 ]
+
+
+def test_one_thing_is_told_in_the_singular():
+    """With its verb; none and several are not."""
+    assert [counted(n, "sample", "was", "were") for n in (0, 1, 2)] == [
+        "0 samples were",
+        "1 sample was",
+        "2 samples were",
+    ]
+    assert [counted(n, "row") for n in (1, 3)] == ["1 row", "3 rows"]
 
 
 @pytest.mark.parametrize("text", SI + OTHER)

@@ -30,7 +30,7 @@ class OutOfRange(Cause):
     size = "beyond the range of the model, at most"
     texts: ClassVar[Mapping[str, str]] = {
         "gate": (
-            "{count:.0f} samples of the input lie outside {low:.4g} .. {high:.4g}{in_u}, "
+            "the {input} leaves {low:.4g} .. {high:.4g}{in_u} in {count:.0f} of its samples, "
             "by up to {beyond:.3g}{in_u}"
         )
     }
