@@ -58,7 +58,8 @@ def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
     added = {one.cause for one in extended.extensions}
     at_one_rate = [name for name in sorted(added) if "rates" in found.lacks and library()[name].widens]
     rates = (
-        "was seen at one rate of change only, and at others it is a guess: `verify` RUN.h5 at others tells"
+        "was seen at one rate of change, or nearly so, and at others it is a guess: "
+        "`verify` RUN.h5 at others tells"
     )
     doubts = dict.fromkeys(
         f"{one.cause} is in doubt ({'; '.join(one.doubts)}): `verify` RUN.h5, a run that was not diagnosed, "

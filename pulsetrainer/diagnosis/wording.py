@@ -305,7 +305,7 @@ TABLE = (
 )
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``Bench.numbers``
 LACKS: Mapping[str, str] = {
-    "rates": "nearly all of it was run at one rate",
+    "rates": f"nearly all of it was run at one rate, or at rates less than {LIMITS.one_rate:g} times apart",
     "holds": "the {input} never rests for {hold_least} or more",
     "length": "it is shorter than {short}",
     "time": "its samples have no time",

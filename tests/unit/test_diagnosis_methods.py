@@ -896,6 +896,12 @@ def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
     assert "at each of 100.04, 99.98, 100.02 and 99.96 A" in said
 
 
+def test_two_rates_that_count_as_one_are_not_told_as_one():
+    """A recording at two clearly different rates was said to be of one: the words tell how far apart."""
+    said = wording.sentence(Evidence("lacks", names=("rates",)), {})
+    assert f"less than {LIMITS.one_rate:g} times apart" in said
+
+
 def test_what_a_record_lacks_is_asked_for_in_numbers():
     """Rates, stops and length, for a slow bench in millimetres."""
     bench = wording.Bench(Scale(low=0.0, reach=2.0, second=100.0), "mm")
