@@ -120,7 +120,8 @@ def measured_of(
         good &= np.isfinite(run.reference)
     if good.sum() < LIMITS.least_samples:
         raise DataError(
-            f"{name} has only {counted(int(good.sum()), 'sample')} with numbers: too few to tell causes apart",
+            f"{name} has only {counted(int(good.sum()), 'sample')} with numbers, "
+            "too few to tell causes apart",
             hint="record longer",
         )
     u = run.input[good]
