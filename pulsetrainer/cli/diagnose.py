@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from functools import partial
 from pathlib import Path
@@ -12,11 +11,8 @@ from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
-from pulsetrainer.cli.next_step import free
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 from pulsetrainer.steps.arguments import check_once
-
-_CAPTURE = re.compile(r"pulsetrainer (capture [^`]*?) -o \S+\.h5")
 
 
 def diagnose(
@@ -75,7 +71,7 @@ def next_commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path,
     """Return the commands to go on with: to extend the model, or to correct the runs and begin again.
 
     A model that was not identified from its ``own`` runs is not at fault, and stays. After a quick screen
-    comes the full diagnosis; where the advice is another recording by us, that and its diagnosis.
+    comes the full diagnosis.
     """
     words: list[list[object]] = []
     if found.next_command == "extend":  # fitted with all faults of the measurement taken out
@@ -89,18 +85,4 @@ def next_commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path,
         words.append(["diagnose", *corrected, "--model", again, "-o", f"{out.stem}-corrected.h5"])
     if not words and found.quick:
         words.append(["diagnose", *runs, "--model", model, "-o", f"{out.stem}-full.h5"])
-    elif not words and (advised := _CAPTURE.search(found.next_experiment)):
-        recorded = free(runs[-1])
-        words.append([*shlex.split(advised[1]), *_port_of(runs[-1]), "-o", recorded])
-        words.append(["diagnose", recorded, "--model", model, "-o", free(out)])
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
-
-
-def _port_of(run: Path) -> list[str]:
-    """Return the option that names the port a run was recorded on, where that is no simulated device."""
-    from pulsetrainer.files import store
-
-    device = store.read_header(run).provenance.device if run.is_file() else None
-    # of a simulated one the file keeps no parameters: its name alone would be another device
-    simulated = device is None or device.port.partition(":")[0] in ("", "bench", "qemu")
-    return [] if device is None or simulated else ["--port", device.port]

@@ -58,7 +58,7 @@ _NEXT = {
 def next_step(problem: PulsetrainerError) -> str:
     """Return what to do about an error: a command or an option where there is one, else its own hint."""
     if isinstance(problem, ExistsError) and problem.hint == ExistsError.usual:
-        other = shlex.quote(str(free(problem.path)))
+        other = shlex.quote(str(_free(problem.path)))
         return f"name another file, such as {other}, or give --overwrite to replace it"
     if isinstance(problem, WrongKindError):
         return _after_wrong_kind(problem)
@@ -88,7 +88,7 @@ def to_make(kind: str, path: Path) -> str:
     return f"{line} {shlex.quote(str(path))}"
 
 
-def free(path: Path) -> Path:
+def _free(path: Path) -> Path:
     """Return a name like this one that is not taken."""
     return next(
         other

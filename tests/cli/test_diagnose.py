@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import replace
 
 import numpy as np
 import pytest
-import store_examples
 
 from program import pulsetrainer
-from pulsetrainer.cli.diagnose import next_commands
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.diagnosis.extended import Extended
-from pulsetrainer.files.provenance import Device
-from pulsetrainer.files.store import write
 from wording import tells
 
 RATE_HZ = 100.0
@@ -123,25 +118,6 @@ def test_quick_says_that_it_is_quick(bench):
     done = pulsetrainer(bench, "extend", "quick.h5", "--model", "model.h5", "-o", "no.h5")
     assert done.code == 3
     assert "without --quick" in done.err
-
-
-def test_advice_to_record_again_comes_with_its_commands(tmp_path):
-    """Under names that are free, on the port of a device that is none of ours; not where it is imported."""
-    said = "Then: pulsetrainer capture diagnostic --current-max 0.9 -o diagnostic-2.h5."
-    found = replace(store_examples.diagnosis(), extended=None, correctable=(), next_experiment=said)
-    runs, model, out = [tmp_path / "run.h5"], tmp_path / "model.h5", tmp_path / "d.h5"
-    (tmp_path / "run-2.h5").touch()
-    capture = f"pulsetrainer capture diagnostic --current-max 0.9 -o {tmp_path}/run-3.h5"
-    then = f"pulsetrainer diagnose {tmp_path}/run-3.h5 --model {model} -o {tmp_path}/d-2.h5"
-    for port, words in (("bench:", ""), ("/dev/ttyUSB0", " --port /dev/ttyUSB0")):
-        header = store_examples.header()
-        device = replace(header.provenance, device=Device("X", "1", port))
-        header = replace(header, provenance=device)
-        write(runs[0], store_examples.run(), header, overwrite=True)
-        told = next_commands(found, runs, model, out, own=False)
-        assert told == [capture.replace(" -o", f"{words} -o"), then]
-    imported = replace(found, next_experiment="Write a table with columns of time in s and force in N.")
-    assert next_commands(imported, runs, model, out, own=False) == []
 
 
 @pytest.mark.slow
