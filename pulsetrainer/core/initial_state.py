@@ -20,6 +20,8 @@ from pulsetrainer.core.plane import FloatArray, IntArray
 from pulsetrainer.core.record import Record
 
 NEAR = 0.01  # of the range: a noisy record touches its extreme only once, late
+_LATE = 0.5  # of the samples: an end that is reached later than that costs more than it tells, where ...
+_ALMOST = 0.1  # ... an end was almost reached before, to within so much of the range
 _APART = 0.005  # of the output's span: a first stroke that runs so far from the later ones is another ...
 _TIMES = 2.0  # ... if these run nearer to each other by this factor
 _MET = 0.5  # of how far they lie apart: strokes that differ by no more at the other end have met there
@@ -34,7 +36,8 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
 
     Where the input reaches an end of [low, high], every remembered extreme is wiped out. Reached means within
     ``NEAR`` of the range. An input that never gets there is known, up to a constant, from where it first
-    reaches an end of its own range: see ``start_of``.
+    reaches an end of its own range: see ``start_of``. One that reaches an end late, as under a drift, but came
+    almost as near before, is known from there: only what lies between the two stays open.
 
     A device that begins at an end may never have come there: then its first stroke differs from all later
     ones from that end, which wiping-out makes alike (Mayergoyz 2003, section 1.2). With the ``outputs`` (n,)
@@ -42,12 +45,22 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
     input's own range, where what lies beyond may be switched by the first stroke alone.
     """
     ends = near_ends(inputs, low, high)
-    begin = int(ends[0]) if ends.size else first_extreme(inputs)[0]
+    begin = _almost(inputs, low, high, int(ends[0])) if ends.size else first_extreme(inputs)[0]
     if outputs is None or (ends.size and begin > 0):
         return begin
     if not ends.size:
         low, high = float(inputs.min()), float(inputs.max())
     return begin + _past_a_first_stroke(inputs[begin:], outputs[begin:], low, high)
+
+
+def _almost(inputs: FloatArray, low: float, high: float, at: int) -> int:
+    """First sample that comes almost as near an end as any before ``at``, where that is late; else ``at``."""
+    if at < _LATE * inputs.size:
+        return at
+    away = np.minimum(inputs - low, high - inputs)[: round(_LATE * inputs.size)]
+    nearest = float(away.min())
+    near = nearest + NEAR * (high - low)
+    return int(np.argmax(away <= near)) if nearest <= _ALMOST * (high - low) else at
 
 
 def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> str:

@@ -105,7 +105,7 @@ def input_range(model: Model) -> tuple[float, float]:
     operator, fit = operator_of(model), model.fit
     if model.form != "dual" or fit is None or fit.input.size == 0:
         return operator.low, operator.high
-    return min(operator.low, float(fit.input.min())), max(operator.high, float(fit.input.max()))
+    return float(fit.input.min()), float(fit.input.max())
 
 
 def measured_of(

@@ -1515,6 +1515,27 @@ def test_a_slow_fault_that_the_rest_of_the_model_holds_is_none(monkeypatch, name
     assert [(one.kind, one.cause) for one in after.evidence] == ([] if found else [("held", name)])
 
 
+@pytest.mark.parametrize(
+    ("beside", "predicts", "found"),
+    [
+        ("field-lag", 81.0, True),  # moves no level
+        ("field-lag", 79.0, False),
+        ("creep", 99.0, False),  # mends its formula
+        ("thermal-drift", 99.0, False),
+        ("step", 99.0, False),
+    ],
+)
+def test_a_drift_that_is_held_but_predicts_is_there(monkeypatch, beside, predicts, found):
+    """A sensor that warms up: reversal curves hold 96 % of it, and the rest is told by time left out."""
+    monkeypatch.setattr(repetition, "refit", _refitted)
+    monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
+    monkeypatch.setattr(repetition, "squares_added", lambda *_: 1e6)
+    drift = replace(_finding("offset-drift", 10.0), held_out_gain_percent=predicts)
+    state = _state(_fit(500.0, beside, "offset-drift"), findings=(_finding(beside, 80.0), drift))
+    without = {"offset-drift": _fit(600.0), "step": _fit(600.0)}
+    assert repetition.stage(replace(state, without=without)).findings[-1].found is found
+
+
 def test_a_step_below_what_the_levels_leave_is_not_held(monkeypatch):
     """Beside coarse steps the floor is above all that is left, so shares of what is above it tell nothing."""
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())

@@ -33,6 +33,24 @@ def _record(*, cycled: bool, down: bool = False, noise: float = 0.01, turns: tup
     return (5.0 - u, -y) if down else (u, y)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("almost", "late", "known"),
+    [
+        (4.6, 120, 46),  # within a tenth of the range, and the end itself in the last sixth of the record
+        (4.4, 120, 120),  # not so near: too much would stay open
+        (4.6, 60, 60),  # not late
+    ],
+)
+def test_an_end_that_is_reached_late_is_known_from_where_it_was_almost_reached(almost, late, known, sign):
+    """A drift of the output moves its extremes: the dual form of such a record counted 143 of 6133 samples."""
+    u = np.full(144, 2.5)
+    u[10:70] = np.interp(np.arange(60), [0, 36, 59], [2.5, almost, 2.5])
+    u[late:] = 5.0
+    u = u if sign > 0 else 5.0 - u
+    assert abs(known_from(u, 0.0, 5.0) - known) <= 1  # from a hundredth of the range before it
+
+
 @pytest.mark.parametrize("noisy", [0.0, 0.02])
 @pytest.mark.parametrize("down", [False, True])
 def test_a_first_stroke_apart_does_not_count(down, noisy):

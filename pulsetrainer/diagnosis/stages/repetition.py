@@ -13,8 +13,10 @@ That which repeats least goes first; the others are then refitted without it and
 been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
 cent of the span, was not found: it mends the formula of another cause, or nothing. Nor was a slow fault of
 the measurement of which the weights and the causes beside it hold nearly all: it would be taken out as large
-as it was fitted, from a device that never had it. That is said, since it may be there all the same. What is
-left beside it is refitted without it, and a step asked again whether it only settles.
+as it was fitted, from a device that never had it. That is said, since it may be there all the same. But where
+no cause is slow besides, and it predicts nearly all that can be lowered on time that was left out, it is
+there. What is left beside one that is not is refitted without it, and a step asked again whether it only
+settles.
 """
 
 from __future__ import annotations
@@ -37,6 +39,7 @@ from pulsetrainer.diagnosis.stages.rivals import (
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 
+SLOW = ("slow memory", "slow gain", "drift")  # families of what a drift may mend
 DOUBT, NOT_ADDED, A_FAULT = "does not repeat", "not added", "may be a fault"
 
 
@@ -117,7 +120,15 @@ def _is_held(state: State, finding: Finding) -> bool:
     if term is None or not (term.cause.drifts and term.cause.corrects):
         return False
     fall = state.without[finding.cause.id].squares - state.current.squares
-    return fall < LIMITS.held_by_the_rest * squares_added(state, term)
+    little = fall < LIMITS.held_by_the_rest * squares_added(state, term)
+    return little and not _is_predicted(state, finding)
+
+
+def _is_predicted(state: State, finding: Finding) -> bool:
+    """Whether a fault predicts nearly all that can be lowered, and mends no cause that is slow as well."""
+    beside = [term.cause for term in state.current.terms if term.cause.id != finding.cause.id]
+    mends = any(cause.family in SLOW for cause in beside)
+    return finding.held_out_gain_percent / PERCENT > LIMITS.predicts_though_held and not mends
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:
