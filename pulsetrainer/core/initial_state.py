@@ -36,8 +36,8 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
 
     Where the input reaches an end of [low, high], every remembered extreme is wiped out. Reached means within
     ``NEAR`` of the range. An input that never gets there is known, up to a constant, from where it first
-    reaches an end of its own range: see ``start_of``. One that reaches an end late, as under a drift, but came
-    almost as near before, is known from there: only what lies between the two stays open.
+    reaches an end of its own range: see ``start_of``. One that reaches an end late, as under a drift, but
+    came almost as near before, is known from there: only what lies between the two stays open.
 
     A device that begins at an end may never have come there: then its first stroke differs from all later
     ones from that end, which wiping-out makes alike (Mayergoyz 2003, section 1.2). With the ``outputs`` (n,)

@@ -43,7 +43,7 @@ def _record(*, cycled: bool, down: bool = False, noise: float = 0.01, turns: tup
     ],
 )
 def test_an_end_that_is_reached_late_is_known_from_where_it_was_almost_reached(almost, late, known, sign):
-    """A drift of the output moves its extremes: the dual form of such a record counted 143 of 6133 samples."""
+    """A drift of the output moves its extremes: 143 of 6133 samples counted for a dual model."""
     u = np.full(144, 2.5)
     u[10:70] = np.interp(np.arange(60), [0, 36, 59], [2.5, almost, 2.5])
     u[late:] = 5.0
