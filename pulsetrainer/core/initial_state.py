@@ -36,8 +36,7 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
 
     Where the input reaches an end of [low, high], every remembered extreme is wiped out. Reached means within
     ``NEAR`` of the range. An input that never gets there is known, up to a constant, from where it first
-    reaches an end of its own range: see ``start_of``. One that reaches an end late, as under a drift, but
-    came almost as near before, is known from there: only what lies between the two stays open.
+    reaches an end of its own range: see ``start_of``.
 
     A device that begins at an end may never have come there: then its first stroke differs from all later
     ones from that end, which wiping-out makes alike (Mayergoyz 2003, section 1.2). With the ``outputs`` (n,)
@@ -45,7 +44,7 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
     input's own range, where what lies beyond may be switched by the first stroke alone.
     """
     ends = near_ends(inputs, low, high)
-    begin = _almost(inputs, low, high, int(ends[0])) if ends.size else first_extreme(inputs)[0]
+    begin = int(ends[0]) if ends.size else first_extreme(inputs)[0]
     if outputs is None or (ends.size and begin > 0):
         return begin
     if not ends.size:
@@ -53,14 +52,18 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
     return begin + _past_a_first_stroke(inputs[begin:], outputs[begin:], low, high)
 
 
-def _almost(inputs: FloatArray, low: float, high: float, at: int) -> int:
-    """First sample that comes almost as near an end as any before ``at``, where that is late; else ``at``."""
-    if at < _LATE * inputs.size:
-        return at
+def counts_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray | None = None) -> int:
+    """First sample (n,) that a fit counts: where the memory is known, or nearly so where that is late.
+
+    An input that reaches an end late but came almost as near before counts from there: a drift moves the
+    extremes of an output, which the dual form takes for its input. Only what lies between the two stays open.
+    """
+    known = known_from(inputs, low, high, outputs)
+    if known < _LATE * inputs.size:
+        return known
     away = np.minimum(inputs - low, high - inputs)[: round(_LATE * inputs.size)]
-    nearest = float(away.min())
-    near = nearest + NEAR * (high - low)
-    return int(np.argmax(away <= near)) if nearest <= _ALMOST * (high - low) else at
+    nearest, reach = float(away.min()), high - low
+    return int(np.argmax(away <= nearest + NEAR * reach)) if nearest <= _ALMOST * reach else known
 
 
 def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> str:
@@ -202,12 +205,12 @@ def start_of(inputs: FloatArray, low: float, high: float) -> State | None:
 
 
 def record_of(inputs: FloatArray, outputs: FloatArray, low: float, high: float) -> Record:
-    """Return measured input and output (n,) as a record to fit; it counts from where the memory is known.
+    """Return measured input and output (n,) as a record to fit, which ``counts_from`` some sample on.
 
     ArgumentError where there are too few samples, or NaN or infinity.
     """
     counts = np.ones(inputs.size)
-    counts[: known_from(inputs, low, high, outputs)] = 0.0
+    counts[: counts_from(inputs, low, high, outputs)] = 0.0
     return Record(inputs, outputs, counts, start_of(inputs, low, high))
 
 

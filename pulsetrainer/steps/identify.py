@@ -17,7 +17,7 @@ from pulsetrainer.core.dual import exchanged
 from pulsetrainer.core.fit import Fitted, fit
 from pulsetrainer.core.forms import Form
 from pulsetrainer.core.identification import Method, Smoothing
-from pulsetrainer.core.initial_state import first_stroke_words, known_from
+from pulsetrainer.core.initial_state import counts_from, first_stroke_words
 from pulsetrainer.core.loop import loop_of
 from pulsetrainer.core.plane import FloatArray, Plane, Reading
 from pulsetrainer.errors import DataError
@@ -368,7 +368,7 @@ def _model(
     measured = fitted.counted_output
     errors = metrics.prediction(measured, np.concatenate(fitted.counted(fitted.predicted)))
     thinned = slice(
-        known_from(first.input, operator.low, operator.high, first.output),
+        counts_from(first.input, operator.low, operator.high, first.output),
         None,
         max(1, first.input.size // TRACE_SAMPLES),
     )

@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 import pulsetrainer as pt
-from pulsetrainer.core.initial_state import _at_end, _stroke, first_stroke_words, known_from
+from pulsetrainer.core.initial_state import (
+    _at_end,
+    _stroke,
+    counts_from,
+    first_stroke_words,
+    known_from,
+    record_of,
+)
 
 DT_S = 0.02
 RADII = np.linspace(0.1, 1.5, 8)
@@ -42,13 +49,14 @@ def _record(*, cycled: bool, down: bool = False, noise: float = 0.01, turns: tup
         (4.6, 60, 60),  # not late
     ],
 )
-def test_an_end_that_is_reached_late_is_known_from_where_it_was_almost_reached(almost, late, known, sign):
+def test_an_end_that_is_reached_late_counts_from_where_it_was_almost_reached(almost, late, known, sign):
     """A drift of the output moves its extremes: 143 of 6133 samples counted for a dual model."""
     u = np.full(144, 2.5)
     u[10:70] = np.interp(np.arange(60), [0, 36, 59], [2.5, almost, 2.5])
     u[late:] = 5.0
     u = u if sign > 0 else 5.0 - u
-    assert abs(known_from(u, 0.0, 5.0) - known) <= 1  # from a hundredth of the range before it
+    assert abs(counts_from(u, 0.0, 5.0) - known) <= 1  # from a hundredth of the range before it
+    assert record_of(u, u, 0.0, 5.0).counts.sum() == u.size - counts_from(u, 0.0, 5.0)
 
 
 @pytest.mark.parametrize("noisy", [0.0, 0.02])
