@@ -34,6 +34,9 @@ KINDS = {
     "rest": (0.3, 1.5),
     "last turn": (0.1, 0.5),
     "two": (0.2, 1.0),
+    "gain by mean input": (0.2, 1.2),
+    "gain by speed": (0.3, 3.0),
+    "gain by last turn": (0.1, 0.5),
     "none": (1.0, 2.0),
 }
 
@@ -82,6 +85,10 @@ class Device:
             "speed": lambda: np.sqrt(mean(np.abs(np.diff(u, prepend=u[0])) / h) + 0.05),
             "rest": lambda: np.log1p(_rested(u) * h / tau),
             "last turn": lambda: -dip(mean(_turns(u)), 0.4 + 0.7 * self.place, 0.2),
+            # the gain is about an output of the device's own
+            "gain by mean input": lambda: dip(mean(u), HIGH * self.place, 0.15) * (y - self.place + 0.35),
+            "gain by speed": lambda: np.log1p(mean(np.abs(np.diff(u, prepend=u[0])) / h)) * y,
+            "gain by last turn": lambda: -dip(mean(_turns(u)), 0.4 + 0.7 * self.place, 0.2) * y,
             "two": lambda: dip(mean(u), HIGH * self.place, 0.12) + rise(mean(u**2, 12.0), 0.8, 0.2),
             "none": lambda: np.zeros(u.size),
         }[self.kind]()

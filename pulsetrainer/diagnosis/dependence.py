@@ -1,16 +1,18 @@
 """Which state of the device explains what is left: every one of a bank, scored on time that was left out.
 
-For each kind of state and each time constant of a grid the columns are curves over the state, less what the
-weights and the causes in the model can do. A ridge fit on the rest of the time predicts each of a few whole
-pieces of the record; the score is the fall of the squares there. The same is done with noise that looks like
-what the best state leaves, again and again: the p-value is the share of draws of which any state of the bank
-scores as much (Davison and Hinkley, Bootstrap Methods and their Application, 1997, section 4.2).
+For each kind of state and each time constant of a grid the columns are curves over the state, added to the
+output or to its gain, less what the weights and the causes in the model can do. A ridge fit on the rest of
+the time predicts each of a few whole pieces of the record; the score is the fall of the squares there. The
+same is done with noise that looks like what the best state leaves, again and again: the p-value is the
+share of draws of which any state of the bank scores as much (Davison and Hinkley, Bootstrap Methods and
+their Application, 1997, section 4.2).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import scipy  # its parts load when they are first used
@@ -49,6 +51,7 @@ class Bank:
             shown_output(before, y, frame)
             for y, frame in zip(simulator.inner(fitted.terms), simulator.frames, strict=True)
         ]
+        self.output = fitted.problem.bins.average(self.outputs)  # (count,)
         own = fitted.projector(fitted.slopes)
         self.known = scipy.linalg.orth(own) if own.shape[1] else own
         self.residual = self.project(fitted.residual[:, None])[:, 0]
@@ -65,14 +68,14 @@ class Bank:
         signals = [STATES[kind].at(y, tau, f, "") for y, f in zip(self.outputs, frames, strict=True)]
         return self.fitted.problem.bins.average(signals)
 
-    def columns(self, kind: int, tau: float) -> tuple[Part, FloatArray] | None:
-        """Curves (count, KNOTS - 1) over one state; None where it does not vary."""
+    def columns(self, kind: int, tau: float, *, gain: bool) -> tuple[Part, FloatArray] | None:
+        """What curves (count, KNOTS - 1) over one state add; None where it does not vary."""
         z = self.state(kind, tau)
         low, high = self._ends(z)
         if not high > low:
             return None
-        part = Part(kind, low, high)
-        return part, part.columns(z)
+        part = Part(kind, low, high, gain)
+        return part, part.added(self.output, z, self.fitted.simulator.frames[0].zero)
 
     def _ends(self, z: FloatArray) -> tuple[float, float]:
         """Ends of the curve over a state (count,): how far it comes on two pieces at least.
@@ -101,8 +104,8 @@ def best_dependence(
     fastest = min(max(LIMITS.fastest_state_s, 2.0 * frame.dt_s), slowest)
     taus = spread(fastest, slowest, LIMITS.state_ratio)
     found = []
-    for kind in range(len(STATES)):
-        made = [(tau, one) for tau in taus if (one := bank.columns(kind, tau)) is not None]
+    for kind, gain in product(range(len(STATES)), (False, True)):
+        made = [(tau, one) for tau in taus if (one := bank.columns(kind, tau, gain=gain)) is not None]
         if made:
             free = bank.project(np.hstack([columns for _, (_, columns) in made]))
             parts = np.split(free.astype(np.float32), len(made), axis=1)
@@ -122,7 +125,7 @@ def best_dependence(
     like = noise_in(bank.residual, free_of_both, problem.bins, problem.measured, rng)
     noise = bank.project(_drawn(like, LIMITS.bank_draws, rng))
     largest = np.max(_falls(seen, noise, bank.piece), axis=0)
-    part, values = _refined(bank, part.state, tau, fastest, slowest)
+    part, values = _refined(bank, part, tau, fastest, slowest)
     return Dependence(part, values, max(scores), p_value(max(scores), largest))
 
 
@@ -137,11 +140,11 @@ def _drawn(noise: Noise, draws: int, rng: np.random.Generator) -> FloatArray:
     return np.asarray((drawn * noise.scale).T)
 
 
-def _refined(bank: Bank, kind: int, tau: float, fastest: float, slowest: float) -> tuple[Part, Values]:
+def _refined(bank: Bank, found: Part, tau: float, fastest: float, slowest: float) -> tuple[Part, Values]:
     """Return the time constant near ``tau``, from fastest to slowest, that fits best, and its curve."""
 
     def left(log_tau: float) -> float:
-        made = bank.columns(kind, float(np.exp(log_tau)))
+        made = bank.columns(found.state, float(np.exp(log_tau)), gain=found.gain)
         if made is None:
             return float("inf")
         free = bank.project(made[1])
@@ -152,7 +155,7 @@ def _refined(bank: Bank, kind: int, tau: float, fastest: float, slowest: float) 
         left, bounds=near, method="bounded", options={"xatol": LIMITS.state_settled}
     )
     tau = float(np.exp(best.x))
-    made = bank.columns(kind, tau)
+    made = bank.columns(found.state, tau, gain=found.gain)
     assert made is not None
     part, columns = made
     return part, (tau, *bank.curve(bank.project(columns)).tolist())

@@ -14,12 +14,12 @@ from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
 from pulsetrainer.diagnosis.dependence import Bank
 from pulsetrainer.diagnosis.finding import Estimate
 from pulsetrainer.diagnosis.state import State
-from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
 from pulsetrainer.diagnosis.wording import figure
 
 _OFFSETS = {"input": "u", "turn": "u", "output": "y"}  # states told from the zero of the quantity
 _TEXT = (
-    "the {output} also depends on something that is in no list: it is {way} by {size} when {state} {where}"
+    "the {output} also depends on something that is in no list: {it} is {way} by {size} when {state} {where}"
 )
 
 
@@ -30,7 +30,7 @@ class _Curve:
     part: Part
     tau: float
     at: FloatArray  # (k,)
-    value: FloatArray  # (k,)
+    value: FloatArray  # (k,) of a gain per cent
     half: FloatArray  # (k,) half width of the band
 
 
@@ -58,7 +58,7 @@ def learned(state: State, words: Mapping[str, str]) -> tuple[Dependence, ...]:
                 at=curve.at,
                 value=curve.value,
                 half=curve.half,
-                output_unit=words["y"],
+                output_unit=_unit(curve, words),
             )
         )
     return tuple(found)
@@ -79,10 +79,12 @@ def _curve(
         at = -tau * scale.second * np.log1p(-np.minimum(places, 1.0 - LIMITS.same_value))
     shift = {"u": scale.low, "y": scale.zero + scale.span * bank.fitted.simulator.frames[0].zero}
     at = at + (shift[_OFFSETS[part.kind.name]] if part.kind.name in _OFFSETS else 0.0)
+    if part.gain:
+        value, half = PERCENT * value, PERCENT * half
     sign = state.question.given.model.polarity if state.question.given else 1
     if sign < 0 and part.kind.unit == "{y}":
         at, value, half = -at[::-1], value[::-1], half[::-1]
-    return _Curve(part, tau * scale.second, at, sign * scale.span * value, half)
+    return _Curve(part, tau * scale.second, at, (1.0 if part.gain else sign * scale.span) * value, half)
 
 
 def _text(curve: _Curve, words: Mapping[str, str]) -> str:
@@ -96,9 +98,14 @@ def _text(curve: _Curve, words: Mapping[str, str]) -> str:
         change, where = float(bent[k]), f"is near {_place(curve, k, unit)}"
     else:
         where = f"goes from {_place(curve, 0, unit)} to {_place(curve, -1, unit)}"
-    size = with_unit(figure(abs(change), 2), words["y"])
-    way = "lower" if change < 0 else "higher"
-    return _TEXT.format(output=words["output"], way=way, size=size, state=_said(curve, words), where=where)
+    size = with_unit(figure(abs(change), 2), _unit(curve, words))
+    it, way = "its gain" if curve.part.gain else "it", "lower" if change < 0 else "higher"
+    state = _said(curve, words)
+    return _TEXT.format(output=words["output"], it=it, way=way, size=size, state=state, where=where)
+
+
+def _unit(curve: _Curve, words: Mapping[str, str]) -> str:
+    return "%" if curve.part.gain else words["y"]
 
 
 def _said(curve: _Curve, words: Mapping[str, str]) -> str:

@@ -138,9 +138,8 @@ def dependence(one: Dependence, output_quantity: str = "") -> Figure:
     axes.axhline(0.0, **GUIDE)
     axes.set_xlabel(label(one.state, one.unit), wrap=True)
     panels.headroom(axes)
-    axes.set_ylabel(
-        label(f"change of the {output_quantity or panels.quantity_of(one.output_unit)}", one.output_unit)
-    )
+    of = "gain" if one.output_unit == "%" else output_quantity or panels.quantity_of(one.output_unit)
+    axes.set_ylabel(label(f"change of the {of}", one.output_unit))
     return figure
 
 

@@ -104,7 +104,7 @@ def test_a_curve_goes_through_its_knots_and_stays_level_beyond_them():
 
 def test_what_a_model_keeps_of_it_brings_it_back():
     """States, ends, constants and curves of several."""
-    cause = Unlisted([Part(0, 0.0, 1.5), Part(4, 0.2, 3.0)])
+    cause = Unlisted([Part(0, 0.0, 1.5, gain=True), Part(4, 0.2, 3.0)])
     values = tuple(float(k) for k in range(2 * KNOTS))
     kept = (*(value for _, value, _ in cause.constants()), *values)
     again, same = Unlisted().restored(kept)
@@ -335,6 +335,8 @@ def test_a_curve_is_told_by_its_bump_or_by_its_ends(value, said):
     """A wide bump is one: it stands out from the line between its ends by more than they differ."""
     at = np.asarray([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 1100.0])
     kind = SimpleNamespace(unit="1", words="it", saturates=False)
-    curve = learned._Curve(SimpleNamespace(kind=kind), 1.0, at, np.asarray(value), np.zeros(8))
+    curve = learned._Curve(SimpleNamespace(kind=kind, gain=False), 1.0, at, np.asarray(value), np.zeros(8))
     words = {"input": "current", "output": "force", "u": "A", "y": "mN"}
-    assert said in learned._text(curve, words)
+    assert f"it is {said}" in learned._text(curve, words)
+    of_gain = replace(curve, part=SimpleNamespace(kind=kind, gain=True))
+    assert f"its gain is {said.replace('mN', '%')}" in learned._text(of_gain, words)

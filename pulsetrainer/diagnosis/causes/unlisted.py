@@ -1,4 +1,8 @@
-"""the output depends on something that is in no list: y + sum_j f_j(z_j), each z_j a state of the device."""
+"""the output depends on something that is in no list: y + sum_j f_j(z_j), each z_j a state of the device.
+
+Of some parts the curve is added to the gain instead of the output: y + f_j(z_j) (y - y0), y0 that of empty
+memory.
+"""
 
 from __future__ import annotations
 
@@ -154,11 +158,12 @@ STATES: tuple[State, ...] = (
 
 @dataclass(frozen=True)
 class Part:
-    """One dependence: on which state, and between which values the curve is drawn."""
+    """One dependence: on which state, between which values the curve is drawn, and what it is added to."""
 
     state: int
     low: float
     high: float
+    gain: bool = False
 
     @property
     def kind(self) -> State:
@@ -174,6 +179,22 @@ class Part:
         share = np.clip((z - self.low) / (self.high - self.low), 0.0, 1.0)
         return np.asarray(_curves()(share))[:, 1:]
 
+    def added(self, y: FloatArray, z: FloatArray, zero: float) -> FloatArray:
+        """What points of the curve add (n, KNOTS - 1) to an output ``y`` (n,); ``zero`` is empty memory's."""
+        columns = self.columns(z)
+        return columns * (y - zero)[:, None] if self.gain else columns
+
+    @property
+    def coded(self) -> float:
+        """Its state as a model keeps it: those of a gain count down from -1."""
+        return float(-1 - self.state if self.gain else self.state)
+
+    @classmethod
+    def decoded(cls, code: float, low: float, high: float) -> Part:
+        """The part that a model keeps as ``coded`` and the ends of its curve."""
+        state = int(code)
+        return cls(-1 - state, low, high, gain=True) if state < 0 else cls(state, low, high)
+
 
 @cache
 def _curves() -> scipy.interpolate.CubicSpline:
@@ -185,7 +206,10 @@ class Unlisted(Cause):
 
     id = "unlisted"
     title = "the {output} also depends on something that is in no list"
-    formula = "y + f(z), z a state (filtered input or output, their squares and rates, path, last turn, rest)"
+    formula = (
+        "y + f(z) or y + f(z) (y - y0), "
+        "z a state (filtered input or output, their squares and rates, path, last turn, rest)"
+    )
     signature = "a curve over one state that predicts blocks of time that were left out"
     excitation = "the state through its whole range, several times"
     source = "Hastie and Tibshirani, Generalized Additive Models, 1990, chapter 6"
@@ -199,23 +223,18 @@ class Unlisted(Cause):
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """A constant and the values of the curve, of each part."""
-        most = _STEEPEST * frame.span
-        curve = tuple(
-            Quantity(f"f{k}", "{y}", -most, most, _SMALL_CHANGE * frame.span, "point of the curve")
-            for k in range(2, KNOTS + 1)
-        )
         longest = max(frame.length_s, 2.0 * frame.dt_s)
         tau = Quantity(
             "tau", "s", frame.dt_s, longest, _SMALL_TIME_S, "time over which the state is averaged"
         )
-        return (tau, *curve) * len(self.parts)
+        return tuple(one for part in self.parts for one in (tau, *_points(part, frame)))
 
     def constants(self) -> tuple[tuple[str, float, str], ...]:
         return tuple(
             one
             for part in self.parts
             for one in (
-                ("state", float(part.state), "1"),
+                ("state", part.coded, "1"),
                 ("low", part.low, part.kind.unit),
                 ("high", part.high, part.kind.unit),
             )
@@ -233,7 +252,7 @@ class Unlisted(Cause):
         """Return the cause with its states, and its parameters, for the constants and parameters kept."""
         count = len(values) // (_CONSTANTS + KNOTS)
         kept = np.reshape(values[: _CONSTANTS * count], (count, _CONSTANTS))
-        parts = [Part(int(state), float(low), float(high)) for state, low, high in kept]
+        parts = [Part.decoded(*one) for one in kept.tolist()]
         return Unlisted(parts), values[_CONSTANTS * count :]
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
@@ -244,5 +263,15 @@ class Unlisted(Cause):
         found = y
         for k, part in enumerate(self.parts):
             tau, *curve = values[k * KNOTS : (k + 1) * KNOTS]
-            found = found + part.columns(part.at(y, tau, frame, k)) @ np.asarray(curve)
+            found = found + part.added(y, part.at(y, tau, frame, k), frame.zero) @ np.asarray(curve)
         return found
+
+
+def _points(part: Part, frame: Frame) -> tuple[Quantity, ...]:
+    """The points of a curve: of the output, or of its gain."""
+    name, unit, span, of = ("g", "1", 1.0, " of the gain") if part.gain else ("f", "{y}", frame.span, "")
+    most, small = _STEEPEST * span, _SMALL_CHANGE * span
+    return tuple(
+        Quantity(f"{name}{k}", unit, -most, most, small, f"point of the curve{of}")
+        for k in range(2, KNOTS + 1)
+    )

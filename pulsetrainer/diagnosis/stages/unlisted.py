@@ -1,14 +1,14 @@
 """Unlisted: what no listed cause explains is sought in a bank of states.
 
-Where more is left than noise, the device may depend on something that is in no list. Its output is then
-fitted by a curve over one state after another: averages of input and output over many times, of their squares
-and speeds, how far each is from its average, the last turn, the way and the time since, and how long the
-input has rested. The state is taken that best predicts whole pieces of the time that were left out, if noise
-alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if it matters and is more
-than the formulas of listed causes may miss (8 % of what they explain), and if, refitted with all weights, it
-repeats (`repetition`). The noise is heard again beside it, and the next one is sought in what is left, up to
-three. What may be slow noise is searched too; a curve that is found there must predict three quarters of all
-that is left above the noise from sample to sample (decision 105).
+Where more is left than noise, the device may depend on something that is in no list. Its output, or its
+gain, is then fitted by a curve over one state after another: averages of input and output over many times, of
+their squares and speeds, how far each is from its average, the last turn, the way and the time since, and how
+long the input has rested. The state is taken that best predicts whole pieces of the time that were left out,
+if noise alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if it matters and
+is more than the formulas of listed causes may miss (8 % of what they explain), and if, refitted with all
+weights, it repeats (`repetition`). The noise is heard again beside it, and the next one is sought in what is
+left, up to three. What may be slow noise is searched too; a curve that is found there must predict three
+quarters of all that is left above the noise from sample to sample (decision 105).
 
 Where the listed causes found leave more than half unexplained, or nothing is found beside them, the
 search begins without them: they may have been taken for what they are not. They are then asked for again,
@@ -148,7 +148,7 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
 
 def _cancel(parts: list[Part], values: list[float]) -> bool:
     """Whether two dependences are on the same state over nearly the same time: their curves cancel."""
-    taus = [(part.state, values[k * KNOTS]) for k, part in enumerate(parts)]
+    taus = [(part.coded, values[k * KNOTS]) for k, part in enumerate(parts)]
     return any(
         one == other and max(tau / near, near / tau) < LIMITS.other_tau
         for (one, tau), (other, near) in combinations(taus, 2)
