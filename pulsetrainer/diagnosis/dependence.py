@@ -11,7 +11,7 @@ their Application, 1997, section 4.2).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -31,11 +31,10 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 
 @dataclass(frozen=True)
 class Dependence:
-    """The best state, with the start of a joint refit."""
+    """The best state, with the starts of joint refits."""
 
-    part: Part
-    values: Values  # time constant, then the curve
-    gain: float  # fall of the squares on pieces that were left out
+    starts: tuple[tuple[Part, Values], ...]  # each with its time constant, then the curve: the best one first
+    fall: float  # of the squares, on pieces that were left out
     p_value: float  # over the whole bank
 
 
@@ -113,8 +112,9 @@ def best_dependence(
     if not found:
         return None
     seen = [own for _, _, own in found]
-    scores = _falls(seen, bank.residual[:, None], bank.piece)[:, 0].tolist()
-    tau, part, own = found[int(np.argmax(scores))]
+    scores = _falls(seen, bank.residual[:, None], bank.piece)[:, 0]
+    first = int(np.argmax(scores))
+    tau, part, own = found[first]
     axes = scipy.linalg.orth(own.astype(np.float64))
 
     def free_of_both(columns: FloatArray) -> FloatArray:
@@ -125,8 +125,15 @@ def best_dependence(
     like = noise_in(bank.residual, free_of_both, problem.bins, problem.measured, rng)
     noise = bank.project(_drawn(like, LIMITS.bank_draws, rng))
     largest = np.max(_falls(seen, noise, bank.piece), axis=0)
-    part, values = _refined(bank, part, tau, fastest, slowest)
-    return Dependence(part, values, max(scores), p_value(max(scores), largest))
+    best = float(scores[first])
+    # added to the output or to its gain: where both predict, a joint refit tells
+    near = [
+        one.coded for (_, one, _), score in zip(found, scores, strict=True) if score > LIMITS.as_well * best
+    ]
+    twin = replace(part, gain=not part.gain)
+    both = [part, twin] if twin.coded in near else [part]
+    starts = tuple(_refined(bank, one, tau, fastest, slowest) for one in both)
+    return Dependence(starts, best, p_value(best, largest))
 
 
 def _drawn(noise: Noise, draws: int, rng: np.random.Generator) -> FloatArray:

@@ -125,22 +125,22 @@ def _learned(state: State) -> tuple[Fitted | None, float, bool]:
         if (
             best is None
             or best.p_value > LIMITS.p_max
-            or best.gain < LIMITS.linearised * state.floor.relevant
+            or best.fall < LIMITS.linearised * state.floor.relevant
         ):
             break
-        begun = [*parts, best.part], [*values, *best.values]
-        if _cancel(*begun):
+        begun = [([*parts, part], [*values, *start]) for part, start in best.starts]
+        trials = [(_refitted(state, current, *one), one[0]) for one in begun if not _cancel(*one)]
+        if not trials:
             break
-        trial = _refitted(state, current, *begun)
+        trial, more = min(trials, key=lambda one: one[0].squares)
         refitted = list(next(term.values for term in trial.terms if term.cause.id == _ID))
-        if _cancel(begun[0], refitted):
+        if _cancel(more, refitted):
             break
         falls = current.squares - trial.squares > max(state.floor.relevant, listed)
         if not falls or not repeats(state.held_out, current, trial):
             doubtful = falls and not parts
             break
-        parts.append(best.part)
-        values = refitted
+        parts, values = more, refitted
         largest = max(largest, best.p_value)
         state = _heard_again(replace(state, current=trial))
     return (state.current if parts else None), largest, doubtful
