@@ -136,6 +136,16 @@ def best_dependence(
     return Dependence(starts, best, p_value(best, largest))
 
 
+def of_a_wandering_zero(fitted: Fitted, held_out: HeldOut, order: int) -> float:
+    """Return by how much a zero that follows the time alone, smoothly, lowers the squares of a fit."""
+    share = np.linspace(0.0, 1.0, fitted.residual.size)
+    knots = LIMITS.wander_knots
+    curves = scipy.interpolate.CubicSpline(np.linspace(0.0, 1.0, knots), np.eye(knots))(share)
+    bank = Bank(fitted, held_out, order)
+    axes = scipy.linalg.orth(bank.project(curves))
+    return float(np.sum((axes.T @ bank.residual) ** 2))
+
+
 def _drawn(noise: Noise, draws: int, rng: np.random.Generator) -> FloatArray:
     """Noise (count, draws) with a spectrum and a local size."""
     drawn = np.empty((draws, noise.bins.count))

@@ -54,6 +54,11 @@ class Floor:
         return replace(self, white=white, noise=self.single, doubtful=0.0)
 
     @property
+    def fine(self) -> Floor:
+        """The quick floor of levels as fine as can be."""
+        return replace(self.quick, discretisation=float(np.sqrt(self.hidden)))
+
+    @property
     def slow(self) -> float:
         """Noise of an average, as a multiple of that from sample to sample and of steps; NaN for none."""
         quick = self.quick.white

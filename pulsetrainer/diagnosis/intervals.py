@@ -43,7 +43,8 @@ def estimates_of(
     others = np.stack([_late(fitted), *_otherwise(fitted)], axis=1)
     systematic = np.linalg.norm(np.linalg.lstsq(columns / size, others, rcond=None)[0], axis=1) / size
     aligned = LIMITS.aligned * floor.discretisation * np.sqrt(floor.count) / size
-    half = np.sqrt(LIMITS.student**2 * variance + aligned**2 + systematic**2)
+    with np.errstate(over="ignore"):  # a parameter that changes nothing lies anywhere
+        half = np.sqrt(LIMITS.student**2 * variance + aligned**2 + systematic**2)
     found: dict[str, tuple[Estimate, ...]] = {}
     frame, at = fitted.problem.frames[0], 0
     for term in fitted.terms:

@@ -145,6 +145,7 @@ class Thresholds:
     wander_pieces: int = 10  # of the time: a gain and an offset of each show that the record wanders ...
     wander_left: float = 0.33  # ... if they take away so much of what is left (true drifts: up to 0.15) ...
     wander_fall: float = 0.1  # ... and so much of what a drift took away
+    wander_knots: int = 16  # of a zero that follows the time: it turns every twelfth of a record at most
     gain_in_use: float = 0.6  # of what causes gain in the search: true ones keep 0.68 and more
     begin_share: float = 0.2  # of a record: what went on before it has decayed by then
     settled_times: float = 5.0  # of the longest time constant: a rest after which 0.7 % is still under way

@@ -51,6 +51,11 @@ TEXTS: Mapping[str, str] = {
         "span of it, {times:.1f} times what the noise from sample to sample would leave. Something acts on "
         "the device or the sensor that was not recorded, or the model cannot follow a device of this kind"
     ),
+    "zero wanders": (
+        "What is left follows the time alone as well as any state of the device: the zero of the {output} "
+        "wanders, or the device changes slowly. Let device and sensor warm up, look for draughts and loose "
+        "plugs, and record again"
+    ),
     "not accepted": (
         "Noise alone would hardly look like {names} (p = {p:.3f}). But once the model is fitted together "
         "with it, it is too small to matter, or does not predict the parts of the recordings that were left "

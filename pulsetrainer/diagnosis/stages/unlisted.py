@@ -23,7 +23,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, Part, Unlisted
-from pulsetrainer.diagnosis.dependence import best_dependence
+from pulsetrainer.diagnosis.dependence import best_dependence, of_a_wandering_zero
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.fitting import Fitted, refit
@@ -38,12 +38,34 @@ _ID = Unlisted.id
 
 def stage(state: State) -> State:
     """Return the state with learned dependences in the model, where they repeat."""
-    if not _more_is_left(state) or not state.question.timed or state.jagged:
+    if not state.question.timed or state.jagged:
         return state
+    if _more_is_left(state):
+        return _sought(state)
+    if not _levels_are_most(state):
+        return state
+    fine = replace(state, floor=state.floor.fine)
+    found = _sought(fine)
+    return state if found.current is fine.current else found
+
+
+def _levels_are_most(state: State) -> bool:
+    """Whether most of what is left would be the error of the levels, and it matters.
+
+    What is missing makes that estimate too large: it may be what the finer levels imitate.
+    """
+    of_levels = state.floor.count * state.floor.discretisation**2 > LIMITS.half * state.current.squares
+    return of_levels and state.current.rms > LIMITS.matters * state.floor.span
+
+
+def _sought(state: State) -> State:
+    """Return the state with the learned dependences that repeat and predict."""
     alone = replace(state, current=state.baseline, p_values={}, without={})
     doubts = []
     for begun in [alone] if state.unexplained else [state, alone] if state.current.terms else [state]:
         found, p_value, doubtful = _learned(begun)
+        if found is not None and _wanders(begun, found):
+            return replace(state, evidence=(*state.evidence, Evidence("zero wanders", _ID)))
         if found is not None and _predicts(begun, found):
             return _compared(state, begun, found, p_value)
         doubts.append(doubtful or found is not None)
@@ -98,6 +120,15 @@ def _predicts(state: State, found: Fitted) -> bool:
     """
     floor = state.floor if _is_above(state, state.floor) else state.floor.quick
     return state.held_out.gain(state.current, found, floor) >= LIMITS.learned_predicts
+
+
+def _wanders(begun: State, found: Fitted) -> bool:
+    """Whether a zero that follows the time alone explains nearly as much as learned dependences.
+
+    Reversal curves go through their turns once, in the order of the time: a state follows it there.
+    """
+    fall = begun.current.squares - found.squares
+    return of_a_wandering_zero(begun.current, begun.held_out, Unlisted.order) > LIMITS.nearly_all * fall
 
 
 def _is_above(state: State, floor: Floor) -> bool:
