@@ -668,10 +668,11 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
 ):
     """Sought where more is left than noise; one that does not predict other pieces of the record is said."""
     term = Term(unlisted.Unlisted([part := unlisted.Part(0, 0.0, 1.0)]), (0.1,) * 9)
-    best = SimpleNamespace(p_value=p_value, gain=gain, part=part, values=term.values)
+    best = SimpleNamespace(p_value=p_value, fall=gain, starts=((part, term.values),))
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: best)
     monkeypatch.setattr(unlisted, "refit", lambda *_, **__: Fit(left - fall, (term,)))
     monkeypatch.setattr(unlisted, "repeats", lambda *_: again)
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
     for one in (search, elimination):
         monkeypatch.setattr(one, "stage", lambda state: state)
     after = unlisted.stage(_state(_fit(left), held_out=HeldOut(float(again))))
@@ -694,7 +695,7 @@ def test_two_of_one_state_that_are_nearly_the_same_are_one(state, tau, there):
 def test_a_second_curve_that_the_refit_moves_onto_the_first_is_left_out(monkeypatch, moved, curves):
     """Together they would cancel: each may be nothing then, and neither would be added to the model."""
     found = [
-        SimpleNamespace(p_value=0.009, gain=40.0, part=unlisted.Part(0, 0.0, 1.0), values=(tau, *[0.1] * 7))
+        SimpleNamespace(p_value=0.009, fall=40.0, starts=((unlisted.Part(0, 0.0, 1.0), (tau, *[0.1] * 7)),))
         for tau in (3.0, 1.0)
     ]
 
@@ -706,10 +707,62 @@ def test_a_second_curve_that_the_refit_moves_onto_the_first_is_left_out(monkeypa
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
     monkeypatch.setattr(unlisted, "refit", refitted)
     monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
     for one in (search, elimination):
         monkeypatch.setattr(one, "stage", lambda state: state)
     after = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0)))
     assert [len(term.cause.parts) for term in after.current.terms] == [curves]
+
+
+@pytest.mark.parametrize(("of_gain", "added"), [(140.0, True), (160.0, False)])
+def test_whether_output_or_gain_depends_on_it_the_refit_tells(monkeypatch, of_gain, added):
+    """Both predict as well; the one that fits better with all weights is it."""
+    starts = tuple((unlisted.Part(0, 0.0, 1.0, gain), (1.0, *[0.1] * 7)) for gain in (False, True))
+    found = [SimpleNamespace(p_value=0.009, fall=40.0, starts=starts)]
+
+    def refitted(_, terms, current, **__):
+        (part,) = terms[-1].cause.parts
+        return Fit(current.squares - (of_gain if part.gain else 150.0), (terms[-1],))
+
+    monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
+    monkeypatch.setattr(unlisted, "refit", refitted)
+    monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+    (term,) = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0))).current.terms
+    assert [part.gain for part in term.cause.parts] == [not added]
+
+
+@pytest.mark.parametrize(("by_time", "said"), [(89.0, ()), (91.0, ("zero wanders",))])
+def test_what_follows_the_time_as_well_is_no_dependence(monkeypatch, by_time, said):
+    """Nine tenths of what the curve explains: the zero of the sensor wanders, which no model goes on with."""
+    term = Term(unlisted.Unlisted([unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
+    monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(400.0, (term,)), 0.001, False))
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: by_time)
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+    after = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0)))
+    assert tuple(one.kind for one in after.evidence) == said
+    assert after.current.names == (() if said else ("unlisted",))
+
+
+@pytest.mark.parametrize(
+    ("levels", "span", "sought"),
+    [
+        (8.0, 100.0, True),  # of the squares of 100 that are left, 64 would be the error of the levels
+        (7.0, 100.0, False),  # 49: by less than half
+        (8.0, 1e4, False),  # all that is left is small
+    ],
+)
+def test_what_the_levels_would_explain_is_searched_too(monkeypatch, levels, span, sought):
+    """A missing cause makes their error too large. What is found there leaves the floor of finer levels."""
+    floors = []
+    monkeypatch.setattr(unlisted, "_sought", lambda state: floors.append(state.floor) or state)
+    floor = replace(FLOOR, sampled=0.65, discretisation=levels / np.sqrt(FLOOR.count), span=span)
+    state = _state(_fit(100.0), floor=floor)
+    assert unlisted.stage(state) is state  # nothing was found
+    assert [one.discretisation for one in floors] == ([0.0] if sought else [])
 
 
 @pytest.mark.parametrize(("sampled", "sought"), [(0.65, False), (0.55, True), (0.0, True)])
@@ -729,6 +782,7 @@ def test_where_nothing_is_found_beside_listed_causes_it_is_sought_without_them(m
     monkeypatch.setattr(
         unlisted, "_learned", lambda state: (None if state.current.names else curve, 0.001, False)
     )
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
     for one in (search, elimination):
         monkeypatch.setattr(one, "stage", lambda state: state)
     left = _state(_fit(200.0, "creep"), _fit(700.0))
@@ -746,6 +800,7 @@ def test_a_curve_takes_the_place_of_a_listed_cause_where_it_is_clearly_better(
     """Where the listed cause explains less than nine tenths of what the curve does."""
     term = Term(unlisted.Unlisted([unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
     monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(instead, (term,)), 0.001, False))
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
     for one in (search, elimination):
         monkeypatch.setattr(one, "stage", lambda state: state)
     after = unlisted.stage(_state(_fit(left, "creep")))
@@ -759,6 +814,7 @@ def test_of_several_curves_one_gives_its_place_to_a_listed_cause(monkeypatch, fi
     parts = [unlisted.Part(k, 0.0, 1.0) for k in (0, 1)]
     both = unlisted.Term(unlisted.Unlisted(parts), tuple(map(float, range(2 * unlisted.KNOTS))))
     monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(100.0, (both,)), 0.001, False))
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
     for one in (search, elimination):
         monkeypatch.setattr(one, "stage", lambda state: state)
 

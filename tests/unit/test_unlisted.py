@@ -17,9 +17,14 @@ from pulsetrainer.artefacts.diagnosis import Recorded
 from pulsetrainer.core import excitations
 from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import dependence, learned
 from pulsetrainer.diagnosis.causes.base import Frame
 from pulsetrainer.diagnosis.causes.unlisted import KNOTS, STATES, Part, Unlisted
+from pulsetrainer.diagnosis.fitting import weights_for
+from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.past import Past
+from pulsetrainer.diagnosis.problem import problem_for
 from pulsetrainer.diagnosis.repeats import repeats
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
@@ -94,6 +99,44 @@ def test_rest_and_time_since_a_turn_are_times():
         assert -0.5 * np.log1p(-z[end]) == pytest.approx((end - begun) * DT_S, abs=3 * DT_S)
 
 
+def test_a_turn_is_at_the_extreme_though_it_shows_later():
+    """From the next sample on, also where the pieces of a record meet between the two."""
+    u = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(0.999, 0.5, 500), np.linspace(0.51, 0.9, 40)])
+
+    def states(pieces):
+        past, found = Past(), []
+        for piece in pieces:
+            frame = Frame(DT_S, piece, 1.0, 1.0, past=past)
+            turn = STATES[NAMES["turn"]].at(piece, 1e-9, frame, "turn")
+            with np.errstate(divide="ignore"):  # before its first turn it never turned
+                since = -np.log1p(-STATES[NAMES["since turn"]].at(piece, 1.0, frame, "since"))
+            found.append((turn, since))
+            past = past.next()
+        return [np.concatenate(one) for one in zip(*found, strict=True)]
+
+    turn, since = states([u])
+    assert turn[0] == 1.0  # it came from above
+    np.testing.assert_array_equal(turn[1:101], 0.0)
+    np.testing.assert_array_equal(turn[101:601], 1.0)
+    np.testing.assert_allclose(since[101:601], DT_S * np.arange(1, 501), atol=1e-9)
+    np.testing.assert_array_equal(turn[601:], 0.5)
+    np.testing.assert_allclose(since[601:], DT_S * np.arange(1, 41), atol=1e-9)
+    seam = states([u[:110], u[110:]])  # nine samples after the turn, eleven before it shows
+    for one, other in zip(seam, (turn, since), strict=True):
+        np.testing.assert_allclose(one[110:], other[110:], atol=1e-9)
+
+
+def test_the_curve_of_a_gain_goes_with_the_output():
+    """About the output of empty memory."""
+    y, z = np.asarray([3.0, 4.0, 7.0]), np.asarray([0.0, 0.4, 1.0])
+    part = Part(0, 0.0, 1.0)
+    gain = replace(part, gain=True).added(y, z, 3.0)
+    np.testing.assert_allclose(gain, part.added(y, z, 3.0) * np.asarray([[0.0], [1.0], [4.0]]))
+    frame = Frame(DT_S, z, 4.0, 1.0, zero=3.0)
+    units = [one.unit for one in Unlisted([replace(part, gain=True), part]).quantities(frame)]
+    assert units == ["s", *["1"] * (KNOTS - 1), "s", *["{y}"] * (KNOTS - 1)]
+
+
 def test_a_curve_goes_through_its_knots_and_stays_level_beyond_them():
     """The first value is 0."""
     part, values = Part(0, 1.0, 2.0), np.arange(1.0, KNOTS)
@@ -136,6 +179,38 @@ def test_a_dip_over_the_average_current_is_found_and_said(dipping):
     assert np.ptp(curve.value) == pytest.approx(0.5, rel=0.25)
     assert np.all(curve.half > 0)
     assert (curve.unit, curve.output_unit) == ("A", "N")
+
+
+def test_a_gain_that_depends_on_the_speed_is_found_and_said():
+    """In words and per cent, and as a part of a model that predicts another run; the inverse undoes it."""
+
+    def device(u, dt_s=DT_S):
+        speed = _average(np.abs(np.diff(u, prepend=u[0])) / dt_s, 0.5, dt_s)
+        return _static(u) * (1.0 - 0.03 * np.log1p(speed))
+
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    run = _run(u, device(u))
+    model = pt.identify(run, levels=20, form="direct")
+    found = pt.diagnose(run, model)
+    assert [one.cause for one in found.found] == ["unlisted"]
+    (curve,) = found.dependences
+    assert "its gain is lower by " in curve.text
+    assert " % when the average speed of the current" in curve.text
+    assert (curve.output_unit, curve.tau_s) == ("%", pytest.approx(0.5, rel=0.2))
+    at = np.linspace(curve.at[0], curve.at[-1], 9)
+    change = np.interp(at, curve.at, curve.value)
+    truth = -3.0 * np.log1p(at)
+    assert change - change.mean() == pytest.approx(truth - truth.mean(), abs=0.3)
+    better = pt.extend(model, found)
+    other = excitations.identification(0.0, 1.5, n_h=10, speed=4.0, rate_Hz=RATE_HZ).value
+    assert pt.evaluate(_run(other, device(other)), [model, better]).models[1].gain_percent > 60
+    t = np.arange(1200) * DT_S
+    target = 4.0 + 2.0 * np.sin(2 * np.pi * 0.5 * t)
+    errors = []
+    for one in (model, better):
+        drive = pt.invert((t, target), one, periods=1)
+        errors.append(np.std((device(drive.compensated, drive.time_s[1]) - drive.target)[drive.scored]))
+    assert errors[1] < 0.5 * errors[0]
 
 
 def test_what_is_left_is_the_error_of_its_models(dipping):
@@ -276,6 +351,18 @@ def test_what_repeats(after, expected):
     """Half of what the fit gains, and no piece worse by a tenth of it."""
     held_out = _Pieces(before=[2.0] * 5, after=after)
     assert repeats(held_out, _Fit("before", 10.0), _Fit("after", 5.0)) is expected
+
+
+def test_a_zero_that_wanders_explains_what_follows_the_time_and_no_more():
+    """Against the weights: two slow turns of the zero, and as much that follows the average current."""
+    u = excitations.diagnostic(0.0, 1.5, rate_Hz=RATE_HZ).value
+    slow = 0.2 * np.sin(2.0 * np.pi * (2.0 * np.arange(u.size) / u.size + 0.1))
+    for y, low, high in ((_static(u) + slow, 0.95, 1.0), (_dip(u), 0.0, 0.5)):
+        records = [Record(u / 1.5, y / SPAN, np.ones(u.size), dt_s=DT_S)]
+        problem = problem_for(records, 0.0, 1.0, signed=False, base=None)
+        fitted = weights_for(problem, (), None)
+        share = dependence.of_a_wandering_zero(fitted, HeldOut(problem), Unlisted.order) / fitted.squares
+        assert low <= share <= high
 
 
 @given(st.integers(0, 10**6))
