@@ -152,9 +152,7 @@ class Thresholds:
     slow_share: float = 0.4  # of what is left: so much that may be slow noise is sought in the bank too
 
     # Unlisted
-    as_well: float = (
-        0.7  # of what the best state predicts: its gain, or its output, may be what depends on it
-    )
+    as_well: float = 0.7  # of what the best state predicts: the same of the gain, or of the output, is tried
     other_tau: float = 1.5  # of the time constant: two of one state that are nearer are the same
     most_states: int = 3  # learned one after another
     learned_rounds: int = 4  # Gauss-Newton steps of the joint refit with each

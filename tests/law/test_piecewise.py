@@ -19,7 +19,7 @@ DT_S = 1e-3
 STATIC = Preisach(Plane.uniform(0.0, 1.5, 12), np.linspace(1.0, 4.0, 78))
 LASTING = [cause for cause in library().values() if cause.lasting and cause.stage != "record"]
 ENDS = [(0.0, 1.5), (0.0, 300.0), (0.0, 2.2), (0.0, 9e4), (0.0, 20.0), (0.0, 3e3), (-0.5, 0.5), (-99.0, 99.0)]
-ENDS += [(0.0, 1.0), (0.0, 1.5), (0.0, 1.0), (0.0, 1.0)]  # of the states of ``unlisted``
+ENDS += [(0.0, 1.0), (0.0, 1.5), (0.0, 1.0), (0.0, 1.0), (0.0, 1.0)]  # of the states of ``unlisted``
 VALUES = {
     "accommodation": (0.2, 4.0),
     "creep": (0.1, 0.3),
@@ -48,7 +48,8 @@ def _walk(seed, size):
     return 0.75 + 0.6 * np.sin(np.cumsum(steps) / 20.0)
 
 
-OTHER_KINDS = [("creep", (1.0, 0.1, 0.3)), ("thermal-drift", (0.5, 0.2, 3.0))]
+GAIN = ("unlisted", (-5.0, 0.0, 20.0, 0.05, 0.1, -0.3, 0.2, 0.5, 0.4, -0.1, 0.3))  # by the input's speed
+OTHER_KINDS = [("creep", (1.0, 0.1, 0.3)), ("thermal-drift", (0.5, 0.2, 3.0)), GAIN]
 
 
 @pytest.mark.parametrize("extension", [*((c.id, VALUES[c.id]) for c in LASTING), *OTHER_KINDS])

@@ -99,31 +99,25 @@ def test_rest_and_time_since_a_turn_are_times():
         assert -0.5 * np.log1p(-z[end]) == pytest.approx((end - begun) * DT_S, abs=3 * DT_S)
 
 
-def test_a_turn_is_at_the_extreme_though_it_shows_later():
-    """From the next sample on, also where the pieces of a record meet between the two."""
-    u = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(0.999, 0.5, 500), np.linspace(0.51, 0.9, 40)])
+def test_a_reversal_is_where_the_input_moves_the_other_way():
+    """However little, after whatever rest; also where the pieces of a record meet."""
+    u = np.concatenate([np.linspace(0.0, 1.0, 101), np.full(50, 1.0), np.linspace(0.999, 0.9, 100), [0.9001]])
+    kind = STATES[NAMES["since reversal"]]
 
-    def states(pieces):
+    def since(pieces):
         past, found = Past(), []
         for piece in pieces:
             frame = Frame(DT_S, piece, 1.0, 1.0, past=past)
-            turn = STATES[NAMES["turn"]].at(piece, 1e-9, frame, "turn")
-            with np.errstate(divide="ignore"):  # before its first turn it never turned
-                since = -np.log1p(-STATES[NAMES["since turn"]].at(piece, 1.0, frame, "since"))
-            found.append((turn, since))
+            with np.errstate(divide="ignore"):  # before the first one it never reversed
+                found.append(-np.log1p(-kind.at(piece, 1.0, frame, "x")))
             past = past.next()
-        return [np.concatenate(one) for one in zip(*found, strict=True)]
+        return np.concatenate(found)
 
-    turn, since = states([u])
-    assert turn[0] == 1.0  # it came from above
-    np.testing.assert_array_equal(turn[1:101], 0.0)
-    np.testing.assert_array_equal(turn[101:601], 1.0)
-    np.testing.assert_allclose(since[101:601], DT_S * np.arange(1, 501), atol=1e-9)
-    np.testing.assert_array_equal(turn[601:], 0.5)
-    np.testing.assert_allclose(since[601:], DT_S * np.arange(1, 41), atol=1e-9)
-    seam = states([u[:110], u[110:]])  # nine samples after the turn, eleven before it shows
-    for one, other in zip(seam, (turn, since), strict=True):
-        np.testing.assert_allclose(one[110:], other[110:], atol=1e-9)
+    whole = since([u])
+    np.testing.assert_allclose(whole[1:151], DT_S * np.arange(150), atol=1e-9)  # it began to move
+    np.testing.assert_allclose(whole[151:], [*DT_S * np.arange(100), 0.0], atol=1e-9)
+    for cut in (1, 60, 120, 151, 152, 251):
+        np.testing.assert_allclose(since([u[:cut], u[cut:]])[1:], whole[1:], atol=1e-9)
 
 
 def test_the_curve_of_a_gain_goes_with_the_output():

@@ -88,33 +88,36 @@ def _moves(frame: Frame) -> FloatArray:
 
 
 def _turns(frame: Frame) -> tuple[FloatArray, FloatArray]:
-    """The last turn of the input (n,) above the low end, and the time (n,) since it.
-
-    A turn is at the extreme, though it shows only when the input has come back.
-    """
+    """The last turn of the input (n,) above the low end, and whether there is a new one."""
     if "turns" in frame.kept:
-        return frame.kept["turns"], frame.kept["since turn"]
+        return frame.kept["turns"], frame.kept["turned"]
     width = _BACK * frame.reach
     first = frame.input[0]
     # as the memory begins: the input came down through all of its range, and then to the first sample
-    begun = [frame.low, first, 1.0] if first > frame.low + width else [frame.low + frame.reach, first, -1.0]
-    before = remembered(frame.past, "unlisted turn", np.asarray([*begun, 0.0, np.inf]))
-    turn, extreme, way, ago, since_turn = before.tolist()
-    place = np.arange(frame.input.size)
-    turns, since = np.full(place.size, turn), since_turn + (place + 1) * frame.dt_s
-    last = -1 - round(ago)  # sample of the extreme; before the first one below 0
-    for k, value in enumerate(frame.input.tolist()):
+    before = [frame.low, first, 1.0] if first > frame.low + width else [frame.low + frame.reach, first, -1.0]
+    turn, extreme, way = remembered(frame.past, "unlisted turn", np.asarray(before)).tolist()
+    turns, new = [], []
+    for value in frame.input.tolist():
         back = (extreme - value) * way
         if back > width:
-            after = max(last + 1, 0)
-            turns[after:], since[after:] = extreme, (place[after:] - last) * frame.dt_s
-            turn, extreme, way, last = extreme, value, -way, k
-        elif back <= 0:
-            extreme, last = value, k
-    kept = [turn, extreme, way, place[-1] - last, since[-1]]
-    remember(frame.past, "unlisted turn", np.asarray(kept, dtype=np.float64))
-    frame.kept.update({"turns": turns - frame.low, "since turn": since})
-    return frame.kept["turns"], frame.kept["since turn"]
+            turn, extreme, way = extreme, value, -way
+        elif back < 0:
+            extreme = value
+        turns.append(turn)
+        new.append(back > width)
+    remember(frame.past, "unlisted turn", np.asarray([turn, extreme, way]))
+    frame.kept.update(turns=np.asarray(turns) - frame.low, turned=np.asarray(new))
+    return frame.kept["turns"], frame.kept["turned"]
+
+
+def _reverses(frame: Frame) -> FloatArray:
+    """Whether the input moves the other way than when it last moved, at each sample (n,)."""
+    before = remembered(frame.past, "unlisted moved", np.append(frame.input[:1], 0.0))
+    way = np.sign(np.diff(frame.input, prepend=before[0]))
+    last = np.maximum.accumulate(np.where(way != 0.0, np.arange(way.size), -1))
+    way = np.where(last >= 0, way[last], before[1])
+    remember(frame.past, "unlisted moved", np.append(frame.input[-1:], way[-1:]))
+    return np.asarray(way != np.append(before[1], way[:-1]))
 
 
 def _squared(x: FloatArray, tau: float, frame: Frame, name: str) -> FloatArray:
@@ -157,9 +160,12 @@ STATES: tuple[State, ...] = (
     State("turn", "{u}", "the {input} at its last turn, averaged over the last {tau}",
           lambda _, s, f, n: _lagged(_turns(f)[0], s, f, n)),
     State("since turn", "1", "the time since the last turn of the {input}",
-          lambda _, s, f, _n: _share(_turns(f)[1], s), saturates=True),
+          lambda _, s, f, n: _share(_since(_turns(f)[1], f, n), s), saturates=True),
     State("rest", "1", "the time that the {input} has rested",
           lambda _, s, f, n: _share(_since(_moves(f), f, n), s), saturates=True),
+    # exact, where the one since a turn shrugs off noise
+    State("since reversal", "1", "the time since the {input} last changed its direction",
+          lambda _, s, f, n: _share(_since(_reverses(f), f, n), s), saturates=True),
 )  # fmt: skip
 
 
