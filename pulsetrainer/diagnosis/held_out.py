@@ -41,9 +41,18 @@ class HeldOut:
         return float(halves.sum()) if halves.size == _HALVES else float("nan")
 
     def gain(self, before: Fitted, after: Fitted, floor: Floor) -> float:
-        """Share of the reducible held-out error that the extension removes, at most all of it."""
+        """Share of the reducible held-out error that the extension removes, at most all of it.
+
+        Where each cell is told by one half alone, the other half predicts nothing, and the larger model may
+        seem to do harm. Whole pieces, of which a little is told, then count, if that predicts half of it.
+        """
         first, second = self.error(before), self.error(after)
-        return min((first - second) / max(first - floor.squares, floor.relevant), 1.0)
+        share = _share(first, second, floor)
+        if share < 0.0:
+            pieces = (float(np.sum(self.pieces(one, LIMITS.pieces))) for one in (before, after))
+            of_pieces = _share(*pieces, floor)
+            return of_pieces if of_pieces > LIMITS.half else share
+        return share
 
     def pieces(self, fitted: Fitted, count: int) -> FloatArray:
         """Sums of squares (count,) on whole pieces of the time, each predicted from the others; or empty.
@@ -147,6 +156,11 @@ class _Rows:
         masses[self._cells] = change[: self._cells.size]
         added = self._design.bins.settled(self._design.output(masses))
         return np.asarray(added + self._beside[:, :-1] @ change[self._cells.size :])
+
+
+def _share(first: float, second: float, floor: Floor) -> float:
+    """Share of the error above the floor by which a second error is less than the first, at most 1."""
+    return min((first - second) / max(first - floor.squares, floor.relevant), 1.0)
 
 
 def _fold_of(folds: int, *, whole: bool) -> IntArray:

@@ -436,7 +436,26 @@ def test_the_held_out_gain_is_a_share_of_what_is_reducible():
         after: {(2, "in turn"): np.asarray([12.0, 8.0])},
     }
     assert halves.gain(before, after, Floor(10, 1.0, 1.0, 1.0)) == pytest.approx(90.0 / 100.0)
+    halves._known[after][5, "pieces"] = halves._known[before][5, "pieces"] = np.full(5, 20.0)
     assert halves.gain(after, before, Floor(19, 1.0, 1.0, 1.0)) == pytest.approx(-90.0 / (19 * 0.09))
+
+
+@pytest.mark.parametrize(
+    ("halves", "pieces", "told"),
+    [
+        (60.0, 4.0, 80.0),  # of 90 that can be lowered; the halves say -20
+        (60.0, 11.1, -20.0),  # less than half is predicted
+        (40.0, 19.0, 20.0),  # the halves are believed
+    ],
+)
+def test_whole_pieces_are_asked_where_halves_tell_nothing(halves, pieces, told):
+    """A step of the gain between loops that each stand in one half alone: it seemed to do harm."""
+    held_out, before, after = _told({}), _Fit(), _Fit()
+    held_out._known = {
+        before: {(2, "in turn"): np.full(2, 50.0), (5, "pieces"): np.full(5, 20.0)},
+        after: {(2, "in turn"): np.full(2, halves), (5, "pieces"): np.full(5, pieces)},
+    }
+    assert held_out.gain(before, after, Floor(10, 1.0, 1.0, 1.0)) == pytest.approx(told / 90.0)
 
 
 def test_what_was_left_out_once_is_not_left_out_again():
