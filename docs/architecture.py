@@ -58,9 +58,11 @@ The pages are made by scripts in `docs/`: `make.py` writes all that come from th
 
 {modules}
 
-### firmware/core
-
 {firmware}
+
+### waveforms
+
+The pulses, as CSV files that [make.py](waveforms/make.py) writes from their formulas.
 """
 
 
@@ -77,7 +79,7 @@ def architecture_page(mark: str) -> str:
         ),
         contracts="\n".join(f"- {name}." for name in _contracts()),
         modules="\n".join(_modules()).rstrip(),
-        firmware="\n".join(_firmware()),
+        firmware="\n".join(_firmware()).rstrip(),
     )
 
 
@@ -138,11 +140,15 @@ def _modules() -> Iterator[str]:
 
 
 def _firmware() -> Iterator[str]:
-    """Yield every header of the firmware's core with the first paragraph of its first comment."""
-    for path in sorted((ROOT / "firmware" / "core").glob("*.h")):
-        comment = path.read_text(encoding="utf-8").removeprefix("/*").partition("*/")[0]
-        first = comment.partition("\n *\n")[0].replace("\n *", " ")
-        yield f"- [{path.name}]({path.relative_to(ROOT)}): {' '.join(first.split())}"
+    """Yield every header of the firmware with the first paragraph of its first comment."""
+    for folder in ("core", "hal", "plant", "port"):
+        yield f"### firmware/{folder}\n"
+        for path in sorted((ROOT / "firmware" / folder).rglob("*.h")):
+            comment = path.read_text(encoding="utf-8").removeprefix("/*").partition("*/")[0]
+            first = comment.partition("\n *\n")[0].replace("\n *", " ")
+            name = path.relative_to(ROOT / "firmware" / folder)
+            yield f"- [{name}]({path.relative_to(ROOT)}): {' '.join(first.split())}"
+        yield ""
 
 
 def _sentence(path: Path) -> str:

@@ -1,4 +1,5 @@
-/* What may never happen to a finger: limits, plausibility of the sensors, what follows a kill.
+/* What may never happen to a finger: limits, a silent host, sensors that cannot be true, what
+ * follows a kill.
  *
  * Runs in the tick before the PID's output is applied. Units in names: 100 uA, mN, ticks of 100 us, converter counts,
  * counts of the PWM. Every constant says where it comes from. */

@@ -1,4 +1,4 @@
-"""From the records of one device to one operator: its form, where its levels lie, offsets, the weights.
+"""From records of one device to one operator, of as many levels as asked: form, edges, offsets, weights.
 
 ``identification`` solves for weights on given levels. This module decides what it is given: the form that the
 records ask for (``forms``), levels that lie evenly or closer where the loop is steep (``edges``), and an

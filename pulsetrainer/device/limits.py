@@ -1,4 +1,4 @@
-"""What a device may play: its limits, which can only be lowered, and a rehearsal against them without it."""
+"""What a device may play: limits, which can only be lowered; a play too hot for the coil; a rehearsal."""
 
 from __future__ import annotations
 

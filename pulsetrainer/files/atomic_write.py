@@ -1,4 +1,4 @@
-"""Files appear whole or not at all: a temporary name in the same folder, fsync, then a rename."""
+"""Files appear whole or not at all, and over another only with ``--overwrite``: written aside, then renamed."""
 
 from __future__ import annotations
 

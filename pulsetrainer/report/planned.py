@@ -1,4 +1,4 @@
-"""What a dry run says: what would be played, for how long, and how hot the coil would get."""
+"""What a dry run says of the plan that a verb made (``plan`` in its step): what, for how long, how hot."""
 
 from __future__ import annotations
 

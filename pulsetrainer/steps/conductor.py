@@ -1,4 +1,4 @@
-"""The conductor: turns decisions, a beat at a time, into the current of a session.
+"""The conductor: turns decisions, a beat at a time, into the current of a session, with pauses to cool.
 
 A part of a session is what the device plays in one go: once around the major loop, up to the foot of the
 first beat, beats, down again. A change of anything takes effect at the next beat; where the feet of

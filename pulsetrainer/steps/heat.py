@@ -1,4 +1,4 @@
-"""Heat: the coil's temperature while a device plays, and the drive that makes up for the force it costs."""
+"""Heat: the coil's temperature in a play, and the drive that makes up for its force (in a session: conductor)."""
 
 from __future__ import annotations
 
