@@ -1,4 +1,4 @@
-"""The heat of the coil, as the firmware counts it (firmware/core/heat.c): what a play adds, and in how long it cools.
+"""The heat of the coil, as the firmware counts it (firmware/core/heat.c): what a play adds, how it cools.
 
 The device averages the squared current, dh/dt = (i^2 / HEAT_LIMIT_A2 - h) / HEAT_TAU_S, and stops at h = 1.
 After power-on it does not know how hot its coil is and assumes the limit; a host that has seen it before

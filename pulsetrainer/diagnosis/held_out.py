@@ -49,8 +49,8 @@ class HeldOut:
         first, second = self.error(before), self.error(after)
         share = _share(first, second, floor)
         if share < 0.0:
-            pieces = (float(np.sum(self.pieces(one, LIMITS.pieces))) for one in (before, after))
-            of_pieces = _share(*pieces, floor)
+            first, second = (float(np.sum(self.pieces(one, LIMITS.pieces))) for one in (before, after))
+            of_pieces = _share(first, second, floor)
             return of_pieces if of_pieces > LIMITS.half else share
         return share
 

@@ -1,4 +1,4 @@
-"""Heat: the coil's temperature in a play, and the drive that makes up for its force (in a session: conductor)."""
+"""Heat: the coil's temperature in a play, and the drive that makes up for it (in a session: conductor)."""
 
 from __future__ import annotations
 
