@@ -47,9 +47,16 @@ def known_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray 
     begin = int(ends[0]) if ends.size else first_extreme(inputs)[0]
     if outputs is None or (ends.size and begin > 0):
         return begin
-    if not ends.size:
-        low, high = float(inputs.min()), float(inputs.max())
-    return begin + _past_a_first_stroke(inputs[begin:], outputs[begin:], low, high)
+    return begin + _past_a_first_stroke(inputs[begin:], outputs[begin:], *_reached(inputs, low, high))
+
+
+def _reached(inputs: FloatArray, low: float, high: float) -> tuple[float, float]:
+    """Ends between which strokes run: where an input (n,) never comes near one, it turns before it.
+
+    What lies beyond is never switched, and adds a constant.
+    """
+    near, bottom, top = NEAR * (high - low), float(inputs.min()), float(inputs.max())
+    return bottom if bottom > low + near else low, top if top < high - near else high
 
 
 def counts_from(inputs: FloatArray, low: float, high: float, outputs: FloatArray | None = None) -> int:
@@ -110,6 +117,7 @@ def _past_a_first_stroke(inputs: FloatArray, outputs: FloatArray, low: float, hi
 
 def second_stroke(inputs: FloatArray, low: float, high: float) -> int:
     """First sample (n,) at an end of [low, high] again, of a record that begins at one; 0 for none."""
+    low, high = _reached(inputs, low, high)
     away, back, reach = inputs - low, high - inputs, high - low
     if min(away[0], back[0]) > NEAR * reach:
         return 0

@@ -100,7 +100,7 @@ TEXTS: Mapping[str, str] = {
     "given worse": (
         "The model as given leaves {given:.2f} % of the span (rms of single samples), and weights refitted "
         "to these recordings {refitted:.2f} %. It does not carry over: the device, its zero or its sensor "
-        "was not the same when it was identified, or the device is none that such a model describes"
+        "was not the same when it was identified, or a model of this kind does not describe the device"
     ),
     "given worse, own": (
         "The model as given leaves {given:.2f} % of the span (rms of single samples), and weights refitted "
@@ -305,14 +305,14 @@ OURS = (
     "-o diagnostic-2.h5."
 )
 TABLE = (
-    " Write a table with columns of {columns}; pulsetrainer import makes a recording of it, "
-    "as of those that were diagnosed."
+    " Save it as a table with the columns {columns}, and read that with pulsetrainer import, as you did "
+    "for the recordings here."
 )
 # What recordings may lack, with {hold_least} and {short} for the bench: see ``Bench.numbers``
 LACKS: Mapping[str, str] = {
     "rates": f"nearly all of it was run at one rate, or at rates less than {LIMITS.one_rate:g} times apart",
     "holds": "the {input} never rests for {hold_least} or more",
-    "length": "it is shorter than {short}",
+    "length": "the recording is shorter than {short}",
     "time": "its samples have no time",
 }
 # What to record instead

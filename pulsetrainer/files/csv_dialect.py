@@ -348,8 +348,9 @@ def _with_header(
         of_text |= {len(first)}
     if len(of_text) == len(names):
         raise DataError(
-            f"{path} has no column of numbers: line {begin.number} is {begin.text[:60]!r}",
-            hint="export the recording as CSV, one column per quantity",
+            f"{path} has no rows of numbers: all of its lines are words or headings, as line {begin.number}: "
+            f"{begin.text[:60]!r}",
+            hint="export what stands below the headings too: a column per quantity, a row a sample",
         )
     units = [cell.strip("()[] ") for cell in rows[1]] if heads == 2 else []
     return Dialect(
@@ -422,7 +423,11 @@ def ends_in_a_number(path: Path, dialect: Dialect) -> bool:
         return False
     sign = "," if dialect.decimal_comma else "."
     *before, last = [len(cells[-1].partition(sign)[2]) for cells in rows]
-    return len(set(before)) == 1 and last < before[0] and all(_is_number(cells[-1]) for cells in rows)
+    return (
+        len(set(before)) == 1
+        and last < before[0]
+        and all(_is_number(cells[-1].removesuffix(sign)) for cells in rows)
+    )
 
 
 def _cut_settings(rows: list[list[str]]) -> float | None:

@@ -107,9 +107,9 @@ def warmth_words(kelvin: Sequence[float] | FloatArray) -> str:
 
 def minor_words(percent: float, switched_percent: float) -> str:
     """Say how many cells minor loops tell apart, and what of the others is known."""
-    nothing = ", or nothing" if switched_percent < _ALL else ""
+    nothing = ", or nothing did" if switched_percent < _ALL else ""
     rest = (
-        f"; the rest only the major loop has switched{nothing}: loops within it would tell"
+        f"; only the major loop switched the rest{nothing}: smaller loops within it would tell them apart"
         if percent < _HARDLY
         else ""
     )

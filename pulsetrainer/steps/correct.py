@@ -147,6 +147,7 @@ def _instead(diagnosis: Diagnosis) -> str:
         return "extend the model: pulsetrainer extend DIAGNOSIS.h5 --model MODEL.h5 -o extended.h5"
     if diagnosis.quick:
         return "diagnose without `quick`: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o full.h5"
-    if diagnosis.verdict in ("unknown", "inconclusive"):
+    in_doubt = any(one.confounded_with or one.doubts for one in diagnosis.found)
+    if in_doubt or diagnosis.verdict in ("unknown", "inconclusive"):
         return f"follow the advice of the diagnosis: {diagnosis.next_experiment}"
     return "use the run as it is"

@@ -86,7 +86,9 @@ def test_a_table_of_bad_rows_is_refused_with_the_option_too(tmp_path):
     assert not (tmp_path / "a.h5").exists()
 
 
-@pytest.mark.parametrize(("end", "left_out"), [("0.05,1.0", True), ("0.05,1.0000", False), ("0.05,1", True)])
+@pytest.mark.parametrize(
+    ("end", "left_out"), [("0.05,1.0", True), ("0.05,1.0000", False), ("0.05,1", True), ("0.05,1.", True)]
+)
 def test_a_file_that_was_cut_within_a_number_loses_that_row(tmp_path, end, left_out):
     """A row without a line end is whole where it has as many decimals as all others."""
     rows = "".join(f"{k / 100:.2f},{k % 7 / 3:.4f}\n" for k in range(30))

@@ -1045,7 +1045,10 @@ def test_advice_to_record_again_says_how():
     ours = wording.advice(lacks, wording.Bench(Scale(0.0, 1.5), "A", ours=True, reached=(0.0, 0.6)))
     assert ours.endswith("pulsetrainer capture diagnostic --current-max 0.9 -o diagnostic-2.h5.")
     bench = wording.Bench(Scale(), "A/m", input="H", output="strain", unit_of_output="1")
-    assert "columns of time in s, H in A/m and strain; pulsetrainer import" in wording.advice(lacks, bench)
+    assert (
+        "the columns time in s, H in A/m and strain, and read that with pulsetrainer import"
+        in wording.advice(lacks, bench)
+    )
 
 
 @pytest.mark.parametrize("name", sorted(CAUSE))

@@ -15,6 +15,7 @@ from pulsetrainer.core.initial_state import (
     first_stroke_words,
     known_from,
     record_of,
+    second_stroke,
 )
 
 DT_S = 0.02
@@ -75,6 +76,16 @@ def test_a_first_stroke_apart_does_not_count(down, noisy):
     u, y = _record(cycled=True, down=down)
     assert known_from(u, 0.0, 5.0, y) == 0
     assert first_stroke_words(u, y, 0.0, 5.0) == ""
+
+
+@pytest.mark.parametrize("down", [False, True])
+def test_a_first_stroke_ends_where_the_input_turns_before_an_end_that_it_never_reaches(down):
+    """A model up to 6.5, loops up to 5: not the whole slow half of such a record is left out."""
+    u, y = _record(cycled=False, down=down)
+    ends = (-1.5, 5.0) if down else (0.0, 6.5)
+    at = known_from(u, *ends, y)
+    assert at * DT_S == pytest.approx(2.0, abs=0.06)
+    assert second_stroke(u, *ends) == pytest.approx(at, abs=3)
 
 
 @pytest.mark.parametrize(

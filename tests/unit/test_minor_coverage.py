@@ -43,10 +43,10 @@ def test_reversal_curves_and_the_diagnostic_signal_tell_all_apart():
 def test_what_nothing_has_switched_is_not_said_of_the_major_loop():
     """Of a record that was cut, 7 % of the cells were told apart, and the rest was called switched."""
     assert minor_words(7.0, 100.0).endswith(
-        "the rest only the major loop has switched: loops within it would tell"
+        "only the major loop switched the rest: smaller loops within it would tell them apart"
     )
     assert minor_words(7.0, 7.7).endswith(
-        "the rest only the major loop has switched, or nothing: loops within it would tell"
+        "only the major loop switched the rest, or nothing did: smaller loops within it would tell them apart"
     )
     assert minor_words(99.0, 99.0) == "99 % of the cells"
 

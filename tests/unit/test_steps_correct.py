@@ -234,6 +234,17 @@ def test_a_recorders_delay_is_taken_out_only_when_told(clean):
         pt.correct(late, nothing)
 
 
+def test_where_a_fault_may_be_a_cause_of_the_device_the_advice_says_what_to_record(clean):
+    """Not to use the run as it is: the diagnosis said how to tell the two apart."""
+    found = _diagnosis(clean, "offset-drift", rate=0.1)
+    tied = replace(found.causes[0], confounded_with=("accommodation",))
+    said = "Record twenty cycles."
+    tied_diagnosis = replace(found, causes=(tied,), correctable=(), next_experiment=said)
+    assert said in instead(tied_diagnosis)
+    with pytest.raises(DataError, match="nothing to correct"):
+        pt.correct(clean, tied_diagnosis)
+
+
 def test_a_delay_longer_than_the_record_is_refused(clean):
     """Nothing of the output would be left."""
     found = _diagnosis(clean, "offset-drift", rate=0.1)
@@ -272,7 +283,8 @@ def test_a_part_that_was_not_diagnosed_stays_as_it_is(clean):
 @pytest.mark.parametrize(("verdict", "goes_on"), [("unknown", True), ("inconclusive", True), ("none", False)])
 def test_what_cannot_be_corrected_is_not_called_sound(verdict, goes_on):
     """Where something is wrong that has no name, the diagnosis says what to do."""
-    found = SimpleNamespace(verdict=verdict, extended=None, quick=False, next_experiment="Record again.")
+    known = {"extended": None, "quick": False, "next_experiment": "Record again.", "found": ()}
+    found = SimpleNamespace(verdict=verdict, **known)
     told = instead(found)
     assert ("Record again." in told) is goes_on
     assert ("as it is" in told) is not goes_on

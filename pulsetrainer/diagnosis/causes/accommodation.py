@@ -29,8 +29,10 @@ class Accommodation(Cause):
     scales = True
     needs_time = False
     parameters = (
-        Quantity("amplitude", "1", -0.5, 1.0, 0.002, "what follows over cycles, per change at once"),
-        Quantity("path", "{u}", 2.0, 700.0, 0.3, "way of the {input} until it has followed"),
+        Quantity(
+            "amplitude", "1", -0.5, 1.0, 0.002, "the part that follows over cycles, over the part at once"
+        ),
+        Quantity("path", "{u}", 2.0, 700.0, 0.3, "travel of the {input} in which 63 % of it follow"),
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:

@@ -48,7 +48,7 @@ class Creep(OfKinds):
     tried = (_EQUAL, _ALONE, _FIVE)  # shares of the middle time constant
     common = True
     parameters = (
-        Quantity("amplitude", "1", -0.3, 0.6, 0.002, "what follows slowly, per change at once"),
+        Quantity("amplitude", "1", -0.3, 0.6, 0.002, "the part that follows slowly, over the part at once"),
         Quantity("tau", "s", 0.04, 20.0, 0.02, "time constant; of several, the middle one"),
     )
 

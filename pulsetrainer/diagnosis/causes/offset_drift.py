@@ -44,7 +44,7 @@ class OffsetDrift(Cause):
     strengths = 2
     parameters = (
         Quantity("rate", "{y}/s", -1e6, 1e6, 1e-5, "drift of the zero of the {output}, from end to end"),
-        Quantity("bend", "{y}/s^2", -1e6, 1e6, 1e-7, "half of the change of that rate, a second"),
+        Quantity("bend", "{y}/s^2", -1e6, 1e6, 1e-7, "half of what that rate changes by in a second"),
         Quantity("slowing", "1/s", -1e6, 1e6, 1e-5, "by 1/e in a time of one over it; below 0: it grows so"),
     )
     lasting = False
