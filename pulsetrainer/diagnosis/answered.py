@@ -98,7 +98,7 @@ def diagnosis_of(state: State) -> Diagnosis:
         lacks=state.lacks,
         whole=state.is_whole(extended) and state.verdict != "unknown",
         dependences=dependences,
-        notes=tuple(_by_name(note, given.names) for note in state.question.notes),
+        notes=state.question.notes,
         model=model.fingerprint,
         records=tuple(
             Recorded(
@@ -125,15 +125,6 @@ def _advice(state: State) -> Evidence:
         small = "none, small, quick" if state.question.quick else "none, small"
         return Evidence(small, names=(tried[0].cause.id,))
     return one
-
-
-def _by_name(note: str, names: Sequence[str]) -> str:
-    """Return a note with the name of the record that it is about: stages know records by their number."""
-    for k, name in enumerate(names):
-        called = f"{wording.recording(k, {})}: "
-        if note.startswith(called):
-            return f"{name}: {note.removeprefix(called)}"
-    return note
 
 
 def _said(model: Model, evidence: Sequence[str]) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ def question_of(
     DataError where runs and model differ in their units or ranges, the model cannot be diagnosed, or a run is
     too short, or has too few samples with a number.
     """
-    low, high = input_range(model)
+    low, high = _range_of(model, runs)
     *called, model_name = names
     records, notes, fingerprints, titles = [], [], [], []
     stamps: list[FloatArray | None] = []
@@ -105,7 +105,21 @@ def input_range(model: Model) -> tuple[float, float]:
     operator, fit = operator_of(model), model.fit
     if model.form != "dual" or fit is None or fit.input.size == 0:
         return operator.low, operator.high
-    return float(fit.input.min()), float(fit.input.max())
+    return min(operator.low, float(fit.input.min())), max(operator.high, float(fit.input.max()))
+
+
+def _range_of(model: Model, runs: Sequence[Run]) -> tuple[float, float]:
+    """Return the range between whose ends memory is wiped out: of a dual model where inputs went within it.
+
+    A drift widens its operator, and no input comes near those ends.
+    """
+    low, high = input_range(model)
+    if model.form != "dual" or model.fit is None:
+        return low, high
+    inputs = [one[np.isfinite(one)] for one in (model.fit.input, *(run.input for run in runs))]
+    ends = [(one.min(), one.max()) for one in inputs if one.size]
+    bottom, top = (float(pick(side)) for pick, side in zip((min, max), zip(*ends, strict=True), strict=True))
+    return max(low, bottom), min(high, top)
 
 
 def measured_of(

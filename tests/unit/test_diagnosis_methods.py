@@ -42,7 +42,7 @@ from pulsetrainer.diagnosis.procedure import diagnose
 from pulsetrainer.diagnosis.raw import Firing, evenly
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.screening import _log_tail, p_value
-from pulsetrainer.diagnosis.stages import advice
+from pulsetrainer.diagnosis.stages import advice, first_stroke
 from pulsetrainer.diagnosis.state import Question
 from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.errors import DataError
@@ -987,12 +987,25 @@ def test_where_an_error_is_largest_is_told_with_its_quantity():
 
 
 def test_evidence_calls_a_record_by_its_name_where_it_has_one():
-    """Nobody counts files to know which one is meant; so do notes that stages made without names."""
+    """Nobody counts files to know which one is meant; so do the notes of a stage."""
     seen = Evidence("gate", "outliers", {"count": 3.0, "limit": 0.5}, record=1)
     assert wording.sentence(seen, {"record 2": "b.h5"}).startswith("outliers: b.h5: 3 ")
-    notes = ("record 2: left out", "record 3: left out", "b.h5: left out")
-    told = [answered._by_name(note, ("a.h5", "b.h5")) for note in notes]
-    assert told == ["b.h5: left out", "record 3: left out", "b.h5: left out"]
+    for names, called in ((("a.h5", "b.h5"), "b.h5"), ((), "record 2")):
+        asked = SimpleNamespace(question=SimpleNamespace(given=SimpleNamespace(names=names)))
+        assert first_stroke._called(asked, 1) == called
+
+
+@pytest.mark.parametrize(
+    ("form", "expected"), [("dual", (0.2, 9.5)), ("direct", (0.0, 10.0)), ("signed", (0.0, 10.0))]
+)
+def test_the_range_of_a_dual_model_is_where_inputs_went_within_it(monkeypatch, form, expected):
+    """Its operator reaches as far as a drift took the output; other forms end where their levels do."""
+    monkeypatch.setattr(question, "input_range", lambda model: (0.0, 10.0))
+    model = SimpleNamespace(form=form, fit=SimpleNamespace(input=np.asarray([0.5, 9.0])))
+    runs = [SimpleNamespace(input=np.asarray([0.2, np.nan, 8.0])), SimpleNamespace(input=np.asarray([9.5]))]
+    assert question._range_of(model, runs) == expected
+    beyond = [SimpleNamespace(input=np.asarray([-1.0, 11.0]))]
+    assert question._range_of(model, beyond) == (0.0, 10.0)
 
 
 def test_the_records_of_a_question_are_called_as_the_runs_were_named():

@@ -49,7 +49,7 @@ def _without(state: State, counts: Sequence[int]) -> State | None:
             continue
         weight[:own] = 0.0
         records[k] = replace(records[k], sample_weight=weight)
-        where = f"record {k + 1}: " if len(records) > 1 else ""
+        where = f"{_called(state, k)}: " if len(records) > 1 else ""
         notes.append(f"{where}less what was found, {left_out_words(own)}")
     if not notes:
         return None
@@ -58,3 +58,9 @@ def _without(state: State, counts: Sequence[int]) -> State | None:
     for one in (search, restart, exchange, elimination):
         again = one.stage(again)
     return again
+
+
+def _called(state: State, k: int) -> str:
+    """Return what a person calls a record, or its number."""
+    names = state.question.given.names if state.question.given else ()
+    return names[k] if names else f"record {k + 1}"
