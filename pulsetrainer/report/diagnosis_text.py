@@ -14,7 +14,7 @@ from pulsetrainer.diagnosis.thresholds import LIMITS
 from pulsetrainer.report.tables import Facts, Table
 
 _SHOWN = 8  # causes in the table
-_CURVE = re.compile(r"f\d+")  # the values of a learned curve: one by one they say nothing
+_CURVE = re.compile(r"[fg]\d+")  # the values of a learned curve, of a gain: one by one they say nothing
 _OF_A_CURVE = ("state", "low", "high")
 # what is left by each model: in words, then the fields of single samples and of short averages
 ERRORS = (
@@ -107,11 +107,13 @@ def parameters(several: Sequence[Parameter]) -> dict[str, str]:
         if not of_a_curve(one):
             said[_numbered(one.name, said)] = parameter(one)
     values = [one for one in several if _CURVE.fullmatch(one.name)]
-    begins = [k for k, one in enumerate(values) if one.name == values[0].name]
+    begins = [k for k, one in enumerate(values) if one.name[1:] == values[0].name[1:]]
     for begin, end in pairwise([*begins, len(values)]):
-        curve = [0.0, *(one.value for one in values[begin:end])]
-        ends = with_unit(f"{min(curve):.3g} to {max(curve):.3g}", values[0].unit)
-        said[_numbered("curve", said)] = f"{ends}: what it adds to the output; the report (--html) draws it"
+        of_gain = values[begin].name.startswith("g")
+        times, unit, to = (100.0, "%", "gain") if of_gain else (1.0, values[begin].unit, "output")
+        curve = [0.0, *(times * one.value for one in values[begin:end])]
+        ends = with_unit(f"{min(curve):.3g} to {max(curve):.3g}", unit)
+        said[_numbered("curve", said)] = f"{ends}: what it adds to the {to}; the report (--html) draws it"
     return said
 
 

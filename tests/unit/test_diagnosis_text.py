@@ -122,19 +122,21 @@ def test_a_cause_that_could_be_instead_has_no_share_of_its_own():
     assert math.isnan(explains(other, told))
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_learned_curve_is_told_by_its_ends_and_not_value_by_value(count):
-    """Its values are of the output, zero at the first knot; several curves and time constants are counted."""
+    """Of the output or its gain, zero at the first knot; several curves and time constants are counted."""
     kept = [Parameter("state", 3.0, "1", 3.0, 3.0), Parameter("low", 0.0, "A", 0.0, 0.0)]
     curves = [
         [Parameter("tau", 2.0, "s", NAN, NAN)]
-        + [Parameter(f"f{k}", size * (k - 4), "N", NAN, NAN) for k in range(2, 9)]
-        for size in (0.1, 0.2)[:count]
+        + [Parameter(f"{name}{k}", size * (k - 4), unit, NAN, NAN) for k in range(2, 9)]
+        for name, size, unit in (("f", 0.1, "N"), ("g", 0.01, "1"), ("f", 0.2, "N"))[:count]
     ]
     said = parameters(sum(curves, kept))
-    assert list(said) == [*["tau", "tau 2"][:count], *["curve", "curve 2"][:count]]
-    told = [text.partition(":")[0] for name, text in said.items() if name.startswith("curve")]
-    assert told == ["-0.2 to 0.4 N", "-0.4 to 0.8 N"][:count]
+    assert list(said) == [*["tau", "tau 2", "tau 3"][:count], *["curve", "curve 2", "curve 3"][:count]]
+    told = [text.partition(";")[0] for name, text in said.items() if name.startswith("curve")]
+    adds = "what it adds to the"
+    known = [f"-0.2 to 0.4 N: {adds} output", f"-2 to 4 %: {adds} gain", f"-0.4 to 0.8 N: {adds} output"]
+    assert told == known[:count]
 
 
 def test_where_nothing_is_left_no_cause_explains_a_share_of_it():
