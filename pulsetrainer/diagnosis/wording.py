@@ -312,7 +312,7 @@ TABLE = (
 LACKS: Mapping[str, str] = {
     "rates": f"nearly all of it was run at one rate, or at rates less than {LIMITS.one_rate:g} times apart",
     "holds": "the {input} never rests for {hold_least} or more",
-    "length": "the recording is shorter than {short}",
+    "length": "all of it lasts less than {short}",
     "time": "its samples have no time",
 }
 # What to record instead

@@ -65,7 +65,7 @@ def _sought(state: State) -> State:
     for begun in [alone] if state.unexplained else [state, alone] if state.current.terms else [state]:
         found, p_value, doubtful = _learned(begun)
         if found is not None and _wanders(begun, found):
-            return replace(state, evidence=(*state.evidence, Evidence("zero wanders", _ID)))
+            return replace(state, evidence=(*state.evidence, Evidence("zero wanders")))
         if found is not None and _predicts(begun, found):
             return _compared(state, begun, found, p_value)
         doubts.append(doubtful or found is not None)
