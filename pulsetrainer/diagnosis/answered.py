@@ -138,7 +138,7 @@ def _held_out_gain(state: State) -> float:
     """Per cent of the reducible error on blocks that were not fitted, which all causes together remove."""
     if state.current is state.baseline or not state.extends:
         return float("nan")
-    return PERCENT * state.held_out.gain(state.baseline, state.current, state.floor)
+    return PERCENT * state.held_out.gain_told(state.baseline, state.current, state.floor)
 
 
 def _words(given: Given) -> Words:

@@ -41,13 +41,16 @@ class HeldOut:
         return float(halves.sum()) if halves.size == _HALVES else float("nan")
 
     def gain(self, before: Fitted, after: Fitted, floor: Floor) -> float:
-        """Share of the reducible held-out error that the extension removes, at most all of it.
+        """Share of the reducible held-out error that the extension removes, at most all of it."""
+        return _share(self.error(before), self.error(after), floor)
+
+    def gain_told(self, before: Fitted, after: Fitted, floor: Floor) -> float:
+        """The same of a cause that was accepted; by whole pieces where halves tell nothing.
 
         Where each cell is told by one half alone, the other half predicts nothing, and the larger model may
         seem to do harm. Whole pieces, of which a little is told, then count, if that predicts half of it.
         """
-        first, second = self.error(before), self.error(after)
-        share = _share(first, second, floor)
+        share = self.gain(before, after, floor)
         if share < 0.0:
             first, second = (float(np.sum(self.pieces(one, LIMITS.pieces))) for one in (before, after))
             of_pieces = _share(first, second, floor)

@@ -455,7 +455,10 @@ def test_whole_pieces_are_asked_where_halves_tell_nothing(halves, pieces, told):
         before: {(2, "in turn"): np.full(2, 50.0), (5, "pieces"): np.full(5, 20.0)},
         after: {(2, "in turn"): np.full(2, halves), (5, "pieces"): np.full(5, pieces)},
     }
-    assert held_out.gain(before, after, Floor(10, 1.0, 1.0, 1.0)) == pytest.approx(told / 90.0)
+    assert held_out.gain_told(before, after, Floor(10, 1.0, 1.0, 1.0)) == pytest.approx(told / 90.0)
+    assert held_out.gain(before, after, Floor(10, 1.0, 1.0, 1.0)) == pytest.approx(
+        (100.0 - 2 * halves) / 90.0
+    )
 
 
 def test_what_was_left_out_once_is_not_left_out_again():

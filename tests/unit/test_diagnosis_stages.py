@@ -102,6 +102,8 @@ class HeldOut:
         """Return what was told."""
         return self.told
 
+    gain_told = gain
+
     def error(self, fitted):
         """As large as the squares."""
         return fitted.squares
@@ -745,6 +747,20 @@ def test_what_follows_the_time_as_well_is_no_dependence(monkeypatch, by_time, sa
     after = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0)))
     assert tuple(one.kind for one in after.evidence) == said
     assert after.current.names == (() if said else ("unlisted",))
+
+
+@pytest.mark.parametrize(
+    ("left", "butterfly", "learned"), [(109.0, False, True), (110.0, False, False), (110.0, True, True)]
+)
+def test_a_pinched_loop_is_explained_whole_or_not_at_all(monkeypatch, left, butterfly, learned):
+    """A memristor was told to depend on four states, and predicted hardly better; a butterfly has a form."""
+    term = Term(unlisted.Unlisted([unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
+    monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(left, (term,)), 0.001, False))
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+    state = replace(_state(_fit(500.0), held_out=HeldOut(1.0)), pinched_at=0.5, butterfly=butterfly)
+    assert unlisted.stage(state).current.names == (("unlisted",) if learned else ())
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,7 @@ def _of_little_use(state: State, current: Fitted, without: Sequence[Fitted]) -> 
     ]
     if not without:
         return None
-    gains = [state.held_out.gain(fewer, current, state.floor) for fewer in without]
+    gains = [state.held_out.gain_told(fewer, current, state.floor) for fewer in without]
     least = int(np.argmin(gains))  # NaN where it cannot be told: that is the least, and no reason
     return without[least] if gains[least] < LIMITS.held_out_kept else None
 

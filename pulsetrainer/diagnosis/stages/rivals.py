@@ -66,7 +66,7 @@ def stage(state: State) -> State:
 def _finding(state: State, term: Term) -> Finding:
     name = term.cause.id
     without = state.without[name]
-    gain = PERCENT * state.held_out.gain(without, state.current, state.floor)
+    gain = PERCENT * state.held_out.gain_told(without, state.current, state.floor)
     doubts = tuple(_doubts(state, term, gain, without.squares - state.current.squares))
     tied = () if name in state.by_contrast else rivals(state, term)
     if MAY_BE_WEAR in doubts and Accommodation.id not in (*tied, *state.current.names):
@@ -123,7 +123,7 @@ def _of_a_drift(state: State, term: Term, fall: float) -> Iterator[str]:
     left = residual.wander(state.current.residual, state.problem.measured)
     if left > max(LIMITS.wander_left * state.current.squares, LIMITS.wander_fall * fall):
         yield WANDERS
-    of_all = state.held_out.gain(state.baseline, state.current, state.floor)
+    of_all = state.held_out.gain_told(state.baseline, state.current, state.floor)
     if not term.cause.lasting and of_all < LIMITS.half:  # one of the device is asked whether it repeats
         yield LITTLE
     if wear.is_as_good(state, term):
