@@ -116,8 +116,8 @@ def _predicts(state: State, found: Fitted) -> bool:
     """Whether learned dependences predict most of what can be lowered on blocks that were left out.
 
     The loops of a device that is no Preisach operator look like a dependence on the last turn, but by halves.
-    What may all be slow noise must be predicted down to the noise from sample to sample. A pinched loop, which
-    any curves describe by halves, must be explained down to it.
+    What may all be slow noise must be predicted down to the noise from sample to sample. A pinched loop,
+    which curves describe by halves as well, must be explained down to it.
     """
     if state.pinched_at is not None and not state.butterfly:
         return not _is_above(replace(state, current=found), state.floor.fine)
