@@ -641,6 +641,13 @@ def test_small_sticking_is_sought_where_something_is_left(monkeypatch, left, fir
     assert [firing.cause for _, firing in after.firings] == found
 
 
+def _nothing_else_happens(monkeypatch):
+    """No zero wanders, and beside what is learned no cause comes or goes."""
+    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
+    for one in (search, elimination):
+        monkeypatch.setattr(one, "stage", lambda state: state)
+
+
 @pytest.mark.parametrize(
     ("left", "p_value", "gain", "fall", "again", "learned", "said"),
     [
@@ -674,9 +681,7 @@ def test_a_dependence_in_no_list_is_learned_where_it_repeats(
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: best)
     monkeypatch.setattr(unlisted, "refit", lambda *_, **__: Fit(left - fall, (term,)))
     monkeypatch.setattr(unlisted, "repeats", lambda *_: again)
-    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
-    for one in (search, elimination):
-        monkeypatch.setattr(one, "stage", lambda state: state)
+    _nothing_else_happens(monkeypatch)
     after = unlisted.stage(_state(_fit(left), held_out=HeldOut(float(again))))
     assert after.current.names == (("unlisted",) if learned else ())
     assert after.p_values == ({"unlisted": p_value} if learned else {})
@@ -709,9 +714,7 @@ def test_a_second_curve_that_the_refit_moves_onto_the_first_is_left_out(monkeypa
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
     monkeypatch.setattr(unlisted, "refit", refitted)
     monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
-    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
-    for one in (search, elimination):
-        monkeypatch.setattr(one, "stage", lambda state: state)
+    _nothing_else_happens(monkeypatch)
     after = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0)))
     assert [len(term.cause.parts) for term in after.current.terms] == [curves]
 
@@ -729,9 +732,7 @@ def test_whether_output_or_gain_depends_on_it_the_refit_tells(monkeypatch, of_ga
     monkeypatch.setattr(unlisted, "best_dependence", lambda *_: found.pop() if found else None)
     monkeypatch.setattr(unlisted, "refit", refitted)
     monkeypatch.setattr(unlisted, "repeats", lambda *_: True)
-    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
-    for one in (search, elimination):
-        monkeypatch.setattr(one, "stage", lambda state: state)
+    _nothing_else_happens(monkeypatch)
     (term,) = unlisted.stage(_state(_fit(500.0), held_out=HeldOut(1.0))).current.terms
     assert [part.gain for part in term.cause.parts] == [not added]
 
@@ -756,9 +757,7 @@ def test_a_pinched_loop_is_explained_whole_or_not_at_all(monkeypatch, left, butt
     """A memristor was told to depend on four states, and predicted hardly better; a butterfly has a form."""
     term = Term(unlisted.Unlisted([unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
     monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(left, (term,)), 0.001, False))
-    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
-    for one in (search, elimination):
-        monkeypatch.setattr(one, "stage", lambda state: state)
+    _nothing_else_happens(monkeypatch)
     state = replace(_state(_fit(500.0), held_out=HeldOut(1.0)), pinched_at=0.5, butterfly=butterfly)
     assert unlisted.stage(state).current.names == (("unlisted",) if learned else ())
 
@@ -798,9 +797,7 @@ def test_where_nothing_is_found_beside_listed_causes_it_is_sought_without_them(m
     monkeypatch.setattr(
         unlisted, "_learned", lambda state: (None if state.current.names else curve, 0.001, False)
     )
-    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
-    for one in (search, elimination):
-        monkeypatch.setattr(one, "stage", lambda state: state)
+    _nothing_else_happens(monkeypatch)
     left = _state(_fit(200.0, "creep"), _fit(700.0))
     assert not left.unexplained
     assert unlisted.stage(left).current.names == names
@@ -816,9 +813,7 @@ def test_a_curve_takes_the_place_of_a_listed_cause_where_it_is_clearly_better(
     """Where the listed cause explains less than nine tenths of what the curve does."""
     term = Term(unlisted.Unlisted([unlisted.Part(0, 0.0, 1.0)]), (0.0,) * 9)
     monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(instead, (term,)), 0.001, False))
-    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
-    for one in (search, elimination):
-        monkeypatch.setattr(one, "stage", lambda state: state)
+    _nothing_else_happens(monkeypatch)
     after = unlisted.stage(_state(_fit(left, "creep")))
     assert after.current.names == (("creep",) if kept else ("unlisted",))
 
@@ -830,9 +825,7 @@ def test_of_several_curves_one_gives_its_place_to_a_listed_cause(monkeypatch, fi
     parts = [unlisted.Part(k, 0.0, 1.0) for k in (0, 1)]
     both = unlisted.Term(unlisted.Unlisted(parts), tuple(map(float, range(2 * unlisted.KNOTS))))
     monkeypatch.setattr(unlisted, "_learned", lambda state: (Fit(100.0, (both,)), 0.001, False))
-    monkeypatch.setattr(unlisted, "of_a_wandering_zero", lambda *_: 0.0)
-    for one in (search, elimination):
-        monkeypatch.setattr(one, "stage", lambda state: state)
+    _nothing_else_happens(monkeypatch)
 
     def refit(problem, terms, begun, rounds):
         (kept,) = terms[-1].cause.parts
