@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,3 +134,19 @@ def chain(
     done = pulsetrainer(folder, "evaluate", *played, "-o", f"evaluation-{reading}.h5", *html, "--json")
     assert done.code == 0, done
     return done.json
+
+
+def until_recorded(folder: Path, least: int, process: subprocess.Popen[str]) -> None:
+    """Wait until a file of the folder that is no table has so many bytes: a recording has begun."""
+    deadline = time.monotonic() + 60
+    while not any(_bytes(path) > least for path in folder.iterdir() if path.suffix != ".csv"):
+        assert time.monotonic() < deadline
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+
+
+def _bytes(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:  # a temporary file that has its own name by now
+        return 0

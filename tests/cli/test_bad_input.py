@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import pulsetrainer as pt
-from program import PROGRAM, Ran, pulsetrainer
+from program import PROGRAM, Ran, pulsetrainer, until_recorded
 from wording import refusal
 
 MODEL = ("--model", "model.h5", "-o", "x.h5")
@@ -301,11 +301,7 @@ def test_control_c_stops_the_output_and_keeps_what_was_recorded(tmp_path):
         # what runs in the background of a shell has SIGINT ignored, and hands that on
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - one thread
     )
-    deadline = time.monotonic() + 60
-    while not any(path.stat().st_size > 100_000 for path in tmp_path.iterdir()):  # recording has begun
-        assert time.monotonic() < deadline, process.communicate(timeout=5)
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.1)
+    until_recorded(tmp_path, 100_000, process)
     time.sleep(1.0)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=30)

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from program import PROGRAM, Ran, pulsetrainer
+from program import PROGRAM, Ran, pulsetrainer, until_recorded
 from pulsetrainer import load, save
 from pulsetrainer.device.codes import PROTOCOL_MAJOR, PROTOCOL_MINOR
 from pulsetrainer.device.opening import open_device
@@ -76,14 +76,6 @@ def kept(folder: Path, least: int) -> int:
     assert shown.json["facts"]["complete"] is False
     assert shown.json["facts"]["samples"] == len(time_s)
     return len(time_s)
-
-
-def _recording_began(folder: Path, process: subprocess.Popen[str]) -> None:
-    deadline = time.monotonic() + 60
-    while not any(p.suffix != ".csv" and p.stat().st_size > 60_000 for p in folder.iterdir()):
-        assert time.monotonic() < deadline
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.05)
 
 
 def _started(folder: Path, port: str) -> subprocess.Popen[str]:
@@ -154,7 +146,7 @@ def test_a_port_that_vanishes_in_mid_capture(folder, firmware):
     """The device pulled out: told as such, what came until then is kept."""
     port, device = firmware("--speed", "real")
     process = _started(folder, port)
-    _recording_began(folder, process)
+    until_recorded(folder, 60_000, process)
     time.sleep(1.0)
     device.kill()
     _, err = process.communicate(timeout=30)
@@ -166,13 +158,42 @@ def test_a_port_that_vanishes_in_mid_capture(folder, firmware):
 def test_a_host_that_is_stopped_finds_the_device_off(folder):
     """Asleep for a second, buffers full: the device switched off by itself, says why, the part is kept."""
     process = _started(folder, "bench:?speed=real")
-    _recording_began(folder, process)
+    until_recorded(folder, 60_000, process)
     process.send_signal(signal.SIGSTOP)
     time.sleep(1.5)
     process.send_signal(signal.SIGCONT)
     _, err = process.communicate(timeout=30)
     refusal(Ran(process.returncode, "", err), 4, "host was silent")
     kept(folder, 100)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the device's process in /proc")
+def test_a_computer_that_falls_asleep_is_no_silent_host(folder):
+    """Host and emulated device asleep for two seconds, the device awake first: it waits, nothing is lost."""
+    table = np.loadtxt(folder / "wave.csv", delimiter=",", skiprows=1)
+    t = np.arange(0, 120, 0.05)
+    np.savetxt(
+        folder / "wave.csv",
+        np.column_stack([t, np.interp(t % 10, *table.T)]),
+        delimiter=",",
+        header="t_s,current_A",
+        comments="",
+    )
+    process = _started(folder, "bench:")
+    until_recorded(folder, 60_000, process)
+    (device,) = map(int, Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split())
+    process.send_signal(signal.SIGSTOP)
+    time.sleep(0.2)  # the device waits for its host
+    os.kill(device, signal.SIGSTOP)
+    time.sleep(2.0)
+    os.kill(device, signal.SIGCONT)
+    time.sleep(0.1)
+    process.send_signal(signal.SIGCONT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, (out, err)
+    with h5py.File(folder / "run.h5") as file:
+        assert file.attrs["complete"]
+        assert file["time"][-1] > 119
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@
  *     for at most half a second of wall time after the last heartbeat, and three seconds in all; after that it
  *     goes on at the wall clock, so that a host that is really gone trips the 200 ms heartbeat like on a real device,
  *     and one that lives but sends no more samples an underrun.
+ * Wall time in which this process itself did not run is no silence of the host: both were asleep.
  * A coil that has tripped its heat model cools only while time runs: open a new bench instead of waiting. */
 #include "commands.h"
 #include "control.h"
@@ -23,6 +24,7 @@
 #define GRACE_NS 500000000          /* wall time that a stalled device waits for its host */
 #define PATIENCE_NS 3000000000      /* the same for one that beats, but has nothing to play */
 #define CATCH_UP_NS 50000000        /* a computer that was busy: what is lost is lost, or the host looks silent */
+#define LOOK_MS 20                  /* a stalled device looks at the clock this often; less than CATCH_UP_NS */
 
 static enum pace_speed speed;
 static int64_t epoch_ns;       /* real: when tick 0 was due; max: since when device time has been stalled */
@@ -30,6 +32,7 @@ static int64_t epoch_ticks;    /* ticks run since then */
 static bool stalled;
 static uint32_t heard;         /* the last heartbeat while stalled */
 static int64_t stalled_ns;     /* since when */
+static int64_t looked_ns;      /* max: when the clock was last read */
 static int32_t settle_ticks;
 static int64_t next_ns;        /* steady: until then no tick runs */
 
@@ -41,6 +44,7 @@ void pace_init(enum pace_speed chosen, int64_t now_ns)
     stalled = false;
     heard = 0;
     stalled_ns = now_ns;
+    looked_ns = now_ns;
     settle_ticks = 0;
     next_ns = now_ns;
 }
@@ -85,8 +89,19 @@ static bool must_wait(void)
     }
 }
 
+static void leave_out_time_asleep(int64_t now_ns)
+{
+    int64_t asleep_ns = now_ns - looked_ns;
+    looked_ns = now_ns;
+    if (!stalled || asleep_ns <= CATCH_UP_NS)
+        return;
+    epoch_ns += asleep_ns;
+    stalled_ns += asleep_ns;
+}
+
 static int32_t max_ticks(int64_t now_ns)
 {
+    leave_out_time_asleep(now_ns);
     if (output_off()) {
         stalled = false;
         int32_t rest = settle_ticks; /* at once: the next command finds the coil settled, however soon it comes */
@@ -144,5 +159,7 @@ int32_t pace_wait_ms(int64_t now_ns)
     if (speed == PACE_STEADY && !stalled)
         return 1;
     int64_t ms = (epoch_ns - now_ns) / 1000000;
-    return ms > 1 ? (int32_t)ms : 1;
+    if (ms < 1)
+        return 1;
+    return ms < LOOK_MS ? (int32_t)ms : LOOK_MS;
 }
