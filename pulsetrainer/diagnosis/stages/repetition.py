@@ -115,20 +115,22 @@ def _is_nothing(state: State, finding: Finding) -> bool:
 
 
 def _is_held(state: State, finding: Finding) -> bool:
-    """Whether the rest of the model holds nearly all that a slow fault of the measurement adds."""
+    """Whether the rest of the model holds a fault that was found."""
     term = next((one for one in state.current.terms if one.cause is finding.cause), None)
-    if term is None or not (term.cause.drifts and term.cause.corrects):
+    return term is not None and is_held(state, term, finding.held_out_gain_percent)
+
+
+def is_held(state: State, term: Term, gain_percent: float) -> bool:
+    """Whether the rest of the model holds nearly all that a slow fault of the measurement adds.
+
+    Not of one that predicts nearly all that can be lowered, and mends no cause that is slow as well.
+    """
+    if not (term.cause.drifts and term.cause.corrects):
         return False
-    fall = state.without[finding.cause.id].squares - state.current.squares
-    little = fall < LIMITS.held_by_the_rest * squares_added(state, term)
-    return little and not _is_predicted(state, finding)
-
-
-def _is_predicted(state: State, finding: Finding) -> bool:
-    """Whether a fault predicts nearly all that can be lowered, and mends no cause that is slow as well."""
-    beside = [term.cause for term in state.current.terms if term.cause.id != finding.cause.id]
-    mends = any(cause.family in SLOW for cause in beside)
-    return finding.held_out_gain_percent / PERCENT > LIMITS.predicts_though_held and not mends
+    fall = state.current.without(term).squares - state.current.squares
+    little = fall < LIMITS.held_by_the_rest * squares_added(state, term, but_a_zero=True)
+    mends = any(one.cause.family in SLOW for one in state.current.terms if one is not term)
+    return little and (mends or gain_percent / PERCENT <= LIMITS.predicts_though_held)
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:
