@@ -1494,7 +1494,7 @@ def _asked_again(monkeypatch, shares):
     monkeypatch.setattr(fitting, "refit", refitted)
     monkeypatch.setattr(repetition, "refit", refitted)
     monkeypatch.setattr(repetition, "repeated", repeated)
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: 0.0)
     names = ("creep", "thermal-drift", "output-lag", "step")
     findings = tuple(_finding(name, 20.0) for name in names)
     state = _state(_fit(500.0, *names), findings=findings, without={"step": _fit(700.0)})
@@ -1569,7 +1569,7 @@ def test_a_slow_fault_that_the_rest_of_the_model_holds_is_none(monkeypatch, name
     """It mends the formula of a creep: taken out, the next record was predicted 1.5 times worse."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: added)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: added)
     others = [] if beside is None else [_finding(beside, 80.0)]
     names = [one.cause.id for one in others]
     state = _state(_fit(500.0, *names, name), findings=(*others, _finding(name, 10.0)))
@@ -1594,7 +1594,7 @@ def test_a_drift_that_is_held_but_predicts_is_there(monkeypatch, beside, predict
     """A sensor that warms up: reversal curves hold 96 % of it, and the rest is told by time left out."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: 1e6)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: 1e6)
     drift = replace(_finding("offset-drift", 10.0), held_out_gain_percent=predicts)
     state = _state(_fit(500.0, beside, "offset-drift"), findings=(_finding(beside, 80.0), drift))
     without = {"offset-drift": _fit(600.0), "step": _fit(600.0)}
@@ -1604,7 +1604,7 @@ def test_a_drift_that_is_held_but_predicts_is_there(monkeypatch, beside, predict
 def test_a_step_below_what_the_levels_leave_is_not_held(monkeypatch):
     """Beside coarse steps the floor is above all that is left, so shares of what is above it tell nothing."""
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: 100.0)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: 100.0)
     finding, floor = _finding("step", 100.0), replace(FLOOR, white=10.0)
     state = _state(_fit(200.0, "step"), _fit(300.0), findings=(finding,), floor=floor)
     after = repetition.stage(replace(state, without={"step": _fit(300.0)}))
@@ -1621,7 +1621,7 @@ def test_a_step_beside_what_is_gone_is_asked_again_whether_it_settles(monkeypatc
     """Beside a slow cause it was a small rest of that; without it, it is that in the whole."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: 0.0)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: settles and len(state.current.terms) == 1)
     findings = (_finding("step", 2.0), _finding("thermal-drift", 9.0, doubts=(rivals.MAY_BE_NOTHING,)))
     state = _state(_fit(500.0, "step", "thermal-drift"), findings=findings, without={"step": _fit(520.0)})

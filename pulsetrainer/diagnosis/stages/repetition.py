@@ -34,7 +34,7 @@ from pulsetrainer.diagnosis.stages.rivals import (
     MAY_BE_NOTHING,
     MAY_BE_WEAR,
     SETTLES,
-    squares_added,
+    squares_moved,
 )
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -117,20 +117,22 @@ def _is_nothing(state: State, finding: Finding) -> bool:
 def _is_held(state: State, finding: Finding) -> bool:
     """Whether the rest of the model holds a fault that was found."""
     term = next((one for one in state.current.terms if one.cause is finding.cause), None)
-    return term is not None and is_held(state, term, finding.held_out_gain_percent)
+    if term is None:
+        return False
+    return is_held(state, term, state.without[finding.cause.id], finding.held_out_gain_percent)
 
 
-def is_held(state: State, term: Term, gain_percent: float) -> bool:
+def is_held(state: State, term: Term, without: Fitted, gain_percent: float) -> bool:
     """Whether the rest of the model holds nearly all that a slow fault of the measurement adds.
 
     Not of one that predicts nearly all that can be lowered, and mends no cause that is slow as well.
     """
     if not (term.cause.drifts and term.cause.corrects):
         return False
-    fall = state.current.without(term).squares - state.current.squares
-    little = fall < LIMITS.held_by_the_rest * squares_added(state, term, but_a_zero=True)
+    fall = without.squares - state.current.squares
     mends = any(one.cause.family in SLOW for one in state.current.terms if one is not term)
-    return little and (mends or gain_percent / PERCENT <= LIMITS.predicts_though_held)
+    predicts = gain_percent / PERCENT > LIMITS.predicts_though_held and not mends
+    return not predicts and fall < LIMITS.held_by_the_rest * squares_moved(state, term)
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:

@@ -32,6 +32,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual, wear
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.accommodation import Accommodation
@@ -49,7 +50,6 @@ WORSE, WANDERS, LITTLE, NO_LOOPS = "predicts worse", "wanders", "predicts little
 OWN_ERROR, STRONGEST, AT_BOUND, LEAVES_MORE = "own error", "strength at bound", "at bound", "leaves more"
 MAY_BE_NOTHING, MAY_BE_WEAR, SETTLES, IN_STEP = "spans zero", "may be wear", "settles", "in step"
 IMITATES = "imitates"
-_EVEN = 4.0  # mean square of a drift that goes on evenly from zero, over its variance
 
 
 def stage(state: State) -> State:
@@ -138,18 +138,27 @@ def _is_in_step(state: State, term: Term, fall: float) -> bool:
     return fall < LIMITS.free_of_weights * squares_added(state, term)
 
 
-def squares_added(state: State, term: Term, *, but_a_zero: bool = False) -> float:
-    """Return the sum of squares of what a cause of the model adds to the output, averaged.
+def squares_added(state: State, term: Term) -> float:
+    """Return the sum of squares of what a cause of the model adds to the output, averaged."""
+    added = _added(state, term)
+    return float(added @ added)
 
-    Of one that is over soon most is another zero, which no model lacks: without it, in the measure of a drift
-    that goes on evenly, of whose squares a quarter is left.
+
+def squares_moved(state: State, term: Term) -> float:
+    """Return the same of a slow fault, but for another zero, which no model lacks.
+
+    Of one that is over soon that is most of it. In the measure of a drift that goes on evenly, of whose
+    squares a quarter is left.
     """
+    added = _added(state, term)
+    return min(float(added @ added), LIMITS.even_drift * added.size * float(np.var(added)))
+
+
+def _added(state: State, term: Term) -> FloatArray:
     current, simulator = state.current, state.current.simulator
     others = [one for one in current.terms if one is not term]
     pairs = zip(simulator.full(current.terms), simulator.full(others), strict=True)
-    added = state.problem.bins.average([whole - rest for whole, rest in pairs])
-    squares = float(added @ added)
-    return min(squares, _EVEN * added.size * float(np.var(added))) if but_a_zero else squares
+    return state.problem.bins.average([whole - rest for whole, rest in pairs])
 
 
 def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:

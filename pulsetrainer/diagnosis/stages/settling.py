@@ -40,5 +40,6 @@ def stage(state: State) -> State:
 
 
 def _is_held(state: State, term: Term) -> bool:
-    gain = state.held_out.gain_told(state.current.without(term), state.current, state.floor)
-    return is_held(state, term, PERCENT * gain)
+    without = state.current.without(term)
+    gain = state.held_out.gain_told(without, state.current, state.floor)
+    return is_held(state, term, without, PERCENT * gain)
