@@ -48,7 +48,7 @@ def check(
 
     if update != (out is not None):
         raise UsageError(
-            "--update writes a model and -o names its file: the one needs the other",
+            "--update, which writes the updated model, and -o, which names its file, need each other",
             hint="give both, or neither",
         )
     job = Job(context, inputs=(model,), outputs=(out,))

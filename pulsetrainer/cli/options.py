@@ -20,6 +20,13 @@ def positive(value: float | None, param: CallbackParam) -> float | None:
     return value
 
 
+def not_empty(port: str | None) -> str | None:
+    """Refuse ``--port "$PORT"`` where that is not set: it would play on the simulated device instead."""
+    if port == "":
+        raise BadParameter("must name a port, got an empty text")
+    return port
+
+
 def word_or_number(text: str | None, word: str, option: str, must: str, *, least: float, most: float) -> Any:
     """Return the word, or the number from ``least`` to ``most`` that a text spells; None is no choice."""
     if text is None or text == word:
@@ -53,6 +60,7 @@ Port = Annotated[
         help="bench: (simulated, the default), bench:?seed=3, qemu: (emulated; needs qemu-system-arm), "
         "/dev/ttyUSB0, COM3 or socket://host:port.",
         envvar="PULSETRAINER_PORT",
+        callback=not_empty,
     ),
 ]
 DryRun = Annotated[bool, Option("--dry-run", help="Say what would be played; touch no port, write nothing.")]

@@ -11,9 +11,9 @@ from pulsetrainer.device.limits import less_current
 FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
 # What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
-    codes.Fault.OVER_FORCE: "if nothing pressed so hard, check the force sensor; else raise "
-    "`limit_force_N` where it was lowered, or "
-    + less_current("`current_max_A` well below the current told here"),
+    codes.Fault.OVER_FORCE: "if nothing pressed that hard, check the force sensor; if you lowered "
+    "`limit_force_N`, raise it; otherwise "
+    + less_current("`current_max_A` well below the current given here"),
     codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where the supply "
     "or the coil has been changed, set the gains again: pulsetrainer tune -o pulsetrainer.toml",
     codes.Fault.CURRENT_FROZEN: "check the current sensor, its wires and its supply",

@@ -45,7 +45,7 @@ def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
         raise UsageError(f"the output {path} is not an ordinary file", hint="name a file on disk")
     if not folder.exists():
         raise UsageError(
-            f"the output {path} cannot be written: there is no folder {folder}",
+            f"the output {path} cannot be written: the folder {folder} does not exist",
             hint=f"make the folder: mkdir -p {shlex.quote(str(folder))}",
         )
     if not folder.is_dir():

@@ -418,7 +418,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
         elif all(column[row] == column[row - 1] for column in table.columns.values()):
             hint, other = "drop the repeated rows", ", or give a `rate_Hz` instead of the time"
         else:
-            hint = "its stamps are rounded too coarsely, or repeated: write them with more digits"
+            hint = "its time stamps are repeated, or rounded too coarsely: write them with more digits"
             other = ", or give a `rate_Hz` instead of the time"
         raise DataError(
             f"the time in {table.path}, {column_words(name)}, does not increase at {table.place(row)}: "

@@ -122,7 +122,7 @@ def check_refined(refined: Waveform) -> Model:
     """Return the model of a drive; DataError where nothing was learnt on it."""
     if not refined.passes:
         raise DataError(
-            f"the drive of {refined.name} that `learnt` names was not refined: nothing was learnt on it",
+            f"the drive of {refined.name} given as `learnt` was never refined, so it has learnt nothing",
             hint="refine it first: pulsetrainer refine REFINED.h5 -o refined.h5",
         )
     return check(refined, passes=1)
