@@ -227,7 +227,7 @@ MESSAGES = {
 NOTES = {
     "false reversals": ("false reversals",),
     "cells never switched": ("never switched", "% of the plane"),
-    "reversed": ("falls where the model rises", "the other way round", "Identify it again"),
+    "reversed": ("falls where the model rises", "the wrong way round", "Identify it again"),
     "follows the velocity": ("velocity of u", "wrong model"),
     "leaves much": ("% of the span", "the noise from sample to sample", "pulsetrainer diagnose"),
     "not congruent": ("not congruent", "% of the span", "other reversals"),

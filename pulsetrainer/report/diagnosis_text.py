@@ -89,7 +89,7 @@ def answer(one: Cause, found: Diagnosis) -> str:
         return "in doubt" if one.doubts else "yes"
     instead = [other.cause for other in found.found if one.cause in other.confounded_with]
     if instead:
-        return f"no: it could be instead of {instead[0]}"
+        return f"no: an alternative to {instead[0]}"
     if one.p_value is None:
         return "no"
     if one.p_value > LIMITS.p_max:

@@ -92,7 +92,7 @@ def run(record: Run) -> Figure:
     loop.set_xlabel(input_label)
     loop.set_ylabel(output_label)
     directions(loop, record.input, record.output)
-    loop.set_title(f"{record.output_quantity} over {record.input_quantity}, arrows: the way it goes")
+    loop.set_title(f"{record.output_quantity} over {record.input_quantity}, arrows: direction of motion")
     return figure
 
 

@@ -1421,7 +1421,7 @@ def test_what_the_records_show_is_cited_as_seen(monkeypatch):
     for name, lacks in (("creep", ()), ("creep", ("length",)), ("step", ("rates", "holds"))):
         findings = (_finding(name, 20.0),)
         found = _accounted(monkeypatch, verdict=name, findings=findings, lacks=lacks)
-        assert "What gives it away: " in wording.sentence(found[1], {})
+        assert "Its signature: " in wording.sentence(found[1], {})
 
 
 TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
