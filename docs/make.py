@@ -36,8 +36,8 @@ COMMANDS = """\
 
 {mark}
 
-`pulsetrainer COMMAND --help` says the same on the screen. Results go to stdout, progress and notes to stderr; bars show
-only on a terminal, colours nowhere when `NO_COLOR` is set. No command replaces a file without `--overwrite`.
+`pulsetrainer COMMAND --help` shows the same on the screen. Results go to stdout, progress and notes to stderr. Progress bars appear
+only on a terminal; with `NO_COLOR` set there are no colours. No command replaces a file without `--overwrite`.
 
 With `--json` a command writes one object to stdout: `{{"schema": 1, "command": ..., ...}}`, and for an error
 `"error": {{"kind", "message", "hint"}}`.
@@ -51,21 +51,21 @@ With `--json` a command writes one object to stdout: `{{"schema": 1, "command": 
 
 
 CODES = {
-    0: "it is done",
-    1: "a quality gate failed: a bound of `evaluate --bounds`, a finding of `doctor`",
-    2: "the command line, the settings, or an output that exists",
-    3: "an artefact or its data",
-    4: "the device or the line to it",
+    0: "success",
+    1: "a quality gate failed: a bound of `evaluate --bounds`, or a problem that `doctor` found",
+    2: "wrong command line or settings, or an output that already exists",
+    3: "something is wrong with an artefact or its data",
+    4: "something is wrong with the device or the line to it",
     5: "a fit or an inverse did not converge",
-    70: "a bug of ours: `--debug` shows where",
+    70: "a bug in this program: `--debug` shows where",
     130: "you stopped it",
-    141: "who reads the output went away, as `head` does: what was not printed yet is lost, and may not be done",
+    141: "the reader of the output went away, as `head` does: the rest was not printed, and may not have been done",
 }
 SETTINGS_WORDS = """\
-What stands in `pulsetrainer.toml` need not be typed. The file is that in the folder where you work, or the one that
-`--settings` or `PULSETRAINER_SETTINGS` names, or the one in your own configuration folder. A flag wins over the
-environment, the environment over the file, the file over the default; an unknown key is an error. A dot in a key is a
-table of the file.
+Options set in `pulsetrainer.toml` need not be typed. The file is the one that `--settings` or `PULSETRAINER_SETTINGS` names, or
+the one in the folder where you work, or the one in your own configuration folder. An option overrides the environment, the
+environment the file, and the file the default; an unknown key is an error. A dot in a key stands for a table of the file:
+`limits.force_N` is `force_N` under `[limits]`.
 """
 
 

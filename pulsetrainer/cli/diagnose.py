@@ -26,9 +26,9 @@ def diagnose(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Say what a model gets wrong on runs, and why.
+    """Find out what a model gets wrong on runs, and why.
 
-    It names the causes, how sure they are, and what to measure next.
+    It names the causes, how certain they are, and what to measure next.
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """

@@ -22,7 +22,7 @@ def doctor(
     context: Context,
     port: Port = None,
     capture: Annotated[
-        bool, Option(help="Drive the coil for 3 s, to half its range, and look at what comes back.")
+        bool, Option(help="Drive the coil for 3 s, to half its range, and check what comes back.")
     ] = True,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
@@ -30,7 +30,7 @@ def doctor(
 ) -> None:
     """Check this computer, its ports and the device.
 
-    Exit code 1 when something stands in the way. Nobody's finger should be on the device meanwhile.
+    Exit code 1 if something needs fixing. Keep fingers off the device meanwhile.
 
     Example: pulsetrainer doctor --port /dev/ttyUSB0
     """

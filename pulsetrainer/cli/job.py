@@ -109,7 +109,7 @@ class Job:
         port = in_real_time(self.port or DEFAULT_PORT) if by_key else self.port
         device = open_device(port, limits=self.limits, tuned=self._settings)
         if self._settings is not None and device.gains != DELIVERED:
-            self.notes([f"{device.info.serial} plays with the gains that {self._settings} has for it"])
+            self.notes([f"{device.info.serial} plays with the gains in {self._settings}"])
         elif self._settings is not None:
             from pulsetrainer.files.tuning import read_tuned
 

@@ -48,12 +48,12 @@ SETTINGS = (
     Setting("levels", int, "", "levels of the plane"),
     Setting("current_max_A", float, "A", "top of the range of a capture"),
     Setting("speed_A_per_s", float, "A/s", "speed of identification"),
-    Setting("rate_Hz", float, "Hz", "samples a second"),
-    Setting("slew_A_per_s", float, "A/s", "fastest a drive may move"),
+    Setting("rate_Hz", float, "Hz", "sample rate"),
+    Setting("slew_A_per_s", float, "A/s", "fastest that a drive may move"),
     Setting("periods", int, "", "periods of a pulse"),
     Setting("repeats", int, "", "how often a drive is played"),
-    Setting("limits.current_A", float, "A", "the device refuses more"),
-    Setting("limits.force_N", float, "N", "the device switches off above"),
+    Setting("limits.current_A", float, "A", "highest current that the device accepts"),
+    Setting("limits.force_N", float, "N", "force above which the device switches off"),
 )
 
 

@@ -1413,7 +1413,7 @@ def test_each_cause_found_brings_its_evidence(monkeypatch):
     ]  # fmt: skip
     assert found[1].figures == {"p": 0.005, "explains": 20.0}
     assert found[-1].names == ("rates",)
-    assert "not all in these recordings: the output goes on" in wording.sentence(found[1], {})
+    assert "part of which is missing in these recordings: the output keeps" in wording.sentence(found[1], {})
 
 
 def test_what_the_records_show_is_cited_as_seen(monkeypatch):
