@@ -1,10 +1,10 @@
 """Advice: what to measure next.
 
-Where the model as given is of the wrong kind, or of another condition, that comes first: another model is
-needed. Where the device was still settling when the records began, it must rest first. Where causes are tied,
-the experiment on which they look least alike, tried on paper with the model that was found. Else what the
-recordings lack; else what the verdict asks for: a fault of the measurement is taken out of the record
-(`correct`), a property of the device goes into the model (`extend`).
+If the model as given is of the wrong kind, or of another condition, that comes first: another model is
+needed. If the device was still settling when the records began, it must rest first. If causes are tied, the
+advice is the experiment on which they look least alike, simulated with the model that was found. Otherwise it
+is what the recordings lack, or what the verdict asks for: a fault of the measurement is taken out of the
+record (`correct`), a property of the device goes into the model (`extend`).
 """
 
 from __future__ import annotations
