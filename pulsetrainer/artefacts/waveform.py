@@ -25,7 +25,7 @@ class RefinePass:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Waveform(Shown):
-    """A target force and the two currents that shall press it: compensated and merely scaled.
+    """A target force and the two currents meant to press it: compensated and merely scaled.
 
     Examples
     --------

@@ -237,6 +237,6 @@ def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed:
     if seconds > 0:
         raise DeviceError(
             f"the coil is too hot for this: it is at {100 * heat:.0f} % of its limit"
-            + (", as far as is known: nobody has seen this device cool" if assumed else ""),
+            + (", as far as is known: no program has seen this device cool" if assumed else ""),
             hint=f"wait {in_words(seconds)}, then run the command again",
         )

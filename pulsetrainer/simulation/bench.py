@@ -115,7 +115,7 @@ class Bench:
                 raise _explain(executable, options, complaint)
             raise DeviceError(
                 f"the bench did not start: {complaint}",
-                hint="see whether /dev/ptmx exists and may be opened: ls -l /dev/ptmx",
+                hint="check that /dev/ptmx exists and may be opened: ls -l /dev/ptmx",
             )
 
     @property

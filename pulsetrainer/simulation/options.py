@@ -191,7 +191,7 @@ def _setting(name: str, text: str) -> float:
     if math.isnan(value):
         raise UsageError(
             f"`port`: the qemu parameter {name}={text} is not a number from {low:g} to {high:g}",
-            hint='like this: `port` "qemu:?ambient=20"',
+            hint='write it like this: `port` "qemu:?ambient=20"',
         )
     return value
 

@@ -71,7 +71,7 @@ def _check_is(kinds: tuple[type, ...], one: object) -> None:
             f"expected {' or '.join(map(_a, kinds))}, got {repr(name) if name else _a(type(one))}",
             hint=f"pt.load({name!r}) gives it"
             if "." in name
-            else "its help tells the order of the arguments",
+            else "its help shows the order of the arguments",
         )
 
 

@@ -162,7 +162,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
         if _is_fitted_to(model, run):
             raw = "; its fit took the noise of the input out, this prediction does not"
             noisy = model.fit is not None and model.fit.false_reversals > 0 and model.form != "direct"
-            notes.append(f"{title} was fitted to {name}: how good it is, another run shows{raw * noisy}")
+            notes.append(f"{title} was fitted to {name}: only another run shows how good it is{raw * noisy}")
         if one.outside_percent > 0:
             share = f"{one.outside_percent:.1f}" if one.outside_percent >= _TOLD else f"less than {_TOLD}"
             notes.append(

@@ -203,7 +203,7 @@ def _check_length(shape: Shape, model: Model, periods: int) -> None:
             f"for at most {ON_TIME_S:g} s at a time",
             hint=f"give `periods` at most {most}; pulsetrainer session presses for as long as you like"
             if most
-            else "a pulse this long is mostly one whose time is not in seconds",
+            else "a pulse this long usually means that its time is not in seconds",
         )
 
 
@@ -230,11 +230,11 @@ def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
         why = f"the drive may move at most {unit}, which this pulse exceeds"
     elif drive.clipped_samples:
         why = (
-            "parts of the pulse are out of the model's reach; a smaller one (`force_min`, `force_max`) or a "
-            "slower one is not"
+            "parts of the pulse are out of the model's reach: try a smaller pulse (`force_min`, `force_max`) "
+            "or a slower one"
         )
     elif drive.inversion == "closest-match":
-        why = "the drive takes the steps of the levels"
+        why = "the drive moves in steps of the levels"
     else:
         why = "the model's output does not follow the pulse even without a limit"
     return [f"warning: the model itself expects errors of up to {error:.1f} % of {full}: {why}"]
