@@ -239,7 +239,7 @@ NOTES = {
     "follows half the range": ("% of 0.75 A",),
     "stronger": ("the force moved by +5", "(limit 1.5 %)"),
     "changed": ("(limit 0.", "next", "identify again", "temperature"),
-    "taken as seconds": ("says no unit that is known", "seconds", "[min]"),
+    "taken as seconds": ("has no known unit", "seconds", "[min]"),
     "beats found": ("6 whole beats", "0.644 to 0.653 s"),
     "stretched": ("are stretched to", "N: give --force-min and --force-max"),
 }

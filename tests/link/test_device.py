@@ -267,7 +267,7 @@ def test_a_reader_that_hangs_is_stopped(monkeypatch):
     with open_device("bench:?speed=real") as device:
         recording = device.play(np.full(20_000, 0.5), 1000, on_block=lambda _: time.sleep(1.0))
     assert not recording.complete
-    assert "did not take its data" in recording.fault
+    assert "did not collect its data" in recording.fault
     assert "the disk is too slow" in recording.remedy
     assert recording.tick[-1] < 30_000
 
