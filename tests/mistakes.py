@@ -153,7 +153,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a force in another unit": (
         *("invert normal --model model.h5 -o out.h5 --force-max 20kN", 2, "got '20kN'"),
-        "write it in N, without the unit: 20000",
+        "the number alone, without a unit; --force-max is: force at its top, N or",
     ),
     "an option of another command": (
         "identify run.h5 --model model.h5 -o out.h5",

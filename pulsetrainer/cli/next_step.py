@@ -48,10 +48,10 @@ _NEXT = {
     "then `pulsetrainer evaluate played.h5 -o evaluation.h5`",
     ("diagnosis", "run"): "run `pulsetrainer diagnose {file} --model model.h5 -o diagnosis.h5`",
     ("diagnosis", "model"): "run `pulsetrainer diagnose RUN.h5 --model {file} -o diagnosis.h5`",
-    ("run", "playback"): "a run comes from `pulsetrainer capture`; of a playback the errors are told by "
+    ("run", "playback"): "make a run with `pulsetrainer capture`; for the errors of a playback, run "
     "`pulsetrainer evaluate {file} -o evaluation.h5`",
-    ("run", "model"): "give the run it was identified from: `pulsetrainer show {file}` tells its history",
-    ("run", "diagnosis"): "give the run that was diagnosed: `pulsetrainer show {file}` tells its history",
+    ("run", "model"): "give the run it was identified from: `pulsetrainer show {file}` shows its history",
+    ("run", "diagnosis"): "give the run that was diagnosed: `pulsetrainer show {file}` shows its history",
 }
 
 
@@ -74,7 +74,7 @@ def next_step(problem: PulsetrainerError) -> str:
             table = shlex.quote(str(problem.path))
             columns = "--input COLUMN --output COLUMN"
             return f"import the table first: pulsetrainer import {table} {columns} -o run.h5"
-        elsewhere = "a recording from elsewhere comes in with `pulsetrainer import`"
+        elsewhere = "to read a recording from elsewhere, use `pulsetrainer import`"
         return f"give a file that pulsetrainer wrote; {elsewhere}"
     return problem.hint
 
@@ -128,7 +128,7 @@ def with_files(text: str, parameters: Mapping[str, Any]) -> str:
 def _after_wrong_kind(problem: WrongKindError) -> str:
     if problem.expected[:2] == ("playback", "run") and problem.found == "model":
         given = shlex.quote(str(problem.path))
-        return f"each model goes behind a --model of its own: pulsetrainer evaluate run.h5 --model {given}"
+        return f"give each model after a --model of its own: pulsetrainer evaluate run.h5 --model {given}"
     for kind in problem.expected:
         if (kind, problem.found) in _NEXT:
             return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))

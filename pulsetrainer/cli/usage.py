@@ -209,7 +209,8 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     instead = _INSTEAD.get(name, "{command} --help")
     if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
         instead = "leave it out; to look into a file: pulsetrainer show {extra}"
-    beside = "one file at a time; evaluations or sessions side by side: pulsetrainer compare a.h5 b.h5"
+    beside = "one file at a time, its name in quotes if it has spaces; to compare evaluations or sessions: "
+    beside += "pulsetrainer compare a.h5 b.h5"
     return UsageError(
         f"{command} takes {' and '.join(taken) or 'options'} only, got {extra} as well",
         hint=beside if taken == ["FILE.h5"] else instead.format(command=command, extra=extra),
@@ -255,9 +256,10 @@ def _as_a_number(parameter: Any, must: str) -> str:
         return f"write it with a point and without a unit: {number}"
     if said and unit == said[1]:
         return f"write the number alone, in {unit}: {number}"
-    if said and unit[1:] == said[1] and unit[0] in _FACTORS:
+    if said and unit[1:] == said[1] and unit[0] in _FACTORS and f"{said[1]} or " not in _meaning(parameter):
         return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}"
-    return f"write the number alone: {_meaning(parameter)}"  # what is typed in ms must not be taken for s
+    # what is typed in ms must not be taken for s
+    return f"write the number alone, without a unit; {_named(parameter)} is: {_meaning(parameter)}"
 
 
 def _choice(parameter: Any, must: str) -> str:

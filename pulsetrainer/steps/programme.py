@@ -52,7 +52,7 @@ def _check_length(minutes: float | None, beats: int | None) -> None:
     if beats is not None and not 1 <= beats <= MOST_BEATS:
         raise UsageError(
             f"`beats` must be 1 or more and at most {MOST_BEATS}, got {beats}",
-            hint="for instance 20, which last about a quarter of a minute",
+            hint="for instance 20 beats, which last about a quarter of a minute",
         )
     if minutes is not None and not 0 < minutes <= MOST_MINUTES:
         raise UsageError(
