@@ -57,7 +57,7 @@ def test_a_run_that_the_model_was_fitted_to_is_no_test_of_it():
     runs = [_run(0.01 * rng.standard_normal(U.size)) for _ in range(2)]
     model = identify(runs[0], levels=6)
     notes = [evaluate(run, model, names=["a"], model_names=["m"]).notes for run in runs]
-    assert notes[0] == ("m was fitted to a: how good it is, another run shows",)
+    assert notes[0] == ("m was fitted to a: only another run shows how good it is",)
     assert notes[1] == ()
 
 
