@@ -68,9 +68,9 @@ class Screen:
         self.is_terminal = sys.stdout.isatty()
         self.width = shutil.get_terminal_size().columns if self.is_terminal else _PIPE_WIDTH
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, lead: str = "note: ") -> None:
         """Say one line to the person, beside the results; on a terminal folded between words."""
-        say("" if text.startswith("warning: ") else "note: ", text)
+        say(lead, text)
 
     @contextmanager
     def bar(self, label: str) -> Iterator[Progress]:

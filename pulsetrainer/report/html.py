@@ -145,7 +145,7 @@ def render_evaluation(
         predicted=evaluation.models,
         model_stems=evaluation.stems[len(played) :],
         worse=worse(evaluation),
-        notes=evaluation.notes,
+        warnings=evaluation.warnings,
     )
 
 

@@ -309,6 +309,14 @@ def odd_numbers():
     return Page(render(Evaluation(waveforms=(played,)))).numbers()
 
 
+def test_warnings_stand_before_the_result():
+    """Those of the evaluation, each a paragraph; its notes are not warnings."""
+    warned = replace(examples.model_comparison(), notes=("warning: a note",), warnings=("model m does not",))
+    before = render(warned).partition("<main")[2].partition("<h2")[0]
+    assert "<strong>Warning: model m does not</strong>" in before
+    assert "a note" not in before
+
+
 def test_no_value_is_said_in_words(odd_numbers):
     """An error of nothing."""
     value, printed = odd_numbers["normal.closest-match.noise_percent"][0]
