@@ -161,7 +161,7 @@ def test_numbers_of_models_on_a_run(comparison):
         assert shown[f"{stem}.run_offset"][0][0] == model.offset
         for field in ("rms", "rms_percent", "max_percent", "gain_percent", "shape_rms_percent"):
             assert shown[f"{stem}.{field}"][0][0] == getattr(model, field)
-    assert shown["model.creep.amplitude"][0] == (0.051, "0.051")
+    assert shown["model.creep.amplitude"][0] == (0.051, "0.05100")
     assert shown["model.creep.amplitude.lower"][0][0] == 0.047
 
 
