@@ -375,6 +375,8 @@ def test_error_panel_is_in_percent_of_full_force():
         ("1", ""),
         ("", ""),
         ("N*m", "N·m"),
+        ("1/(1)^2", ""),
+        ("N/(1)^2", "N"),
     ],
 )
 def test_units_are_printed_as_people_write_them(unit, shown):
