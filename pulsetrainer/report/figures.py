@@ -115,13 +115,15 @@ def waveform(drive: Waveform) -> Figure:
 def playback(played: Playback) -> Figure:
     """Return every repeat of both drives: force, current, how well it followed, and the coil's heat."""
     asked, kelvin = played.waveform, played.temperature_K
-    if kelvin is None or not kelvin.size:
-        whole = figure = _sheet(1.5 * COLUMN_IN, 1.5 * _ROW_IN)
-    else:
-        whole = _sheet(1.5 * COLUMN_IN, 1.9 * _ROW_IN)
-        figure, below = whole.subfigures(2, 1, squeeze=False, height_ratios=(3.2, 0.8))[:, 0]
-        heat_figures.temperature_of_repeats(below.subplots(), kelvin)
-    force, current, error = figure.subplots(3, 1, sharex=True, height_ratios=(1.4, 1.0, 0.8))
+    rows = 3 if kelvin is None or not kelvin.size else 4
+    figure = _sheet(1.5 * COLUMN_IN, (1.5 if rows == 3 else 1.9) * _ROW_IN)
+    panes = figure.subplots(rows, 1, height_ratios=(1.4, 1.0, 0.8, 0.65)[:rows])
+    force, current, error = panes[:3]
+    for axes in (force, current):
+        axes.sharex(error)
+        axes.tick_params(labelbottom=False)
+    if kelvin is not None and rows > 3:
+        heat_figures.temperature_of_repeats(panes[3], kelvin)
     panels.trace(force, asked.time_s, asked.target, **TARGET, label="target")
     for name, drive, style in (
         ("scaled", played.scaled, SCALED),
@@ -140,7 +142,7 @@ def playback(played: Playback) -> Figure:
     for axes in (force, current, error):
         panels.unscored(axes, asked)
     panels.headroom(force)
-    return whole
+    return figure
 
 
 @styled
