@@ -51,7 +51,7 @@ _DENSITY_QUANTILE = 0.99
 _DENSITY_REACH = 2.0
 # letters of a title in a line, above a whole column and above a square; matplotlib's own wrapping reads
 # what stands between two dollars as a formula, whatever the settings say
-_TITLE, _SQUARE_TITLE = 48, 28
+_TITLE, _SQUARE_TITLE = 48, 30
 _CLOCK = 100.0  # lengths of the record that its first time is late: a date, which tick labels cannot hold
 _QUANTITIES = {
     "N": "force", "A": "current", "T": "flux density", "V": "voltage", "Pa": "pressure", "N*m": "torque",
