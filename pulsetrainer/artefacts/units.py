@@ -218,7 +218,8 @@ def shown(unit: str) -> str:
             continue
         digits = len(power) - len(power.lstrip("-0123456789"))
         head += power[:digits].translate(_POWERS) + power[digits:]
-    return head.replace("*", "·")
+    printed = head.replace("*", "·").removesuffix("/1²")  # the square of a number without a unit
+    return "" if printed == "1" else printed
 
 
 _WHOLE = 100.0  # from here on no decimals

@@ -74,6 +74,7 @@ def evaluate(
         hint = "find out what changed; if the new figure is right, change the bound on purpose"
         failed = QualityError(problem, hint=hint)
     job.alike(model)
+    job.notes(evaluation.warnings, "warning: ")
     job.notes(evaluation.notes)
     for path, one in zip(model, models, strict=True):
         # a static model holds the record that it was fitted to; of an extended one the history tells

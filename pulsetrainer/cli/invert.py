@@ -106,4 +106,5 @@ def invert(
             job.uses(pulse)
         job.save(out, drive, drive_title(drive))
     job.notes(drive.notes)
+    job.notes(drive.warnings, "warning: ")
     job.show(*inverted(out, drive))

@@ -263,10 +263,10 @@ class Job:
         for left, samples in interrupted(out, kind):
             self.notes([f"{left} holds {counted(samples, 'sample')} of {said.format(left=left)}"])
 
-    def notes(self, lines: Sequence[str]) -> None:
+    def notes(self, lines: Sequence[str], lead: str = "note: ") -> None:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
-            self.screen.note(as_options(with_files(line, self._parameters)))
+            self.screen.note(as_options(with_files(line, self._parameters)), lead)
 
 
 def _is_path(value: Any) -> bool:

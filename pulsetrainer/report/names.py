@@ -92,4 +92,4 @@ def beyond_rounding(offset: float, rms: float) -> float:
 
 def digits(value: float) -> str:
     """Return a figure with two decimals; a small one with three significant digits, never as nothing."""
-    return f"{value:.3g}" if 0.0 < abs(value) < 0.1 else f"{value:.2f}"
+    return f"{value:#.3g}" if 0.0 < abs(value) < 0.1 else f"{value:.2f}"

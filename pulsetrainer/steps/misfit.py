@@ -21,7 +21,7 @@ def misfit_words(one: ModelEvaluation, name: str, run: Run) -> str:
     if one.rms_percent <= _AT_ALL and one.outside_percent <= _MOST:
         return ""
     error = f"its rms error is {one.rms_percent:.3g} % of the span of the output"
-    return f"warning: {one.name} does not describe {name} at all: {error}. {_reason(one, name, run)}"
+    return f"{one.name} does not describe {name} at all: {error}. {_reason(one, name, run)}"
 
 
 def _reason(one: ModelEvaluation, name: str, run: Run) -> str:

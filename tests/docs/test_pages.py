@@ -198,10 +198,13 @@ def test_a_figure_of_the_readme_is_the_one_that_was_kept():
     assert demo.block(kept) not in page
 
 
-def test_figures_of_the_theory_are_drawn_by_the_code(tmp_path):
+@pytest.mark.parametrize(
+    ("page", "named", "most"), [("theory", "FIGURES", 60_000), ("measured", "MEASURED_FIGURES", 200_000)]
+)
+def test_figures_of_a_page_are_drawn_by_the_code(page, named, most):
     """Each figure on the page has its function, and what is written in it is what the function writes."""
-    drawn = script("figures").FIGURES
-    shown = [target for target in links(ROOT / "docs/theory.md") if target.endswith(".svg")]
+    drawn = getattr(script("figures"), named)
+    shown = [target for target in links(ROOT / f"docs/{page}.md") if target.endswith(".svg")]
     assert sorted(shown) == sorted(f"figures/{name}.svg" for name in drawn)
     for name, draw in drawn.items():
         made = encode(draw(), "svg").decode()
@@ -209,7 +212,7 @@ def test_figures_of_the_theory_are_drawn_by_the_code(tmp_path):
         labels = [re.findall(r"<text[^>]*>([^<]*[A-Za-zα-ω][^<]*)</text>", text) for text in (made, kept)]
         assert labels[0] == labels[1]
         assert len(labels[0]) >= 6
-        assert len(kept) < 60_000
+        assert len(kept) < most
 
 
 # --- the format -------------------------------------------------------------------------------------------

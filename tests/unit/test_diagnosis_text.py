@@ -190,4 +190,4 @@ def test_the_chart_says_no_more_than_the_table():
 def test_the_figure_bears_the_verdict_of_the_page(verdict):
     """A cause that is told, but is no verdict, is none in the figure's title either."""
     found = replace(store_examples.diagnosis(), verdict=verdict)
-    assert course(found).axes[0].get_title("left") == f"verdict: {verdict}"
+    assert course(found).axes[0].get_title("left") == f"Verdict: {verdict}"

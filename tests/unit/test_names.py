@@ -120,7 +120,7 @@ def test_a_small_figure_reads_the_same_wherever_it_is_shown():
     shown = [
         text(row[-1]),
         html.metric(one, "compensated.hysteresis_percent", "").text,
-        *re.findall(r"compensated, loop area (\S+) %", legend),
+        *re.findall(r"compensated: (\S+)", legend),
         *re.findall(r"compensated drive one of (\S+) %", page),
     ]
     assert set(shown) == {"0.00553"}
