@@ -167,6 +167,8 @@ AGAIN = (
     "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
     "recording.{command}"
 )
+# after what can be done with the records as they are
+LATER = f" This recording cannot show everything ({{lacked}}). If that matters to you, {AGAIN}"
 ADVICE: Mapping[str, str] = {
     "tied, quick": "Run the full diagnosis: a quick screen cannot distinguish between {names}.",
     "tied": (
@@ -185,21 +187,23 @@ ADVICE: Mapping[str, str] = {
         "cause is found, the device may be of a kind that the model cannot follow; if not, something else "
         "acts on it: vary one thing at a time, such as temperature, load or amplitude."
     ),
-    "none": "Nothing was found on this recording beyond what is taken for noise.",
+    "none": ("Nothing was found on this recording beyond what is taken for noise: use the model as it is."),
+    "none, quick": "The quick screen found nothing. The full diagnosis tells smaller effects.",
     "none, seen": (
         "Nothing was found on this recording that asks for another model: {names} can be seen, but in doubt "
-        "or no larger than the noise."
+        "or no larger than the noise. Use the model as it is."
     ),
     "none, small": (
         "Nothing that matters was found on this recording: noise alone would hardly look like {names}, but "
-        "it is too small to matter, or does not predict what was left out of the fit."
+        "it is too small to matter, or does not predict what was left out of the fit. Use the model as it is."
     ),
     "none, small, quick": (
         "Nothing that matters was found on this recording: noise alone would hardly look like {names}, but "
         "it is too small to matter."
     ),
     "extend, quick": (
-        "Run the full diagnosis, which fits what was found: a quick screen has no model to extend by it."
+        "Run the full diagnosis, which fits what was found: after a quick screen there is nothing to extend "
+        "the model by, or to take out of the recording."
     ),
     "too noisy": (
         "These recordings could not have shown {names} of {matters:.2g} % of the span. Record the same for "
@@ -473,9 +477,13 @@ def advice(one: Evidence, bench: Bench) -> str:
     numbers = bench.numbers(faster)
     tied = one.kind == "tied"  # its first name is that of the experiment
     names = one.names[1:] if tied else one.names
-    return ADVICE[one.kind].format(
+    lacked, told = [name for name in names if name in LACKS], ADVICE[one.kind]
+    if lacked and "{missing}" not in told:
+        told += LATER
+    return told.format(
         **numbers,
         names=_listed([name for name in names if name not in LACKS] or names, numbers),
+        lacked=_listed(lacked, numbers),
         experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
         lasting=bench.lasting(one.names[0], faster) if tied else "",
         missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),

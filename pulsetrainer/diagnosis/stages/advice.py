@@ -3,8 +3,9 @@
 Where the model as given is of the wrong kind, or of another condition, that comes first: another model is
 needed. Where the device was still settling when the records began, it must rest first. Where causes are tied,
 the experiment on which they look least alike, tried on paper with the model that was found. Else what the
-recordings lack; else what the verdict asks for: a fault of the measurement is taken out of the record
-(`correct`), a property of the device goes into the model (`extend`).
+verdict asks for: a fault of the measurement is taken out of the record (`correct`), a property of the device
+goes into the model (`extend`). What the records lack comes after what can be done with them; it comes first
+where that is nothing.
 """
 
 from __future__ import annotations
@@ -73,18 +74,26 @@ def _of_the_causes(state: State) -> Evidence:
 
 def _after_verdict(state: State) -> Evidence:
     if state.verdict in ("unknown", "none"):
-        return Evidence("lacks", names=state.lacks) if state.lacks else Evidence(state.verdict)
+        kind = "lacks" if state.lacks and state.verdict == "unknown" else state.verdict
+        return Evidence(kind, names=state.lacks)
     if state.verdict in state.correctable:
         device = any(one.found and one.cause.lasting for one in state.findings)
         return Evidence("correct, extend" if device else "correct", names=tuple(state.correctable))
-    if state.lacks and state.verdict != OutOfRange.id:  # no recording in the model's range would show more
-        return Evidence("lacks", names=state.lacks)
-    if not library()[state.verdict].lasting and state.extended is None:
-        return Evidence(_TO_REPAIR.get(state.verdict, "repair"))
-    if state.extended is not None and state.correctable:
-        return Evidence("extend, correct", names=tuple(state.correctable))
-    extend = "extend, or late" if state.verdict == Delay.id else "extend"
-    return Evidence(extend if state.extended is not None or state.question.quick else "again")
+    # no recording in the model's range would show more
+    lacks = state.lacks if state.verdict != OutOfRange.id else ()
+    cause = library()[state.verdict]
+    if state.extended is not None or (state.question.quick and (cause.lasting or cause.corrects)):
+        return _now_and_later(state, lacks)
+    if lacks:
+        return Evidence("lacks", names=lacks)
+    return Evidence("again" if cause.lasting else _TO_REPAIR.get(state.verdict, "repair"))
+
+
+def _now_and_later(state: State, lacks: tuple[str, ...]) -> Evidence:
+    """Extend the model; what the records lack comes after that."""
+    if state.correctable:
+        return Evidence("extend, correct", names=(*state.correctable, *lacks))
+    return Evidence("extend, or late" if state.verdict == Delay.id else "extend", names=lacks)
 
 
 def _to_see_more(state: State) -> Evidence:
