@@ -167,6 +167,11 @@ AGAIN = (
     "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
     "recording.{command}"
 )
+# of tied causes one of which is the measurement's, another the device's: no record decides, a person may
+KNOWN = (
+    " If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up), "
+    "record the same again, and identify the model from that."
+)
 # after what can be done with the records as they are
 LATER = f" This recording cannot show everything ({{lacked}}). If that matters to you, {AGAIN}"
 ADVICE: Mapping[str, str] = {
@@ -268,8 +273,13 @@ ADVICE: Mapping[str, str] = {
         "and diagnose that."
     ),
     "identify anew": (
-        "Identify the device again in this condition (a new run, then pulsetrainer identify), and "
-        "diagnose with the new model."
+        "Identify the model again in this condition, from these recordings or from a new run, and diagnose "
+        "with the new model."
+    ),
+    "warm up": (
+        "Let device and sensor warm up, record the same again, and identify the model from that recording. "
+        "If it then leaves little, something drifted here: go on with the new model. If it leaves as much, "
+        "a Preisach model may not describe this device."
     ),
 }
 DOUBTS: Mapping[str, str] = {
@@ -480,10 +490,14 @@ def advice(one: Evidence, bench: Bench) -> str:
     lacked, told = [name for name in names if name in LACKS], ADVICE[one.kind]
     if lacked and "{missing}" not in told:
         told += LATER
+    faults = [name for name in names if name not in LACKS and library()[name].corrects]
+    if one.kind in ("tied", "tied, no better") and 0 < len(faults) < len(names):
+        told += KNOWN
     return told.format(
         **numbers,
         names=_listed([name for name in names if name not in LACKS] or names, numbers),
         lacked=_listed(lacked, numbers),
+        faults=_listed(faults, numbers),
         experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
         lasting=bench.lasting(one.names[0], faster) if tied else "",
         missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),

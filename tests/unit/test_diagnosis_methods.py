@@ -928,6 +928,23 @@ def test_what_can_be_done_now_comes_before_what_to_record(kind):
     assert "record output and input again" in both
 
 
+@pytest.mark.parametrize("kind", ["tied", "tied, no better"])
+@pytest.mark.parametrize(
+    ("names", "known"),
+    [
+        (("offset-drift", "accommodation"), True),
+        (("creep", "accommodation"), False),
+        (("offset-drift", "step"), False),
+    ],
+)
+def test_who_knows_that_it_is_the_sensor_is_told_the_way_on(kind, names, known):
+    """No recording decides between the sensor and the device as surely as a person who knows the sensor."""
+    figures = {"there": 1.0, "here": 0.5}
+    named = ("heating", *names) if kind == "tied" else names
+    said = wording.advice(Evidence(kind, figures=figures, names=named), wording.Bench(Scale(), "A"))
+    assert ("If you know that it is the measurement (offset-drift)" in said) is known
+
+
 def test_two_rates_that_count_as_one_are_not_told_as_one():
     """A recording at two clearly different rates was said to be of one: the words tell how far apart."""
     said = wording.sentence(Evidence("lacks", names=("rates",)), {})

@@ -1453,6 +1453,10 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
         ({"findings": (TIED,), "evidence": (Evidence("wrong kind"),)}, "other model"),
         ({"findings": (TIED,), "evidence": (Evidence("changed", "condition-change"),)}, "identify anew"),
         ({"evidence": (Evidence("shifted", "condition-change"),)}, "identify anew"),
+        ({"evidence": (Evidence("given worse"),), "lacks": ("rates",)}, "identify anew"),
+        ({"evidence": (Evidence("given worse, own"),), "lacks": ("rates",)}, "warm up"),
+        ({"evidence": (Evidence("given worse, own"),), "verdict": "unknown"}, "warm up"),
+        ({"evidence": (Evidence("given worse"),), "verdict": "unknown"}, "unknown"),
     ],
 )
 def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):

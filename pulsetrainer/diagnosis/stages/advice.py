@@ -32,12 +32,15 @@ _ANOTHER_MODEL = {
     "reversed": "identify anew",
     "one stroke": "strokes",
 }
+# ... and where nothing was found
+_NOT_AS_GIVEN = {"given worse, own": "warm up", "given worse": "identify anew"}
 _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 
 
 def stage(state: State) -> State:
     """Return the state with its advice."""
-    return replace(state, advice=_of_the_conditions(state) or _of_the_causes(state))
+    advice = _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
+    return replace(state, advice=advice)
 
 
 def _of_the_conditions(state: State) -> Evidence | None:
@@ -49,6 +52,15 @@ def _of_the_conditions(state: State) -> Evidence | None:
     if began and state.extended is None:
         return Evidence("rest first", figures={"rest": began[0].figures["rest"]})
     return None
+
+
+def _not_as_given(state: State) -> Evidence | None:
+    """Return what to do where nothing was found, but the model as given misses what refitted weights hold."""
+    missed = next((one.kind for one in state.evidence if one.kind in _NOT_AS_GIVEN), None)
+    if missed is None or state.verdict not in ("none", "inconclusive", "unknown"):
+        return None
+    own = missed == "given worse, own"
+    return Evidence(_NOT_AS_GIVEN[missed]) if own or state.verdict != "unknown" else None
 
 
 def _of_the_causes(state: State) -> Evidence:
