@@ -23,6 +23,7 @@ from pulsetrainer.report.tables import text as shown
 
 _MORE_BEFORE = 1.05  # times the full force, in the strokes before the pulse: said
 _SMALL = 0.1  # of a unit: three decimals would not tell a range of less
+_LARGE = 100.0  # of a unit: of more, three decimals tell what no sensor does
 
 _VERDICT: Final = {True: "better", False: "worse", None: ""}
 
@@ -100,8 +101,8 @@ def drive_title(drive: Waveform) -> str:
 
 
 def _range_words(ends: tuple[float, float], unit: str) -> str:
-    """Return a range with three decimals, or with more digits where these would not tell its ends apart."""
-    if ends[1] - ends[0] < _SMALL:
+    """Return a range with three decimals; with other digits where these tell too much or too little."""
+    if ends[1] - ends[0] < _SMALL or max(map(abs, ends)) >= _LARGE:
         return span_words(np.asarray(ends), unit)
     return with_unit(f"{ends[0]:.3f} .. {ends[1]:.3f}", unit)
 
