@@ -58,7 +58,7 @@ _NEXT = {
 def next_step(problem: PulsetrainerError) -> str:
     """Return what to do about an error: a command or an option where there is one, else its own hint."""
     if isinstance(problem, ExistsError) and problem.hint == ExistsError.usual:
-        other = shlex.quote(str(_free(problem.path)))
+        other = shlex.quote(str(free(problem.path)))
         return f"name another file, such as {other}, or give --overwrite to replace it"
     if isinstance(problem, WrongKindError):
         return _after_wrong_kind(problem)
@@ -88,13 +88,10 @@ def to_make(kind: str, path: Path) -> str:
     return f"{line} {shlex.quote(str(path))}"
 
 
-def _free(path: Path) -> Path:
-    """Return a name like this one that is not taken."""
-    return next(
-        other
-        for number in itertools.count(2)
-        if not (other := path.with_name(f"{path.stem}-{number}{path.suffix}")).exists()
-    )
+def free(path: Path) -> Path:
+    """Return a path, or, where it is taken, a name like it that is not."""
+    others = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in itertools.count(2))
+    return next(other for other in itertools.chain((path,), others) if not other.exists())
 
 
 _PARAMETER = re.compile(r"`([a-z]+(?:_[a-z]+)*)(?:_[A-Z]\w*)?`")  # without the unit at its end

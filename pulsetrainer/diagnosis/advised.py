@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from pulsetrainer.artefacts.units import shown, with_seconds, with_unit
 from pulsetrainer.diagnosis import experiment
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.scale import Scale
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -17,6 +18,13 @@ AGAIN = (
     "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
     "recording.{command}"
 )
+# of tied causes one of which is the measurement's, another the device's: no record decides, a person may
+KNOWN = (
+    " If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up), "
+    "record the same again, and identify the model from that."
+)
+# after what can be done with the records as they are
+LATER = f" This recording cannot show everything ({{lacked}}). If that matters to you, {AGAIN}"
 ADVICE: Mapping[str, str] = {
     "tied, quick": "Run the full diagnosis: a quick screen cannot distinguish between {names}.",
     "tied": (
@@ -35,14 +43,16 @@ ADVICE: Mapping[str, str] = {
         "cause is found, the model may not be able to follow a device of this kind; if not, something else "
         "acts on it: vary one thing at a time, such as temperature, load or amplitude."
     ),
-    "none": "Nothing was found in this recording beyond what is taken for noise.",
+    "none": "Nothing was found in this recording beyond what is taken for noise: use the model as it is.",
+    "none, quick": "The quick screen found nothing. The full diagnosis shows smaller effects.",
     "none, seen": (
         "Nothing in this recording calls for another model: {names} can be seen, but in doubt or no larger "
-        "than the noise."
+        "than the noise. Use the model as it is."
     ),
     "none, small": (
         "Nothing that matters was found in this recording: noise alone is unlikely to look like {names}, "
-        "but it is too small to matter, or does not predict what was left out of the fit."
+        "but it is too small to matter, or does not predict what was left out of the fit. Use the model as "
+        "it is."
     ),
     "none, small, quick": (
         "Nothing that matters was found in this recording: noise alone is unlikely to look like {names}, "
@@ -50,7 +60,7 @@ ADVICE: Mapping[str, str] = {
     ),
     "extend, quick": (
         "Run the full diagnosis, which fits what was found: a quick screen fits nothing that a model could "
-        "be extended by."
+        "be extended by, or that could be taken out of the recording."
     ),
     "too noisy": (
         "These recordings could not have shown {names} as small as {matters:.2g} % of the span. Record the "
@@ -117,8 +127,13 @@ ADVICE: Mapping[str, str] = {
         "loops, and diagnose that."
     ),
     "identify anew": (
-        "Identify the device again in this condition (a new run, then pulsetrainer identify), and "
-        "diagnose with the new model."
+        "Identify the model again in this condition, from these recordings or from a new run, and diagnose "
+        "with the new model."
+    ),
+    "warm up": (
+        "Let device and sensor warm up, record the same again, and identify the model from that recording. "
+        "If it then leaves little, something drifted here: go on with the new model. If it leaves as much, "
+        "a Preisach model may not describe this device."
     ),
 }
 OURS = (
@@ -243,9 +258,17 @@ def advice(one: Evidence, bench: Bench) -> str:
     numbers = bench.numbers(faster)
     tied = one.kind == "tied"  # its first name is that of the experiment
     names = one.names[1:] if tied else one.names
-    return ADVICE[one.kind].format(
+    lacked, told = [name for name in names if name in LACKS], ADVICE[one.kind]
+    if lacked and "{missing}" not in told:
+        told += LATER
+    faults = [name for name in names if name not in LACKS and library()[name].corrects]
+    if one.kind in ("tied", "tied, no better") and 0 < len(faults) < len(names):
+        told += KNOWN
+    return told.format(
         **numbers,
         names=listed([name for name in names if name not in LACKS] or names, numbers),
+        lacked=listed(lacked, numbers),
+        faults=listed(faults, numbers),
         experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
         lasting=bench.lasting(one.names[0], faster) if tied else "",
         missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),

@@ -120,10 +120,12 @@ def _advice(state: State) -> Evidence:
         return replace(one, kind="extend, quick")
     seen = tuple(dict.fromkeys(finding.cause.id for finding in state.findings if finding.found))
     if one.kind == "none" and seen:
-        return Evidence("none, seen", names=seen)
+        return Evidence("none, seen", names=(*seen, *one.names))
     if one.kind == "none" and tried and tried[0].p_value <= LIMITS.p_max:
         small = "none, small, quick" if state.question.quick else "none, small"
-        return Evidence(small, names=(tried[0].cause.id,))
+        return Evidence(small, names=(tried[0].cause.id, *one.names))
+    if one.kind == "none" and state.question.quick:
+        return replace(one, kind="none, quick")
     return one
 
 

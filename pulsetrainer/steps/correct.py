@@ -136,9 +136,14 @@ def _restored(
 def _nothing(diagnosis: Diagnosis, name: str) -> str:
     if diagnosis.quick:
         return f"{name} only screened for causes and fitted none: there is nothing to correct"
+    tied = [
+        f"; {one.cause} could equally be {' or '.join(one.confounded_with)}"
+        for one in diagnosis.found
+        if library()[one.cause].corrects and one.confounded_with
+    ]
     return (
         f"{name} ended with the verdict {diagnosis.verdict!r} and found no fault of the measurement that is "
-        "beyond doubt and can be taken out: there is nothing to correct"
+        f"beyond doubt and can be taken out: there is nothing to correct{''.join(tied)}"
     )
 
 

@@ -20,6 +20,7 @@ import typer
 from pages import PAGES, ROOT, anchors, blocks, links, tables, words
 
 from pulsetrainer.cli.app import app
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.files import store
 from pulsetrainer.report.render import encode
 
@@ -38,6 +39,14 @@ def test_every_column_of_a_table_has_a_heading(page):
     """A screen reader tells it with each cell."""
     heads = re.findall(r"^(\|.*\|)\n\|[-:| ]+\|$", page.read_text(encoding="utf-8"), re.MULTILINE)
     assert [head for head in heads if re.search(r"\|\s*\|", head)] == []
+
+
+def test_the_vocabulary_says_what_every_cause_is():
+    """In the words of the program, and whether it belongs into the model or out of the run."""
+    page = (ROOT / "docs" / "vocabulary.md").read_text(encoding="utf-8")
+    for one in library().values():
+        then = "correct" if one.corrects else "extend" if one.lasting else "-"
+        assert f"| {one.id} | {one.title.format(input='input', output='output')} | {then} |" in page
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

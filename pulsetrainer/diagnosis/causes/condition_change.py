@@ -59,8 +59,8 @@ class ConditionChange(Cause):
         "changed": (
             "a Preisach model fitted to these recordings describes them, but the given one does not: the "
             "device is in another condition (load, configuration, zero). Its output is shifted by "
-            "{shift:.2g}{in_y} on average, has {times:.3f} times the gain of the model, and differs in "
-            "shape by {left:.2g}{in_y} rms. Identify it again in this condition"
+            "{shift:.2g}{in_y} on average, its gain differs by {gain:+.1f} %, and its shape by "
+            "{left:.2g}{in_y} rms. Identify it again in this condition"
         ),
         "reversed": (
             "the {output} falls where the model rises: {times:.3f} times what the model says, and an offset, "
