@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
 from pulsetrainer.report.render import encode
 from pulsetrainer.report.style import (
@@ -64,7 +65,9 @@ def before_after(beat: dict[str, Any], errors: dict[str, float]) -> Figure:
         loop.plot(np.append(asked, asked[0]), np.append(pressed, pressed[0]), **style)
     _name(over_time, label("time", "s"), label("force", "N"), "One beat on the finger")
     _name(loop, label("force asked", "N"), label("force pressed", "N"), "The loop closes")
-    loop.set_aspect("equal", adjustable="datalim")
+    loop.set_aspect("equal")
+    for axis in (loop.xaxis, loop.yaxis):  # equal scales have equal ticks
+        axis.set_major_locator(MultipleLocator(2.0))
     figure.legend(*over_time.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 

@@ -1,6 +1,7 @@
 """Draw the figures of the pages: ``python docs/figures.py`` writes docs/figures/*.svg.
 
-A made-up operator, evaluated by the program's own core: what the pages show is what the program computes.
+A made-up operator, evaluated by the program's own core, and two of the measured records of tests/data: what the pages show
+is what the program computes.
 """  # noqa: INP001 - a folder of pages with its script, not a package
 
 from __future__ import annotations
@@ -11,14 +12,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from before_after import pictures
+from before_after import DARK, pictures
 from demo import KEPT
+from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
 
+import pulsetrainer as pt
 from pulsetrainer.core.inversion import invert
 from pulsetrainer.core.memory import State
 from pulsetrainer.core.operator import Preisach, follow
 from pulsetrainer.core.plane import Plane
+from pulsetrainer.report.figures import model as model_figure
 from pulsetrainer.report.render import encode
 from pulsetrainer.report.style import (
     BLUE,
@@ -41,6 +45,7 @@ if TYPE_CHECKING:
     FloatArray = NDArray[np.float64]
 
 HERE = Path(__file__).parent / "figures"
+DATA = Path(__file__).parents[1] / "tests" / "data"
 SIZE_IN = (7.6, 3.5)
 
 
@@ -121,9 +126,11 @@ def everett() -> Figure:
     field[model.plane.cell_indices] = np.minimum(model.weights, np.quantile(model.weights, 0.97))
     edges = model.plane.edges
     shown = np.ma.masked_invalid(field)
-    left.pcolormesh(edges, edges, shown, cmap="Blues", rasterized=True)
+    blues = LinearSegmentedColormap.from_list("blues", [to_rgba(BLUE, 0.0), BLUE])  # on any ground
+    left.pcolormesh(edges, edges, shown, cmap=blues, rasterized=True)
     left.fill([beta, beta, alpha], [beta, alpha, alpha], facecolor="none", edgecolor=VERMILION, linewidth=2)
-    left.annotate("E(α, β)", (0.42, 0.67), color=VERMILION, weight="bold")
+    line = {"arrowstyle": "-", "color": VERMILION}
+    left.annotate("E(α, β)", (0.58, 0.66), (0.6, 0.4), color=VERMILION, weight="bold", arrowprops=line)
     left.annotate("α", (0.02, alpha), color=VERMILION, va="bottom")
     left.annotate("β", (beta, 0.02), color=VERMILION, ha="left")
     left.plot([0, beta], [alpha, alpha], **GUIDE)
@@ -160,7 +167,7 @@ def wiping_out() -> Figure:
     left.plot(
         range(1, 5), turns[1:5], "o", color=VERMILION, markersize=6, fillstyle="none", label="wiped out"
     )
-    left.plot([5], turns[5:], "o", color=VERMILION, markersize=6, label="kept")
+    left.plot([5], turns[5:], "o", color=VERMILION, markersize=6, label="kept", clip_on=False)
     left.set_xlabel("time")
     left.set_ylabel("input u")
     left.set_ylim(0, 1.12)
@@ -205,14 +212,39 @@ def inverse() -> Figure:
     return figure
 
 
+def measured_steel() -> Figure:
+    """Return the model of an electrical steel: a steep loop."""
+    run = pt.read_table(
+        DATA / "bh_steel_m130_27s_3.csv", input="u", output="y", input_unit="A/m", output_unit="T"
+    )
+    return model_figure(pt.identify(run))
+
+
+def measured_damper() -> Figure:
+    """Return the model of a damper, which is the wrong kind."""
+    return model_figure(pt.identify(pt.read_table(DATA / "mrdamper_ensaio1_1.csv", input="u", output="y")))
+
+
 FIGURES = {"plane": plane, "everett": everett, "wiping-out": wiping_out, "inverse": inverse}
+MEASURED_FIGURES = {"measured-steel": measured_steel, "measured-damper": measured_damper}
+
+
+def themed(svg: str) -> str:
+    """Return a figure that is light on a light page and dark on a dark one, without a ground of its own."""
+    names = {colour: f"--c{number}" for number, colour in enumerate(DARK)}
+    for colour, name in names.items():
+        svg = svg.replace(colour, f"var({name}, {colour})")
+    dark = "; ".join(f"{names[colour]}: {other}" for colour, other in DARK.items())
+    style = f"<style>@media (prefers-color-scheme: dark) {{ svg {{ {dark} }} }}</style>"
+    at = svg.index(">", svg.index("<svg")) + 1
+    return f"{svg[:at]}\n {style}{svg[at:]}".replace("fill: #ffffff", "fill: none")
 
 
 def main() -> None:
     """Write every figure."""
     HERE.mkdir(exist_ok=True)
-    for name, draw in FIGURES.items():
-        (HERE / f"{name}.svg").write_bytes(encode(draw(), "svg"))
+    for name, draw in (FIGURES | MEASURED_FIGURES).items():
+        (HERE / f"{name}.svg").write_text(themed(encode(draw(), "svg").decode()), encoding="utf-8")
         print(f"wrote docs/figures/{name}.svg")
     for name, picture in pictures(json.loads(KEPT.read_text(encoding="utf-8"))).items():
         (HERE / name).write_text(picture, encoding="utf-8")

@@ -36,8 +36,8 @@ COMMANDS = """\
 
 {mark}
 
-`pulsetrainer COMMAND --help` says the same on the screen. Results go to stdout, progress and notes to stderr; bars show
-only on a terminal, colours nowhere when `NO_COLOR` is set. No command replaces a file without `--overwrite`.
+`pulsetrainer COMMAND --help` shows the same on the screen. Results go to stdout, progress and notes to stderr. Progress bars appear
+only on a terminal; with `NO_COLOR` set there are no colours. No command replaces a file without `--overwrite`.
 
 With `--json` a command writes one object to stdout: `{{"schema": 1, "command": ..., ...}}`, and for an error
 `"error": {{"kind", "message", "hint"}}`.
@@ -51,21 +51,21 @@ With `--json` a command writes one object to stdout: `{{"schema": 1, "command": 
 
 
 CODES = {
-    0: "it is done",
-    1: "a quality gate failed: a bound of `evaluate --bounds`, a finding of `doctor`",
-    2: "the command line, the settings, or an output that exists",
-    3: "an artefact or its data",
-    4: "the device or the line to it",
+    0: "success",
+    1: "a quality gate failed: a bound of `evaluate --bounds`, or a problem that `doctor` found",
+    2: "wrong command line or settings, or an output that already exists",
+    3: "something is wrong with an artefact or its data",
+    4: "something is wrong with the device or the line to it",
     5: "a fit or an inverse did not converge",
-    70: "a bug of ours: `--debug` shows where",
+    70: "a bug in this program: `--debug` shows where",
     130: "you stopped it",
-    141: "who reads the output went away, as `head` does: what was not printed yet is lost, and may not be done",
+    141: "the reader of the output went away, as `head` does: the rest was not printed, and may not have been done",
 }
 SETTINGS_WORDS = """\
-What stands in `pulsetrainer.toml` need not be typed. The file is that in the folder where you work, or the one that
-`--settings` or `PULSETRAINER_SETTINGS` names, or the one in your own configuration folder. A flag wins over the
-environment, the environment over the file, the file over the default; an unknown key is an error. A dot in a key is a
-table of the file.
+Options set in `pulsetrainer.toml` need not be typed. The file is the one that `--settings` or `PULSETRAINER_SETTINGS` names, or
+the one in the folder where you work, or the one in your own configuration folder. An option overrides the environment, the
+environment the file, and the file the default; an unknown key is an error. A dot in a key stands for a table of the file:
+`limits.force_N` is `force_N` under `[limits]`.
 """
 
 
@@ -152,20 +152,20 @@ FORMAT = """\
 Every artefact is one HDF5 file. Any HDF5 reader opens it; axes are dimension scales, so xarray
 (`xarray.open_dataset("run.h5", engine="h5netcdf")`) finds them by name, and pint parses every unit.
 
-- **Root attributes**: `kind` ({kinds}), `format_version` (1), `title`, `created` (UTC, ISO 8601), `history` (a line a
+- **Root attributes**: `kind` ({kinds}), `format_version` (1), `title`, `created` (UTC, ISO 8601), `history` (one line for each
   command, oldest first), `provenance` (JSON: program, version, argv, effective parameters, seed, sha256 of the inputs,
   versions of the libraries, serial number and firmware of the device), `samples` where there is a time axis.
-- **Datasets** have the attributes `units` and `quantity` (in words). Numbers are 64-bit floats, yes and no are 8-bit
-  integers with the attribute `dtype` = `bool`. NaN stands for a sample that was lost; what drives a device and what a model
-  is made of holds neither NaN nor infinity.
-- **Units** come with the data: where the table says `input_unit`, the attribute of that name in the same group says which.
-- **Groups** hold parts, groups named `0000`, `0001`, ... hold a list. What is marked *optional* may be missing.
+- **Datasets** have the attributes `units` and `quantity` (in words). Numbers are 64-bit floats; yes and no are 8-bit
+  integers with the attribute `dtype` = `bool`. NaN stands for a lost sample; drives and the parts of a model
+  contain neither NaN nor infinity.
+- **Units** come with the data: where a table below gives `input_unit` as the unit, the attribute of that name in the same group holds it.
+- **Groups** hold parts; groups named `0000`, `0001`, ... form a list. What is marked *optional* may be missing.
 - An axis is the dataset of its name: `time` in seconds, or an index (`level`, `cell`, `repeat`, `group`, `beat`, `question`). Time may be
   missing in a run that was imported without one.
 - Files are written under another name and renamed when they are complete: a killed command leaves the old file or none. A
   capture keeps its samples in `NAME.partial` until it ends; stopped by a fault or Ctrl-C, it has `complete` = 0. After a kill
-  or a power cut `NAME.partial` is left: every command that reads a run reads it, and `capture --resume` goes on with it.
-  Of a session it is a session, as far as it went.
+  or a power cut `NAME.partial` is left: every command that reads a run reads it, and `capture --resume` continues it.
+  What is left of a session is read as a session, up to where it stopped.
 
 Cells of the Preisach plane are numbered k = i (i + 1) / 2 + j, i >= j: the relays that switch up between levels i and i + 1,
 down between levels j and j + 1 ([theory](theory.md)).
@@ -176,16 +176,46 @@ down between levels j and j + 1 ([theory](theory.md)).
 
 # attributes have no words of their own in the file
 WORDS = {
+    "answered": "names answered, question by question",
+    "as_measured": "whether the signs of parameters are those of the output as measured",
+    "asked": "names asked, question by question",
+    "begin_s": "s, start of the record since that of the first one, as if they had been made one after another",
+    "captured": "whether it was recorded on our own device",
+    "choices": "names that could be answered",
+    "detectable_from_percent": "smallest effect that would have shown, rms, % of the span",
+    "doubts": "what speaks against a cause that was found, in words",
+    "edges_unit": "unit of the edges: that of the input, or of the output of a dual model",
+    "false_reversals": "reversals made by noise, taken out of the input before the fit",
+    "fault": "why the device stopped early; empty if it did not",
+    "form": "direct, dual or signed",
+    "learner": "who answered",
+    "loop": "counterclockwise, clockwise, butterfly or none; of a falling output once it is turned to rise",
+    "masked_samples": "wild samples, left out of the fit",
+    "meaning": "the parameter in words",
+    "minor_percent": "cells that minor loops tell apart, % of those within the range; NaN where unknown",
+    "notes": "what a person should know about it",
+    "offset_unit": "unit of the offset: that of the output, or of the input of a dual model",
+    "offsets": "offset of each run's output from their mean; zeros where one offset serves all",
+    "period_s": "s, length of one beat",
+    "pulses": "names of the pulses",
+    "serial": "serial number of the device",
+    "spacing": "of the levels: even, or crowded where the loop is steep",
+    "state": "the state in words",
+    "stiffness": "how alike the density is along the diagonal; 0: it is free",
+    "tau_s": "s, time constant of the state",
+    "underruns": "times that the reference did not arrive in time",
+    "warning": "that this kind of model is the wrong one, in words; empty if it is not",
+    "whole": "no while what is left is more than noise",
     "start": "state before the run: known, or which one was estimated",
     "cause": "id of the cause",
     "clipped_samples": "targets outside the reachable range",
-    "complete": "the recording was not interrupted",
-    "confounded_with": "causes that these runs cannot tell from it",
+    "complete": "whether the recording was not interrupted",
+    "confounded_with": "causes that these runs cannot tell apart from it",
     "draws": "refits of the block bootstrap, 0 for none",
-    "dropped_samples": "lost on the wire; those that are here are right",
+    "dropped_samples": "lost on the wire; the others are right",
     "evidence": "reasons for the verdict, in words",
     "explains_percent": "of what can be explained of the squared error",
-    "found": "it was found",
+    "found": "whether it was found",
     "held_out_gain_percent": "of what can be explained, on blocks that were not fitted; NaN where not measured",
     "input_quantity": "what the input is",
     "input_unit": "unit of the input",

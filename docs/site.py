@@ -30,6 +30,8 @@ PAGES = (
     "waveforms/README.md",
 )
 LINK = re.compile(r"(\]\(|src=\"|srcset=\")([^)#\"]+)")
+# what GitHub draws by a program that the site would have to fetch, with the paragraph about it; a table says the same
+DRAWING = re.compile(r"(?:[^\n]+\n)+\n```mermaid\n.*?\n```\n\n", re.DOTALL)
 DATA = re.compile(r"(?:\.\./)+tests/data/[\w.]+")  # what a notebook reads
 LISTS = {"HOW_TO": "docs/how-to/*.md", "DECISIONS": "docs/decisions/*.md"}
 
@@ -44,6 +46,8 @@ def gather() -> None:
         if file.suffix == ".ipynb":  # its links to others: there they are pages
             text = file.read_text(encoding="utf-8")
             copy.write_text(re.sub(r"(\]\([^):]+)\.(?:ipynb|md)\)", r"\1.html)", text), encoding="utf-8")
+        elif file.suffix == ".md":
+            copy.write_text(DRAWING.sub("", file.read_text(encoding="utf-8")), encoding="utf-8")
         else:
             shutil.copyfile(file, copy)
     (SITE / "docs" / "api.md").write_text(api(), encoding="utf-8")

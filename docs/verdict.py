@@ -50,7 +50,7 @@ def verdict_page(mark: str) -> str:
     parts = [VERDICT.format(mark=mark), "## The stages\n"]
     for number, module in enumerate(stages, start=1):
         title, text = _docstring(module)
-        parts.append(f"{number}. **{title}.** {textwrap.indent(text, '   ').lstrip()}\n")
+        parts.append(f"{number}. **{title}.** {textwrap.indent(text, '    ').lstrip()}\n")
     parts.append("## How it is computed\n")
     for module in METHODS:
         title, text = _docstring(module)

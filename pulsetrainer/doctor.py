@@ -154,10 +154,10 @@ def _folder() -> Iterator[Finding]:
             os.fsync(probe.fileno())
     except OSError as error:
         said = f"{where} cannot be written: {error.strerror or error}"
-        yield _finding("folder", said, problem="work in a folder of your own, or make room")
+        yield _finding("folder", said, problem="work in a folder of your own, or free some space")
         return
     free_MB = shutil.disk_usage(where).free / 1e6
-    fix = None if free_MB > _ROOM_MB else "make room: an hour of capture takes 150 MB"
+    fix = None if free_MB > _ROOM_MB else "free some space: an hour of capture takes 150 MB"
     yield _finding("folder", f"{where} can be written, {free_MB:.0f} MB free", warning=fix)
 
 
@@ -169,11 +169,11 @@ def _ports() -> Iterator[Finding]:
     }
     ports = list_ports()
     if not ports:
-        yield _finding("ports", "no serial port; without a device --port bench: is there")
+        yield _finding("ports", "no serial port; without a device, use --port bench:")
     for port in ports:
         state: State = "ok" if port.status == "free" else "problem" if port.is_device else "warning"
         known = [text for text in (port.description, port.vid_pid) if text not in ("", "n/a")]
-        kind = ["our device", port.vid_pid] if port.is_device else known or ["not known what it is"]
+        kind = ["our device", port.vid_pid] if port.is_device else known or ["unknown device"]
         said = f"{port.status}, {' '.join(kind)}".strip()
         yield Finding(f"port {port.device}", state, said, fixes.get(port.status, ""))
 
@@ -250,7 +250,7 @@ def _noise(name: str, still: FloatArray, full: float, of: str, unit: str, fix: s
     sigma = float(np.std(scipy.signal.detrend(still)))  # creep is a slope on so short a hold
     if sigma == 0.0:
         said = f"none at all: {still[0]:.4g} {unit} in every sample"
-        return _finding(name, said, warning="is the sensor alive?")
+        return _finding(name, said, warning="check that the sensor is connected and has power")
     share = sigma / full if full > 0 else 0.0
     said = f"{1e3 * sigma:.2g} m{unit} rms, {100 * share:.2g} % of the {of}"
     return _finding(name, said, warning=fix if share > _NOISE_SHARE else None)
@@ -271,5 +271,5 @@ def _rails(recording: Trace, top: float) -> Iterator[Finding]:
     yield _finding("current tracking", said, warning=tune if worst > _TRACKING_SHARE else None)
     fired.pop("current-tracking", None)
     for cause, one in fired.items():
-        more = "pulsetrainer diagnose tells more"
+        more = "pulsetrainer diagnose shows more"
         yield _finding(f"force: {cause}", wording.text(one.evidence), warning=more)

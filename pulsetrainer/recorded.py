@@ -107,8 +107,8 @@ def _then(remedy: str) -> str:
     if "`" in remedy:  # it names options: with others it is another capture
         return remedy
     if remedy == FORCE_REMEDY:
-        return f"{remedy}; then record again with --overwrite: the force just before this was not true"
-    return (f"{remedy}; then " if remedy else "") + "go on with the same command and --resume"
+        return f"{remedy}; then record again with --overwrite: the force recorded just before this was wrong"
+    return (f"{remedy}; then " if remedy else "") + "continue with the same command and --resume"
 
 
 def session_into(

@@ -32,6 +32,7 @@ def lay_out(folder: Path) -> None:
     (folder / "other" / "run.csv").write_text("t_s,current_A,force_N\n0,0,0\n")
     (folder / "wrong.toml").write_text("levles = 48\n")
     (folder / "limits.toml").write_text("[limits]\ncurent_A = 1.0\n")
+    (folder / "two words.csv").write_text("t,u,y\n0,0,0\n")
     (folder / "bare").mkdir()
     (folder / "bare.toml").write_text("")
     (folder / "pulse.toml").write_text("normal = 3\n")
@@ -130,6 +131,8 @@ def at_once() -> dict[str, Mistake]:
     bounds = ("evaluate", "played.h5", "--bounds", "absent.toml")
     found["no such file of bounds"] = Mistake(bounds, 2, "absent.toml")
     found["no such CSV signal"] = Mistake(("capture", "absent.csv", "-o", "out.h5"), 3, "(argument ")
+    nowhere = ("play", "drive.h5", "-o", "out.h5", "--port", "")
+    found["a port that a script left empty"] = Mistake(nowhere, 2, "--port must name a port", "leave it out")
     return found
 
 
@@ -150,7 +153,7 @@ _WORDS_OF_A_TIRED_HAND = {
     ),
     "a force in another unit": (
         *("invert normal --model model.h5 -o out.h5 --force-max 20kN", 2, "got '20kN'"),
-        "the number alone: force at its top, N or",
+        "the number alone, without a unit; --force-max is: force at its top, N or",
     ),
     "an option of another command": (
         "identify run.h5 --model model.h5 -o out.h5",
@@ -185,14 +188,19 @@ _WORDS_OF_A_TIRED_HAND = {
         "give its path",
     ),
     "json before the command": (
-        *("--json show run.h5", 2, "pulsetrainer has no option --json", "behind the command"),
+        *("--json show run.h5", 2, "pulsetrainer has no option --json", "after the command"),
     ),
-    "an output without its name": ("identify run.h5 -o", 2, "-o needs a value: file to write", "behind -o"),
+    "an output without its name": ("identify run.h5 -o", 2, "-o needs a value: file to write", "after -o"),
     "an option in the place of a name": (
-        *("capture identification -o --json", 2, "--json stands where the name of a file", "then --json"),
+        *(
+            "capture identification -o --json",
+            2,
+            "the name of a file is missing before --json",
+            "then --json",
+        ),
     ),
     "a folder of nothing": ("identify bare -o out.h5", 3, "bare is a folder", "bare holds none"),
-    "a folder as a page": ("evaluate played.h5 --html bare", 2, "bare is a folder", "name a file in it"),
+    "a folder as a page": ("evaluate played.h5 --html bare", 2, "'bare' is a folder", "name a file in it"),
     "one run twice": ("identify run.h5 run.h5 -o out.h5", 2, "run.h5 is named twice", "each file once"),
     "a quiz of one pulse": (
         *(
@@ -266,7 +274,7 @@ _WORDS_OF_A_TIRED_HAND = {
     "one table twice": (
         *("import x.csv x.csv --input u --output y -o out.h5", 2, "x.csv is named twice", "each file once"),
     ),
-    "bounds of nothing": ("evaluate played.h5 --bounds bare.toml", 2, "holds no bound", "= [90, 100]"),
+    "bounds of nothing": ("evaluate played.h5 --bounds bare.toml", 2, "has no bounds", "= [90, 100]"),
     "a bound the wrong way round": (
         *("evaluate played.h5 --bounds round.toml", 2, "got [98, 90]", "percent = [90.0, 98.0]"),
     ),
@@ -275,7 +283,7 @@ _WORDS_OF_A_TIRED_HAND = {
             "evaluate played.h5 --bounds one.toml",
             2,
             "a pair [low, high], got 90",
-            "= [81.0, 99.0], the lowest",
+            "= [81.0, 99.0], the lowest first",
         ),
     ),
     "a bound of a pulse": (
@@ -294,10 +302,26 @@ _WORDS_OF_A_TIRED_HAND = {
             "--settings limits.toml show run.h5",
             2,
             "'limits.curent_A'",
-            "did you mean current_A below [limits]?",
+            "did you mean current_A under [limits]?",
         ),
     ),
     "a switch with a value": ("show run.h5 --json=yes", 2, "--json takes no value", "write --json alone"),
+    "a beginning of an option": ("identify run.h5 --o out.h5", 2, "no option --o", "did you mean --out"),
+    "two drives": ("play drive.h5 model.h5 -o out.h5", 2, "got model.h5 as well", "one drive at a time"),
+    "a name with spaces, of the only file": (
+        *("show two words.csv", 2, "got words.csv as well", "in quotes: 'two words.csv'"),
+    ),
+    "a name with spaces, of several files": (
+        "import two words.csv --input u --output y -o out.h5",
+        *(3, "two (argument FILE.csv) does not exist", "in quotes: 'two words.csv'"),
+    ),
+    "no table of such a name": (
+        *("import nothing --input u --output y -o out.h5", 3, "nothing (argument", "no file here has"),
+    ),
+    "a figure for a pipe": ("plot run.h5 -o -", 2, "- has no such ending", "name it figure.png"),
+    "an update without its output": (
+        *("check model.h5 --update", 2, "--update, which writes the updated model,", "give both"),
+    ),
 }
 
 
@@ -326,6 +350,8 @@ TABLES = {
     "wide.csv": "time;Spannung;Kraft;Bemerkung\n0,0;1,5;2,5;gut\n0,1;2,5;3,5;gut\n",
     "still.csv": "t,F\n0,0\n1,1\n1,2\n2,3\n",
     "bounds.toml": "normal.continuous.mean_err = [1, 2]\n",
+    "bare.csv": "0,0.1,2\n1,0.2,3\n2,0.3,4\n",
+    "excel.csv": "Zeit (s);Strom (A);Kraft (N)\n0,000;0,10;1.234,5\n0,001;0,20;1.235,5\n",
 }
 INSIDE = {
     "a drive as a run": Mistake(
@@ -394,7 +420,7 @@ INSIDE = {
     "learnt from a drive that was not refined": Mistake(
         ("invert", "bifid", "--model", "model.h5", "-o", "out.h5", "--learnt", "drive.h5"),
         3,
-        "that --learnt names",
+        "given as --learnt was never refined",
         "pulsetrainer refine drive.h5",
     ),
     "a unit in words": Mistake(
@@ -402,7 +428,7 @@ INSIDE = {
             *("import", "wide.csv", "--input", "Spannung", "--output", "Kraft", "--input-unit", "Volts"),
             *("-o", "out.h5"),
         ),
-        *(3, "'Volts' is not a known unit", "did you mean 'V'?"),
+        *(3, "--input-unit 'Volts' is not a known unit", "did you mean 'V'?"),
     ),
     "a unit in words, with a prefix": Mistake(
         (
@@ -431,10 +457,46 @@ INSIDE = {
     ),
     "too many levels for the coil": Mistake(
         ("capture", "identification", "-o", "out.h5", "--levels", "2000"),
-        *(3, "heats even a cold coil to 108 % of", "fewer --levels"),
+        *(3, "would heat the coil to 108 % of its limit, even from cold", "fewer --levels"),
     ),
     "a pulse whose time stands still": Mistake(
         ("invert", "still.csv", "--model", "model.h5", "-o", "out.h5"), 3, "line 4", "with more digits\n"
+    ),
+    "a force limit that nothing keeps": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--limit-force", "0.5"),
+        *(4, "a force of 13.6 N is predicted", "raise --limit-force, or capture again with a lower"),
+    ),
+    "a heading of a table without headings": Mistake(
+        ("import", "bare.csv", "--input", "current_A", "--output", "force_N", "-o", "out.h5"),
+        *(3, "it has no headings", "by number: 1 is the first"),
+    ),
+    "a separator of thousands, as Excel writes it in German": Mistake(
+        ("import", "excel.csv", "--input", "Strom (A)", "--output", "Kraft (N)", "-o", "out.h5"),
+        *(3, "excel.csv has '1.234,5' in column Kraft (N), line 2", "without thousands separators"),
+    ),
+    "nobody at the other side": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "socket://localhost:1"),
+        *(4, "cannot reach socket://localhost:1: Connection refused\n", "the other side is listening"),
+    ),
+    "a file as a port": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "run.h5"),
+        *(4, "run.h5 is not a serial port\n", "pulsetrainer ports"),
+    ),
+    "a session of no beat": Mistake(
+        ("session", "--model", "model.h5", "-o", "out.h5", "--beats", "0"),
+        *(2, "--beats must be 1 or more and at most 345600, got 0", "about a quarter of a minute"),
+    ),
+    "a rate that no heart has": Mistake(
+        ("session", "--model", "model.h5", "-o", "out.h5", "--rate", "1000"),
+        *(2, "a rate of 1000 beats a minute is outside 20 to 240", "a usual rate is 75"),
+    ),
+    "a bench parameter that is no number": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "bench:?seed=abc"),
+        *(2, "seed=abc is not a number", "give seed a value in that range; it sets:"),
+    ),
+    "more bytes damaged than there are": Mistake(
+        ("play", "drive.h5", "-o", "out.h5", "--port", "bench:?wire=9"),
+        *(2, "must be the share of bytes to damage, from 0 to 0.1, got 9", "one byte in ten thousand"),
     ),
     "answers that are no text": Mistake(
         (

@@ -56,7 +56,7 @@ MESSAGES = {
     "kept elsewhere": Message("kept in", "", "{file}"),
     "recording is finished": Message("finished", "a new run"),
     "disk is full": Message("is full", "kept", "{folder}", got="bytes are left"),
-    "no folder": Message("there is no folder", "mkdir -p", "{folder}"),
+    "no folder": Message("does not exist", "mkdir -p", "the folder {folder}"),
     "no sound provenance": Message("the provenance is not", "", "{file}"),
     "no provenance": Message("'provenance' is missing", "", "{file}"),
     "not writable": Message("not writable", "", "{folder}"),
@@ -66,7 +66,7 @@ MESSAGES = {
     "column not named": Message("--input is missing", "--input 'Drive (V)'", "piezo.csv", "{has}"),
     "not finite": Message(" a number: ", "remove", "{file}", got="{value} in column {column}, line {line}"),
     "separator of thousands": Message(
-        "not a number", "separator of thousands", got="{cell!r} in column {column}, line {line}"
+        "not a number", "thousands separators", got="{cell!r} in column {column}, line {line}"
     ),
     "not a number": Message("not a number", "line", "{file}", got="'abc' in column current_A, line 3"),
     "bad rows": Message("not a number", "--skip-bad-rows", "{file}", got="{place}: not a number ({where})"),
@@ -160,7 +160,7 @@ MESSAGES = {
     "no cache": Message("cannot write the firmware cache", "", "{folder}"),
     "refused by number": Message("", "", got="{code}", expected="{fault}"),
     "too hot now": Message("too hot", "wait", got="% of its limit"),
-    "too hot ever": Message("even a cold coil", "lower current", got=" % of the heat that it bears"),
+    "too hot ever": Message("even from cold", "lower current", got=" % of its limit"),
     "another shape": Message("shape", ""),
     "stray current": Message("current flows although the reference is zero", ""),
     "current flows on": Message("still flow", "plug", got="{amperes}"),
@@ -208,7 +208,7 @@ MESSAGES = {
         expected="below {least} A",
         got="the limit in force is {limit} A",
     ),
-    "a quiz without a terminal": Message("a quiz is answered by key", "in a file", got="no live view"),
+    "a quiz without a terminal": Message("answered on the keyboard", "in a file", got="no live view"),
     "another supply": Message("does not fit the voltage", "the supply", "during {during}"),
     "limit below the model's range": Message(
         "the current goes up", "--limit-current", expected="the limit in force is {limit} A", got="{got} A"
@@ -227,7 +227,7 @@ MESSAGES = {
 NOTES = {
     "false reversals": ("false reversals",),
     "cells never switched": ("never switched", "% of the plane"),
-    "reversed": ("falls where the model rises", "the other way round", "Identify it again"),
+    "reversed": ("falls where the model rises", "the wrong way round", "Identify it again"),
     "follows the velocity": ("velocity of u", "wrong model"),
     "leaves much": ("% of the span", "the noise from sample to sample", "pulsetrainer diagnose"),
     "not congruent": ("not congruent", "% of the span", "other reversals"),
@@ -239,7 +239,7 @@ NOTES = {
     "follows half the range": ("% of 0.75 A",),
     "stronger": ("the force moved by +5", "(limit 1.5 %)"),
     "changed": ("(limit 0.", "next", "identify again", "temperature"),
-    "taken as seconds": ("says no unit that is known", "seconds", "[min]"),
+    "taken as seconds": ("has no known unit", "seconds", "[min]"),
     "beats found": ("6 whole beats", "0.644 to 0.653 s"),
     "stretched": ("are stretched to", "N: give --force-min and --force-max"),
 }

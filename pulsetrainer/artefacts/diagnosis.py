@@ -40,7 +40,7 @@ class Profile:
 
 @dataclass(frozen=True, slots=True)
 class Dependence:
-    """A learned dependence of the output on a state of the device that is in no list (k places)."""
+    """A learned dependence of the output on a state that is not in the list of causes (k places)."""
 
     text: str  # in words
     state: str  # in words

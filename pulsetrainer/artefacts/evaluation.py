@@ -133,6 +133,7 @@ class Evaluation(Shown):
     models: tuple[ModelEvaluation, ...] = ()
     model: Model | None = None  # the model behind the last waveform, for the figures
     notes: tuple[str, ...] = ()  # what a person should know about the comparison
+    warnings: tuple[str, ...] = ()  # why the models may be the wrong ones for it
 
     def figures(self) -> dict[str, float]:
         """All figures by dotted name: ``normal.continuous.scaled.max_abs_error_percent``."""

@@ -17,7 +17,7 @@ from pulsetrainer.artefacts.time_steps import behind_turns
 
 @dataclass(frozen=True, slots=True)
 class Coil:
-    """What the duty told of the coil while the device recorded: see ``core.temperature``."""
+    """What the duty showed of the coil while the device recorded: see ``core.temperature``."""
 
     duty_per_A: Annotated[float, Data("1/A", "duty for a current, cold coil")]
     duty_offset: Annotated[float, Data("1", "duty for the free-wheeling diode")]
@@ -30,7 +30,7 @@ class Coil:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Run(Shown):
-    """What a device, or a table from any bench, reported: nothing that a real device does not know.
+    """What a device, or a table from any bench, reported: only what a real device can know.
 
     Examples
     --------
@@ -107,7 +107,8 @@ class Run(Shown):
         plural = "s" if number > 1 else ""
         return (
             f"the input may have turned unseen in {number} gap{plural} of the time stamps: "
-            "what is behind counts from where the input next reaches an end, which makes its memory known"
+            "what follows counts only from where the input next reaches an end, since its memory is known "
+            "there"
         )
 
     @property
@@ -126,8 +127,8 @@ class Run(Shown):
     def parts(self, at_least: int = 1) -> tuple[Run, ...]:
         """Return the uninterrupted parts of ``at_least`` so many samples; the run itself where there is none.
 
-        After a seam the device had been off: what is slow in it (heat, creep) does not go on where it was.
-        Each such part begins at the low end of the input, so that its memory is known; behind an unseen turn
+        Before a seam the device was off, so what is slow in it (heat, creep) does not continue across it.
+        Each such part begins at the low end of the input, so that its memory is known; after an unseen turn
         it is known from where the input next reaches an end.
         """
         slices = self.slices

@@ -101,8 +101,8 @@ def _is_symbol(text: str) -> bool:
 def check_unit(text: str, what: str, where: str = "") -> str:
     """Return a unit as it is written; the two letters that look like a micro are one.
 
-    DataError where it is none; ``what`` names it there ("input unit"), ``where`` what it was read from, if
-    anything ("the heading 'Force (measured)' of scope.csv").
+    DataError where it is none; ``what`` is the option for it, ``where`` what it was read from, if anything
+    ("the heading 'Force (measured)' of scope.csv").
     """
     if is_unit(text):
         return text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}")  # they look the same
@@ -110,8 +110,8 @@ def check_unit(text: str, what: str, where: str = "") -> str:
     near = [spelled] if spelled else difflib.get_close_matches(text, [*_PREFIXED, *_BARE], n=2, cutoff=0.5)
     meant = f"did you mean {' or '.join(repr(n) for n in near)}? " if near else ""
     raise DataError(
-        f"the {what} {text!r}{where and ' in '}{where} is not a known unit",
-        hint=f"{meant}give the {what}, such as N or mm/s^2; 1 stands for a pure number",
+        f"{what} {text!r}{where and ' in '}{where} is not a known unit",
+        hint=f"{meant}Give {what}, such as N or mm/s^2; 1 stands for a pure number",
     )
 
 
@@ -218,7 +218,8 @@ def shown(unit: str) -> str:
             continue
         digits = len(power) - len(power.lstrip("-0123456789"))
         head += power[:digits].translate(_POWERS) + power[digits:]
-    return head.replace("*", "·")
+    printed = head.replace("*", "·").removesuffix("/1²")  # the square of a number without a unit
+    return "" if printed == "1" else printed
 
 
 _WHOLE = 100.0  # from here on no decimals

@@ -25,7 +25,7 @@ class RefinePass:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Waveform(Shown):
-    """A target force and the two currents that shall press it: compensated and merely scaled.
+    """A target force and the two currents meant to press it: compensated and merely scaled.
 
     Examples
     --------
@@ -57,6 +57,7 @@ class Waveform(Shown):
     model: Model | None = None
     period_s: float = float("nan")  # of one beat
     notes: tuple[str, ...] = ()  # what a person should know about the inverse
+    warnings: tuple[str, ...] = ()  # why it may not press what is asked for
     passes: tuple[RefinePass, ...] = ()  # of refining, in their order
     kept: int = 0  # number of the pass whose drive this is, from 1
 

@@ -32,13 +32,13 @@ def capture(
     out: Out,
     port: Port = None,
     levels: Annotated[
-        int, setting("levels", "--levels", "Levels whose cells the signal shall switch.", min=2)
+        int, setting("levels", "--levels", "Levels of the plane whose cells the signal switches.", min=2)
     ] = 48,
     current_max_A: Annotated[float, setting("current_max_A", "--current-max", "Top of the range, A.")] = 1.5,
     speed_A_per_s: Annotated[
         float, setting("speed_A_per_s", "--speed", "Speed of the identification signal, A/s.")
     ] = 0.75,
-    rate_Hz: Annotated[float, setting("rate_Hz", "--rate", "Samples a second, Hz.")] = 1000.0,
+    rate_Hz: Annotated[float, setting("rate_Hz", "--rate", "Sample rate, Hz.")] = 1000.0,
     condition: Annotated[bool, Option(help="Go around the major loop once before recording.")] = True,
     repeats: Annotated[int, Option(min=1, help="How often the signal is played, without a pause.")] = 1,
     resume: Annotated[

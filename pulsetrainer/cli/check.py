@@ -28,7 +28,7 @@ def check(
     model: Annotated[Path, Argument(help="Model of the device.", metavar="MODEL.h5")],
     port: Port = None,
     update: Annotated[
-        bool, Option("--update", help="Write a model with the present offset and gain.")
+        bool, Option("--update", help="Write a model with the present offset and gain; needs -o.")
     ] = False,
     out: Annotated[Path | None, Option("-o", "--out", help="File to write, with --update.")] = None,
     limit_current_A: LimitCurrent = None,
@@ -36,11 +36,11 @@ def check(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Tell in ten seconds whether a model is still true.
+    """Check in ten seconds whether a model still describes its device.
 
     It measures on the model's own device, with the force sensor in place.
 
-    The verdict is true, shifted (offset, gain, temperature) or changed (the shape: identify again).
+    The verdict is true, shifted (offset, gain or temperature) or changed (the shape: identify again).
 
     Example: pulsetrainer check model.h5 --update -o updated.h5
     """
@@ -48,7 +48,7 @@ def check(
 
     if update != (out is not None):
         raise UsageError(
-            "--update writes a model and -o names its file: the one needs the other",
+            "--update, which writes the updated model, and -o, which names its file, need each other",
             hint="give both, or neither",
         )
     job = Job(context, inputs=(model,), outputs=(out,))

@@ -22,13 +22,13 @@ def compare(
         list[Path], Argument(help="Evaluations or sessions, the oldest first.", metavar="EVALUATION.h5...")
     ],
     out: Annotated[Path | None, Option("-o", "--out", help="Figure (png, svg, pdf) or table (csv).")] = None,
-    everything: Annotated[bool, Option("--all", help="All figures, not only the headlines.")] = False,
+    everything: Annotated[bool, Option("--all", help="All figures, not only the main ones.")] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Compare evaluations or sessions side by side.
 
-    Before and after, device against device, week against week, learner against learner.
+    For example before and after, two devices, two weeks, or two learners.
 
     Example: pulsetrainer compare before.h5 after.h5 -o change.png
     """

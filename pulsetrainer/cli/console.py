@@ -68,9 +68,9 @@ class Screen:
         self.is_terminal = sys.stdout.isatty()
         self.width = shutil.get_terminal_size().columns if self.is_terminal else _PIPE_WIDTH
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, lead: str = "note: ") -> None:
         """Say one line to the person, beside the results; on a terminal folded between words."""
-        say("" if text.startswith("warning: ") else "note: ", text)
+        say(lead, text)
 
     @contextmanager
     def bar(self, label: str) -> Iterator[Progress]:
@@ -82,7 +82,9 @@ class Screen:
         from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
         from rich.progress import Progress as Bars
 
-        columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+        # how far it is comes first: a narrow terminal cuts off what comes last
+        said = TextColumn("{task.percentage:3.0f} % {task.description}", markup=False)
+        columns = (said, BarColumn(), TimeRemainingColumn())
         with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
             task = bars.add_task(label, total=1.0)
             yield lambda share: bars.update(task, completed=min(share, 1.0))

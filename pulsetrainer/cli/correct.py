@@ -19,15 +19,13 @@ def correct(
     run: Annotated[Path, Argument(help="Run that was diagnosed.", metavar="RUN.h5")],
     diagnosis: Annotated[Path, Option(help="Diagnosis of the run.")],
     out: Out,
-    delay: Annotated[
-        float, Option(min=0.0, help="Delay of the recorder of the output, s, if it has one.")
-    ] = 0.0,
+    delay: Annotated[float, Option(min=0.0, help="Known delay of the output's recorder, s.")] = 0.0,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Take the faults of the measurement out of a run.
 
-    Those that a diagnosis has found; where it found none there is nothing to correct.
+    It takes out those that the diagnosis has found; if it found none, there is nothing to correct.
 
     Example: pulsetrainer correct drifting.h5 --diagnosis drift.h5 -o corrected.h5
     """
@@ -57,7 +55,7 @@ def correct(
         "samples left out": f"{masked} of {corrected.output.size}",
     }
     if not most and masked == int((~measured.counts).sum()):
-        job.notes(["nothing tells what lies between the steps: the output is as it was"])
+        job.notes(["nothing shows what lies between the steps, so the output is left as it was"])
     lasting = "a run that the model is tested on may have the same fault: diagnose and correct it too"
     job.notes([lasting])
     job.show(payload, f"{out}: corrected run", rows)

@@ -11,8 +11,11 @@ from typer import Argument, Context, Option
 
 import pulsetrainer as pt
 from pulsetrainer.cli.job import Job
+from pulsetrainer.cli.next_step import free
 from pulsetrainer.cli.options import AsJson, Out, Overwrite
 from pulsetrainer.steps.arguments import check_once
+
+_ANOTHER_CONDITION = "condition-change"
 
 
 def diagnose(
@@ -26,9 +29,9 @@ def diagnose(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Say what a model gets wrong on runs, and why.
+    """Find out what a model gets wrong on runs, and why.
 
-    It names the causes, how sure they are, and what to measure next.
+    It names the causes, how certain they are, and what to measure next.
 
     Example: pulsetrainer diagnose diagnostic.h5 --model model.h5 -o diagnosis.h5 --html diagnosis.html
     """
@@ -57,32 +60,59 @@ def diagnose(
             from pulsetrainer.report.diagnosis_html import render_diagnosis
 
             job.page(html, partial(render_diagnosis, commands=commands), found, header)
-    job.notes(found.notes)
+    job.notes([*found.notes, *_before_correction(runs, measured, model, known)])
     job.screen.result(
         diagnosed(found) | {"next_commands": commands, "output": out, "html": html, "seconds": job.seconds}
     )
     job.screen.parts(sections(found))
     job.wrote(out, html)
-    for line in commands:
-        job.screen.whole(f"then: {line}")
+    for number, line in enumerate(commands, start=1):
+        which = f" {number} of {len(commands)}" if len(commands) > 1 else ""
+        job.screen.whole(f"then{which}: {line}")
+
+
+def _before_correction(runs: list[Path], measured: list[pt.Run], model: Path, known: set[str]) -> list[str]:
+    """Say of which runs the model is that of the time before they were corrected; ``known``: its inputs."""
+    from pulsetrainer.files import store
+
+    return [
+        f"{model} was identified from the run that {path} was corrected from, so it holds what was taken out "
+        f"({', '.join(run.corrected)}): identify it from {path}, and diagnose with that model"
+        for path, run in zip(runs, measured, strict=True)
+        if run.corrected and known & set(store.read_header(path).provenance.inputs.values())
+    ]
 
 
 def next_commands(found: pt.Diagnosis, runs: list[Path], model: Path, out: Path, *, own: bool) -> list[str]:
     """Return the commands to go on with: to extend the model, or to correct the runs and begin again.
 
-    A model that was not identified from its ``own`` runs is not at fault, and stays. After a quick screen
-    comes the full diagnosis.
+    A model that was not identified from its ``own`` runs is not at fault, and stays, but for one of another
+    condition. After a quick screen comes the full diagnosis. No command overwrites a file.
     """
     words: list[list[object]] = []
     if found.next_command == "extend":  # fitted with all faults of the measurement taken out
-        words.append(["extend", out, "--model", model, "-o", "extended.h5"])
-    if found.next_command == "correct":
-        corrected = [f"{run.stem}-corrected.h5" for run in runs]
+        words.append(["extend", out, "--model", model, "-o", free(Path("extended.h5"))])
+    elif found.next_command == "correct":
+        corrected = [_beside(run, "corrected") for run in runs]
         pairs = zip(runs, corrected, strict=True)
         words += [["correct", run, "--diagnosis", out, "-o", made] for run, made in pairs]
-        again = Path(f"{model.stem}-corrected.h5") if own else model
-        words += [["identify", *corrected, "-o", again]] if own else []
-        words.append(["diagnose", *corrected, "--model", again, "-o", f"{out.stem}-corrected.h5"])
+        words += _again(corrected, model, out, "corrected", anew=own)
+    elif (
+        found.verdict == _ANOTHER_CONDITION and len(found.records) == 1
+    ):  # of several, some may be the model's
+        words += _again(runs, model, out, "anew", anew=True)
     if not words and found.quick:
-        words.append(["diagnose", *runs, "--model", model, "-o", f"{out.stem}-full.h5"])
+        words.append(["diagnose", *runs, "--model", model, "-o", _beside(out, "full")])
     return [shlex.join(["pulsetrainer", *map(str, line)]) for line in words]
+
+
+def _again(runs: list[Path], model: Path, out: Path, called: str, *, anew: bool) -> list[list[object]]:
+    """Return the words that diagnose runs again, with a model identified ``anew`` from them or as it is."""
+    again = _beside(model, called) if anew else model
+    words: list[list[object]] = [["identify", *runs, "-o", again]] if anew else []
+    return [*words, ["diagnose", *runs, "--model", again, "-o", _beside(out, called)]]
+
+
+def _beside(path: Path, called: str) -> Path:
+    """Return a name in this folder that is like another one, and not taken."""
+    return free(Path(f"{path.stem}-{called}.h5"))

@@ -22,7 +22,7 @@ def doctor(
     context: Context,
     port: Port = None,
     capture: Annotated[
-        bool, Option(help="Drive the coil for 3 s, to half its range, and look at what comes back.")
+        bool, Option(help="Drive the coil for 3 s, to half its range, and check what comes back.")
     ] = True,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
@@ -30,7 +30,7 @@ def doctor(
 ) -> None:
     """Check this computer, its ports and the device.
 
-    Exit code 1 when something stands in the way. Nobody's finger should be on the device meanwhile.
+    Exit code 1 if something needs fixing. Keep fingers off the device meanwhile.
 
     Example: pulsetrainer doctor --port /dev/ttyUSB0
     """
@@ -48,9 +48,8 @@ def doctor(
         result = examine(port, capture=capture, limits=held, settings=words, tuned=file, progress=progress)
     typed = [replace(f, found=as_options(f.found), fix=as_options(f.fix)) for f in result.findings]
     result = replace(result, findings=tuple(typed))
-    stand = "stands" if result.problems == 1 else "stand"
-    problem = f"{result.problems} of {len(result.findings)} findings {stand} in the way"
-    failed = QualityError(problem, hint="follow the fixes, from the top") if result.problems else None
+    problem = f"{result.problems} of {len(result.findings)} checks found a problem"
+    failed = QualityError(problem, hint="make the fixes in order, from the top") if result.problems else None
     screen.result(plain(result) | {"problems": result.problems}, failed)
     if not json:
         width = max(len(one.name) for one in result.findings)

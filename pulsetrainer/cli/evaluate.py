@@ -23,14 +23,16 @@ def evaluate(
     model: Annotated[list[Path], Option(help="Model to test on the run; may be given again.")] = [],  # noqa: B006
     out: Annotated[Path | None, Option("-o", "--out", help="File to write.")] = None,
     html: Annotated[Path | None, Option(help="Report to write.")] = None,
-    bounds: Annotated[Path | None, Option(help="TOML file of bounds; a figure outside them: exit 1.")] = None,
+    bounds: Annotated[
+        Path | None, Option(help="TOML file of bounds; exit code 1 if a figure is outside them.")
+    ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """Report how large the errors are.
 
     Force errors of playbacks, or prediction errors of models on a run that they were not fitted to. For a
-    session it says what was pressed and answered, and --html writes its score sheet.
+    session it reports what was pressed and answered, and --html writes its score sheet.
 
     Example: pulsetrainer evaluate played.h5 -o evaluation.h5 --html report.html
     """
@@ -69,14 +71,15 @@ def evaluate(
         listed = "; ".join(f"{b.metric} = {b.value:.4g} is outside [{b.low:g}, {b.high:g}]" for b in broken)
         are = "is" if len(broken) == 1 else "are"
         problem = f"{len(broken)} of {len(limits)} bounds of {bounds} {are} broken: {listed}"
-        hint = "look at what changed; if the new figure is right, change the bound knowingly"
+        hint = "find out what changed; if the new figure is right, change the bound on purpose"
         failed = QualityError(problem, hint=hint)
     job.alike(model)
+    job.notes(evaluation.warnings, "warning: ")
     job.notes(evaluation.notes)
     for path, one in zip(model, models, strict=True):
         # a static model holds the record that it was fitted to; of an extended one the history tells
         if one.extensions and store.is_made_from(path, inputs[0]):
-            job.notes([f"{path} was made with {inputs[0]}: how good it is, another run shows"])
+            job.notes([f"{path} was made with {inputs[0]}: only another run shows how good it is"])
     job.screen.result(
         evaluated(evaluation)
         | {"output": out, "html": html, "bounds_checked": len(limits), "breaches": plain(broken)},

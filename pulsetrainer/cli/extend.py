@@ -18,12 +18,12 @@ def extend(
     model: Annotated[Path, Option(help="Model that was diagnosed.")],
     out: Out,
     verify: Annotated[
-        Path | None, Option(help="Run, not diagnosed, that each cause must predict better.")
+        Path | None, Option(help="A run that was not diagnosed, which each cause must predict better.")
     ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Write the model with the causes found.
+    """Add the causes found to the model.
 
     Its static part is identified again together with them.
 
@@ -32,6 +32,7 @@ def extend(
     inputs = (diagnosis, model, *([] if verify is None else [verify]))
     job = Job(context, inputs=inputs, outputs=(out,))
     from pulsetrainer.report.facts import extension_words
+    from pulsetrainer.report.results import as_fitted_again
     from pulsetrainer.report.results import extended as extended_by
 
     with job.working("extending"):
@@ -48,7 +49,7 @@ def extend(
         job.notes([f"{model} was identified from {verify}: a run that neither has seen proves more"])
     job.show(*extended_by(out, extended, found, verify, proof))
     for one in extended.extensions:
-        job.screen.facts(f"with {one.cause}", extension_words(one))
+        job.screen.facts(f"with {one.cause}", extension_words(as_fitted_again(one, found)))
 
 
 def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
@@ -59,16 +60,16 @@ def _doubts(found: pt.Diagnosis, extended: pt.Model) -> list[str]:
     at_one_rate = [name for name in sorted(added) if "rates" in found.lacks and library()[name].widens]
     rates = (
         "was seen at one rate of change, or nearly so, and at others it is a guess: "
-        "`verify` RUN.h5 at others tells"
+        "`verify` RUN.h5 at others would show it"
     )
     doubts = dict.fromkeys(
         f"{one.cause} is in doubt ({'; '.join(one.doubts)}): `verify` RUN.h5, a run that was not diagnosed, "
-        "tells whether it repeats"
+        "shows whether it repeats"
         for one in found.found
         if one.cause in added and one.doubts
     )
-    part = "this is not all of the error, and on other recordings the rest may be larger than what it mends"
-    partly = [] if found.whole else [f"{part}: `verify` RUN.h5 tells"]
+    part = "this is not all of the error, and on other recordings the rest may outweigh the improvement"
+    partly = [] if found.whole else [f"{part}: check with `verify` RUN.h5"]
     return [*(f"{name} {rates}" for name in at_one_rate), *doubts, *partly]
 
 

@@ -50,7 +50,7 @@ class Hands:
             if "small" in dark:
                 first = "make the window larger"
             raise UsageError(
-                f"a quiz is answered by key, and {dark}",
+                f"a quiz is answered on the keyboard, but {dark}",
                 hint=f"{first}, or give the answers in a file: --answers answers.txt",
             )
         if dark:

@@ -47,7 +47,7 @@ def identify(
         str | None,
         Option(
             metavar="auto|0|NUMBER",
-            help="Length below which the density is smoothed, share of the input range; "
+            help="Length below which the density is smoothed, as a share of the input range; "
             "auto: by held-out blocks (default; 0 with relay).",
         ),
     ] = None,

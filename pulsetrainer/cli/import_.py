@@ -28,7 +28,9 @@ def import_(
             help="CSV, TSV, .npz, .npy, .mat or .wav; several are parts of one run.", metavar="FILE.csv..."
         ),
     ],
-    out: Annotated[Path, Option("-o", "--out", help="File to write; '{name}.h5' makes a run of each file.")],
+    out: Annotated[
+        Path, Option("-o", "--out", help="File to write; '{name}.h5' writes one run for each file.")
+    ],
     input_column: Annotated[str, Option("--input", help="Column of the input, by its heading or number.")],
     output_column: Annotated[str, Option("--output", help="Column of the output, by its heading or number.")],
     time_column: Annotated[
@@ -37,7 +39,7 @@ def import_(
     reference_column: Annotated[str | None, Option("--reference", help="Column of the reference.")] = None,
     input_unit: Annotated[str | None, Option(help="Unit of the input; default: from the header.")] = None,
     output_unit: Annotated[str | None, Option(help="Unit of the output; default: from the header.")] = None,
-    rate: Annotated[float | None, Option(help="Samples a second, Hz, instead of a time column.")] = None,
+    rate: Annotated[float | None, Option(help="Sample rate, Hz, instead of a time column.")] = None,
     no_time: Annotated[
         bool, Option("--no-time", help="Ignore time: only the order of the samples counts.")
     ] = False,
@@ -58,7 +60,7 @@ def import_(
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Make a run of a record measured elsewhere.
+    """Turn a record measured elsewhere into a run.
 
     Example: pulsetrainer import scope.csv --input current_A --output force_N -o run.h5
     """

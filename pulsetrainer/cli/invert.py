@@ -35,7 +35,8 @@ def invert(
         str | None,
         Option(
             metavar="N|mean",
-            help="Beat of a recorded pulse: its number from 1, or the mean. Default: all is one period.",
+            help="Beat of a recorded pulse: its number from 1, or mean. "
+            "Default: the whole record is one period.",
         ),
     ] = None,
     periods: Annotated[
@@ -46,16 +47,16 @@ def invert(
         setting(
             "slew_A_per_s",
             "--slew",
-            "Fastest the drive may move, A/s or input unit a second; default: 30 for a model of our own "
-            "device, none for any other.",
+            "Fastest that the drive may move, A/s or input units a second; default: 30 for a model of our "
+            "own device, none for any other.",
         ),
     ] = None,
     learnt: Annotated[
         Path | None,
-        Option(help="Another pulse, refined with this model: what was learnt there is asked for too."),
+        Option(help="Another pulse, refined with this model, whose corrections are used here too."),
     ] = None,
     despite_warning: Annotated[
-        bool, Option("--despite-warning", help="Invert a model that does not describe its own record.")
+        bool, Option("--despite-warning", help="Invert a model even if it does not describe its own record.")
     ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
@@ -64,7 +65,7 @@ def invert(
 
     Writes the compensated drive and, for comparison, the merely scaled one with the same extremes.
 
-    With --learnt it begins from what refining found missing on another pulse.
+    With --learnt it also uses what was learnt by refining another pulse.
 
     Example: pulsetrainer invert normal --model model.h5 -o drive.h5
     """
@@ -105,4 +106,5 @@ def invert(
             job.uses(pulse)
         job.save(out, drive, drive_title(drive))
     job.notes(drive.notes)
+    job.notes(drive.warnings, "warning: ")
     job.show(*inverted(out, drive))

@@ -109,7 +109,7 @@ class Job:
         port = in_real_time(self.port or DEFAULT_PORT) if by_key else self.port
         device = open_device(port, limits=self.limits, tuned=self._settings)
         if self._settings is not None and device.gains != DELIVERED:
-            self.notes([f"{device.info.serial} plays with the gains that {self._settings} has for it"])
+            self.notes([f"{device.info.serial} plays with the gains in {self._settings}"])
         elif self._settings is not None:
             from pulsetrainer.files.tuning import read_tuned
 
@@ -263,10 +263,10 @@ class Job:
         for left, samples in interrupted(out, kind):
             self.notes([f"{left} holds {counted(samples, 'sample')} of {said.format(left=left)}"])
 
-    def notes(self, lines: Sequence[str]) -> None:
+    def notes(self, lines: Sequence[str], lead: str = "note: ") -> None:
         """Say what a verb has to tell, a line each, on stderr."""
         for line in lines:
-            self.screen.note(as_options(with_files(line, self._parameters)))
+            self.screen.note(as_options(with_files(line, self._parameters)), lead)
 
 
 def _is_path(value: Any) -> bool:

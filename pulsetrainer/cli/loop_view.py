@@ -34,9 +34,12 @@ class LoopView:
     def __init__(self, current_A: float, force_N: float = FULL_SCALE_N) -> None:
         columns, lines = shutil.get_terminal_size()
         self.fits = columns >= SMALLEST[0] and lines >= SMALLEST[1]
-        self._size = max(min(columns - 2, 72), 1), max(min(lines - 4, _HIGHEST), 1)
+        self._size = max(min(columns - 2, 72), 1), max(min(lines - 6, _HIGHEST), 1)
         self._ends = max(current_A, 1e-9), max(force_N, 1e-9)
         self._dots = Dots(*self._size)
+        self._taken: list[
+            tuple[FloatArray, FloatArray]
+        ] = []  # since the last drawing: all at a time cost less
         self._share, self._label = 0.0, ""
         self._drawn_s = -np.inf
         self._show: Callable[[RenderableType], None] = lambda _drawn: None
@@ -44,8 +47,7 @@ class LoopView:
 
     def take(self, current_A: FloatArray, force_N: FloatArray) -> None:
         """Take in samples (n,); those that were lost are NaN."""
-        there = np.isfinite(current_A) & np.isfinite(force_N)
-        self._dots.add(current_A[there] / self._ends[0], force_N[there] / self._ends[1])
+        self._taken.append((current_A, force_N))
         self._draw()
 
     @contextmanager
@@ -69,8 +71,13 @@ class LoopView:
         """Return the loop with its axes, and the figures."""
         from rich.text import Text
 
+        if self._taken:
+            current_A, force_N = map(np.concatenate, zip(*self._taken, strict=True))
+            there = np.isfinite(current_A) & np.isfinite(force_N)
+            self._dots.add(current_A[there] / self._ends[0], force_N[there] / self._ends[1])
+            self._taken.clear()
         loop = [f"│{line}" for line in self._dots.lines()]
         axis = f"└{'─' * self._size[0]}"
-        ends = f"axes: 0 to {self._ends[0]:.3g} A, 0 to {self._ends[1]:.3g} N"
-        said = f"{self._label}: {100.0 * self._share:.0f} %, {ends}"
-        return Text("\n".join([*loop, axis, said, self.figures]), no_wrap=True, overflow="crop")
+        ends = f"across: 0 to {self._ends[0]:.3g} A, up: 0 to {self._ends[1]:.3g} N"
+        said = f"{self._label}: {100.0 * self._share:.0f} %; {ends}"
+        return Text("\n".join([*loop, axis, said, self.figures]))  # words that do not fit go on below

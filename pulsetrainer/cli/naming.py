@@ -14,6 +14,7 @@ from typer.core import TyperCommand, TyperOption
 
 from pulsetrainer.cli.help_text import HelpContext
 from pulsetrainer.cli.next_step import next_step, to_make, with_files
+from pulsetrainer.cli.usage import spaced
 from pulsetrainer.errors import AbsentError, ExistsError, Interrupted, PulsetrainerError, UsageError
 from pulsetrainer.files.input_file import is_sound, near_names
 from pulsetrainer.files.pulses import library
@@ -139,7 +140,11 @@ def _name(error: AbsentError | ExistsError, given: Any, context: typer.Context) 
         error.hint = (f"did you mean {error.path.with_name(near[0])}? " if near else "") + _TABLES[name]
         return
     if isinstance(error, ExistsError) and command == "capture":
-        error.hint = f"{next_step(error)}; an interrupted recording goes on with --resume"
+        error.hint = f"{next_step(error)}; --resume continues an interrupted recording"
+    values = context.params.get(name)
+    if isinstance(values, list | tuple) and (meant := spaced([str(one) for one in values])):
+        error.hint = f"put a name with spaces in quotes: {meant}"
+        return
     if isinstance(error, ExistsError) or kinds is None or not folder.is_dir():
         return
     if hint := _several(error.path, given, option) or _cut_off(error.path):

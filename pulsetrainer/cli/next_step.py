@@ -48,17 +48,17 @@ _NEXT = {
     "then `pulsetrainer evaluate played.h5 -o evaluation.h5`",
     ("diagnosis", "run"): "run `pulsetrainer diagnose {file} --model model.h5 -o diagnosis.h5`",
     ("diagnosis", "model"): "run `pulsetrainer diagnose RUN.h5 --model {file} -o diagnosis.h5`",
-    ("run", "playback"): "a run comes from `pulsetrainer capture`; of a playback the errors are told by "
+    ("run", "playback"): "make a run with `pulsetrainer capture`; for the errors of a playback, run "
     "`pulsetrainer evaluate {file} -o evaluation.h5`",
-    ("run", "model"): "give the run it was identified from: `pulsetrainer show {file}` tells its history",
-    ("run", "diagnosis"): "give the run that was diagnosed: `pulsetrainer show {file}` tells its history",
+    ("run", "model"): "give the run it was identified from: `pulsetrainer show {file}` shows its history",
+    ("run", "diagnosis"): "give the run that was diagnosed: `pulsetrainer show {file}` shows its history",
 }
 
 
 def next_step(problem: PulsetrainerError) -> str:
     """Return what to do about an error: a command or an option where there is one, else its own hint."""
     if isinstance(problem, ExistsError) and problem.hint == ExistsError.usual:
-        other = shlex.quote(str(_free(problem.path)))
+        other = shlex.quote(str(free(problem.path)))
         return f"name another file, such as {other}, or give --overwrite to replace it"
     if isinstance(problem, WrongKindError):
         return _after_wrong_kind(problem)
@@ -74,7 +74,7 @@ def next_step(problem: PulsetrainerError) -> str:
             table = shlex.quote(str(problem.path))
             columns = "--input COLUMN --output COLUMN"
             return f"import the table first: pulsetrainer import {table} {columns} -o run.h5"
-        elsewhere = "a recording from elsewhere comes in with `pulsetrainer import`"
+        elsewhere = "to read a recording from elsewhere, use `pulsetrainer import`"
         return f"give a file that pulsetrainer wrote; {elsewhere}"
     return problem.hint
 
@@ -88,13 +88,10 @@ def to_make(kind: str, path: Path) -> str:
     return f"{line} {shlex.quote(str(path))}"
 
 
-def _free(path: Path) -> Path:
-    """Return a name like this one that is not taken."""
-    return next(
-        other
-        for number in itertools.count(2)
-        if not (other := path.with_name(f"{path.stem}-{number}{path.suffix}")).exists()
-    )
+def free(path: Path) -> Path:
+    """Return a path, or, where it is taken, a name like it that is not."""
+    others = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in itertools.count(2))
+    return next(other for other in itertools.chain((path,), others) if not other.exists())
 
 
 _PARAMETER = re.compile(r"`([a-z]+(?:_[a-z]+)*)(?:_[A-Z]\w*)?`")  # without the unit at its end
@@ -128,7 +125,7 @@ def with_files(text: str, parameters: Mapping[str, Any]) -> str:
 def _after_wrong_kind(problem: WrongKindError) -> str:
     if problem.expected[:2] == ("playback", "run") and problem.found == "model":
         given = shlex.quote(str(problem.path))
-        return f"each model goes behind a --model of its own: pulsetrainer evaluate run.h5 --model {given}"
+        return f"give each model after a --model of its own: pulsetrainer evaluate run.h5 --model {given}"
     for kind in problem.expected:
         if (kind, problem.found) in _NEXT:
             return _NEXT[kind, problem.found].format(file=shlex.quote(str(problem.path)))

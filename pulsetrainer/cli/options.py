@@ -20,6 +20,13 @@ def positive(value: float | None, param: CallbackParam) -> float | None:
     return value
 
 
+def not_empty(port: str | None) -> str | None:
+    """Refuse ``--port "$PORT"`` where that is not set: it would play on the simulated device instead."""
+    if port == "":
+        raise BadParameter("must name a port, got an empty text")
+    return port
+
+
 def word_or_number(text: str | None, word: str, option: str, must: str, *, least: float, most: float) -> Any:
     """Return the word, or the number from ``least`` to ``most`` that a text spells; None is no choice."""
     if text is None or text == word:
@@ -53,18 +60,19 @@ Port = Annotated[
         help="bench: (simulated, the default), bench:?seed=3, qemu: (emulated; needs qemu-system-arm), "
         "/dev/ttyUSB0, COM3 or socket://host:port.",
         envvar="PULSETRAINER_PORT",
+        callback=not_empty,
     ),
 ]
-DryRun = Annotated[bool, Option("--dry-run", help="Say what would be played; touch no port, write nothing.")]
+DryRun = Annotated[bool, Option("--dry-run", help="Show what would be played; open no port, write nothing.")]
 ShowLive = Annotated[
-    bool, Option("--live", help="Draw the loop on the terminal while it grows; quiet in a pipe.")
+    bool, Option("--live", help="Draw the loop on the terminal as it is recorded; nothing in a pipe.")
 ]
 TrackHeat = Annotated[
     bool | None,
     Option(
         "--track-heat/--no-track-heat",
-        help="Tell the coil's temperature from the duty and make up for the force it costs; "
-        "default: where the model has a thermal term and was captured with the duty.",
+        help="Measure the coil's temperature by the duty and compensate for the force it costs; "
+        "default: on if the model has a thermal term and was captured with the duty.",
     ),
 ]
 LimitCurrent = Annotated[
@@ -72,7 +80,7 @@ LimitCurrent = Annotated[
     setting(
         "limits.current_A",
         "--limit-current",
-        "Highest current the device may drive, A; this can only lower the device's own limit.",
+        "Highest current that the device may drive, A; it can only lower the device's own limit.",
     ),
 ]
 LimitForce = Annotated[
@@ -80,6 +88,6 @@ LimitForce = Annotated[
     setting(
         "limits.force_N",
         "--limit-force",
-        "Force above which the device switches off, N; this can only lower the device's own limit.",
+        "Force above which the device switches off, N; it can only lower the device's own limit.",
     ),
 ]

@@ -16,10 +16,10 @@ def plot(
     context: Context,
     file: Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")],
     out: Annotated[
-        Path | None, Option("-o", "--out", help="File to write; default: beside it, as PNG.")
+        Path | None, Option("-o", "--out", help="File to write; default: a PNG beside the file.")
     ] = None,
     data: Annotated[
-        bool, Option("--data", help="Write what is drawn as a table too, beside the figure, as CSV.")
+        bool, Option("--data", help="Also write what is drawn as a CSV table, beside the figure.")
     ] = False,
     overwrite: Overwrite = False,
     json: AsJson = False,

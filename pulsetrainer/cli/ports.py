@@ -11,7 +11,7 @@ _HEADS = {"device": "port", "vid_pid": "vendor:product", "is_device": "our devic
 def ports(json: AsJson = False) -> None:
     """List the serial ports.
 
-    Which of them is our device, and whether each can be opened.
+    It shows which of them is our device, and whether each can be opened.
 
     Example: pulsetrainer ports
     """

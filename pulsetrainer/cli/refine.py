@@ -18,17 +18,19 @@ def refine(
     drive: Annotated[Path, Argument(help="Waveform made by invert.", metavar="DRIVE.h5")],
     out: Out,
     port: Port = None,
-    passes: Annotated[int, Option(min=1, help="Passes at most; the first one plays the drive as it is.")] = 5,
+    passes: Annotated[
+        int, Option(min=1, help="Number of passes at most; the first one plays the drive as it is.")
+    ] = 5,
     limit_current_A: LimitCurrent = None,
     limit_force_N: LimitForce = None,
     dry_run: DryRun = False,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Learn a drive on the device itself.
+    """Improve a drive on the device itself.
 
     The force sensor must be in place. Each pass plays the drive and corrects it by the force that was
-    missed; the best is written.
+    missed; the best pass is written.
 
     Example: pulsetrainer refine drive.h5 -o refined.h5
     """

@@ -21,7 +21,7 @@ _MOST_SEED = 2**31
 
 def session(
     context: Context,
-    model: Annotated[Path, Option(help="Model of the device, best an extended one.")],
+    model: Annotated[Path, Option(help="Model of the device, ideally an extended one.")],
     out: Out,
     pulses: Annotated[
         str, Option(help="Names of the library or CSV files, separated by commas; each gets an equal share.")
@@ -36,7 +36,7 @@ def session(
         float, Option(min=0, max=25, help="Standard deviation of the intervals between beats, %.")
     ] = 0.0,
     respiration: Annotated[
-        float, Option(min=0, max=30, help="Swing of the intervals with the breath, %.")
+        float, Option(min=0, max=30, help="Swing of the intervals with each breath, %.")
     ] = 0.0,
     ectopic: Annotated[float, Option(min=0, max=50, help="Share of premature beats, %.")] = 0.0,
     seed: Annotated[
@@ -47,11 +47,12 @@ def session(
         ),
     ] = None,
     changes: Annotated[
-        Path | None, Option(help="Table of what changes when: t_s and any of rate, amplitude, pulse.")
+        Path | None, Option(help="Table of changes over time: t_s and any of rate, amplitude, pulse.")
     ] = None,
     quiz: Annotated[int, Option(min=0, help="Number of questions; 0: no quiz.")] = 0,
     answers: Annotated[
-        Path | None, Option(help="Answers to the quiz, a pulse name a line; default: by key.")
+        Path | None,
+        Option(help="File of answers to the quiz, one pulse name a line; default: answered on the keyboard."),
     ] = None,
     html: Annotated[Path | None, Option(help="Score sheet to write.")] = None,
     track_heat: TrackHeat = None,
@@ -64,8 +65,8 @@ def session(
 ) -> None:
     """Press pulses for as long as you like.
 
-    On a terminal keys change rate, amplitude and pulse, pause and stop; the simulated device then keeps
-    pace with the clock. With --quiz the pulses come blind.
+    On a terminal, keys change rate, amplitude and pulse, pause and stop; the simulated device then keeps
+    pace with the clock. With --quiz learners name pulses that are not shown.
 
     Example: pulsetrainer session --model extended.h5 -o session.h5 --pulses normal,bifid --minutes 2
     """

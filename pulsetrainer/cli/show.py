@@ -19,9 +19,9 @@ def show(
     file: Annotated[Path, Argument(help="Any file this program wrote.", metavar="FILE.h5")],
     json: AsJson = False,
 ) -> None:
-    """Say what is in a file.
+    """Show what is in a file.
 
-    Its kind, its main figures, and the commands it came from.
+    Its kind, its main figures, and the commands that made it.
 
     Example: pulsetrainer show model.h5
     """

@@ -21,8 +21,16 @@ def _stop(_number: int, _frame: FrameType | None) -> None:
     os._exit(_EXIT)
 
 
+def _open_what_was_closed() -> None:
+    """Open on nothing what the shell closed (``>&-``): else the next file opened is what is printed into."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - to the end
+
+
 def main() -> None:
     """Load the program and run it."""
+    _open_what_was_closed()
     heard = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # not in the background of a shell
     if heard:
         signal.signal(signal.SIGINT, _stop)

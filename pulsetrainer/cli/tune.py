@@ -32,7 +32,7 @@ def tune(
         Option(
             "--supply",
             callback=positive,
-            help="Voltage of the supply, V, where you have measured it; default: told by the diode's 0.6 V.",
+            help="Voltage of the supply, V, if you have measured it; default: from the diode's 0.6 V.",
         ),
     ] = None,
     drive: Annotated[
@@ -49,9 +49,9 @@ def tune(
 ) -> None:
     """Measure the coil and set the gains of its current loop.
 
-    Nobody's finger should be on the device meanwhile. The gains go into the file of settings, under the
-    device's serial number; the other commands read them there. --overwrite replaces what an earlier tuning of
-    that device wrote; the rest of the file stays.
+    Keep fingers off the device meanwhile. The gains go into the file of settings, under the device's serial
+    number, where the other commands find them. --overwrite replaces what an earlier tuning of that device
+    wrote; the rest of the file stays.
 
     Example: pulsetrainer tune -o pulsetrainer.toml
     """

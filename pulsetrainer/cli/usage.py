@@ -26,6 +26,7 @@ _INSTEAD = {
     "doctor": "a port is an option: pulsetrainer doctor --port {extra}",
     "invert": "one pulse at a time: run it once for each, with an output of its own",
     "capture": "one signal at a time: run it once for each, with an output of its own",
+    "play": "one drive at a time; a drive already holds what is needed of its model",
 }
 # of them, those that are no file's name
 _NO_FILE = {"ports", "doctor"}
@@ -38,6 +39,7 @@ _NO_COMMAND = {
 _UNKNOWN = re.compile(r"No such command '(.*?)'(?:\..* '(.*)')?")
 _EXTRA = re.compile(r"Got unexpected extra argument(?:s|\(s\))? \((.*)\)")
 _GOT = re.compile(r"'?(.*?)'? is not (?:a valid|in the range)")
+_FACTORS = {"m": 1e-3, "k": 1e3}  # of units that a number was given in
 _NEARLY_A_NUMBER = re.compile(r", got '(-?\d+)(?:[.,](\d+))?\s*([^\d\s.,]*)'$")
 
 
@@ -56,9 +58,9 @@ def usage_of(error: Exception, words: Sequence[str] = ()) -> UsageError | None:
         hint = f"did you mean {' or '.join(near)}?" if near else help_
         if given == "--settings":
             behind = command.removeprefix("pulsetrainer")
-            hint = f"it stands before the command: pulsetrainer --settings FILE{behind}"
+            hint = f"put it before the command: pulsetrainer --settings FILE{behind}"
         elif given == "--json" and command == "pulsetrainer":
-            hint = "it stands behind the command: pulsetrainer show FILE.h5 --json"
+            hint = "put it after the command: pulsetrainer show FILE.h5 --json"
         return UsageError(f"{command} has no option {given}", hint=hint)
     if kind == "MissingParameter" and parameter is not None:
         return _missing(parameter, context, help_)
@@ -95,7 +97,7 @@ def check_apart(words: Sequence[str]) -> None:
         if word.startswith(("-ou", "-o=")):
             name = word.partition("=")[2] or "FILE"
             raise UsageError(
-                f"there is no option {word}: the file to write stands behind -o and a blank",
+                f"there is no option {word}: give the file to write after -o and a space",
                 hint=f"-o {shlex.quote(name)}" + "; --output names a column" * ("import" in words),
             )
     _check_completion(words)
@@ -128,7 +130,8 @@ def _alike(given: str, context: Any) -> list[str]:
     if len(given) == 2:
         near = [name for name in names if name.startswith(given[1:])]
     else:
-        near = difflib.get_close_matches(given.lstrip("-").lower(), names, n=2)
+        typed = given.lstrip("-").lower()
+        near = difflib.get_close_matches(typed, names, n=2) or [n for n in names if n.startswith(typed)]
     return [f"--{name}" for name in near]
 
 
@@ -156,7 +159,13 @@ def _with_or_without_value(error: Exception, context: Any, help_: str) -> UsageE
     if "not take" in str(getattr(error, "message", "")):
         return UsageError(f"{option} takes no value", hint=f"write {option} alone; see {help_}")
     meaning = next((f": {_meaning(one)}" for one in params if option in one.opts), "")
-    return UsageError(f"{option} needs a value{meaning}", hint=f"write it behind {option}, or see {help_}")
+    return UsageError(f"{option} needs a value{meaning}", hint=f"write it after {option}, or see {help_}")
+
+
+def spaced(words: Sequence[str]) -> str:
+    """Return the file whose name has spaces in it and was typed without quotes, in quotes; else empty."""
+    runs = (" ".join(words[i:j]) for i in range(len(words)) for j in range(i + 2, len(words) + 1))
+    return next((shlex.quote(run) for run in runs if Path(run).is_file()), "")
 
 
 def _columns(table: Path) -> tuple[str, ...]:
@@ -178,7 +187,10 @@ def _other(said: str, command: str, parsed: Any, words: Sequence[str]) -> UsageE
     """What has no words of its own here, but for one argument too many and a command that does not exist."""
     help_ = f"{command} --help"
     if extra := _EXTRA.match(said):
-        return _one_too_many(extra[1], command, parsed)
+        problem = _one_too_many(extra[1], command, parsed)
+        if meant := spaced(words):
+            problem.hint = f"put a name with spaces in quotes: {meant}"
+        return problem
     unknown = _UNKNOWN.match(said)
     if unknown is None:
         return UsageError(said, hint=help_)
@@ -197,7 +209,8 @@ def _one_too_many(extra: str, command: str, parsed: Any) -> UsageError:
     instead = _INSTEAD.get(name, "{command} --help")
     if name in _NO_FILE and Path(extra).suffix in (".h5", ".csv", ".toml"):
         instead = "leave it out; to look into a file: pulsetrainer show {extra}"
-    beside = "one file at a time; evaluations or sessions side by side: pulsetrainer compare a.h5 b.h5"
+    beside = "one file at a time, its name in quotes if it has spaces; to compare evaluations or sessions: "
+    beside += "pulsetrainer compare a.h5 b.h5"
     return UsageError(
         f"{command} takes {' and '.join(taken) or 'options'} only, got {extra} as well",
         hint=beside if taken == ["FILE.h5"] else instead.format(command=command, extra=extra),
@@ -243,9 +256,10 @@ def _as_a_number(parameter: Any, must: str) -> str:
         return f"write it with a point and without a unit: {number}"
     if said and unit == said[1]:
         return f"write the number alone, in {unit}: {number}"
-    if said and unit == f"m{said[1]}":
-        return f"write it in {said[1]}, without the unit: {float(number) / 1000:g}"
-    return f"write the number alone: {_meaning(parameter)}"  # what is typed in ms must not be taken for s
+    if said and unit[1:] == said[1] and unit[0] in _FACTORS and f"{said[1]} or " not in _meaning(parameter):
+        return f"write it in {said[1]}, without the unit: {float(number) * _FACTORS[unit[0]]:g}"
+    # what is typed in ms must not be taken for s
+    return f"write the number alone, without a unit; {_named(parameter)} is: {_meaning(parameter)}"
 
 
 def _choice(parameter: Any, must: str) -> str:

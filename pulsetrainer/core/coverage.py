@@ -43,7 +43,7 @@ class Gap:
         parts = [f"{which} {at:.3g} {unit}".rstrip() for which, at, told in limits if told]
         which = f"relays with {' and '.join(parts)}" if parts else "all relays"
         rest = self.uncovered - self.share
-        more = f"; {100 * rest:.0f} % more lies elsewhere" if rest >= 0.005 else ""
+        more = f"; {100 * rest:.0f} % more is elsewhere" if rest >= 0.005 else ""
         share = f"{100 * self.share:.0f}" if self.share < 0.995 or not parts else f"{100 * self.share:.1f}"
         return f"never switched: {which} ({share} % of the plane{more})"
 
@@ -53,7 +53,7 @@ def little_words(share: float) -> str:
     if share >= _LITTLE:
         return ""
     what = f"only {100 * share:.1f} % of the cells are switched"
-    good = "a model of this record holds for its own strokes"
+    good = "a model of this record holds only for strokes like its own"
     return f"{what}: {good}. Record the whole range down and up, with loops within it"
 
 

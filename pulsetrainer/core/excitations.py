@@ -66,7 +66,7 @@ def through(points: ArrayLike, speed: float, rate_Hz: float) -> FloatArray:
         raise ArgumentError(
             f"a path of {distance[-1]:.3g} at a speed of {speed:g} would have {steps:.3g} samples "
             f"at {rate_Hz:g} Hz",
-            hint="another speed or rate",
+            hint="give another speed or rate",
         )
     # a turn between two samples would be cut short: put it on the nearest sample, each turn on one of its own
     apart = np.abs(np.diff(points)) > _DUST * np.abs(points).max()

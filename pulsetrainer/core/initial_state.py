@@ -81,7 +81,7 @@ def first_stroke_words(inputs: FloatArray, outputs: FloatArray, low: float, high
 
 def left_out_words(samples: int) -> str:
     """Say that a first stroke of so many samples is left out."""
-    why = "it is unlike all later ones, as of a device that was not cycled before"
+    why = "it differs from all later ones, like that of a device that was never cycled before"
     return f"the first stroke ({samples} samples) is left out: {why}"
 
 

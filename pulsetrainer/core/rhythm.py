@@ -54,10 +54,12 @@ class Rhythm:
             if not 0.0 <= value <= most:
                 raise ArgumentError(
                     f"{name} must be from 0 to {100 * most:g} %, got {100 * value:g} %",
-                    hint="5 % is much for a heart at rest",
+                    hint="5 % is a lot for a heart at rest",
                 )
         if self.seed < 0:
-            raise ArgumentError(f"a seed is not negative, got {self.seed}", hint="any whole number from 0")
+            raise ArgumentError(
+                f"a seed must not be negative, got {self.seed}", hint="give any whole number from 0"
+            )
 
     def timing(self, number: int, time_s: float) -> Timing:
         """Return how beat ``number``, from 0, that begins at ``time_s``, differs from an even one."""

@@ -143,7 +143,8 @@ def check_force(
     if most > limit_N:
         # a slower stroke creeps higher, and sensors have noise: a tenth of the limit is left to them
         told_A = math.floor(100 * current_A[int(np.argmax(expected_N > 0.9 * limit_N))]) / 100
-        lower = "a lower `current_max_A`" if foretold_N is None else f"`current_max_A` at most {told_A:g}"
+        known = foretold_N is not None and told_A > 0
+        lower = f"`current_max_A` at most {told_A:g}" if known else "a lower `current_max_A`"
         raise DeviceError(
             f"the device would stop: a force of {most:.3g} N is predicted, and its limit is {limit_N:g} N",
             hint=f"raise `limit_force_N`, or {less_current(lower)}",
@@ -203,8 +204,8 @@ class Rehearsal:
 def less_current(than: str) -> str:
     """Say how less is pressed in all that is made from a model: a lower pulse does not do it."""
     return (
-        f"capture with {than}; then a drive or a session needs a new model from that (identify, invert), "
-        "since it begins with a stroke over the whole range of its model"
+        f"capture again with {than}, and make a new model and drive from that run (identify, invert): "
+        "every drive and session begins with a stroke over the whole range of its model"
     )
 
 
@@ -214,7 +215,7 @@ def _bearable_wait_s(heat: float, reference_A: FloatArray, rate_Hz: float) -> fl
     if math.isinf(seconds):
         share = 100.0 * float(course(0.0, reference_A, rate_Hz).max())
         raise ArgumentError(
-            f"this reference heats even a cold coil to {math.ceil(share)} % of the heat that it bears",
+            f"this reference would heat the coil to {math.ceil(share)} % of its limit, even from cold",
             hint="play less of it at a time (fewer `levels`, `repeats` or `periods`), faster (a higher "
             "`speed`), or at a lower current",
         )
@@ -236,6 +237,6 @@ def check_cool(heat: float, reference_A: FloatArray, rate_Hz: float, *, assumed:
     if seconds > 0:
         raise DeviceError(
             f"the coil is too hot for this: it is at {100 * heat:.0f} % of its limit"
-            + (", as far as is known: nobody has seen this device cool" if assumed else ""),
+            + (", as far as is known: no program has seen this device cool" if assumed else ""),
             hint=f"wait {in_words(seconds)}, then run the command again",
         )

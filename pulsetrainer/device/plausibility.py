@@ -138,7 +138,7 @@ def _outside(time_s: FloatArray, current_A: FloatArray, force_N: FloatArray) -> 
     return (
         f"the force reading of {np.median(force_N[at]):.2f} N is implausible at "
         f"{np.median(current_A[at]):.2f} A: between {np.median(low[at]):.1f} and {np.median(high[at]):.1f} N "
-        "could be"
+        "would be plausible"
     )
 
 
@@ -171,7 +171,7 @@ def judge_against(time_s: FloatArray, expected_N: FloatArray, force_N: FloatArra
         return ""
     return (
         f"the force reading of {np.median(force[at]):.2f} N at {time[at][0]:.2f} s is far from the "
-        f"{np.median(expected_N[there][at]):.2f} N that the model foretells"
+        f"{np.median(expected_N[there][at]):.2f} N that the model predicts"
     )
 
 

@@ -222,7 +222,7 @@ class Player:
         while self._ack.state == codes.State.RUNNING and not self._last_block:
             if self._monotonic() - self.taken_at_s > _TAKER_S:
                 self.stop(
-                    f"the program did not take its data for {_TAKER_S:g} s",
+                    f"the program did not collect its data for {_TAKER_S:g} s",
                     "the disk is too slow: write elsewhere, close other programs",
                 )
             if self._stop.is_set():

@@ -95,8 +95,8 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
     if "://" in port:
         whole = not re.fullmatch(r"socket://[^:/]+/?", port)
         return DeviceError(
-            f"cannot reach {port}: {text if whole else 'it names no port number'}",
-            hint="check host and port number, and that the other side listens"
+            f"cannot reach {port}: {text.rpartition('] ')[2] if whole else 'it has no port number'}",
+            hint="check the host and the port number, and that the other side is listening"
             if whole
             else f"give the port number too, such as {port.rstrip('/')}:5000",
         )
@@ -122,7 +122,5 @@ def cannot_open(port: str, error: Exception) -> DeviceError:
             "network socket://host:port",
         )
     if number in {errno.ENOTTY, errno.EINVAL, errno.EISDIR}:
-        return DeviceError(
-            f"{port} is not a serial port: {text}", hint="`pulsetrainer ports` lists the ports"
-        )
+        return DeviceError(f"{port} is not a serial port", hint="`pulsetrainer ports` lists the ports")
     return DeviceError(f"cannot open the port {port}: {text}", hint="`pulsetrainer ports` lists the ports")

@@ -14,6 +14,9 @@ from pulsetrainer.device.messages import Telemetry, TelemetryDuty
 FloatArray = NDArray[np.float64]
 Int64Array = NDArray[np.int64]
 
+# divided, 477 mN are 0.477 N; times 0.001 they would be 0.47700000000000004 N
+_PER_UNIT = np.round(1.0 / np.asarray((CURRENT_UNIT_A, CURRENT_UNIT_A, FORCE_UNIT_N)))
+
 
 @dataclass(frozen=True, slots=True)
 class Block:
@@ -37,7 +40,7 @@ class Block:
         starts = np.array([m.first_tick for m in messages], dtype=np.int64)
         counts = np.array([m.count for m in messages], dtype=np.int64)
         within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        scaled = items[:, :3] * (CURRENT_UNIT_A, CURRENT_UNIT_A, FORCE_UNIT_N)
+        scaled = items[:, :3] / _PER_UNIT
         return cls(
             tick=np.repeat(starts, counts) + decimation * within,
             reference_A=scaled[:, 0].copy(),

@@ -11,18 +11,19 @@ from pulsetrainer.device.limits import less_current
 FORCE_REMEDY = "remove the cause: check the force sensor, its plug, and that it rests on the finger"
 # What to do about a fault whose cause is not in the device, or known.
 _REMEDY: dict[int, str] = {
-    codes.Fault.OVER_FORCE: "if nothing pressed so hard, check the force sensor; else raise "
-    "`limit_force_N` where it was lowered, or "
-    + less_current("`current_max_A` well below the current told here"),
+    codes.Fault.OVER_FORCE: "if nothing pressed that hard, check the force sensor; if you lowered "
+    "`limit_force_N`, raise it; otherwise "
+    + less_current("`current_max_A` well below the current given here"),
     codes.Fault.CURRENT_IMPLAUSIBLE: "check the supply, its plug, and the current sensor; where the supply "
     "or the coil has been changed, set the gains again: pulsetrainer tune -o pulsetrainer.toml",
     codes.Fault.CURRENT_FROZEN: "check the current sensor, its wires and its supply",
     codes.Fault.NO_CURRENT: "check the supply, its plug, and the wires of the coil and of the current sensor",
-    codes.Fault.HEARTBEAT: "the computer was away or the line is bad: keep it from sleeping, check the cable",
+    codes.Fault.HEARTBEAT: "the computer was busy or asleep, or the line is bad: keep it from sleeping, "
+    "check the cable",
     codes.Fault.UNDERRUN: "the computer is too busy or the line bad: close other programs, check the cable",
     codes.Fault.TICK_OVERRUN: "the emulated device (qemu:) must keep pace with the clock: close other "
     "programs, or use bench:, which has time; on a real device the firmware is too slow",
-    codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less or lower",
+    codes.Fault.COIL_HEAT: "let the coil cool for two minutes, then play less, or with less current",
     codes.Fault.ON_TIME: "play it in several pieces",
     codes.Fault.WAVE_CRC: "check the cable, then run the command again",
     codes.Fault.NO_FORCE: FORCE_REMEDY,
@@ -86,7 +87,7 @@ def describe_not_off(status: m.StatusReply) -> str:
     """Return that the output could not be switched off, empty if it could."""
     current_A = flows_A(status)
     if current_A:
-        return f"the output could not be switched off: {current_A:.1f} A still flow"
+        return f"the output could not be switched off: {current_A:.1f} A still flows"
     if status.flags & codes.STATUS_OUTPUT_NOT_OFF:
         return "the output could not be switched off: current flowed on for a while"
     return ""

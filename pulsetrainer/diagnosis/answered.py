@@ -22,7 +22,7 @@ from pulsetrainer.core.coverage import coverage, covers_range
 from pulsetrainer.core.initial_state import estimated_start
 from pulsetrainer.core.metrics import root_mean_square
 from pulsetrainer.core.plane import FloatArray
-from pulsetrainer.diagnosis import residual, wording
+from pulsetrainer.diagnosis import advised, residual, wording
 from pulsetrainer.diagnosis.causes.base import Cause as Asked
 from pulsetrainer.diagnosis.causes.condition_change import ConditionChange
 from pulsetrainer.diagnosis.causes.unlisted import Unlisted
@@ -53,7 +53,7 @@ def diagnosis_of(state: State) -> Diagnosis:
     thin = slice(None, None, max(1, problem.bins.count // LIMITS.trace_samples))
     ends = np.cumsum([0.0] + [r.input.size * r.step for r in problem.records])
     inputs = np.concatenate([record.input for record in problem.records])
-    bench = wording.Bench(
+    bench = advised.Bench(
         scale,
         model.input_unit,
         state.question.timed,
@@ -79,7 +79,7 @@ def diagnosis_of(state: State) -> Diagnosis:
             one for finding in state.findings for one in _causes(state, finding, words, dependences)
         ),
         evidence=_said(model, [wording.sentence(one, words) for one in state.evidence]),
-        next_experiment=wording.advice(_advice(state), bench),
+        next_experiment=advised.advice(_advice(state), bench),
         profiles=_profiles(state, words),
         time_s=scale.second * (problem.bins.time_s + ends[problem.bins.record])[thin],
         input=scale.inputs(problem.bins.average([r.input for r in problem.records]))[thin],
@@ -120,10 +120,12 @@ def _advice(state: State) -> Evidence:
         return replace(one, kind="extend, quick")
     seen = tuple(dict.fromkeys(finding.cause.id for finding in state.findings if finding.found))
     if one.kind == "none" and seen:
-        return Evidence("none, seen", names=seen)
+        return Evidence("none, seen", names=(*seen, *one.names))
     if one.kind == "none" and tried and tried[0].p_value <= LIMITS.p_max:
         small = "none, small, quick" if state.question.quick else "none, small"
-        return Evidence(small, names=(tried[0].cause.id,))
+        return Evidence(small, names=(tried[0].cause.id, *one.names))
+    if one.kind == "none" and state.question.quick:
+        return replace(one, kind="none, quick")
     return one
 
 

@@ -19,7 +19,8 @@ from pulsetrainer.diagnosis.wording import figure
 
 _OFFSETS = {"input": "u", "turn": "u", "output": "y"}  # states told from the zero of the quantity
 _TEXT = (
-    "the {output} also depends on something that is in no list: {it} is {way} by {size} when {state} {where}"
+    "the {output} also depends on something that is not in the list of causes: {it} is {way} by {size} when "
+    "{state} {where}"
 )
 
 

@@ -96,6 +96,7 @@ def spectrum(problem: Problem, residual: FloatArray) -> tuple[FloatArray, FloatA
     band = np.digitize(frequency, edges)
     power = np.bincount(band, weights=density, minlength=edges.size + 1) * (frequency[1] - frequency[0])
     used = np.bincount(band, minlength=edges.size + 1)[1:-1] > 0
+    used &= edges[1:] <= frequency[-1]  # a band that ends beyond what was sampled holds less than it should
     return np.sqrt(edges[1:] * edges[:-1])[used], np.sqrt(power[1:-1])[used]
 
 

@@ -180,4 +180,6 @@ def _columns(path: Path, arrays: Mapping[str, Any], units: Mapping[str, str] | N
 
 
 def _unreadable(path: Path, kind: str, error: Exception) -> DataError:
-    return DataError(f"{path} is not {kind} that can be read: {error}", hint="save it again, or export CSV")
+    return DataError(
+        f"{path} is not {kind} that can be read: {error}", hint="save it again, or export it as CSV"
+    )

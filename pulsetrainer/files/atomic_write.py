@@ -40,12 +40,12 @@ def check_output(path: Path | str, overwrite: bool = False) -> None:
 
 def _check_target(path: Path, folder: Path, *, overwrite: bool) -> None:
     if path.is_dir():
-        raise UsageError(f"the output {path} is a folder", hint="name a file in it")
+        raise UsageError(f"the output {str(path)!r} is a folder", hint="name a file in it")
     if path.exists() and not path.is_file():
         raise UsageError(f"the output {path} is not an ordinary file", hint="name a file on disk")
     if not folder.exists():
         raise UsageError(
-            f"the output {path} cannot be written: there is no folder {folder}",
+            f"the output {path} cannot be written: the folder {folder} does not exist",
             hint=f"make the folder: mkdir -p {shlex.quote(str(folder))}",
         )
     if not folder.is_dir():

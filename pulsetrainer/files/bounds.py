@@ -8,7 +8,7 @@ from pathlib import Path
 from pulsetrainer.errors import UsageError
 from pulsetrainer.files.settings import leaves, read_toml
 
-_HOW = "write it, a line for each figure: normal.continuous.mean_error_reduction_percent = [90, 100]"
+_HOW = "write one line for each figure, such as: normal.continuous.mean_error_reduction_percent = [90, 100]"
 
 
 def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
@@ -17,7 +17,9 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
     UsageError where the file cannot be read, is no TOML or is empty, or a bound is not a pair low <= high.
     """
     if not path.exists():
-        raise UsageError(f"the file of bounds {path} does not exist", hint=f"check its name, or {_HOW}")
+        raise UsageError(
+            f"the file of bounds {path} does not exist", hint=f"check its name; to make it, {_HOW}"
+        )
     bounds = {}
     for name, pair in leaves(read_toml(path, "bounds")):
         match pair:
@@ -33,8 +35,8 @@ def read_bounds(path: Path) -> dict[str, tuple[float, float]]:
                     usual = [float(f"{low:.4g}"), float(f"{high:.4g}")]
                 raise UsageError(
                     f"the bound {name} in {path} must be a pair [low, high], got {pair!r}",
-                    hint=f"write {figure} = {usual}, the lowest and the highest" if of else _HOW,
+                    hint=f"write {figure} = {usual}, the lowest first" if of else _HOW,
                 )
     if not bounds:
-        raise UsageError(f"{path} holds no bound, so nothing would be checked", hint=_HOW)
+        raise UsageError(f"{path} has no bounds in it, so nothing would be checked", hint=_HOW)
     return bounds

@@ -76,7 +76,7 @@ def _change(
         raise DataError(
             f"{path}, line {line}: rate is {rate:g}, expected {SLOWEST_BPM:g} to {FASTEST_BPM:g} beats a "
             "minute",
-            hint="75 is usual",
+            hint="a usual rate is 75",
         )
     if amplitude is not None and not 0.0 < amplitude <= 100.0:
         raise DataError(

@@ -348,9 +348,9 @@ def _with_header(
         of_text |= {len(first)}
     if len(of_text) == len(names):
         raise DataError(
-            f"{path} has no rows of numbers: all of its lines are words or headings, as line {begin.number}: "
-            f"{begin.text[:60]!r}",
-            hint="export what stands below the headings too: a column per quantity, a row a sample",
+            f"{path} has no rows of numbers: all of its lines are words or headings, such as line "
+            f"{begin.number}: {begin.text[:60]!r}",
+            hint="export what is below the headings too: one column per quantity, one row per sample",
         )
     units = [cell.strip("()[] ") for cell in rows[1]] if heads == 2 else []
     return Dialect(

@@ -189,7 +189,7 @@ class _Reader:
         if value is None and k in self.needed:
             said = f"{self.path} has {self._place(cell, k, line)}: not a number"
             if has_thousands(cell):  # all large values are so: without them the record is another
-                raise DataError(said, hint="export it without the separator of thousands")
+                raise DataError(said, hint="export it without thousands separators")
             self.misfit = self.misfit or said
         return np.nan if value is None else value
 

@@ -41,9 +41,7 @@ def check_artefact(path: Path | str) -> None:
 def check_no_option(path: Path) -> None:
     """Raise UsageError for an option in the place of a file: the parser took it for a value."""
     if str(path).startswith("--"):
-        raise UsageError(
-            f"{path} stands where the name of a file is expected", hint=f"name the file, then {path}"
-        )
+        raise UsageError(f"the name of a file is missing before {path}", hint=f"name the file, then {path}")
 
 
 def is_journal(path: Path | str) -> bool:
@@ -97,7 +95,7 @@ def _names_in(folder: Path, path: Path) -> str:
     names = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
     near = difflib.get_close_matches(path.name, names, n=10, cutoff=0.5)
     near += [name for name in names if name.startswith(f"{path.name}.partial") and name not in near]
-    near = near or [name for name in names if name.endswith(path.suffix or ".h5")]
+    near = near or [name for name in names if path.suffix and name.endswith(path.suffix)]
     offered = ", ".join(file.name for file in _offered(folder / name for name in near))
     where = "here" if folder == Path() else f"in {folder}"
     return f"files {where}: {offered}" if offered else f"no file {where} has a similar name: give its path"

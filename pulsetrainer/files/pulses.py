@@ -69,7 +69,7 @@ def read_pulse(name: str) -> Shape:
     note = ""
     if len(columns.names) > 2:
         note = (
-            f"of the {len(columns.names)} columns of {path} the second is played, {columns.names[1]}: write "
-            "another one into a table of its own, time and value"
+            f"of the {len(columns.names)} columns of {path} the second is played, {columns.names[1]}; to "
+            "play another one, write it into a table of its own, time and value"
         )
     return Shape(path.stem, time_s, value, said.get("source") or path.name, feet_s, note)

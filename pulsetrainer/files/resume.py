@@ -70,8 +70,8 @@ def earlier_of(path: Path, asked: Mapping[str, Any], *, overwrite: bool) -> Earl
         cut_off = f"{path.name}.partial"
         beside = min((one.name for one in path.parent.glob(f"{glob.escape(cut_off)}*")), default=cut_off)
         raise UsageError(
-            f"{beside} is being written by another program, or is no capture that can be read",
-            hint=f"wait for it, or look: pulsetrainer show {beside}",
+            f"{beside} is being written by another program, or is not a readable capture",
+            hint=f"wait for it, or look at it: pulsetrainer show {beside}",
         )
     source, _ = max(found, key=lambda pair: pair[1])
     lease = Lease(source)

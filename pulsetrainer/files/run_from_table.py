@@ -181,7 +181,7 @@ def _time(
         time = table.names[place]
         # no row is counted in ms; the licensed t_s of seconds does count rows
         if _just_counts(whole.columns[time]) and _unit_of_time(table, time) in ("", "s"):
-            lack = f"the column {time} of {table.path} just counts the rows, so it is not used as time"
+            lack = f"the column {time} of {table.path} only counts the rows, so it is not used as time"
             return _counted(table, lack, f"if it is in seconds, give `time` {time!r}", whole=table is whole)
     heading = table.names[table.index(time)]
     unit = _unit_of_time(table, heading)
@@ -191,7 +191,7 @@ def _time(
         notes = (f"the column {heading} of {table.path} is taken as {told}, by its size",)
         table = replace(table, units={**table.units, heading: unit})
     elif not unit and _unknown_unit(table, heading):
-        said = f"the heading {heading!r} of {table.path} says no unit that is known: taken as seconds"
+        said = f"the heading {heading!r} of {table.path} has no known unit: taken as seconds"
         notes = (f"{said} (write the unit in brackets, such as 't [min]')",)
     words = f"time from {split_unit(heading)[0]} " + (f"[{unit}]" if unit else "(no unit: taken as s)")
     stamps, again = _begun_again(table.check_finite(time, remedy=_LEAVE_OUT), unit or "s")
@@ -201,8 +201,8 @@ def _time(
     time_s = seconds(table, time, of_record=True)
     step = float(np.median(np.diff(time_s)))
     if not unit and step >= _SLOW_S and time_s.size >= _MANY:
-        said = f"the samples of {table.path} lie {step:g} s apart, if its time is in seconds as taken"
-        notes = (*notes, f"{said} (for ms write the heading as '{heading} [ms]')")
+        said = f"the samples of {table.path} are {step:g} s apart if its time is in seconds, as assumed"
+        notes = (*notes, f"{said} (if it is in ms, write the heading as '{heading} [ms]')")
     if np.spacing(np.abs(time_s[0])) > _EXACT * step:
         notes = (*notes, f"the stamps of {table.path} have more digits than a number holds: {_SUBTRACT}")
     return _Time(time_s, words, notes)
@@ -212,7 +212,7 @@ def _counted(table: Table, lack: str, remedy: str, *, whole: bool) -> _Time:
     """Return the time of counted rows at the rate that the comments state, else none."""
     stated = stated_rate(table.comments) if whole else None
     if stated is None:
-        return _Time(None, "no time", (f"{lack}: the samples have an order only ({remedy})",))
+        return _Time(None, "no time", (f"{lack}: only the order of the samples is known ({remedy})",))
     rate_Hz, said = stated
     note = f"{lack}: the rate is that of its comment {said!r}"
     return _Time(np.arange(table.rows) / rate_Hz, f"time by the rate of {rate_Hz:g} Hz", (note,))
@@ -293,7 +293,7 @@ def _without_bad_rows(table: Table, *, counted: bool) -> tuple[Table, tuple[str,
         )
     if counted or table.rate_Hz is not None:
         raise UsageError(
-            f"{said}, and its rows are counted to tell the time",
+            f"{said}, and its rows are counted to give the time",
             hint="name a `time` column, or give `no_time`, so that rows can be left out",
         )
     kept = np.delete(np.arange(table.rows), bad)
@@ -335,7 +335,7 @@ def _other_units(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[
 def _times_asked_for(table: Table, meanings: Mapping[str, tuple[str, str]]) -> list[str]:
     """Say which columns look like the time of the record, by name and numbers, and were given a meaning."""
     return [
-        f"the column {heading!r} of {table.path} looks like the time, and was asked for as the {meaning}"
+        f"the column {heading!r} of {table.path} looks like the time, but was given as the {meaning}"
         for meaning, (column, _) in meanings.items()
         if _is_called_time(heading := table.names[table.index(column)])
         and bool(np.all(np.diff(table.columns[heading]) > 0))
@@ -418,7 +418,7 @@ def seconds(table: Table, name: str, *, of_record: bool = False) -> FloatArray:
         elif all(column[row] == column[row - 1] for column in table.columns.values()):
             hint, other = "drop the repeated rows", ", or give a `rate_Hz` instead of the time"
         else:
-            hint = "its stamps are rounded too coarsely, or repeated: write them with more digits"
+            hint = "its time stamps are repeated, or rounded too coarsely: write them with more digits"
             other = ", or give a `rate_Hz` instead of the time"
         raise DataError(
             f"the time in {table.path}, {column_words(name)}, does not increase at {table.place(row)}: "

@@ -48,12 +48,12 @@ SETTINGS = (
     Setting("levels", int, "", "levels of the plane"),
     Setting("current_max_A", float, "A", "top of the range of a capture"),
     Setting("speed_A_per_s", float, "A/s", "speed of identification"),
-    Setting("rate_Hz", float, "Hz", "samples a second"),
-    Setting("slew_A_per_s", float, "A/s", "fastest a drive may move"),
+    Setting("rate_Hz", float, "Hz", "sample rate"),
+    Setting("slew_A_per_s", float, "A/s", "fastest that a drive may move"),
     Setting("periods", int, "", "periods of a pulse"),
     Setting("repeats", int, "", "how often a drive is played"),
-    Setting("limits.current_A", float, "A", "the device refuses more"),
-    Setting("limits.force_N", float, "N", "the device switches off above"),
+    Setting("limits.current_A", float, "A", "highest current that the device accepts"),
+    Setting("limits.force_N", float, "N", "force above which the device switches off"),
 )
 
 
@@ -67,7 +67,7 @@ def find(named: str | None, environment: Mapping[str, str]) -> Path | None:
                 f"the file of settings {chosen} {is_what}",
                 hint="check its name, or leave --settings out"
                 if named
-                else f"check its name, or take the variable {VARIABLE} away",
+                else f"check its name, or unset the variable {VARIABLE}",
             )
         return Path(chosen)
     from platformdirs import user_config_path  # noqa: PLC0415 - a file that is named needs no search
@@ -90,7 +90,7 @@ def read_toml(path: Path | str, what: str = "settings") -> dict[str, Any]:
             f"the {what} in {path} cannot be read: {reason}" + (f": {line.strip()}" if line else ""),
             hint=f"write the number with a point: {comma[1]}.{comma[2]}"
             if comma
-            else f"write it as TOML, a line each, such as: {_TOML_LINES[what]}",
+            else f"write it as TOML, one {what.rstrip('s')} a line, such as: {_TOML_LINES[what]}",
         ) from error
 
 
@@ -125,10 +125,10 @@ def _value(path: Path, key: str, value: Any) -> Any:
         import difflib  # noqa: PLC0415 - needed by a mistake only
 
         near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-        hint = f"did you mean {_in_its_table(near[0])}?" if near else f"there are: {', '.join(known)}"
+        hint = f"did you mean {_in_its_table(near[0])}?" if near else f"the settings are {', '.join(known)}"
         table, _, name = key.rpartition(".")
         if name in known:
-            hint = f"put {name} above [{table}]: what stands below that belongs to it"
+            hint = f"put {name} above [{table}]: all that is below that line belongs to [{table}]"
         raise UsageError(f"{path} sets {key!r}, which is not a setting", hint=hint)
     setting = known[key]
     number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -146,9 +146,9 @@ def _value(path: Path, key: str, value: Any) -> Any:
 
 
 def _in_its_table(key: str, words: str = "") -> str:
-    """Return a key, or ``words`` of it, as written in the file: ``current_A below [limits]``."""
+    """Return a key, or ``words`` of it, as written in the file: ``current_A under [limits]``."""
     table, _, name = key.rpartition(".")
-    return (words or name) + (f" below [{table}]" if table else "")
+    return (words or name) + (f" under [{table}]" if table else "")
 
 
 def effective(file: Path | None, environment: Mapping[str, str]) -> list[tuple[Setting, Any, str]]:

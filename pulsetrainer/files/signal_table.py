@@ -48,7 +48,7 @@ def read_signal(path: Path, rate_Hz: float) -> Signal:
     if unit not in ("", "A"):
         raise DataError(
             f"{path}: the column {table.names[1]} is in {unit}, expected the current to be played in A",
-            hint="write the current in A into the second column, such as current_A",
+            hint="give the current in A in the second column, such as current_A",
         )
     seconds = float(time[-1]) - float(time[0])
     lasts = seconds * rate_Hz

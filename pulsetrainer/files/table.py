@@ -137,11 +137,13 @@ class Table:
         if k is None:
             near = [own for own in self.names if name.lower() in own.lower()]
             near = near or difflib.get_close_matches(name, self.names, n=3, cutoff=0.5)
+            hint = f"did you mean {' or '.join(repr(n) for n in near)}?" if near else "name one of these"
+            bare_numbers = self.names == tuple(f"column{k}" for k in range(1, len(self.names) + 1))
             raise DataError(
-                f"{self.path} has no column {name!r}; it has {', '.join(self.names)}",
-                hint=f"did you mean {' or '.join(repr(n) for n in near)}?"
-                if near
-                else "name one of these columns",
+                f"{self.path} has no column {name!r}; "
+                + ("it has no headings: its columns are called " if bare_numbers else "it has ")
+                + ", ".join(self.names),
+                hint="name columns by number: 1 is the first" if bare_numbers else hint,
             )
         if self.names[k] in self.text_names:
             raise DataError(

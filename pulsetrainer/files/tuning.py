@@ -76,7 +76,7 @@ def write_tuned(path: Path, serial: str, found: Found, *, overwrite: bool) -> No
     except tomllib.TOMLDecodeError as error:
         raise UsageError(
             f"the entry of {serial} cannot be replaced in {path}: {error}",
-            hint=f"delete what stands there under {TABLE}, then tune again",
+            hint=f"delete what is there under {TABLE}, then tune again",
         ) from error
     with replacing(path, overwrite=True) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -27,7 +27,7 @@ class Dots:
 
     def lines(self) -> list[str]:
         """Return the rows, the top one first."""
-        return ["".join(chr(_BRAILLE + int(cell)) for cell in row) for row in self._cells]
+        return [row.tobytes().decode("utf-32-le") for row in (self._cells + _BRAILLE).astype("<u4")]
 
 
 def plotted(values: np.ndarray, width: int, rows: int) -> list[str]:

@@ -51,7 +51,7 @@ def draw(labels: Sequence[str], values: Mapping[str, Sequence[float | None]]) ->
         sizes = [v for row in within for v in row if v is not None and np.isfinite(v)]
         low, top = min(sizes, default=0.0), max(sizes, default=0.0)
         axes.set_ylim(min(1.1 * low, 0.0), 1.1 * top if top > 0 else 0.1 * abs(low) or 1.0)
-        axes.yaxis.set_major_locator(MaxNLocator(5))
+        axes.yaxis.set_major_locator(MaxNLocator(5, steps=(1, 2, 2.5, 5, 10)))
         axes.margins(x=0.08)
     if not learners:
         axes_of[0].legend(loc="best")

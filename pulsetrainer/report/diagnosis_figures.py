@@ -47,7 +47,7 @@ def course(found: Diagnosis) -> Figure:
     causes = [one.cause for one in found.found]
     verdict = ", ".join(causes) if found.verdict in causes else found.verdict
     how = " (quick screen)" if found.quick else " (in doubt)" if in_doubt(found) else ""
-    above.set_title(f"verdict: {verdict}{how}", wrap=True)
+    above.set_title(f"Verdict: {verdict}{how}", wrap=True)
     panels.headroom(above)
     panels.trace(below, found.time_s, found.output - found.before, **ERROR, label="without causes")
     if found.extended_percent < found.static_percent:
@@ -171,12 +171,11 @@ def ranking(found: Diagnosis) -> Figure:
             va="center",
             fontsize=8.5,
         )
-    axes.set_xlim(
-        0.0, 1.7 * max([*share, 1.0])
-    )  # room for the words beside the bars, but no share over 100 %
-    axes.set_xticks(
-        [tick for tick in axes.get_xticks() if tick <= min(1.2 * max(share, default=0.0), _WHOLE)]
-    )
+    axes.set_xlim(0.0, 1.7 * max([*share, 1.0]))  # room for the words beside the bars
+    ticks = axes.get_xticks()
+    ends = max((tick for tick in ticks if tick <= _WHOLE), default=0.0)  # but no share over 100 %
+    axes.set_xticks([tick for tick in ticks if tick <= ends])
+    axes.spines["bottom"].set_bounds(0.0, ends)
     axes.set_title("Causes, and whether each was found")
     axes.set_xlabel("explains [% of the squared error beyond noise]")
     axes.grid(visible=False, axis="y")

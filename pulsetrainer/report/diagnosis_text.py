@@ -51,11 +51,14 @@ def sections(found: Diagnosis) -> Iterator[Facts | Table]:
     others = [one for one in found.causes if not one.found][: max(_SHOWN - len(found.found), 0)]
     columns = ("cause", "found", "explains, %", "held-out\nshare, %")
     rows = tuple(_row(one, found) for one in (*found.found, *others))
+    explained = {one.cause: one.text for one in others if one.text}  # those found were told above
     if tells_shares(found):
         yield Table("causes, strongest first", columns, rows)
-        yield Facts("in this table", COLUMNS)
+        explained = COLUMNS | explained
     else:
         yield Table("causes, strongest first", columns[:2], tuple(row[:2] for row in rows))
+    if explained:
+        yield Facts("in this table", explained)
     yield Facts("evidence", {str(k): text for k, text in enumerate(found.evidence, start=1)})
     yield Facts("next", {"": found.next_experiment})
 
@@ -89,7 +92,7 @@ def answer(one: Cause, found: Diagnosis) -> str:
         return "in doubt" if one.doubts else "yes"
     instead = [other.cause for other in found.found if one.cause in other.confounded_with]
     if instead:
-        return f"no: it could be instead of {instead[0]}"
+        return f"no: an alternative to {instead[0]}"
     if one.p_value is None:
         return "no"
     if one.p_value > LIMITS.p_max:

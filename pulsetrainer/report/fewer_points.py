@@ -9,6 +9,7 @@ import numpy as np
 from pulsetrainer.core.plane import FloatArray, IntArray
 
 MOST_POINTS: Final = 4000
+MOST_OF_A_LOOP: Final = 4 * MOST_POINTS  # or a fast stroke of a long record becomes a straight line
 _FAR = 4.0  # times as far off its bin as the farthest usually is: no noise, and no fast stretch either
 
 
@@ -39,7 +40,7 @@ def extremes(values: FloatArray, most: int = MOST_POINTS) -> IntArray:
     return np.unique(np.concatenate(picked))
 
 
-def path(x: FloatArray, y: FloatArray, most: int = 2 * MOST_POINTS) -> IntArray:
+def path(x: FloatArray, y: FloatArray, most: int = MOST_OF_A_LOOP) -> IntArray:
     """Return at most ``most`` sample numbers that keep the course of a curve in the plane.
 
     The samples are cut into bins of equal length. Of each stays the sample nearest to the bin's mean, so

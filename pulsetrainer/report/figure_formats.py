@@ -21,6 +21,6 @@ def figure_format(path: Path, what: str, *more: str) -> str:
         raise UsageError(
             f"{what} is written as {', '.join(known[:-1])} or {known[-1]}, but {path} "
             + (f"ends in {path.suffix.lower()!r}" if form else "has no such ending"),
-            hint=f"name it {path.parent / (path.stem or 'figure')}.png",
+            hint=f"name it {path.parent / (path.stem.lstrip('-') or 'figure')}.png",
         )
     return form

@@ -46,13 +46,13 @@ def _sheet(width_in: float = COLUMN_IN, height_in: float = _ROW_IN) -> Figure:
 
 
 def _alone(
-    panel: Callable[Concatenate[FigureBase, P], None], height_in: float = _ROW_IN
+    panel: Callable[Concatenate[FigureBase, P], None], height_in: float = _ROW_IN, width_in: float = COLUMN_IN
 ) -> Callable[P, Figure]:
     """Return what draws a figure of one panel."""
 
     @styled
     def draw(*shown: P.args, **options: P.kwargs) -> Figure:
-        figure = _sheet(height_in=height_in)
+        figure = _sheet(width_in, height_in)
         panel(figure, *shown, **options)
         return figure
 
@@ -63,7 +63,7 @@ preisach_density = _alone(panels.density)  # fig. 7
 identification = _alone(panels.fit, height_in=5.4)  # fig. 8
 tracking = _alone(panels.tracking)  # fig. 9
 methods = _alone(panels.methods, height_in=5.4)
-loops = _alone(panels.loops)  # fig. 10
+loops = _alone(panels.loops, width_in=4.2)  # fig. 10: a square with little beside it
 prediction = _alone(panels.prediction)
 
 
@@ -81,8 +81,8 @@ def run(record: Run) -> Figure:
     input_label = label(record.input_quantity, record.input_unit)
     output_label = label(record.output_quantity, record.output_unit)
     above.set_ylabel(input_label)
-    title = f"{record.signal} signal over time" if record.signal else "the record over time"
-    above.set_title(title + ("" if record.complete else ", incomplete"))
+    title = f"{record.signal} signal over time" if record.signal else "record over time"
+    above.set_title(title[:1].upper() + title[1:] + ("" if record.complete else ", incomplete"))
     if record.reference is not None:
         panels.headroom(above)
     below.set_ylabel(output_label)
@@ -92,7 +92,8 @@ def run(record: Run) -> Figure:
     loop.set_xlabel(input_label)
     loop.set_ylabel(output_label)
     directions(loop, record.input, record.output)
-    loop.set_title(f"{record.output_quantity} over {record.input_quantity}, arrows: the way it goes")
+    title = f"{record.output_quantity} over {record.input_quantity}; arrows: direction"
+    loop.set_title(title[:1].upper() + title[1:])
     return figure
 
 
@@ -114,13 +115,15 @@ def waveform(drive: Waveform) -> Figure:
 def playback(played: Playback) -> Figure:
     """Return every repeat of both drives: force, current, how well it followed, and the coil's heat."""
     asked, kelvin = played.waveform, played.temperature_K
-    if kelvin is None or not kelvin.size:
-        whole = figure = _sheet(1.5 * COLUMN_IN, 1.5 * _ROW_IN)
-    else:
-        whole = _sheet(1.5 * COLUMN_IN, 1.9 * _ROW_IN)
-        figure, below = whole.subfigures(2, 1, squeeze=False, height_ratios=(3.2, 0.8))[:, 0]
-        heat_figures.temperature_of_repeats(below.subplots(), kelvin)
-    force, current, error = figure.subplots(3, 1, sharex=True, height_ratios=(1.4, 1.0, 0.8))
+    rows = 3 if kelvin is None or not kelvin.size else 4
+    figure = _sheet(1.5 * COLUMN_IN, (1.5 if rows == 3 else 1.9) * _ROW_IN)
+    panes = figure.subplots(rows, 1, height_ratios=(1.4, 1.0, 0.8, 0.65)[:rows])
+    force, current, error = panes[:3]
+    for axes in (force, current):
+        axes.sharex(error)
+        axes.tick_params(labelbottom=False)
+    if kelvin is not None and rows > 3:
+        heat_figures.temperature_of_repeats(panes[3], kelvin)
     panels.trace(force, asked.time_s, asked.target, **TARGET, label="target")
     for name, drive, style in (
         ("scaled", played.scaled, SCALED),
@@ -139,7 +142,7 @@ def playback(played: Playback) -> Figure:
     for axes in (force, current, error):
         panels.unscored(axes, asked)
     panels.headroom(force)
-    return whole
+    return figure
 
 
 @styled

@@ -22,17 +22,18 @@ def temperature_of_repeats(axes: Axes, told_K: FloatArray) -> None:
     """Draw how much warmer the copper was before each repeat (r,), K."""
     axes.plot(range(1, told_K.size + 1), told_K, marker="o", **COMPENSATED, label="told by the duty")
     _finish(axes, 0.16)
-    axes.set_xlabel("repeat [number]")
+    axes.set_xlabel("repeat")
+    axes.margins(x=0.04)  # a point is whole at either end
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 @styled
 def of_playback(told_K: FloatArray) -> Figure:
     """Return the coil's temperature before each repeat (r,), K."""
-    figure = Figure(figsize=(COLUMN_IN, 2.6), layout="constrained")
+    figure = Figure(figsize=(0.6 * COLUMN_IN, 2.4), layout="constrained")  # few points: a small figure
     axes = figure.add_subplot()
     temperature_of_repeats(axes, told_K)
-    axes.set_title("Coil temperature, made up for")
+    axes.set_title("Coil temperature")
     return figure
 
 

@@ -53,7 +53,10 @@ def number(value: float | None, metric: str = "", form: str = "", *, published: 
     """
     if value is None:
         return Number("")
-    printed = format(value, form) if form else digits(value)
+    # "#" keeps zeros at the end: 13.50 beside 13.51
+    printed = (
+        format(value, f"#{form}" if form.endswith("g") else form).removesuffix(".") if form else digits(value)
+    )
     text = printed.replace("-", "−") if math.isfinite(value) else "no value"
     return Number(text, repr(float(value)), metric, published)
 
@@ -113,8 +116,9 @@ def page(template: str, *, provenance_json: str, history: Sequence[str] = (), **
 
     Of the header ``title`` and ``created`` are wanted too.
     """
-    provenance = indented(provenance_json)
-    return environment().get_template(template).render(provenance=provenance, history=history, **content)
+    provenance, version = _made_by(provenance_json)
+    rendered = environment().get_template(template).render
+    return rendered(provenance=provenance, version=version, history=history, **content)
 
 
 def render_evaluation(
@@ -131,13 +135,17 @@ def render_evaluation(
     last = f" of {panels.titled(played[-1])}" if len(set(map(panels.titled, played))) > 1 else ""
     if len(evaluation.models) > 1:
         last = f" {PurePath(evaluation.models[-1].name).stem}"
+    pulses = [one.name for one in played]
     return page(
         "evaluation.html.j2",
         **header,
-        waveforms=[
-            (f"waveform-{k}", one, stem)
-            for k, (one, stem) in enumerate(zip(played, evaluation.stems, strict=False), start=1)
-        ],
+        waveforms=sorted(
+            (
+                (f"waveform-{k}", one, stem)
+                for k, (one, stem) in enumerate(zip(played, evaluation.stems, strict=False), start=1)
+            ),
+            key=lambda part: pulses.index(part[1].name),  # those of a pulse together, as in the table
+        ),
         inversions=panels.inversions(played),
         published=published,
         model=evaluation.model,
@@ -145,7 +153,7 @@ def render_evaluation(
         predicted=evaluation.models,
         model_stems=evaluation.stems[len(played) :],
         worse=worse(evaluation),
-        notes=evaluation.notes,
+        warnings=evaluation.warnings,
     )
 
 
@@ -189,9 +197,11 @@ def unbroken(text: str) -> str:
     return type(text)(_UNIT.sub("\N{NO-BREAK SPACE}", text))
 
 
-def indented(text: str) -> str:
-    """Return JSON in lines for a reader; what is not JSON is shown as it is."""
+def _made_by(text: str) -> tuple[str, str]:
+    """Return JSON in lines for a reader, and the version of the program in it; what is not JSON as it is."""
     try:
-        return json.dumps(json.loads(text), indent=2, ensure_ascii=False)
+        read = json.loads(text)
     except ValueError:
-        return text
+        return text, ""
+    version = read.get("version", "") if isinstance(read, dict) else ""
+    return json.dumps(read, indent=2, ensure_ascii=False), version

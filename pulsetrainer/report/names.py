@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 FORCE: Final = "% of full force"
 _ROUNDING: Final = 1e-6
+_LARGE: Final = 99.995  # what two decimals would print as 100.00
 _DRIVES: Final = ("scaled", "compensated")
 
 
@@ -91,5 +92,10 @@ def beyond_rounding(offset: float, rms: float) -> float:
 
 
 def digits(value: float) -> str:
-    """Return a figure with two decimals; a small one with three significant digits, never as nothing."""
-    return f"{value:.3g}" if 0.0 < abs(value) < 0.1 else f"{value:.2f}"
+    """Return a figure with two decimals, or with none of three digits or more: they would tell nothing.
+
+    A small one has three significant digits, and never stands as nothing.
+    """
+    if abs(value) >= _LARGE:
+        return f"{value:.0f}"
+    return f"{value:#.3g}" if 0.0 < abs(value) < 0.1 else f"{value:.2f}"

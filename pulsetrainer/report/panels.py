@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any, Literal
@@ -13,7 +14,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import FigureBase
 from matplotlib.patches import Polygon
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, MultipleLocator, NullFormatter
 
 from pulsetrainer.artefacts import (
     Fit,
@@ -26,7 +27,7 @@ from pulsetrainer.artefacts import (
 from pulsetrainer.artefacts.units import counted, shown
 from pulsetrainer.core.metrics import beats
 from pulsetrainer.report.fewer_points import extremes, path
-from pulsetrainer.report.names import digits
+from pulsetrainer.report.names import NAMES, digits
 from pulsetrainer.report.style import (
     COMPENSATED,
     ERROR,
@@ -48,6 +49,9 @@ from pulsetrainer.report.style import (
 _DENSITY_GAMMA = 0.5
 _DENSITY_QUANTILE = 0.99
 _DENSITY_REACH = 2.0
+# letters of a title in a line, above a whole column and above a square; matplotlib's own wrapping reads
+# what stands between two dollars as a formula, whatever the settings say
+_TITLE, _SQUARE_TITLE = 48, 30
 _CLOCK = 100.0  # lengths of the record that its first time is late: a date, which tick labels cannot hold
 _QUANTITIES = {
     "N": "force", "A": "current", "T": "flux density", "V": "voltage", "Pa": "pressure", "N*m": "torque",
@@ -207,7 +211,12 @@ def fit(
     residual(below, x, record.output - record.predicted, record.rms)
     below.set_xlabel(name)
     below.set_ylabel(label("residual", record.output_unit))
-    below.set_title(f"Residual: rms {record.rms_percent:.3g} % of span (dotted: ± rms)")
+    below.set_title(residual_title(record.rms_percent))
+
+
+def residual_title(rms_percent: float) -> str:
+    """Return what stands above a residual: how large it is."""
+    return f"Residual: rms {rms_percent:.3g} % of span (dotted: ± rms)"
 
 
 def residual(axes: Axes, x: FloatArray, difference: FloatArray, rms: float) -> None:
@@ -230,13 +239,16 @@ def prediction(
     trace(above, x, model.output, **GROUND, label="measured")
     trace(above, x, model.predicted, **MODEL, label="predicted")
     above.set_ylabel(label(quantity or quantity_of(model.output_unit), model.output_unit))
-    above.set_title(f"{PurePath(model.name).stem}: rms {model.rms_percent:.3g} % of span (dotted: ± rms)")
+    above.set_title(
+        textwrap.fill(f"Prediction by {PurePath(model.name).stem}", _TITLE, break_on_hyphens=False)
+    )
     headroom(above)
     residual(below, x, model.output - model.predicted, model.rms)
     if reach is not None and np.isfinite(reach) and reach > 0:
         below.set_ylim(-1.05 * reach, 1.05 * reach)
     below.set_xlabel(name)
     below.set_ylabel(label("residual", model.output_unit))
+    below.set_title(residual_title(model.rms_percent))
 
 
 def largest_residual(models: Sequence[ModelEvaluation]) -> float:
@@ -318,14 +330,18 @@ def loops(panel: FigureBase, played: Sequence[WaveformEvaluation], among: Sequen
         drawn.append((one.inversion if several else "compensated", one, one.compensated, style))
     for name, one, drive, style in drawn:
         beat = slice(0, one.target.size // beats(one.target))
-        shown = f"{name}, loop area {digits(drive.hysteresis_percent)} % of full force²"
+        shown = f"{name}: {digits(drive.hysteresis_percent)}"
         orbit(axes, one.target[beat], drive.output[beat], **style, label=shown)
     axes.set_aspect("equal")
     axes.set_xlabel(label("target", first.output_unit))
     axes.set_ylabel(label("force", first.output_unit))
-    axes.set_title(f"{first.name if several else titled(first)}: one beat", wrap=True)
+    title = f"{first.name}{'' if several else f', {first.inversion}'}: one beat"
+    axes.set_title(textwrap.fill(title, _SQUARE_TITLE, break_on_hyphens=False))
+    step = float(np.diff(MaxNLocator(7, steps=(1, 2, 5, 10)).tick_values(*ends))[0])
+    for axis in (axes.xaxis, axes.yaxis):  # equal scales have equal ticks
+        axis.set_major_locator(MultipleLocator(step))
     # outside, since inside a loop would run through
-    panel.legend(loc="outside lower center")
+    panel.legend(loc="outside lower center", title=str(NAMES["hysteresis_percent"]), alignment="left")
 
 
 def drives(panel: FigureBase, waveform: Waveform) -> None:

@@ -6,6 +6,7 @@ import csv
 import io
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from pulsetrainer.artefacts import Diagnosis, Evaluation, Model, ModelEvaluation, Playback, Run, Waveform
 from pulsetrainer.artefacts.evaluation import METRICS, MODEL_METRICS
+from pulsetrainer.artefacts.model import Extension
 from pulsetrainer.artefacts.units import counted, quantity_in_words, with_seconds, with_unit
 from pulsetrainer.report.facts import loop_words, minor_words, run_facts, span_words, warmth_words
 from pulsetrainer.report.names import digits, split, told
@@ -21,6 +23,7 @@ from pulsetrainer.report.tables import text as shown
 
 _MORE_BEFORE = 1.05  # times the full force, in the strokes before the pulse: said
 _SMALL = 0.1  # of a unit: three decimals would not tell a range of less
+_LARGE = 100.0  # of a unit: of more, three decimals tell what no sensor does
 
 _VERDICT: Final = {True: "better", False: "worse", None: ""}
 
@@ -98,8 +101,8 @@ def drive_title(drive: Waveform) -> str:
 
 
 def _range_words(ends: tuple[float, float], unit: str) -> str:
-    """Return a range with three decimals, or with more digits where these would not tell its ends apart."""
-    if ends[1] - ends[0] < _SMALL:
+    """Return a range with three decimals; with other digits where these tell too much or too little."""
+    if ends[1] - ends[0] < _SMALL or max(map(abs, ends)) >= _LARGE:
         return span_words(np.asarray(ends), unit)
     return with_unit(f"{ends[0]:.3f} .. {ends[1]:.3f}", unit)
 
@@ -124,14 +127,16 @@ def inverted(out: Path, drive: Waveform) -> Said:
     }
     before = ""
     if drive.predicted_peak > _MORE_BEFORE * drive.full_force:
-        before = f"; before it up to {drive.predicted_peak:.3f} {drive.output_unit}, by the model"
+        peak = f"{drive.predicted_peak:.3f} {drive.output_unit}"
+        before = f"; up to {peak} in the strokes before the pulse, by the model"
+    full = "full force" if made == "force" else f"the top of the {made}"
     but = ", which lacks what was learnt" if drive.inversion == "transferred" else ""
     rows = {
         "length": f"{length}, {drive.time_s.size} samples",
         made: _range_words(force, drive.output_unit) + before,
         given: _range_words(current, drive.input_unit),
         "out of reach": counted(drive.clipped_samples, "sample"),
-        "expected error": f"{drive.predicted_max_error_percent:.3f} % max of full {made}, by the model{but}",
+        "expected error": f"at most {drive.predicted_max_error_percent:.3f} % of {full}, by the model{but}",
     }
     return payload, f"{out}: {drive_title(drive)}", rows
 
@@ -320,8 +325,24 @@ def _apart(found: Diagnosis, model: Model) -> dict[str, str]:
     told = {(one.cause, p.name): p.value for one in found.found for p in one.parameters}
     now = {(cause, name): value for cause, several in added.items() for name, value in several.items()}
     if any(told.get(which, value) != value for which, value in now.items()):
-        rows["parameters"] = "fitted again as the model is used: from rest; intervals: of the diagnosis"
+        rows["parameters"] = (
+            "fitted again as the model is used, from rest; intervals are those of the diagnosis, and stand "
+            "only beside what did not change"
+        )
     return rows
+
+
+def as_fitted_again(one: Extension, found: Diagnosis) -> Extension:
+    """Return an extension without the intervals of a diagnosis that told other values."""
+    told: dict[str, list[float]] = {}
+    for cause in found.found:
+        for p in cause.parameters if cause.cause == one.cause else ():
+            told.setdefault(p.name, []).append(p.value)
+    rows = (
+        p if p.value in told.get(p.name, [p.value]) else replace(p, lower=math.nan, upper=math.nan)
+        for p in one.parameters
+    )
+    return replace(one, parameters=tuple(rows))
 
 
 def _left(found: Diagnosis, model: Model) -> dict[str, str]:

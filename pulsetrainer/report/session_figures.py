@@ -33,6 +33,8 @@ def course(session: Session) -> Figure:
         figure = Figure(figsize=(COLUMN_IN, 5.6), layout="constrained")
         above, below, lowest = figure.subplots(3, 1, height_ratios=(1.5, 1.0, 0.8))
         heat_figures.temperature(lowest, warm_s, warm_K)
+        lowest.sharex(below)  # both go over the whole session
+        below.tick_params(labelbottom=False)
     middle = session.time_s[session.time_s.size // 2]
     near = np.abs(session.time_s - middle) <= 0.5 * SHOWN_S
     panels.trace(above, session.time_s[near], session.target[near], **TARGET, label="target")
@@ -49,7 +51,7 @@ def course(session: Session) -> Figure:
     )
     below.plot(beats.start_s, percent * beats.mean_error, ".", markersize=3, color=BLUE, label="mean error")
     below.set_ylabel("error\n[% of full force]")
-    below.set_xlabel(label("start of the beat", "s"))
+    below.set_xlabel(label("start of the beat", "s") if warm_s is None else "")
     below.set_ylim(bottom=0.0)
     panels.headroom(below, 0.3, markerscale=3.0)
     return figure

@@ -55,7 +55,7 @@ def _explain(executable: Path, options: BenchOptions, complaint: str) -> UsageEr
             within = f"{low} to {high} {unit}".removesuffix(" 1")
             most = sys.float_info.max
             amiss = "is not a number from" if math.isnan(number_in(value, -most, most)) else "is outside"
-            hint = f"give {name} ({meaning}) a value in that range"
+            hint = f"give {name} a value in that range; it sets: {meaning}"
             if re.search(r"[,;]\w+=", value):
                 several = f"bench:?{name}={re.sub('[,;]', '&', value)}"
                 hint = f"put & between parameters, and quotes around them: `port` '{several}'"
@@ -115,7 +115,7 @@ class Bench:
                 raise _explain(executable, options, complaint)
             raise DeviceError(
                 f"the bench did not start: {complaint}",
-                hint="see whether /dev/ptmx exists and may be opened: ls -l /dev/ptmx",
+                hint="check that /dev/ptmx exists and may be opened: ls -l /dev/ptmx",
             )
 
     @property

@@ -64,7 +64,7 @@ def find_compiler() -> list[str]:
     if importlib.util.find_spec("ziglang") is not None:
         return [sys.executable, "-m", "ziglang", "cc"]
     raise DeviceError(
-        "the virtual bench needs a C compiler once, and there is neither cc nor ziglang",
+        "the virtual bench needs a C compiler once, but neither cc nor ziglang is installed",
         hint="install one: `sudo apt install gcc libc6-dev`, or without root `pip install ziglang`",
     )
 

@@ -101,7 +101,7 @@ class SocketTransport:
                 if ready:
                     rest = rest[self._socket.send(rest) :]
                 elif time.monotonic() > deadline:
-                    raise self._lost(f"it takes no bytes for {_WRITE_S:g} s")
+                    raise self._lost(f"it has taken no bytes for {_WRITE_S:g} s")
         except (OSError, ValueError) as error:
             raise self._lost(str(error)) from error
 

@@ -42,13 +42,15 @@ class Wire:
             if re.fullmatch(r"\d{1,9}", text):
                 return replace(self, seed=int(text))
             raise UsageError(
-                f"`port`: the {kind} parameter wire-seed={text} is not a whole number from 0 on", hint=like
+                f"`port`: the {kind} parameter wire-seed must be a whole number, 0 or more, got {text}",
+                hint=like,
             )
         rate = number_in(text, 0.0, MAX_RATE)
         if math.isnan(rate):
             raise UsageError(
-                f"`port`: the {kind} parameter wire={text} is not a share of damaged bytes, 0 to {MAX_RATE}",
-                hint=f"one byte in ten thousand: {like}",
+                f"`port`: the {kind} parameter wire must be the share of bytes to damage, from 0 to "
+                f"{MAX_RATE}, got {text}",
+                hint=f"to damage one byte in ten thousand: {like}",
             )
         return replace(self, rate=rate)
 
@@ -126,7 +128,7 @@ def parse_bench(port: str) -> BenchOptions:
     if match is None:
         raise UsageError(
             f"`port`: {port!r} is not a bench port",
-            hint='like this: `port` "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
+            hint='write it like one of these: `port` "bench:", "bench:?ideal", "bench:?seed=3&creep=0.05"',
         )
     asked = BenchOptions()
     for name, value in parse_qsl(match[1] or "", keep_blank_values=True):
@@ -189,7 +191,7 @@ def _setting(name: str, text: str) -> float:
     if math.isnan(value):
         raise UsageError(
             f"`port`: the qemu parameter {name}={text} is not a number from {low:g} to {high:g}",
-            hint='like this: `port` "qemu:?ambient=20"',
+            hint='write it like this: `port` "qemu:?ambient=20"',
         )
     return value
 

@@ -44,7 +44,7 @@ def check_asked_for(answers: object, quiz: int, pulses: Sequence[str]) -> None:
         check_quiz(len(pulses), quiz)
     elif answers:
         raise UsageError(
-            "`answers` were given, but no quiz asks for them",
+            "`answers` was given without `quiz`",
             hint="give `quiz` with the number of questions, or leave `answers` out",
         )
 
@@ -71,7 +71,7 @@ def _check_is(kinds: tuple[type, ...], one: object) -> None:
             f"expected {' or '.join(map(_a, kinds))}, got {repr(name) if name else _a(type(one))}",
             hint=f"pt.load({name!r}) gives it"
             if "." in name
-            else "its help tells the order of the arguments",
+            else "its help shows the order of the arguments",
         )
 
 
@@ -168,7 +168,7 @@ def check_once(files: Sequence[object]) -> None:
     """Raise UsageError for a file that is named twice where each is to count once."""
     for number, path in enumerate(files):
         if path in files[:number]:
-            raise UsageError(f"{path} is named twice, and would count double", hint="name each file once")
+            raise UsageError(f"{path} is named twice, and would be counted twice", hint="name each file once")
 
 
 def check_several(evaluations: Sequence[object]) -> None:

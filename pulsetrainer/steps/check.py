@@ -81,7 +81,7 @@ class Checked:
 
 
 def check(model: Model, device: Device, *, progress: Progress = silent) -> Checked:
-    """Measure for ten seconds and say whether a model is still true of a device.
+    """Measure for ten seconds and say whether a model still describes a device.
 
         y = y_rest + offset + gain (M[u] - y_rest) + a lag + creep + what is left
 
@@ -273,9 +273,12 @@ def _shape(left: FloatArray, span: float) -> Estimate:
 def _temperature(model: Model, device: Device, trace: Trace) -> tuple[Estimate | None, str]:
     """Temperature of the copper, K, in the mean of the windows; None where it cannot be told, and why."""
     if model.coil is None:
-        return None, "the capture of the model was too short, or not in one go, to tell the coil's resistance"
+        return (
+            None,
+            "the model's capture was too short, or had pauses, so it does not give the coil's resistance",
+        )
     if not device.tells_duty:
-        return None, "the device does not tell the duty of its output"
+        return None, "the device does not report the duty of its output"
     meter = thermometer(model.coil, thermal_of(model))
     told = []
     for start in range(0, trace.tick.size, 250):
@@ -285,7 +288,7 @@ def _temperature(model: Model, device: Device, trace: Trace) -> tuple[Estimate |
         ):
             told.append(meter.temperature_K)
     if len(told) < 3:
-        return None, "too few seconds of the check tell it"
+        return None, "too few seconds of the check show it"
     mean, error = float(np.mean(told)), float(np.std(told, ddof=1)) / np.sqrt(len(told))
     return Estimate.of(mean, error), ""
 

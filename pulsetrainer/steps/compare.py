@@ -76,7 +76,7 @@ def compare(
         )
         raise DataError(
             f"evaluations and sessions cannot be compared with each other: {given}",
-            hint="give one kind or the other",
+            hint="give only one kind",
         )
     tested = [one for one in evaluations if isinstance(one, Evaluation)]
     every = [_of_session(one) for one in sessions] or _named(tested, [one.figures() for one in tested])

@@ -21,14 +21,14 @@ _DELAY = "delay"  # told by the caller: no record tells a recorder's from the de
 
 
 def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequence[str] = ()) -> Run:
-    """Take out of a run what the measurement did to its output, as far as a diagnosis of it found that.
+    """Take out of a run's output those faults of the measurement that a diagnosis of it found.
 
         y <- (y - b - g (y - y0)), y - b t, y - A sin(2 pi f t + phi), y(t / (1 + e)), y(t + d)
 
-    Samples that cannot be restored (wild, far beyond a rail, beside a step) are taken between their
-    neighbours and named in ``masked``: no fit counts them. Coarse steps become what lies between them, and a
-    sample at a rail the output expected just beyond it. What was taken out is in ``corrected`` of the new
-    run.
+    Samples that cannot be restored (wild, far beyond a rail, beside a step) are interpolated between their
+    neighbours and marked in ``masked``: no fit counts them. Coarse steps are replaced by what lies between
+    them, and a sample at a rail by the output expected just beyond it. What was taken out is in ``corrected``
+    of the new run.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def correct(run: Run, diagnosis: Diagnosis, *, delay_s: float = 0.0, names: Sequ
     if not any(part.fingerprint in known for _, part in parts):
         raise DataError(
             f"{diagnosis_name} is not a diagnosis of {run_name}: none of the records in it has these samples",
-            hint="give the run that was diagnosed, which pulsetrainer show DIAGNOSIS.h5 tells, or diagnose "
+            hint="give the run that was diagnosed (pulsetrainer show DIAGNOSIS.h5 names it), or diagnose "
             "this one: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o new-diagnosis.h5",
         )
     if delay_s and run.dt_s is None:
@@ -136,9 +136,14 @@ def _restored(
 def _nothing(diagnosis: Diagnosis, name: str) -> str:
     if diagnosis.quick:
         return f"{name} only screened for causes and fitted none: there is nothing to correct"
+    tied = [
+        f"; {one.cause} could equally be {' or '.join(one.confounded_with)}"
+        for one in diagnosis.found
+        if library()[one.cause].corrects and one.confounded_with
+    ]
     return (
         f"{name} ended with the verdict {diagnosis.verdict!r} and found no fault of the measurement that is "
-        "beyond doubt and can be taken out: there is nothing to correct"
+        f"beyond doubt and can be taken out: there is nothing to correct{''.join(tied)}"
     )
 
 

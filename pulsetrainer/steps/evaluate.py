@@ -150,6 +150,7 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
     found: list[ModelEvaluation] = []
     notes = [f"{name}: {run.gap_words}"] if run.gap_words else []
     misfits: list[str] = []
+    warnings: list[str] = []
     for title, model in zip(model_names, models, strict=True):
         if not same_units((model.input_unit, model.output_unit), (run.input_unit, run.output_unit)):
             raise DataError(
@@ -158,11 +159,11 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
             )
         one = _of_model(title, model, run, found[0].rms if found else None)
         if model.fit and model.fit.warning:
-            notes.append(f"warning: {title}: {model.fit.warning}")
+            warnings.append(f"{title}: {model.fit.warning}")
         if _is_fitted_to(model, run):
             raw = "; its fit took the noise of the input out, this prediction does not"
             noisy = model.fit is not None and model.fit.false_reversals > 0 and model.form != "direct"
-            notes.append(f"{title} was fitted to {name}: how good it is, another run shows{raw * noisy}")
+            notes.append(f"{title} was fitted to {name}: only another run shows how good it is{raw * noisy}")
         if one.outside_percent > 0:
             share = f"{one.outside_percent:.1f}" if one.outside_percent >= _TOLD else f"less than {_TOLD}"
             notes.append(
@@ -178,7 +179,9 @@ def _of_run(name: str, run: Run, models: Sequence[Model], model_names: Sequence[
                 notes.append(f"{name}: {said}")
         misfits += filter(None, [misfit_words(one, name, run)])
         found.append(one)
-    return Evaluation(models=tuple(found), model=models[-1], notes=(*misfits, *notes))
+    return Evaluation(
+        models=tuple(found), model=models[-1], notes=tuple(notes), warnings=(*misfits, *warnings)
+    )
 
 
 def _is_fitted_to(model: Model, run: Run) -> bool:

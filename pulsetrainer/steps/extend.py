@@ -53,7 +53,7 @@ def extend(
     if diagnosis.model not in ("", model.fingerprint):  # files of 0.1 do not name theirs
         raise DataError(
             f"{model_name} is not the model that {diagnosis_name} is of",
-            hint="give the model that was diagnosed, which pulsetrainer show DIAGNOSIS.h5 tells, or diagnose "
+            hint="give the model that was diagnosed (pulsetrainer show DIAGNOSIS.h5 names it), or diagnose "
             "this one: pulsetrainer diagnose RUN.h5 --model MODEL.h5 -o new-diagnosis.h5",
         )
     if extended is None:
@@ -71,7 +71,7 @@ def extend(
     diagnosed = {one.fingerprint for one in diagnosis.records}
     if verify is not None and any(verify.cut(part).fingerprint in diagnosed for part in verify.slices):
         raise DataError(
-            f"the run to verify with is one that {diagnosis_name} was made from: it cannot tell what repeats",
+            f"the run to verify with is one that {diagnosis_name} was made from: it cannot show what repeats",
             hint="give a run that was not diagnosed",
         )
     extended = replace(extended, coil=model.coil, captured=model.captured)
@@ -83,7 +83,7 @@ def _nothing_in(diagnosis: Diagnosis, name: str) -> DataError:
     why = (
         "only screened for causes and fitted none"
         if diagnosis.quick
-        else f"ended with the verdict {diagnosis.verdict!r} and has nothing that would hold elsewhere"
+        else f"ended with the verdict {diagnosis.verdict!r} and found nothing that would hold in other runs"
     )
     if diagnosis.correctable:
         hint = "take it out of the run: pulsetrainer correct RUN.h5 --diagnosis DIAGNOSIS.h5 -o corrected.h5"

@@ -73,7 +73,7 @@ def of_rest(fitted: Fitted) -> list[str]:
         return []
     times = f"{left / noise:.0f} times" if left < _UNCOUNTED * noise else "far more than"
     found = f"the model leaves {100 * share:.1f} % of the span (rms), {times} the noise from sample to sample"
-    return [f"{found}: pulsetrainer diagnose tells what it misses"]
+    return [f"{found}: pulsetrainer diagnose shows what it misses"]
 
 
 def of_no_minor_loops(fitted: Fitted, run: Run, minor_percent: float) -> list[str]:
@@ -112,8 +112,8 @@ def of_noisy_ends(model: Model) -> list[str]:
         return []
     ends = with_unit(f"{model.edges[0]:.4g} and {model.edges[-1]:.4g}", model.input_unit)
     noise = with_unit(f"{fit.input_noise:.2g}", model.input_unit)
-    said = f"the drive goes to the ends of the record, {ends}, which hold its noise of {noise}"
-    return [f"{said}: an amplifier that ends so little before them may cut the drive off there"]
+    said = f"the drive goes to the ends of the record, {ends}, which include its noise of {noise}"
+    return [f"{said}: an amplifier whose range ends just short of them may clip the drive there"]
 
 
 def warning(fitted: Fitted, runs: Sequence[Run], asked: str, minor_percent: float) -> str:

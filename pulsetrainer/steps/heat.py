@@ -69,7 +69,7 @@ def coil_of(model: Model | None, *, asked: bool | None) -> Coil | None:
     if asked and model.coil is None:
         raise DataError(
             "the model does not know the coil's resistance at calibration, so no heat can be tracked",
-            hint="capture and identify with firmware that tells the duty (protocol 2.2)",
+            hint="capture and identify with firmware that reports the duty (protocol 2.2)",
         )
     return model.coil
 
@@ -94,15 +94,15 @@ def take_temperature(device: Device, thermometer: Thermometer, high_A: float) ->
     thermometer.add(trace.time_s, trace.reference_A, trace.current_A, trace.duty)
     if not thermometer.known:
         raise DeviceError(
-            f"the duty does not tell the coil's temperature: {trace.samples} samples came back, "
+            f"the duty does not give the coil's temperature: {trace.samples} samples came back, "
             f"{trace.dropped_samples} were lost",
             hint="check the cable to the device, then run the command again; `no_track_heat` leaves heat out",
         )
     kelvin = thermometer.temperature_K
     if not _COLDEST_K <= kelvin <= _HOTTEST_K:
         raise DeviceError(
-            f"the duty says that the coil is {kelvin:+.0f} K against calibration, expected "
-            f"{_COLDEST_K:+.0f} to {_HOTTEST_K:+.0f} K: this is another coil or supply",
+            f"by the duty the coil is {kelvin:+.0f} K against calibration, expected "
+            f"{_COLDEST_K:+.0f} to {_HOTTEST_K:+.0f} K: this is a different coil or supply",
             hint="connect those used at calibration, or capture and identify again; `no_track_heat` leaves "
             "heat out",
         )

@@ -153,7 +153,10 @@ def invert(
         period_s=shape.period_s,
         notes=tuple(notes),
     )
-    return replace(drive, notes=(*notes, *_expected(drive, float(np.abs(current - exact).max()), limit)))
+    if drive.predicted_max_error_percent > EXPECTED:
+        slowed = float(np.abs(current - exact).max())
+        return replace(drive, warnings=(_expected(drive, slowed, limit),))
+    return replace(drive, notes=(*notes, *_of_clipped(drive)))
 
 
 def _check_describes(model: Model, name: str, *, despite_warning: bool) -> None:
@@ -203,7 +206,7 @@ def _check_length(shape: Shape, model: Model, periods: int) -> None:
             f"for at most {ON_TIME_S:g} s at a time",
             hint=f"give `periods` at most {most}; pulsetrainer session presses for as long as you like"
             if most
-            else "a pulse this long is mostly one whose time is not in seconds",
+            else "a pulse this long usually means that its time is not in seconds",
         )
 
 
@@ -219,36 +222,38 @@ def slew_limit(asked: float | None, model: Model) -> float | None:
     return DEVICE_SLEW_A_PER_S if ours else None
 
 
-def _expected(drive: Waveform, slowed: float, limit: float | None) -> list[str]:
-    """Say what error the model itself expects of a drive: with a reason where it is large."""
-    error = drive.predicted_max_error_percent
-    full = f"full {drive.model.output_quantity if drive.model else 'force'}"
-    if not error > EXPECTED:
-        return _of_clipped(drive.clipped_samples, f"{error:.2g} % of {full}", slight=error <= _SLIGHT)
+def _expected(drive: Waveform, slowed: float, limit: float | None) -> str:
+    """Say how large an error the model itself expects of a drive, and why."""
     if limit is not None and slowed > 0:
         unit = with_unit(f"{limit:g}", f"{drive.input_unit}/s")
         why = f"the drive may move at most {unit}, which this pulse exceeds"
     elif drive.clipped_samples:
         why = (
-            "parts of the pulse are out of the model's reach; a smaller one (`force_min`, `force_max`) or a "
-            "slower one is not"
+            "parts of the pulse are out of the model's reach: try a smaller pulse (`force_min`, `force_max`) "
+            "or a slower one"
         )
     elif drive.inversion == "closest-match":
-        why = "the drive takes the steps of the levels"
+        why = "the drive moves in steps of the levels"
     else:
         why = "the model's output does not follow the pulse even without a limit"
-    return [f"warning: the model itself expects errors of up to {error:.1f} % of {full}: {why}"]
+    error = f"{drive.predicted_max_error_percent:.1f} % of {_full(drive)}"
+    return f"the model itself expects errors of up to {error}: {why}"
 
 
-def _of_clipped(samples: int, error: str, *, slight: bool) -> list[str]:
+def _full(drive: Waveform) -> str:
+    return f"full {drive.model.output_quantity if drive.model else 'force'}"
+
+
+def _of_clipped(drive: Waveform) -> list[str]:
     """Say what it costs that the drive stays at an end of its range; nothing where it never has to."""
-    if not samples:
+    if not drive.clipped_samples:
         return []
-    left = counted(samples, "sample")
+    left = counted(drive.clipped_samples, "sample")
+    error = f"{drive.predicted_max_error_percent:.2g} % of {_full(drive)}"
     found = f"for {left} the drive would have to leave the model's range, and stays at its end"
     matters = (
         f"this does not matter, the model expects errors of at most {error}"
-        if slight
+        if drive.predicted_max_error_percent <= _SLIGHT
         else f"the model expects errors of up to {error}; a smaller pulse (`force_min`, `force_max`) has less"
     )
     return [f"{found}: {matters}"]

@@ -101,7 +101,7 @@ class Measurement:
 
     def rest(self) -> float:
         """Return the force at rest, N; refuse one where nothing should press, or that moves."""
-        trace = self.play(rest_of()[1], "the look at the force at rest")
+        trace = self.play(rest_of()[1], "the measurement of the force at rest")
         width = round(MEAN_S * RATE_HZ)
         means = trace.force_N[: trace.force_N.size // width * width].reshape(-1, width).mean(axis=1)
         force = float(means.mean())
@@ -154,7 +154,7 @@ class Measurement:
             raise _no_coil(duty)
         if trace.fault_code in _TOO_MUCH:
             raise _shorted(f"{100 * duty:.0f} % of the supply drove more than the device permits")
-        _raise_if_stopped(trace, "the first look at the coil")
+        _raise_if_stopped(trace, "the first measurement of the coil")
 
     def coil(self) -> Coil:
         """Return the coil by holds up to most of the range, each by what is known so far."""

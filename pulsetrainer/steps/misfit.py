@@ -21,14 +21,14 @@ def misfit_words(one: ModelEvaluation, name: str, run: Run) -> str:
     if one.rms_percent <= _AT_ALL and one.outside_percent <= _MOST:
         return ""
     error = f"its rms error is {one.rms_percent:.3g} % of the span of the output"
-    return f"warning: {one.name} does not describe {name} at all: {error}. {_reason(one, name, run)}"
+    return f"{one.name} does not describe {name} at all: {error}. {_reason(one, name, run)}"
 
 
 def _reason(one: ModelEvaluation, name: str, run: Run) -> str:
     if one.outside_percent > _MOST:
         ends = f"{np.nanmin(run.input):.4g} .. {np.nanmax(run.input):.4g}"
         there = f"{quantity_in_words(run.input_quantity)} ({with_unit(ends, run.input_unit)})"
-        return f"Most of its {there} is outside the range of the model: look at its unit, and at the device"
+        return f"Most of its {there} is outside the range of the model: check its unit, and the device"
     output = quantity_in_words(run.output_quantity)
     measured, predicted = one.output - np.mean(one.output), one.predicted - np.mean(one.predicted)
     square = float(predicted @ predicted)
@@ -36,11 +36,9 @@ def _reason(one: ModelEvaluation, name: str, run: Run) -> str:
     if np.std(measured - factor * predicted) > _ALIKE * np.std(measured):
         return f"Most likely it is of another device than {name}, or of the same one set up otherwise"
     if factor < 0:
-        return (
-            f"The {output} goes the other way: look at its sign, and whether the columns are the right ones"
-        )
+        return f"The {output} goes the other way: check its sign, and whether the columns are the right ones"
     if 1.0 / _SAME < factor < _SAME:
         by = with_unit(f"{one.offset:+.3g}", run.output_unit)
-        return f"It is nearly all an offset of {by}: the zero of the {output} was another one"
+        return f"It is nearly all an offset of {by}: the zero of the {output} was different"
     far = f"The {output} varies {factor:.3g} times as much as by the model"
-    return f"{far}: look at its unit, and at the gain of its sensor"
+    return f"{far}: check its unit, and the gain of its sensor"

@@ -220,7 +220,8 @@ def _is_remade(drive: Waveform, asked: bool | None) -> bool:
         return True
     if asked:
         raise DataError(
-            f"the drive {drive.name} is a closest match, which cannot be made again for another temperature",
+            f"the drive {drive.name} is a closest match, which cannot be computed again for another "
+            "temperature",
             hint="invert with `method` continuous or extended",
         )
     return False

@@ -30,7 +30,7 @@ def check_rate(rate: float | None) -> None:
     if rate is not None and not SLOWEST_BPM <= rate <= FASTEST_BPM:
         raise UsageError(
             f"a rate of {rate:g} beats a minute is outside {SLOWEST_BPM:g} to {FASTEST_BPM:g}",
-            hint="75 is usual",
+            hint="a usual rate is 75",
         )
 
 
@@ -52,12 +52,12 @@ def _check_length(minutes: float | None, beats: int | None) -> None:
     if beats is not None and not 1 <= beats <= MOST_BEATS:
         raise UsageError(
             f"`beats` must be 1 or more and at most {MOST_BEATS}, got {beats}",
-            hint="20 last a quarter of a minute",
+            hint="for instance 20 beats, which last about a quarter of a minute",
         )
     if minutes is not None and not 0 < minutes <= MOST_MINUTES:
         raise UsageError(
             f"`minutes` must be above 0 and at most {MOST_MINUTES} (a day), got {minutes:g}",
-            hint="5 are usual",
+            hint="a usual length is 5",
         )
 
 

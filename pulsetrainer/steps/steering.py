@@ -107,7 +107,7 @@ class Steering:
         elif key == "q":
             self.stopped = True
         else:
-            said = f"{key!r} is none of the keys"
+            said = f"{key!r} is not one of the keys"
         self._played = self._changed(self._played)
         return said
 

@@ -30,8 +30,8 @@ def transfer(drive: Waveform, refined: Waveform, *, slew: float | None = None) -
         ask' = target + E[missed on the way of this drive | missed on the way of the refined one]
 
     What is missed is M[u] less the force measured, M the model; it is taken for a zero, a lag and a density
-    on the Preisach plane that the model has not (``core.missed``). What belongs to one place of one pulse
-    stays behind, and so does all where it cannot be told whether it holds: see Raises.
+    on the Preisach plane that the model lacks (``core.missed``). What belongs to one place of one pulse is
+    not transferred, and nothing is if it is not known whether it holds there: see Raises.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
         raise DataError(
             f"what was learnt on {refined.name} belongs to another model than the one that {drive.name} is "
             "made with",
-            hint="give the model that the refined drive was made with: pulsetrainer show REFINED.h5 tells it",
+            hint="give the model that the refined drive was made with: pulsetrainer show REFINED.h5 names it",
         )
     if abs(drive.rate_Hz - refined.rate_Hz) > 1e-6:
         raise DataError(
@@ -112,7 +112,8 @@ def check_transfer(drive: Waveform, refined: Waveform) -> Model:
         )
     if drive.inversion != "continuous":
         raise DataError(
-            f"{drive.name} is made by {drive.inversion} inversion; only continuous takes what was learnt",
+            f"{drive.name} is made by {drive.inversion} inversion; only continuous inversion can use what "
+            "was learnt",
             hint="refine this drive itself",
         )
     return model
@@ -122,7 +123,7 @@ def check_refined(refined: Waveform) -> Model:
     """Return the model of a drive; DataError where nothing was learnt on it."""
     if not refined.passes:
         raise DataError(
-            f"the drive of {refined.name} that `learnt` names was not refined: nothing was learnt on it",
+            f"the drive of {refined.name} given as `learnt` was never refined, so it has learnt nothing",
             hint="refine it first: pulsetrainer refine REFINED.h5 -o refined.h5",
         )
     return check(refined, passes=1)
@@ -138,13 +139,13 @@ def _check_general(refined: Waveform, drive: Waveform, told: float, uncertain: f
         )
     elif told < _TOLD:
         why = (
-            f"what was learnt on {refined.name} belongs to that pulse: from the rest of the beat, "
-            f"{100 * max(told, 0.0):.0f} % of each part can be told, and {100 * _TOLD:.0f} % are needed"
+            f"what was learnt on {refined.name} belongs to that pulse alone: the rest of the beat predicts "
+            f"only {100 * max(told, 0.0):.0f} % of each part, and {100 * _TOLD:.0f} % is needed"
         )
     elif uncertain > _UNCERTAIN:
         why = (
-            f"{drive.name} goes where {refined.name} never was: {100 * uncertain:.1f} % of the variance are "
-            f"left to chance, and {100 * _UNCERTAIN:.1f} % are allowed"
+            f"{drive.name} goes where {refined.name} never was: {100 * uncertain:.1f} % of the variance is "
+            f"left to chance, and at most {100 * _UNCERTAIN:.1f} % is allowed"
         )
     else:
         return

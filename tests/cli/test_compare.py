@@ -114,7 +114,7 @@ def test_figures_in_different_units_are_not_compared(tmp_path):
     files = ("force.h5", "field.h5", "--all")
     done = pulsetrainer(tmp_path, "compare", *files)
     (row,) = (line for line in done.out.splitlines() if "model: rms error " in line and "0.01" in line)
-    assert row.split()[3:] == ["0.20", "N", "0.01", "T", "-"]
+    assert row.split()[3:] == ["0.20", "N", "0.0100", "T", "-"]
     assert "force.h5 is in N, field.h5 is in T" in done.err
     found = {m["name"]: m for m in pulsetrainer(tmp_path, "compare", *files, "--json").json["metrics"]}
     assert [found[f"model.{name}"]["change"] for name in ("rms", "offset", "rms_percent")] == [
@@ -131,8 +131,8 @@ def test_figures_in_one_small_unit_are_compared(tmp_path):
         pt.save(one, tmp_path / f"{name}.h5")
     done = pulsetrainer(tmp_path, "compare", "old.h5", "new.h5", "--all")
     rows = {line.split()[1]: line.split() for line in done.out.splitlines() if " T " in line}
-    assert rows["rms"][3:] == ["T", "0.004", "0.002", "-0.002", "better"]
-    assert rows["offset"][2:] == ["T", "-0.003", "-0.001", "+0.002", "better"]
+    assert rows["rms"][3:] == ["T", "0.00400", "0.00200", "-0.00200", "better"]
+    assert rows["offset"][2:] == ["T", "-0.00300", "-0.00100", "+0.00200", "better"]
 
 
 def test_two_evaluations_without_a_common_figure(run, built_small, tmp_path):

@@ -68,7 +68,7 @@ def test_where_nothing_tells_what_lies_between_steps_that_is_said(folder):
     pt.save(_diagnosis(stepped, "quantisation", (cause,)), folder / "steps.h5")
     done = pulsetrainer(folder, "correct", "stepped.h5", "--diagnosis", "steps.h5", "-o", "unchanged.h5")
     assert done.code == 0, done
-    assert "the output is as it was" in done.err
+    assert "the output is left as it was" in done.err
     np.testing.assert_array_equal(pt.load(folder / "unchanged.h5").output, stepped.output)
 
 
@@ -138,12 +138,46 @@ def test_a_diagnosis_that_extends_the_model_sends_no_one_to_correct(folder):
         ["correct", "identify", "diagnose"],
         [],
     ]
+    changed = replace(nothing, verdict="condition-change", records=found.records[:1])
+    assert commands(changed) == commands(changed, own=False)
+    assert [line.split()[1] for line in commands(changed)] == ["identify", "diagnose"]
+    assert commands(replace(changed, records=2 * changed.records)) == []  # some may be those of the model
     for name in ("a", "a-corrected"):  # a second round overwrites nothing
         again = f"{name}-corrected.h5"
         assert commands(fault, f"{name}.h5")[1] == f"pulsetrainer identify r-corrected.h5 -o {again}"
     assert commands(fault, own=False)[1:] == [
         "pulsetrainer diagnose r-corrected.h5 --model a.h5 -o d-corrected.h5"
     ]
+
+
+def test_the_way_on_overwrites_nothing(folder, tmp_path, monkeypatch):
+    """It always said extended.h5, and was refused where that was there already."""
+    model = pt.Model(np.linspace(0.0, 1.0, 3), np.ones(3), 0.0, np.ones(3, bool))
+    fault = pt.load(folder / "diagnosis.h5")
+    monkeypatch.chdir(tmp_path)
+    for name in ("extended.h5", "r-corrected.h5"):
+        (tmp_path / name).touch()
+    (extend,) = next_commands(
+        replace(fault, verdict="creep", extended=model), [Path("r.h5")], Path("a.h5"), Path("d.h5"), own=True
+    )
+    assert extend.endswith("-o extended-2.h5")
+    lines = next_commands(replace(fault, extended=None), [Path("r.h5")], Path("a.h5"), Path("d.h5"), own=True)
+    assert [line.count("r-corrected-2.h5") for line in lines] == [1, 1, 1]
+
+
+def test_a_model_of_the_run_before_it_was_corrected_is_told(folder):
+    """It holds what was taken out, which looked like another condition of the device."""
+    for words in (
+        ("correct", "run.h5", "--diagnosis", "diagnosis.h5", "-o", "sound.h5"),
+        ("identify", "run.h5", "--levels", 12, "-o", "before.h5"),
+        ("identify", "sound.h5", "--levels", 12, "-o", "after.h5"),
+    ):
+        assert pulsetrainer(folder, *words).code == 0
+    said = [
+        pulsetrainer(folder, "diagnose", "sound.h5", "--model", name, "--quick", "-o", f"of-{name}").err
+        for name in ("before.h5", "after.h5")
+    ]
+    assert ["so it holds what was taken out" in one for one in said] == [True, False]
 
 
 def test_the_way_on_names_the_diagnosis_that_was_given(folder):

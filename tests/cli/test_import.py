@@ -285,7 +285,7 @@ def test_a_slow_record_without_a_unit_of_time_may_be_one_in_milliseconds(run, tm
 def test_rows_that_are_merely_counted_are_no_time(run, tmp_path):
     """A magnetic loop is indexed 0, 1, 2: that is said, and only its order counts, unless --time insists."""
     done = run(*_words("bh_steel_m130_27s_1", "-o", "run.h5", "--json"))
-    assert "just counts the rows" in done.err
+    assert "only counts the rows" in done.err
     assert done.json["facts"]["rate_Hz"] is None
     with h5py.File(tmp_path / "run.h5") as file:
         assert "time" not in file

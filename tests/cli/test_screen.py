@@ -92,7 +92,7 @@ def test_a_note_is_folded_between_words(monkeypatch):
     screen = Screen("identify", as_json=False)
     text = "the model leaves 0.9 % of the span (rms), 3 times the noise from sample to sample"
     screen.note(text)
-    screen.note("warning: the model expects large errors")
+    screen.note("the model expects large errors", "warning: ")
     lines = shown.getvalue().splitlines()
     assert max(map(len, lines)) <= 40
     assert " ".join(" ".join(lines[:-1]).split()) == f"note: {text}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+import shlex
 import shutil
 import subprocess
 from pathlib import Path
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 from test_screen import on_terminal
 
-from program import PROGRAM, cold
+from program import PROGRAM, cold, pulsetrainer
 from pulsetrainer.cli.guard import funnel
 
 NOWHERE = "/proc/nowhere"  # cannot be made, by root neither
@@ -97,6 +98,20 @@ def test_what_may_not_be_written_is_no_bug(monkeypatch):
     assert funnel(program, ["--install-completion"]) == 3
     assert "error: /home/x/.bashrc: Permission denied" in said.getvalue()
     assert "bug" not in said.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("closed", "line", "code"),
+    [(">&-", "show run.h5", 0), ("2>&-", "show absent.h5", 3), (">&- 2>&- <&-", "export run.h5 -o x.csv", 0)],
+)
+def test_closed_streams_are_no_bug(there, closed, line, code):
+    """As a scheduler leaves them: nothing is printed, nothing goes into a file that took their number."""
+    words = shlex.join([*PROGRAM, *line.split()])
+    done = subprocess.run(["sh", "-c", f"{words} {closed}"], cwd=there, capture_output=True, text=True)  # noqa: PLW1510
+    assert (done.returncode, done.stdout, "Traceback" in done.stderr) == (code, "", False)
+    assert pulsetrainer(there, "show", "run.h5").code == 0
+    if "x.csv" in line:
+        assert (there / "x.csv").read_text().startswith("# ")
 
 
 def test_a_full_disk_behind_the_results_is_no_bug():

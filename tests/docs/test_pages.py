@@ -20,6 +20,7 @@ import typer
 from pages import PAGES, ROOT, anchors, blocks, links, tables, words
 
 from pulsetrainer.cli.app import app
+from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.files import store
 from pulsetrainer.report.render import encode
 
@@ -38,6 +39,14 @@ def test_every_column_of_a_table_has_a_heading(page):
     """A screen reader tells it with each cell."""
     heads = re.findall(r"^(\|.*\|)\n\|[-:| ]+\|$", page.read_text(encoding="utf-8"), re.MULTILINE)
     assert [head for head in heads if re.search(r"\|\s*\|", head)] == []
+
+
+def test_the_vocabulary_says_what_every_cause_is():
+    """In the words of the program, and whether it belongs into the model or out of the run."""
+    page = (ROOT / "docs" / "vocabulary.md").read_text(encoding="utf-8")
+    for one in library().values():
+        then = "correct" if one.corrects else "extend" if one.lasting else "-"
+        assert f"| {one.id} | {one.title.format(input='input', output='output')} | {then} |" in page
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -198,10 +207,13 @@ def test_a_figure_of_the_readme_is_the_one_that_was_kept():
     assert demo.block(kept) not in page
 
 
-def test_figures_of_the_theory_are_drawn_by_the_code(tmp_path):
+@pytest.mark.parametrize(
+    ("page", "named", "most"), [("theory", "FIGURES", 60_000), ("measured", "MEASURED_FIGURES", 200_000)]
+)
+def test_figures_of_a_page_are_drawn_by_the_code(page, named, most):
     """Each figure on the page has its function, and what is written in it is what the function writes."""
-    drawn = script("figures").FIGURES
-    shown = [target for target in links(ROOT / "docs/theory.md") if target.endswith(".svg")]
+    drawn = getattr(script("figures"), named)
+    shown = [target for target in links(ROOT / f"docs/{page}.md") if target.endswith(".svg")]
     assert sorted(shown) == sorted(f"figures/{name}.svg" for name in drawn)
     for name, draw in drawn.items():
         made = encode(draw(), "svg").decode()
@@ -209,7 +221,7 @@ def test_figures_of_the_theory_are_drawn_by_the_code(tmp_path):
         labels = [re.findall(r"<text[^>]*>([^<]*[A-Za-zα-ω][^<]*)</text>", text) for text in (made, kept)]
         assert labels[0] == labels[1]
         assert len(labels[0]) >= 6
-        assert len(kept) < 60_000
+        assert len(kept) < most
 
 
 # --- the format -------------------------------------------------------------------------------------------

@@ -88,7 +88,7 @@ def test_ports_that_do_not(port):
         ),
         ("bench:?friction=1", "no parameter 'friction'", "did you mean coulomb?"),
         ("bench:?drift=1", "no parameter 'drift'", "did you mean thermal-drift or offset-drift?"),
-        ("bench:?creep=7", "creep=7 is outside 0 to 0.5", "give creep ("),
+        ("bench:?creep=7", "creep=7 is outside 0 to 0.5", "give creep a value in that range; it sets: "),
         ("bench:?creep=lots", "creep=lots is not a number from 0 to 0.5", ""),
         ("bench:?creep=", "creep= is not a number from 0 to 0.5", ""),
         ("bench:?seed=3,creep=0.1", "seed=3,creep=0.1 is not", "put & between"),

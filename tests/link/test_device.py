@@ -13,7 +13,7 @@ from pulsetrainer.device import player
 from pulsetrainer.device.codes import CURRENT_UNIT_A, PARAMETERS
 from pulsetrainer.device.device import Device
 from pulsetrainer.device.limits import check_peak
-from pulsetrainer.device.messages import GetParam
+from pulsetrainer.device.messages import GetParam, Telemetry
 from pulsetrainer.device.opening import open_device
 from pulsetrainer.device.schemes import redact
 from pulsetrainer.device.trace import Block
@@ -29,6 +29,17 @@ def test_handshake_says_who_and_how_much(device):
     assert info.serial == "BENCH-0"
     assert (info.tick_rate_Hz, info.current_limit_A, info.force_limit_N) == (10_000, 1.5, 15.0)
     assert (info.heartbeat_s, info.reset_cause, info.latched_fault) == (0.2, "power", "")
+
+
+def test_counts_come_back_as_the_nearest_numbers_of_their_unit():
+    """477 mN stood in a table as 0.47700000000000004."""
+    counts = np.arange(-32766, 32766, dtype="<i2")  # three a sample
+    block = Block.from_wire([Telemetry(1, 0, 0, 0, counts.size // 3, counts.tobytes())], 10)
+    told = np.stack((block.reference_A, block.current_A, block.force_N), axis=1)
+    units = (10_000, 10_000, 1000)
+    assert told.tolist() == [
+        [n / u for n, u in zip(row, units, strict=True)] for row in counts.reshape(-1, 3).tolist()
+    ]
 
 
 def test_every_sample_of_a_play_comes_back_aligned(device, pulse):
@@ -267,7 +278,7 @@ def test_a_reader_that_hangs_is_stopped(monkeypatch):
     with open_device("bench:?speed=real") as device:
         recording = device.play(np.full(20_000, 0.5), 1000, on_block=lambda _: time.sleep(1.0))
     assert not recording.complete
-    assert "did not take its data" in recording.fault
+    assert "did not collect its data" in recording.fault
     assert "the disk is too slow" in recording.remedy
     assert recording.tick[-1] < 30_000
 

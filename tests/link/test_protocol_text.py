@@ -85,7 +85,7 @@ def test_limits_are_the_compiled_ones():
         f"(STATUS_REPLY's flag {codes.STATUS_OUTPUT_NOT_OFF}) is the gravest",
         f"allows (STATUS_REPLY's flag {codes.STATUS_HEAT_ASSUMED})",
         f"times exp(-t / {codes.HEAT_TAU_S:.2f} s)",
-        f"within\n{1000 * TIMEOUTS_S[0]:.0f} ms: the same frame again, five times",
+        f"within\n{1000 * TIMEOUTS_S[0]:.0f} ms, it sends the same frame again, five times",
     ],
 )
 def test_numbers_in_the_prose(said):

@@ -74,8 +74,16 @@ def gone(session: int, seconds: float = 5.0) -> bool:
         ("qemu:?break=hang@1e9", "cannot break", "break=WHAT@SECONDS"),
         ("qemu:?ambient=warm", "qemu parameter ambient=warm", "ambient=20"),
         ("qemu:?coil=-1", "qemu parameter coil=-1", "ambient=20"),
-        ("qemu:?wire=1", "qemu parameter wire=1 is not a share", "wire-seed"),
-        ("qemu:?wire-seed=x", "qemu parameter wire-seed=x", "wire-seed"),
+        (
+            "qemu:?wire=1",
+            "qemu parameter wire must be the share of bytes to damage, from 0 to 0.1, got 1",
+            "wire-seed",
+        ),
+        (
+            "qemu:?wire-seed=x",
+            "qemu parameter wire-seed must be a whole number, 0 or more, got x",
+            "wire-seed",
+        ),
     ],
 )
 def test_parameters_that_make_no_sense_teach(port, says, hint):

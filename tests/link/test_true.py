@@ -156,7 +156,7 @@ def test_a_temperature_that_no_room_has_is_told(model):
     drive = pt.invert("normal", replace(model, extensions=(THERMAL,)), periods=2)
     with (
         pt.open_device("bench:?seed=1&coil=40") as device,
-        raises(DeviceError, "names it", named="this is another coil or supply"),
+        raises(DeviceError, "names it", named="this is a different coil or supply"),
     ):
         pt.play(drive, device, repeats=1)
 
@@ -199,7 +199,7 @@ def test_a_temperature_that_was_not_told_is_no_temperature(model, monkeypatch):
             return replace(whole, duty=np.full(whole.duty.size, np.nan))
 
         monkeypatch.setattr(device, "play", lost)
-        with raises(DeviceError, "names it", named="does not tell the coil's temperature"):
+        with raises(DeviceError, "names it", named="does not give the coil's temperature"):
             take_temperature(device, meter, 1.5)
 
 

@@ -411,7 +411,7 @@ def test_loops_that_are_not_congruent_are_said_to_be_so(square):
     assert model.form == "signed"
     assert model.fit.rms_percent < 1.0  # the fit itself tells nothing
     tells(model.fit.warning, "not congruent")
-    assert any(model.fit.warning in note for note in pt.evaluate(run, model).notes)
+    assert any(model.fit.warning in said for said in pt.evaluate(run, model).warnings)
     assert model.fit.warning in pt.diagnose(run, model, quick=True).evidence[0]
     with pytest.raises(DataError):
         pt.invert("normal", model)

@@ -16,6 +16,7 @@ from pulsetrainer.core.operator import Preisach
 from pulsetrainer.core.plane import Plane
 from pulsetrainer.core.record import Record
 from pulsetrainer.diagnosis import (
+    advised,
     answered,
     experiment,
     floor,
@@ -527,7 +528,7 @@ def test_of_samples_without_time_it_is_time_that_lacks():
     said = diagnose(Question([Record(u, u + 0.01 * noise, dt_s=None)], -0.2, 2.3, np.random.default_rng(0)))
     assert said.lacks == ("time",)
     assert [one.names for one in said.evidence if one.kind == "lacks"] == [("time",)]
-    assert "the time of every sample" in wording.advice(said.advice, wording.Bench(said.scale, "A"))
+    assert "the time of every sample" in advised.advice(said.advice, advised.Bench(said.scale, "A"))
 
 
 def test_a_record_has_several_rates_by_its_way_or_by_its_time():
@@ -852,13 +853,13 @@ def test_every_kind_of_evidence_and_advice_has_words():
         said = wording.sentence(Evidence(kind, "creep" if kind == "tested" else "", figures, names), words)
         assert said.endswith(".")
         assert "{" not in said
-    for kind in wording.ADVICE:
+    for kind in advised.ADVICE:
         names = ("heating", "delay", "creep", "step") if kind == "tied" else ("delay", "creep", "step")
-        for bench in (wording.Bench(Scale(), "A", ours=True), wording.Bench(Scale(), timed=False)):
-            said = wording.advice(Evidence(kind, figures=figures, names=names), bench)
+        for bench in (advised.Bench(Scale(), "A", ours=True), advised.Bench(Scale(), timed=False)):
+            said = advised.advice(Evidence(kind, figures=figures, names=names), bench)
             assert "{" not in said
             assert ("delay, creep and step" in said) is (
-                kind.startswith(("tied", "none, "))
+                kind.startswith(("tied", "none, s"))
                 or kind in ("inconclusive", "too noisy", "far too noisy", "correct")
                 or kind in ("extend, correct", "correct, extend")
             )
@@ -870,17 +871,17 @@ def test_every_kind_of_evidence_and_advice_has_words():
 def test_nobody_is_asked_for_a_recording_without_end(shown_from, longer):
     """Four times as long is advice; a thousand times, or for ever, is none."""
     state = SimpleNamespace(detectable={"delay": shown_from * LIMITS.matters}, blind=("delay",), lacks=())
-    said = wording.advice(advice._to_see_more(state), wording.Bench(Scale(), "A", ours=True))
+    said = advised.advice(advice._to_see_more(state), advised.Bench(Scale(), "A", ours=True))
     assert ("4 times as long" in said, "less noise" in said) == (longer, True)
     assert not re.search(r"\binf\b|e\+", said)
 
 
-@pytest.mark.parametrize("name", wording.EXPERIMENTS)
+@pytest.mark.parametrize("name", advised.EXPERIMENTS)
 def test_every_experiment_is_told_in_numbers_of_the_bench(name):
     """A piezo from 20 to 120 V whose second is 2 ms: volts, volts a second, milliseconds; never amperes."""
-    bench = wording.Bench(Scale(low=20.0, reach=100.0, second=0.002), "V")
+    bench = advised.Bench(Scale(low=20.0, reach=100.0, second=0.002), "V")
     figures = {"there": 1.0, "here": 0.5}
-    said = wording.advice(Evidence("tied", figures=figures, names=(name, "delay", "creep")), bench)
+    said = advised.advice(Evidence("tied", figures=figures, names=(name, "delay", "creep")), bench)
     assert " V" in said
     assert " A" not in said
     told = {
@@ -895,8 +896,8 @@ def test_every_experiment_is_told_in_numbers_of_the_bench(name):
 
 def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
     """A range that ends at -0.3321 mA ends at 0 A for a person; large numbers need no exponent."""
-    said = wording.advice(
-        Evidence("lacks", names=("rates",)), wording.Bench(Scale(-0.0003321, 1.2003, second=1e-3), "A")
+    said = advised.advice(
+        Evidence("lacks", names=("rates",)), advised.Bench(Scale(-0.0003321, 1.2003, second=1e-3), "A")
     )
     assert "between 0 A and 1.2 A" in said
     assert "e+" not in said
@@ -904,18 +905,45 @@ def test_noise_at_the_end_of_a_range_is_no_level_to_be_set():
 
 def test_no_level_is_asked_for_that_the_input_never_had():
     """A dual model may span more than what was recorded: 0 to 1 A of -0.1 to 1.2 A."""
-    bench = wording.Bench(Scale(-0.1, 1.3), "A", reached=(0.1 / 1.3, 1.1 / 1.3))
+    bench = advised.Bench(Scale(-0.1, 1.3), "A", reached=(0.1 / 1.3, 1.1 / 1.3))
     one = Evidence("tied", figures={"there": 1.0, "here": 0.5}, names=("nested loops", "delay", "creep"))
-    said = wording.advice(one, bench)
+    said = advised.advice(one, bench)
     assert "between 0 A and 1 A" in said
 
 
 def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
     """Between 99.95 A and 100.05 A: three digits would make all stops the same."""
-    bench = wording.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
-    said = wording.advice(Evidence("lacks", names=("holds",)), bench)
+    bench = advised.Bench(Scale(low=99.95, reach=0.1, second=1.0), "A")
+    said = advised.advice(Evidence("lacks", names=("holds",)), bench)
     assert "between 99.95 A and 100.05 A" in said
     assert "at each of 100.04, 99.98, 100.02 and 99.96 A" in said
+
+
+@pytest.mark.parametrize("kind", ["none", "none, small", "extend", "extend, or late", "extend, correct"])
+def test_what_can_be_done_now_comes_before_what_to_record(kind):
+    """`next` asked for a recording, `then` to extend the model: in no order."""
+    bench = wording.Bench(Scale(), "A")
+    now = wording.advice(Evidence(kind, names=("creep",)), bench)
+    both = wording.advice(Evidence(kind, names=("creep", "holds")), bench)
+    assert both.startswith(f"{now} This recording cannot show everything (the input never rests")
+    assert "record output and input again" in both
+
+
+@pytest.mark.parametrize("kind", ["tied", "tied, no better"])
+@pytest.mark.parametrize(
+    ("names", "known"),
+    [
+        (("offset-drift", "accommodation"), True),
+        (("creep", "accommodation"), False),
+        (("offset-drift", "step"), False),
+    ],
+)
+def test_who_knows_that_it_is_the_sensor_is_told_the_way_on(kind, names, known):
+    """No recording decides between the sensor and the device as surely as a person who knows the sensor."""
+    figures = {"there": 1.0, "here": 0.5}
+    named = ("heating", *names) if kind == "tied" else names
+    said = wording.advice(Evidence(kind, figures=figures, names=named), wording.Bench(Scale(), "A"))
+    assert ("If you know that it is the measurement (offset-drift)" in said) is known
 
 
 def test_two_rates_that_count_as_one_are_not_told_as_one():
@@ -926,8 +954,8 @@ def test_two_rates_that_count_as_one_are_not_told_as_one():
 
 def test_what_a_record_lacks_is_asked_for_in_numbers():
     """Rates, stops and length, for a slow bench in millimetres."""
-    bench = wording.Bench(Scale(low=0.0, reach=2.0, second=100.0), "mm")
-    said = wording.advice(Evidence("lacks", names=("rates", "holds", "length")), bench)
+    bench = advised.Bench(Scale(low=0.0, reach=2.0, second=100.0), "mm")
+    said = advised.advice(Evidence("lacks", names=("rates", "holds", "length")), bench)
     for words in ("0.01 mm/s", "0.16 mm/s", "300 s", "1.8, 0.6, 1.4 and 0.2 mm", "33.3 min or more"):
         assert words in said, said
     assert "between 0 mm and 2 mm" in said
@@ -1036,6 +1064,7 @@ def test_the_records_of_a_question_are_called_as_the_runs_were_named():
         ("none", False, (), 0.5 * LIMITS.p_max, "none, small"),
         ("none", True, (), 0.5 * LIMITS.p_max, "none, small, quick"),
         ("none", False, (), 2.0 * LIMITS.p_max, "none"),
+        ("none", True, (), 2.0 * LIMITS.p_max, "none, quick"),
         ("lacks", True, (), 0.5 * LIMITS.p_max, "lacks"),
     ],
 )
@@ -1051,19 +1080,19 @@ def test_advice_contradicts_neither_a_quick_screen_nor_what_was_seen(kind, quick
     )
     one = answered._advice(state)
     assert one.kind == told
-    if told.startswith("none, "):
+    if told in ("none, seen", "none, small", "none, small, quick"):
         assert one.names == (found or ("creep",))
 
 
 def test_advice_to_record_again_says_how():
     """By us: the whole command, up to where the input went; elsewhere: the columns of the table."""
     lacks = Evidence("lacks", names=("holds",))
-    ours = wording.advice(lacks, wording.Bench(Scale(0.0, 1.5), "A", ours=True, reached=(0.0, 0.6)))
+    ours = advised.advice(lacks, advised.Bench(Scale(0.0, 1.5), "A", ours=True, reached=(0.0, 0.6)))
     assert ours.endswith("pulsetrainer capture diagnostic --current-max 0.9 -o diagnostic-2.h5.")
-    bench = wording.Bench(Scale(), "A/m", input="H", output="strain", unit_of_output="1")
+    bench = advised.Bench(Scale(), "A/m", input="H", output="strain", unit_of_output="1")
     assert (
         "the columns time in s, H in A/m and strain, and read that with pulsetrainer import"
-        in wording.advice(lacks, bench)
+        in advised.advice(lacks, bench)
     )
 
 

@@ -1413,7 +1413,7 @@ def test_each_cause_found_brings_its_evidence(monkeypatch):
     ]  # fmt: skip
     assert found[1].figures == {"p": 0.005, "explains": 20.0}
     assert found[-1].names == ("rates",)
-    assert "not all in these recordings: the output goes on" in wording.sentence(found[1], {})
+    assert "part of which is missing in these recordings: the output keeps" in wording.sentence(found[1], {})
 
 
 def test_what_the_records_show_is_cited_as_seen(monkeypatch):
@@ -1421,7 +1421,7 @@ def test_what_the_records_show_is_cited_as_seen(monkeypatch):
     for name, lacks in (("creep", ()), ("creep", ("length",)), ("step", ("rates", "holds"))):
         findings = (_finding(name, 20.0),)
         found = _accounted(monkeypatch, verdict=name, findings=findings, lacks=lacks)
-        assert "What gives it away: " in wording.sentence(found[1], {})
+        assert "Its signature: " in wording.sentence(found[1], {})
 
 
 TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
@@ -1445,11 +1445,18 @@ TIED = _finding("field-lag", 20.0, confounded_with=("delay",))
         ),
         ({"verdict": "step", "findings": (_finding("step", 20.0),), "lacks": ("rates",)}, "correct"),
         ({"verdict": "creep", "lacks": ("rates",)}, "lacks"),
+        ({"verdict": "creep", "lacks": ("rates",), "extended": "a model"}, "extend"),
+        ({"verdict": "none", "lacks": ("rates",)}, "none"),
+        ({"verdict": "unknown", "lacks": ("rates",)}, "lacks"),
         ({"findings": (TIED,), "lacks": ("rates",)}, "tied"),
         ({"findings": (replace(TIED, found=False),)}, "none"),
         ({"findings": (TIED,), "evidence": (Evidence("wrong kind"),)}, "other model"),
         ({"findings": (TIED,), "evidence": (Evidence("changed", "condition-change"),)}, "identify anew"),
         ({"evidence": (Evidence("shifted", "condition-change"),)}, "identify anew"),
+        ({"evidence": (Evidence("given worse"),), "lacks": ("rates",)}, "identify anew"),
+        ({"evidence": (Evidence("given worse, own"),), "lacks": ("rates",)}, "warm up"),
+        ({"evidence": (Evidence("given worse, own"),), "verdict": "unknown"}, "warm up"),
+        ({"evidence": (Evidence("given worse"),), "verdict": "unknown"}, "unknown"),
     ],
 )
 def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
@@ -1458,6 +1465,8 @@ def test_the_advice_follows_from_what_was_found(monkeypatch, more, kind):
     monkeypatch.setattr(advice, "best_experiment", lambda state, names: best)
     said = advice.stage(replace(_state(_fit(1.0)), **more)).advice
     assert said.kind == kind
+    if kind in ("extend", "none"):  # it is not forgotten
+        assert said.names == more.get("lacks", ())
     if kind == "tied":
         assert said.names == ("heating", "field-lag", "delay")
         assert said.figures == {"there": pytest.approx(2.0), "here": pytest.approx(0.1), "faster": 4.0}

@@ -74,6 +74,19 @@ def test_columns_that_would_be_empty_are_left_out():
     assert ["in this table" in one for one in shown] == [True, False]
 
 
+@pytest.mark.parametrize("static_percent", [2.0, 0.5])
+def test_a_name_in_the_table_says_what_it_is_of(static_percent):
+    """Words such as accommodation stood alone. A cause that was found has its own line."""
+    other = replace(_cause(0.5), cause="accommodation", text="the loops drift over repeated cycles")
+    causes = (replace(_cause(0.0, found=True), text="it creeps"), other)
+    told = replace(
+        store_examples.diagnosis(), causes=causes, static_percent=static_percent, floor_percent=1.0
+    )
+    (said,) = (part.rows for part in sections(told) if part.title == "in this table")
+    assert said["accommodation"] == "the loops drift over repeated cycles"
+    assert "creep" not in said
+
+
 @pytest.mark.parametrize("doubts", [(), ("it may be nothing", "it wanders")])
 @pytest.mark.parametrize("rivals", [(), ("delay", "output-lag")])
 def test_a_cause_that_was_found_brings_its_parameters_rivals_and_doubts(doubts, rivals):
@@ -190,4 +203,4 @@ def test_the_chart_says_no_more_than_the_table():
 def test_the_figure_bears_the_verdict_of_the_page(verdict):
     """A cause that is told, but is no verdict, is none in the figure's title either."""
     found = replace(store_examples.diagnosis(), verdict=verdict)
-    assert course(found).axes[0].get_title("left") == f"verdict: {verdict}"
+    assert course(found).axes[0].get_title("left") == f"Verdict: {verdict}"

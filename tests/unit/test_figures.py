@@ -25,7 +25,7 @@ from pulsetrainer.errors import DataError
 from pulsetrainer.report import comparison_figure, diagnosis_figures, figures, panels, planned
 from pulsetrainer.report.directions import directions, turns
 from pulsetrainer.report.facts import run_facts, warmth_words
-from pulsetrainer.report.fewer_points import MOST_POINTS, extremes, path
+from pulsetrainer.report.fewer_points import MOST_OF_A_LOOP, MOST_POINTS, extremes, path
 from pulsetrainer.report.render import encode, inline_svg
 from pulsetrainer.report.results import identified
 from pulsetrainer.report.style import THEME, VERMILION, label
@@ -209,6 +209,7 @@ def test_names_from_users_are_not_read_as_formulas():
     named = replace(examples.model_evaluation(), name=odd)
     svg = inline_svg(figures.prediction(named), identifier="x", title=odd, description=odd)
     assert odd in "".join(ET.fromstring(svg).itertext())
+    encode(figures.loops([replace(examples.waveform_evaluation("normal", "relay", 1.0, 0), name=odd)]), "svg")
 
 
 def test_lost_samples_leave_a_gap():
@@ -235,14 +236,14 @@ def test_all_samples_lost():
 
 
 def test_a_million_samples_are_drawn_by_their_envelope():
-    """At most 4000 points per line, 8000 of a loop, and a single-sample spike survives."""
+    """At most 4000 points per line, 16000 of a loop, and a single-sample spike survives."""
     n = 1_000_000
     x = np.sin(np.linspace(0, 300, n))
     y = x.copy()
     y[777_777] = 9.0
     figure = figures.draw(Run(time_s=np.arange(n) * 0.001, input=x, output=y))
     lines = [line for axes in figure.axes for line in axes.lines]
-    assert all(line.get_xdata().size <= 2 * MOST_POINTS for line in lines)
+    assert all(line.get_xdata().size <= MOST_OF_A_LOOP for line in lines)
     assert all(line.get_xdata().size <= MOST_POINTS for axes in figure.axes[:2] for line in axes.lines)
     assert figure.axes[1].lines[0].get_ydata().max() == 9.0
     assert figure.axes[2].lines[0].get_ydata().max() == 9.0
@@ -374,6 +375,8 @@ def test_error_panel_is_in_percent_of_full_force():
         ("1", ""),
         ("", ""),
         ("N*m", "N·m"),
+        ("1/(1)^2", ""),
+        ("N/(1)^2", "N"),
     ],
 )
 def test_units_are_printed_as_people_write_them(unit, shown):

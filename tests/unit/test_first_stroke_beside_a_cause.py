@@ -52,7 +52,7 @@ def test_a_first_stroke_that_creep_hides_is_left_out_once_the_creep_is_known(cyc
     said = diagnose(Question([Record(u, y, dt_s=DT_S)], 0.0, 5.0, rng))
     assert [one.cause.id for one in said.findings if one.found] == ["creep"]
     assert len(said.question.notes) == (0 if cycled else 1)
-    assert all("is left out: it is unlike all later ones" in note for note in said.question.notes)
+    assert all("is left out: it differs from all later ones" in note for note in said.question.notes)
     left_out = int(np.argmax(said.question.records[0].sample_weight > 0.0))
     assert u[max(left_out - 1, 0)] == pytest.approx(0.0 if cycled else 5.0, abs=0.1)
     amplitude = said.findings[0].parameters[0]

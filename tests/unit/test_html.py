@@ -161,7 +161,7 @@ def test_numbers_of_models_on_a_run(comparison):
         assert shown[f"{stem}.run_offset"][0][0] == model.offset
         for field in ("rms", "rms_percent", "max_percent", "gain_percent", "shape_rms_percent"):
             assert shown[f"{stem}.{field}"][0][0] == getattr(model, field)
-    assert shown["model.creep.amplitude"][0] == (0.051, "0.051")
+    assert shown["model.creep.amplitude"][0] == (0.051, "0.05100")
     assert shown["model.creep.amplitude.lower"][0][0] == 0.047
 
 
@@ -307,6 +307,14 @@ def odd_numbers():
     """The numbers of a page: a noise that one repeat cannot have, and a compensation that made it worse."""
     played = replace(EVALUATION.waveforms[0], noise_percent=math.nan, mean_error_reduction_percent=-12.346)
     return Page(render(Evaluation(waveforms=(played,)))).numbers()
+
+
+def test_warnings_stand_before_the_result():
+    """Those of the evaluation, each a paragraph; its notes are not warnings."""
+    warned = replace(examples.model_comparison(), notes=("warning: a note",), warnings=("model m does not",))
+    before = render(warned).partition("<main")[2].partition("<h2")[0]
+    assert "<strong>Warning: model m does not</strong>" in before
+    assert "a note" not in before
 
 
 def test_no_value_is_said_in_words(odd_numbers):

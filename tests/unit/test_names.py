@@ -18,7 +18,7 @@ from pulsetrainer.artefacts.session import FIGURES
 from pulsetrainer.artefacts.waveform import RefinePass
 from pulsetrainer.report import figures, html, results, tables
 from pulsetrainer.report.facts import facts, run_facts
-from pulsetrainer.report.names import FORCE, NAMES, headed, split
+from pulsetrainer.report.names import FORCE, NAMES, digits, headed, split
 from pulsetrainer.report.tables import label, text
 from pulsetrainer.report.text import tables_of
 from pulsetrainer.steps.compare import compare
@@ -120,7 +120,7 @@ def test_a_small_figure_reads_the_same_wherever_it_is_shown():
     shown = [
         text(row[-1]),
         html.metric(one, "compensated.hysteresis_percent", "").text,
-        *re.findall(r"compensated, loop area (\S+) %", legend),
+        *re.findall(r"compensated: (\S+)", legend),
         *re.findall(r"compensated drive one of (\S+) %", page),
     ]
     assert set(shown) == {"0.00553"}
@@ -190,3 +190,9 @@ def test_a_list_is_aligned_by_the_longest_of_its_headings():
 def test_figures_stand_beside_their_names_where_there_is_room(width, said):
     """Twice the longest name and eight letters are room; else they stand below."""
     assert tables.rendered(tables.Facts("t", {"ab": "c"}), width) == said
+
+
+def test_a_figure_has_as_many_digits_as_tell_something():
+    """A model was `304.05 %` worse than another."""
+    known = {93.944: "93.94", 99.99: "99.99", 99.996: "100", -304.05: "-304", 0.01234: "0.0123", 0.0: "0.00"}
+    assert {value: digits(value) for value in known} == known

@@ -159,4 +159,4 @@ def test_ends_in_the_noise_of_the_input_are_told(noise):
     u += noise * np.random.default_rng(3).standard_normal(u.size)
     record = pt.Run(time_s=np.arange(u.size) / 500, input=u, output=0.1 * u, input_unit="V", output_unit="um")
     drive = pt.invert("normal", pt.identify(record, levels=8))
-    assert any("hold its noise of 0.02 V" in note for note in drive.notes) is bool(noise)
+    assert any("include its noise of 0.02 V" in note for note in drive.notes) is bool(noise)

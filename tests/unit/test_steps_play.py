@@ -46,7 +46,10 @@ def test_a_small_pulse_is_told_with_the_strokes_before_it():
     assert f"{largest:.2f} N at most" in to_be_played(planned, 1)["force"]
     payload, _, rows = inverted(Path("drive.h5"), drive)
     assert payload["predicted_peak"] == planned.peak_force_N
-    assert rows["force"] == f"2.000 .. 3.000 N; before it up to {largest:.3f} N, by the model"
+    assert (
+        rows["force"]
+        == f"2.000 .. 3.000 N; up to {largest:.3f} N in the strokes before the pulse, by the model"
+    )
     whole = pt.invert("normal", model)
     assert "before" not in inverted(Path("drive.h5"), whole)[2]["force"]
 

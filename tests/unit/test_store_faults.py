@@ -340,8 +340,8 @@ def test_outputs_that_cannot_be(tmp_path, monkeypatch):
     (tmp_path / "astray.h5").symlink_to(tmp_path / "no" / "a.h5")
     (tmp_path / "itself.h5").symlink_to(tmp_path / "itself.h5")
     for path, words in [
-        (tmp_path / "no" / "a.h5", "there is no folder"),
-        (tmp_path / "astray.h5", "there is no folder"),
+        (tmp_path / "no" / "a.h5", f"the folder {tmp_path / 'no'} does not exist"),
+        (tmp_path / "astray.h5", f"the folder {tmp_path / 'no'} does not exist"),
         (tmp_path / "itself.h5", "cannot be written"),
         (tmp_path, "is a folder"),
         (tmp_path / "file" / "a.h5", "is a file"),

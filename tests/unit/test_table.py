@@ -656,8 +656,8 @@ def test_a_time_that_is_asked_for_as_input_or_output_is_told(table):
     def told(**columns):
         return [note for note in run_from_table(read.path, **columns).notes if "looks like the time" in note]
 
-    assert [said.partition("and")[2] for said in told(input="Zeit", output="T")] == [
-        " was asked for as the input"
+    assert [said.partition("but")[2] for said in told(input="Zeit", output="T")] == [
+        " was given as the input"
     ]
     assert ["'Zeit'" in said for said in told(input="Strom", output="Zeit", rate_Hz=10.0)] == [True]
     assert told(input="Strom", output="T") == []  # a torque that rises and falls is no time

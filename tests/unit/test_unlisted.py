@@ -173,7 +173,13 @@ def test_a_dip_over_the_average_current_is_found_and_said(dipping):
     (cause,) = found.found
     tau = next(one for one in cause.parameters if one.name == "tau")
     assert tau.value == pytest.approx(0.4, rel=0.2)
-    for words in ("in no list", "lower by 0.", " N ", "average current of the last", "near 0."):
+    for words in (
+        "not in the list of causes",
+        "lower by 0.",
+        " N ",
+        "average current of the last",
+        "near 0.",
+    ):
         assert words in cause.text
     (curve,) = found.dependences
     assert curve.at[np.argmin(curve.value)] == pytest.approx(0.7, abs=0.1)

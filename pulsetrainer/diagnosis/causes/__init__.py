@@ -33,7 +33,7 @@ def cause_named(name: str) -> Cause:
     """
     if name not in library():
         raise DataError(
-            f"the model is extended by {name!r}, a cause that this version does not know",
+            f"the model has the extension {name!r}, which this version does not know",
             hint="update pulsetrainer, or extend the model again",
         )
     return library()[name]

@@ -20,7 +20,7 @@ class Accommodation(Cause):
     id = "accommodation"
     title = "the loops drift over repeated cycles"
     formula = "(y + a LP(y; path of u)) / (1 + a)"
-    signature = "the loop moves with the count of cycles, not with time"
+    signature = "the loop moves with the number of cycles, not with time"
     excitation = "twenty equal cycles at two rates"
     source = "Della Torre, Magnetic Hysteresis, 1999, chapter 5: accommodation"
     stage = "output"
@@ -30,9 +30,14 @@ class Accommodation(Cause):
     needs_time = False
     parameters = (
         Quantity(
-            "amplitude", "1", -0.5, 1.0, 0.002, "the part that follows over cycles, over the part at once"
+            "amplitude",
+            "1",
+            -0.5,
+            1.0,
+            0.002,
+            "the part that follows over cycles, relative to the part at once",
         ),
-        Quantity("path", "{u}", 2.0, 700.0, 0.3, "travel of the {input} in which 63 % of it follow"),
+        Quantity("path", "{u}", 2.0, 700.0, 0.3, "travel of the {input} in which 63 % of it follows"),
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:

@@ -19,7 +19,7 @@ class ClockSkew(Cause):
     id = "clock-skew"
     title = "the clocks of {input} and {output} run at different rates"
     formula = "y(t (1 + e))"
-    signature = "the output runs ahead or behind ever more as the record goes on"
+    signature = "the output runs further and further ahead or behind as the record goes on"
     excitation = "fast reversals at the beginning and at the end"
     source = "Ljung, System Identification, 1999, section 14.1"
     stage = "output"

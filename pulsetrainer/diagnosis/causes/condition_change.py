@@ -36,7 +36,7 @@ class ConditionChange(Cause):
     id = "condition-change"
     title = "gain or offset of the later records differs from that of the first"
     formula = "y + b + g (y - y0) in all records but the first"
-    signature = "records agree within themselves and differ between one another"
+    signature = "each record agrees with itself, but they differ from one another"
     excitation = "the same signal twice, in the two conditions"
     source = "Lei et al., Phil. Trans. R. Soc. A 378, 2020: one fit for each protocol"
     stage = "output"
@@ -51,20 +51,20 @@ class ConditionChange(Cause):
     lasting = False
     texts: ClassVar[Mapping[str, str]] = {
         "shifted": (
-            "a Preisach model fitted to these recordings describes them, the given one does not: the device"
-            " is in another condition (load, configuration, zero). Its output is shifted by "
+            "a Preisach model fitted to these recordings describes them, but the given one does not: the "
+            "device is in another condition (load, configuration, zero). Its output is shifted by "
             "{shift:.2g}{in_y} on average; gain and shape are unchanged ({gain:+.1f} %, {left:.2g}{in_y} "
             "rms). Reset the zero before each use, or identify it again"
         ),
         "changed": (
-            "a Preisach model fitted to these recordings describes them, the given one does not: the device"
-            " is in another condition (load, configuration, zero). Its output is shifted by "
-            "{shift:.2g}{in_y} on average, has {times:.3f} times the gain of the model, and differs in "
-            "shape by {left:.2g}{in_y} rms. Identify it again in this condition"
+            "a Preisach model fitted to these recordings describes them, but the given one does not: the "
+            "device is in another condition (load, configuration, zero). Its output is shifted by "
+            "{shift:.2g}{in_y} on average, its gain differs by {gain:+.1f} %, and its shape by "
+            "{left:.2g}{in_y} rms. Identify it again in this condition"
         ),
         "reversed": (
             "the {output} falls where the model rises: {times:.3f} times what the model says, and an offset, "
-            "leave {left:.2g}{in_y} rms. The sensor or the coil is connected the other way round, or the "
+            "leave {left:.2g}{in_y} rms. The sensor or the coil is connected the wrong way round, or the "
             "model is of another device. Identify it again"
         ),
         "each": (

@@ -36,7 +36,7 @@ class Creep(OfKinds):
     id = "creep"
     title = "the {output} creeps on under a constant {input}"
     formula = "(y + a mean_k LP(y; tau_k)) / (1 + a), tau_k = tau/4, tau, 4 tau, or tau/10 to 10 tau, or tau"
-    signature = "the output goes on towards a new value while the input rests"
+    signature = "the output keeps moving towards a new value while the input rests"
     excitation = "holds of three time constants after reversals, on several levels"
     source = "Kuhnen and Krejci, IEEE Trans. Automatic Control 54, 2009: creep as a bank of low-passes"
     stage = "output"
@@ -48,7 +48,9 @@ class Creep(OfKinds):
     tried = (_EQUAL, _ALONE, _FIVE)  # shares of the middle time constant
     common = True
     parameters = (
-        Quantity("amplitude", "1", -0.3, 0.6, 0.002, "the part that follows slowly, over the part at once"),
+        Quantity(
+            "amplitude", "1", -0.3, 0.6, 0.002, "the part that follows slowly, relative to the part at once"
+        ),
         Quantity("tau", "s", 0.04, 20.0, 0.02, "time constant; of several, the middle one"),
     )
 

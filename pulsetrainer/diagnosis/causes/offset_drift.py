@@ -44,17 +44,26 @@ class OffsetDrift(Cause):
     drifts = True
     strengths = 2
     parameters = (
-        Quantity("rate", "{y}/s", -1e6, 1e6, 1e-5, "drift of the zero of the {output}, from end to end"),
-        Quantity("bend", "{y}/s^2", -1e6, 1e6, 1e-7, "half of what that rate changes by in a second"),
-        Quantity("slowing", "1/s", -1e6, 1e6, 1e-5, "by 1/e in a time of one over it; below 0: it grows so"),
+        Quantity(
+            "rate", "{y}/s", -1e6, 1e6, 1e-5, "mean drift of the zero of the {output}, from start to end"
+        ),
+        Quantity("bend", "{y}/s^2", -1e6, 1e6, 1e-7, "half of what the rate changes by in a second"),
+        Quantity(
+            "slowing",
+            "1/s",
+            -1e6,
+            1e6,
+            1e-5,
+            "1 over the time in which the drift falls to 37 %; below 0: grows",
+        ),
     )
     lasting = False
     corrects = True
     texts: ClassVar[Mapping[str, str]] = {
         "against given": (
-            "against the model as given the zero of the {output} moves by {moved:+.2g}{in_y}, and beside "
-            "that the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings hide some of "
-            "it"
+            "relative to the model as given, the zero of the {output} moves by {moved:+.2g}{in_y}; apart "
+            "from that, the model leaves {left:.2g}{in_y} (rms). Weights refitted to these recordings hide "
+            "some of the drift"
         ),
     }
 

@@ -52,7 +52,7 @@ class Periodic(Cause):
     corrects = True
     line = True
     texts: ClassVar[Mapping[str, str]] = {
-        "background": ("a hum at {frequency:.4g} Hz, no larger than the noise: it is told, but is no verdict")
+        "background": ("a hum at {frequency:.4g} Hz, no larger than the noise: reported, but not a verdict")
     }
 
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:

@@ -41,7 +41,7 @@ class Quantisation(Cause):
     texts: ClassVar[Mapping[str, str]] = {
         "gate": "the output changes in steps of {step:.4g}{in_y}, {percent:.2g} % of its span",
         "background": (
-            "steps of {size:.4g}{in_y}, which the noise averages out: they are told, but are no verdict"
+            "steps of {size:.4g}{in_y}, which the noise averages out: reported, but not a verdict"
         ),
     }
 

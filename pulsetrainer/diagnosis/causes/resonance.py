@@ -37,7 +37,7 @@ class Resonance(Cause):
     in_rows = True
     parameters = (
         Quantity("frequency", "Hz", 1.0, 200.0, 0.1, "of the ringing"),
-        Quantity("damping", "1", 0.01, 0.7, 0.005, "ratio: near 0 it rings long, at 1 not at all"),
+        Quantity("damping", "1", 0.01, 0.7, 0.005, "ratio: near 0 it rings for long, at 1 not at all"),
     )
 
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:

@@ -155,7 +155,7 @@ STATES: tuple[State, ...] = (
           lambda _, s, f, n: _change(_above(f), s, f, n)),
     State("output change", "{y}", "the {output} less its average of the last {tau}",
           lambda y, s, f, n: _change(y - f.zero, s, f, n)),
-    State("way", "{u}", "the way of the {input} since its last turn, averaged over the last {tau}",
+    State("way", "{u}", "the distance of the {input} from its last turn, averaged over the last {tau}",
           lambda _, s, f, n: _lagged(np.abs(_above(f) - _turns(f)[0]), s, f, n)),
     State("turn", "{u}", "the {input} at its last turn, averaged over the last {tau}",
           lambda _, s, f, n: _lagged(_turns(f)[0], s, f, n)),
@@ -218,7 +218,7 @@ class Unlisted(Cause):
     """Learned curves over states of the device."""
 
     id = "unlisted"
-    title = "the {output} also depends on something that is in no list"
+    title = "the {output} also depends on something that is not in the list of causes"
     formula = (
         "y + f(z) or y + f(z) (y - y0), "
         "z a state (filtered input or output, their squares and rates, path, last turn, rest)"

@@ -1,12 +1,12 @@
 """Acceptance: the best candidate that is relevant and predicts.
 
-That a candidate is significant at all was asked before it was refitted (``joint_fit``), which also puts them
-in order. The first one is taken that the record can tell at all and whose refit lowers the squares by a
-relevant amount and the error on blocks that were left out by at least a twentieth of what can be lowered. One
-that falls just short is refitted to its end before it is refused. One of several parameters that all run into
-their bounds is no longer the cause that it is named after, and refused. Where too few blocks are left to ask,
-the fit alone decides. With a new cause in the model the error of the levels is estimated again: a missing
-cause makes that estimate too large, never too small.
+Whether a candidate is significant at all was tested before it was refitted (``joint_fit``), which also puts
+the candidates in order. The first one is taken that the record can distinguish at all, and whose refit lowers
+the sum of squares by a relevant amount and the error on blocks that were left out by at least a twentieth of
+what can be lowered. One that falls just short is refitted until it converges before it is refused. One with
+several parameters that all run into their bounds is no longer the cause that it is named after, and is
+refused. If too few blocks are left to test it on, the fit alone decides. With a new cause in the model the
+error of the levels is estimated again: a missing cause makes that estimate too large, never too small.
 """
 
 from __future__ import annotations

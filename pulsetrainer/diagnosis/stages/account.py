@@ -1,9 +1,9 @@
 """Account: what speaks for the verdict, as data.
 
-What the static model leaves and what it would leave if nothing were wrong; for each cause found, what its
-gate saw or its p-value and share; what is left with all of them; where the rest is largest, when nothing
-explains it and it is more than noise; whether what is taken for noise is slow; whether the loop is pinched;
-which cause screening took for significant, where nothing was found; what the records lack.
+It lists what the static model leaves and what it would leave if nothing were wrong; for each cause found,
+what its gate saw, or its p-value and share; what is left with all of them; where the rest is largest, if
+nothing explains it and it is more than noise; whether what is taken for noise is slow; whether the loop is
+pinched; which cause screening took for significant, if nothing was found; and what the records lack.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """Advice: what to measure next.
 
-Where the model as given is of the wrong kind, or of another condition, that comes first: another model is
-needed. Where the device was still settling when the records began, it must rest first. Where causes are tied,
-the experiment on which they look least alike, tried on paper with the model that was found. Else what the
-recordings lack; else what the verdict asks for: a fault of the measurement is taken out of the record
-(`correct`), a property of the device goes into the model (`extend`).
+If the model as given is of the wrong kind, or of another condition, that comes first: another model is
+needed. If the device was still settling when the records began, it must rest first. If causes are tied, the
+advice is the experiment on which they look least alike, simulated with the model that was found. Otherwise it
+is what the verdict asks for: a fault of the measurement is taken out of the record (`correct`), a property of
+the device goes into the model (`extend`). What the records lack comes after what can be done with them; it
+comes first if that is nothing.
 """
 
 from __future__ import annotations
@@ -31,12 +32,15 @@ _ANOTHER_MODEL = {
     "reversed": "identify anew",
     "one stroke": "strokes",
 }
+# ... and where nothing was found
+_NOT_AS_GIVEN = {"given worse, own": "warm up", "given worse": "identify anew"}
 _TO_REPAIR = {ConditionChange.id: "conditions", OutOfRange.id: "out of range"}
 
 
 def stage(state: State) -> State:
     """Return the state with its advice."""
-    return replace(state, advice=_of_the_conditions(state) or _of_the_causes(state))
+    advice = _of_the_conditions(state) or _not_as_given(state) or _of_the_causes(state)
+    return replace(state, advice=advice)
 
 
 def _of_the_conditions(state: State) -> Evidence | None:
@@ -48,6 +52,15 @@ def _of_the_conditions(state: State) -> Evidence | None:
     if began and state.extended is None:
         return Evidence("rest first", figures={"rest": began[0].figures["rest"]})
     return None
+
+
+def _not_as_given(state: State) -> Evidence | None:
+    """Return what to do where nothing was found, but the model as given misses what refitted weights hold."""
+    missed = next((one.kind for one in state.evidence if one.kind in _NOT_AS_GIVEN), None)
+    if missed is None or state.verdict not in ("none", "inconclusive", "unknown"):
+        return None
+    own = missed == "given worse, own"
+    return Evidence(_NOT_AS_GIVEN[missed]) if own or state.verdict != "unknown" else None
 
 
 def _of_the_causes(state: State) -> Evidence:
@@ -73,18 +86,26 @@ def _of_the_causes(state: State) -> Evidence:
 
 def _after_verdict(state: State) -> Evidence:
     if state.verdict in ("unknown", "none"):
-        return Evidence("lacks", names=state.lacks) if state.lacks else Evidence(state.verdict)
+        kind = "lacks" if state.lacks and state.verdict == "unknown" else state.verdict
+        return Evidence(kind, names=state.lacks)
     if state.verdict in state.correctable:
         device = any(one.found and one.cause.lasting for one in state.findings)
         return Evidence("correct, extend" if device else "correct", names=tuple(state.correctable))
-    if state.lacks and state.verdict != OutOfRange.id:  # no recording in the model's range would show more
-        return Evidence("lacks", names=state.lacks)
-    if not library()[state.verdict].lasting and state.extended is None:
-        return Evidence(_TO_REPAIR.get(state.verdict, "repair"))
-    if state.extended is not None and state.correctable:
-        return Evidence("extend, correct", names=tuple(state.correctable))
-    extend = "extend, or late" if state.verdict == Delay.id else "extend"
-    return Evidence(extend if state.extended is not None or state.question.quick else "again")
+    # no recording in the model's range would show more
+    lacks = state.lacks if state.verdict != OutOfRange.id else ()
+    cause = library()[state.verdict]
+    if state.extended is not None or (state.question.quick and (cause.lasting or cause.corrects)):
+        return _now_and_later(state, lacks)
+    if lacks:
+        return Evidence("lacks", names=lacks)
+    return Evidence("again" if cause.lasting else _TO_REPAIR.get(state.verdict, "repair"))
+
+
+def _now_and_later(state: State, lacks: tuple[str, ...]) -> Evidence:
+    """Extend the model; what the records lack comes after that."""
+    if state.correctable:
+        return Evidence("extend, correct", names=(*state.correctable, *lacks))
+    return Evidence("extend, or late" if state.verdict == Delay.id else "extend", names=lacks)
 
 
 def _to_see_more(state: State) -> Evidence:

@@ -1,13 +1,13 @@
 """Begin: the model that goes on is fitted to the beginning of the records too, where it can be.
 
-What a device did before a record decays in it, so that the search fits the beginning of each record freely
-(``design``). But a free beginning hides how a slow cause begins, and a model that is used elsewhere has none:
-it begins from rest. So the causes that repeat are refitted without it. That is the model where it leaves no
-relevantly larger error, or a smaller one, begin and all, after the first fifth of each record; else something
-was going on before the records, and the beginning stays free.
+The after-effects of what a device did before a record decay in it, so the search leaves the beginning of each
+record free (``design``). But a free beginning hides how a slow cause begins, and a model that is used
+elsewhere has none: it starts from rest. So the causes that repeat are refitted without it. That refit is the
+model if it leaves no relevantly larger error, or a smaller one, beginning included, after the first fifth of
+each record; otherwise something was going on before the records, and the beginning stays free.
 
-Both fits are of the same records, so the interval of a parameter holds what either of them says. Where it
-comes to span zero for all strengths of a cause, that cause is in doubt, as any other of which that is so.
+Both fits are of the same records, so the interval of a parameter covers the results of both. If it then spans
+zero for all strengths of a cause, that cause is in doubt, like any other with such an interval.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
 """Backward elimination: no cause that the others have made superfluous.
 
-From the model with all causes each is taken out in turn. While the one that is missed least makes no relevant
+Each cause is taken out of the full model in turn. As long as the least important one makes no relevant
 difference, or less than a five hundredth of that of all together (the formulas of the others are not that
-exact), it is dropped. So is one without which time that was left out is predicted better: it was accepted
-before the others, and does harm beside them. So is one that takes away less than a third of what can be
-lowered on blocks that were left out, where more than noise is left beside it or without it: it fits a device
-that is no Preisach operator, as anything does. But not a line of the spectrum that is most of what is left
-without it: no error of a model is so, however badly blocks that were left out are predicted for other
-reasons. A single cause has proved itself against the baseline, and goes only for the last two reasons.
+exact), it is dropped. A cause is also dropped if time that was left out is predicted better without it: it
+was accepted before the others, and does harm beside them. The same holds if it takes away less than a third
+of what can be lowered on blocks that were left out, while more than noise is left with it or without it: any
+cause fits a device that is not a Preisach operator. A line of the spectrum that is most of what is left
+without it is not dropped for this: no error of a model looks like that, however badly blocks that were left
+out are predicted for other reasons. A single cause has proved itself against the baseline, and is dropped
+only for the last two reasons.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """Equal loops: what the weights can hold is sought where they cannot.
 
-A feedback of the output into the input is held by the weights almost whole, so that no refit shows it. But
+The weights can absorb a feedback of the output into the input almost entirely, so that no refit shows it. But
 all minor loops between the same two turns are congruent in a Preisach model, whatever its weights; their
 differences are tested by exchanging the loops, in standard errors over them, at p of at most 0.001. The cause
-is dropped if its strength runs into its bound, or if the rest of the record denies it: with it in the model
-the squares must not rise by a relevant amount. Not asked where much is unexplained or jagged: either makes
-equal loops differ (decision 042). Nor of the dual form, whose loops between equal turns of the input are not
-congruent.
+is dropped if its strength runs into its bound, or if the rest of the record contradicts it: with it in the
+model the sum of squares must not rise by a relevant amount. The test is not made if much is unexplained or
+jagged, since either makes equal loops differ (decision 042), nor for the dual form, whose loops between equal
+turns of the input are not congruent.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Exchange: each cause against the others of its family, its own other kinds, and its finer formula.
 
 When a cause was chosen, others were still missing. So each is taken out, every other one of its family and
-every other kind of its own is fitted in its place, and the best is kept. The new one inherits the p-value of
-the old: that something of this family is there was tested, which one of it was not (decision 044). A formula
+every other variant of its own is fitted in its place, and the best is kept. The new one inherits the p-value
+of the old: the test was whether anything of this family is there, not which one (decision 044). A formula
 with one more parameter takes the place of its own only where neither noise nor what happens between two
 samples can make the difference, twice over.
 """

@@ -1,11 +1,12 @@
 """Extension: the model with the causes that repeat, as it will be used.
 
-The search judges a model on averages, with a free offset and begin. What is used is a model on levels of its
-own, from rest. It is made here, and must predict the very records better than the model as given, by at least
-three fifths of what the causes gain in the search; else nothing is added to that. What gains less was already
-under way before the record, and begins otherwise in the next. What a fault of the measurement did to the
-records, and can be taken out of them, counts on neither side. Equal loops tell a cause by differences that
-the weights hold, not by what it predicts: where the model gains nothing with it, it is tried without.
+The search judges a model on averages, with a free offset and a free beginning. What is used is a model on
+levels of its own, starting from rest. It is made here, and must predict these same records better than the
+model as given, by at least three fifths of what the causes gain in the search; otherwise nothing is added to
+the model. A cause that gains less was already under way before the record, and will begin differently in the
+next. What a fault of the measurement did to the records, and can be taken out of them, counts on neither
+side. Equal loops show a cause by differences that the weights can absorb, not by what it predicts: if the
+model gains nothing with it, it is tried without.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """First look: the answer of a quick diagnosis.
 
-Only screened, nothing refitted: the best cause is found if it is significant and relevant, its strength is
-linearised and too small, and causes whose signatures look like it (cosine above 0.9) are named beside it.
+Causes are only screened, and nothing is refitted: the best cause is found if it is significant and relevant,
+its strength is linearised and therefore too small, and causes with similar signatures (cosine above 0.9) are
+named beside it.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """First stroke: asked about again, now that causes are known.
 
-The first stroke of a device that was not cycled before is unlike all later ones, and is left out before
-anything is fitted. Where the device creeps, rings or runs in, the later ones differ as well, and hide it.
-So it is looked for once more in the output less what the causes add; where it stands apart there, it is left
-out, and the search begins anew. Where more than noise is left, it may have kept the causes from being found:
-then the search is tried without it, and that counts if it leaves noise only.
+The first stroke of a device that was not cycled before differs from all later ones, and is left out before
+anything is fitted. If the device creeps, rings or runs in, the later strokes differ as well, and hide it. So
+it is looked for once more in the output less what the causes add; if it stands out there, it is left out, and
+the search begins again. If more than noise is left, the first stroke may have kept the causes from being
+found: the search is then tried without it, and that result counts if it leaves only noise.
 """
 
 from __future__ import annotations

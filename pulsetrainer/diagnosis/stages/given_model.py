@@ -8,20 +8,21 @@ records.
 - If a mere function of the velocity describes the output much better, the model is of the wrong kind: causes
   sought on top of it are withdrawn. If the speed matters and not only the direction, the force is `viscous`;
   else the cause is `unknown`.
-- If the model as given leaves less than the search's best, the search found faults of its own coarser levels
-  only: they are withdrawn. What the given one leaves may still be more than noise, and is then `unknown`;
-  else it is `none`, whatever the coarser levels could have shown.
+- If the model as given leaves less than the search's best, the search found only faults of its own coarser
+  levels: they are withdrawn. What the given model leaves may still be more than noise, and is then `unknown`;
+  otherwise the verdict is `none`, whatever the coarser levels could have shown.
 - If the model as given is far off (1 % of the span) where refitted weights are not (a fifth of that), and a
   drift of the zero brings it near, that is the finding: refitted weights hide a drift that is over soon.
-- If it is far off where no input ever turned, nothing can be told: a first stroke is unlike all later ones.
+- If it is far off on records in which the input never turned, there is no verdict: a first stroke differs
+  from all later ones.
 - If it is far off though it was identified from these very records, nothing changed, and that is `unknown`.
 - If it is far off without that, the device is in another condition: `condition-change` comes first. Where
   that is all but a thousandth of the squared error, other causes would only repair the rest of it, and are
-  withdrawn. It is none where the causes found, added to what the model as given says, bring it near; nor
-  where refitted weights are far off too on blocks that were left out: then no Preisach model describes the
-  device, and that is `unknown`. Nor is there a change to be told from a model of the wrong kind, by these
-  records or by its own. A mere shift is none where the input left the model's range: what was switched there
-  stays so, and looks like another zero.
+  withdrawn. There is no such change if the causes found, added to the prediction of the model as given, bring
+  it near; nor if refitted weights are far off too on blocks that were left out: then no Preisach model
+  describes the device, and that is `unknown`. Nor can a model of the wrong kind, by these records or by its
+  own, show a change. A mere shift is not a change if the input left the model's range: what was switched
+  there stays so, and looks like another zero.
 
 What the raw data show stays, and so does what equal loops show, unless the model is of the wrong kind.
 """

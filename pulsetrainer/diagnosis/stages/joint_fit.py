@@ -1,13 +1,14 @@
 """Joint fit: the best of the significant candidates are refitted together with the weights.
 
-The weights have swallowed most of any effect, so that its fit to their residual comes out too small. The
-best three candidates are therefore fitted jointly: parameters of all causes and all weights at once. One
-whose refit lowers nothing (a lag where the output leads) leaves its turn to the next. Beside a lag the other
-lags are tried too, begun as late as that: linearised from afar they are hardly told apart. A candidate must
-be significant, and its linearised score half of what is relevant, since the score shows less than a refit
-does. Of a family that is in the model already none is tried: what a cause of its own kind leaves is its
-imperfect formula, not a second cause. The best fit comes first; but one with fewer parameters comes before
-it, if noise or what happens between two samples could make the difference.
+The weights have absorbed most of any effect, so that its fit to their residual comes out too small. The best
+three candidates are therefore fitted jointly: parameters of all causes and all weights at once. If the refit
+of one lowers nothing (a lag where the output leads), the next takes its turn. Beside a lag the other lags are
+tried too, starting from the same lateness: linearised from far away they are hardly distinguishable. A
+candidate must be significant, and its linearised score at least half of what is relevant, since the score
+shows less than a refit does. No candidate is tried from a family that is in the model already: what a cause
+of that family leaves is due to its imperfect formula, not to a second cause. The best fit comes first; but
+one with fewer parameters comes before it, if noise or what happens between two samples could make the
+difference.
 """
 
 from __future__ import annotations

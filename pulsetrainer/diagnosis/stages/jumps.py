@@ -1,11 +1,11 @@
 """Jumps: the raw data are asked again, now that causes are known.
 
-A hum also jumps between flat runs. So a gate that other causes can set off as well is asked once more about
-the output less what the causes found add to it, and its finding is dropped if it no longer fires. The other
-way round, sticking smaller than the noise, or all at one rate, shows only in what the model leaves: where
-that is relevant beside noise from sample to sample, the residual is searched for it (decision 044). Jumps
-that are not far larger than coarse steps of the output are those steps. What was taken out of a record is not
-asked about, nor what is left of that: coarse steps that were smoothed still have flat runs.
+A hum, too, looks like jumps between flat runs. So a gate that other causes can set off as well is applied
+once more to the output less what the causes found add to it, and its finding is dropped if it no longer
+fires. The other way round, sticking smaller than the noise, or all at one rate, shows only in what the model
+leaves: where that is relevant beside noise from sample to sample, the residual is searched for it (decision
+044). Jumps that are not far larger than coarse steps of the output are those steps. What was taken out of a
+record is not tested again, nor what is left of it: coarse steps that were smoothed still have flat runs.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
 The spread of each parameter is the larger of two: of joint refits, linearised, on redrawn noise, and of
 leaving out each tenth of the record in turn. Added to it are the error of the levels, as if a fifth of it
-were in line with the parameter; a fifth of a sample step, since input and output are not read at one moment;
-and what other formulas would give that are as plausible as the library's. What equal loops show has the
-interval of those loops.
+were aligned with the parameter; a fifth of a sample step, since input and output are not read at the same
+moment; and the estimates by other formulas that are as plausible as the library's. What equal loops show has
+the interval of those loops.
 """
 
 from __future__ import annotations

@@ -1,17 +1,17 @@
 """Gates on the raw data.
 
-Before any model, each record is looked at, sample by sample as it was measured, for what no model can
+Before any model is fitted, each record is checked, sample by sample as it was measured, for what no model can
 repair: an output cut off by its range, single wild samples, coarse steps, jumps, a driver that does not
-follow its reference, an input outside the range that was identified. Each gate stands in the file of its
-cause; some are also told what the model as given says. A gate that fires is a finding, and the samples it
-names are left out of everything that follows: filled in, since causes filter the output and wild samples must
-not reach the filters.
+follow its reference, an input outside the range that was identified. Each gate is in the file of its cause;
+some also get the prediction of the model as given. A gate that fires is a finding, and the samples it names
+are left out of everything that follows. They are filled in, since causes filter the output and wild samples
+must not reach the filters.
 
-Only then is an input that was read in coarse steps followed between them, unless the output moves with the
-steps and so saw them. The records are brought to even time steps, sharp turns of the input to where the lines
-beside them meet, and all to units of their own: the range of the input, the span of the output, and a second
-that follows from how fast the input moves. Nothing that is decided from here on knows a second, an ampere or
-a newton.
+Only then is an input that was read in coarse steps interpolated between them, unless the output moves with
+the steps, which shows that the device saw them. The records are brought to even time steps, and sharp turns
+of the input are moved to where the lines beside them meet. Everything is then put into units of the record
+itself: the range of the input, the span of the output, and a second that follows from how fast the input
+moves. No decision from here on depends on seconds, amperes or newtons.
 """
 
 from __future__ import annotations

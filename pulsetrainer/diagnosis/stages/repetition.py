@@ -1,22 +1,22 @@
 """Repetition: no cause goes into the model that does not predict time which was left out.
 
-What wanders slowly looks like heat, creep or a step, and blocks that alternate only interpolate it. So for
-each cause that belongs to the device whole pieces, a fifth of the time each, are predicted from the others:
-with the cause the errors must fall by at least half of what they fall by in the fit, and on no piece may they
-rise. Nor may they on any quarter of the blocks, sorted by their rate and predicted from the others: a formula
-that only fits the rates of one record misleads at others. A cause that does not do that fits, but does not
-repeat: it is told with these words, and is not added to the model; nor is one that is in doubt for
-another reason (`rivals`), nor one in whose place a fault of the measurement, or a gain that wears off, fits
-as well: that happened in this record, and not in the next. What equal loops show was tested by itself.
+What wanders slowly looks like heat, creep or a step, and alternating blocks only interpolate it. So for each
+cause that belongs to the device, whole stretches, a fifth of the time each, are predicted from the others:
+with the cause the errors must fall by at least half of what they fall by in the fit, and they must not rise
+on any stretch. Nor may they rise on any quarter of the blocks, sorted by rate and predicted from the others:
+a formula that only fits the rates of one record misleads at others. A cause that fails this fits, but does
+not repeat: it is reported in these words, and is not added to the model. Neither is one that is in doubt for
+another reason (`rivals`), nor one that a fault of the measurement, or a gain that wears off, could replace:
+that happened in this record, and will not in the next. What equal loops show was tested separately.
 
-That which repeats least goes first; the others are then refitted without it and asked again, since they had
-been fitted beside it. One whose strength may be nothing, and that explains less than a tenth or half a per
-cent of the span, was not found: it mends the formula of another cause, or nothing. Nor was a slow fault of
-the measurement of which the weights and the causes beside it hold nearly all: it would be taken out as large
-as it was fitted, from a device that never had it. That is said, since it may be there all the same. But where
-no cause is slow besides, and it predicts nearly all that can be lowered on time that was left out, it is
-there. What is left beside one that is not is refitted without it, and a step asked again whether it only
-settles.
+The cause that repeats least goes first; the others are then refitted without it and tested again, since they
+had been fitted beside it. A cause whose strength may be zero, and that explains less than a tenth or half a
+per cent of the span, was not found: it only improves the formula of another cause, if anything. Nor was a
+slow fault of the measurement that the weights and the causes beside it can absorb almost entirely: it would
+be taken out as large as it was fitted, from a device that never had it. This is reported, since it may be
+there all the same. But if no other cause is slow, and it predicts nearly all that can be lowered on time that
+was left out, it is there. What is left beside one that is not there is refitted without it, and a step is
+tested again for whether it only settles.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Restart: the wrong one of a family may hide a second cause.
 
-Of a field lag and a resonance a delay explains most, and what it leaves looks like more lag, so that the
-resonance is never found. Where a cause is still significant whose family is in the model, the search begins
-again with that one in the other's place, and the better of both ends is kept (decision 044).
+If a device has a field lag and a resonance, a delay explains most of both, and what it leaves looks like more
+lag, so that the resonance is never found. If a cause is still significant although its family is in the
+model, the search begins again with that cause in place of the other, and the better of the two results is
+kept (decision 044).
 """
 
 from __future__ import annotations

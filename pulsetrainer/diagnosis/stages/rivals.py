@@ -16,8 +16,9 @@ What speaks against a cause that was found is written beside it:
 - it is slow, and what is left still wanders from one tenth of the time to the next;
 - it is slow and of the record, and all causes together take away less than half of what can be lowered on
   blocks that were left out: a device of another kind leaves as much;
-- it follows the speed, as whatever a device does as it moves: more than the noise from sample to sample is
-  left, and of what the model leaves without it less than three quarters are predicted on blocks left out;
+- it follows the speed, like anything that a device does as it moves: more than the noise from sample to
+  sample is left, and of what the model leaves without it less than three quarters is predicted on blocks left
+  out;
 - only equal loops would show it, and there are none;
 - a gain that wears off with time or with the way of the input fits as well, so that it could equally be
   `accommodation`; of a step: whatever settles from the beginning of the record;

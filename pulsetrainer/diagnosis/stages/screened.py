@@ -1,16 +1,16 @@
 """Screening: every cause is scored against noise, and how small an effect would have shown is told.
 
-Each cause that is not in the model yet is tried at a few values, linearised: how far would the residual
-fall? The same is asked of noise that looks like the residual but holds no cause, drawn again and again, and
-of each draw the least likely score over the whole library counts. The p-value of a cause is the share of
-draws with one as unlikely, so that it holds for the search as a whole and not for one cause. Causes with p of
-at most 0.01 go on to the joint fit.
+Each cause that is not in the model yet is tried at a few values, linearised: how far would the residual fall?
+The same is tried on noise that looks like the residual but holds no cause, drawn again and again; of each
+draw the least likely score over the whole library counts. The p-value of a cause is the share of draws with
+one as unlikely, so that it holds for the search as a whole and not for one cause. Causes with p of at most
+0.01 go on to the joint fit.
 
 From the same null follows how small an effect of each cause would have shown: large enough that the test
 finds it in nine of ten records, that what the weights leave of it is relevant, and that neither is undone by
-what looks like the cause already. Of a cause that is in the model by now it is asked against the noise of
-today. Of one that the weights hold almost whole it is not told: what they leave of it is how finely they are
-drawn.
+what looks like the cause already. For a cause that is in the model by then, the present noise is used. For
+one that the weights can absorb almost entirely no such figure is given: what they leave of it depends only on
+how finely they are drawn.
 """
 
 from __future__ import annotations

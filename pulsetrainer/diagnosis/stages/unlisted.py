@@ -1,20 +1,21 @@
 """Unlisted: what no listed cause explains is sought in a bank of states.
 
-Where more is left than noise, the device may depend on something that is in no list. Its output, or its
+If more than noise is left, the device may depend on something that is not in the list. Its output, or its
 gain, is then fitted by a curve over one state after another: averages of input and output over many times, of
-their squares and speeds, how far each is from its average, the last turn, the way and the time since, and how
-long the input has rested. The state is taken that best predicts whole pieces of the time that were left out,
-if noise alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if it matters and
-is more than the formulas of listed causes may miss (8 % of what they explain), and if, refitted with all
-weights, it repeats (`repetition`). The noise is heard again beside it, and the next one is sought in what is
-left, up to three. What may be slow noise is searched too; a curve that is found there must predict three
-quarters of all that is left above the noise from sample to sample (decision 105).
+their squares and speeds, how far each is from its average, the last turn, the distance and the time since,
+and how long the input has rested. The state is taken that best predicts whole stretches of time that were
+left out, if noise alone hardly ever predicts as much with any state of the bank (p of at most 0.01), if the
+effect matters and is more than the formulas of listed causes may miss (8 % of what they explain), and if,
+refitted with all weights, it repeats (`repetition`). The noise is then estimated again beside it, and the
+next state is sought in what is left, up to three. What may be slow noise is searched too; a curve that is
+found there must predict three quarters of all that is left above the noise from sample to sample (decision
+105).
 
-Where the listed causes found leave more than half unexplained, or nothing is found beside them, the
-search begins without them: they may have been taken for what they are not. They are then asked for again,
-beside the curve; and every cause, listed or not, must be missed when it is taken out. But a curve that
-only takes the place of listed causes which explain nearly as much is a better formula for them, and no
-dependence of its own. So is one of several in whose place the listed causes fit as well.
+If the listed causes found leave more than half unexplained, or nothing is found beside them, the search
+begins without them: they may be mistaken. They are then tested again, beside the curve; and every cause,
+listed or not, must make the fit worse when it is taken out. But a curve that only replaces listed causes
+which explain nearly as much is a better formula for them, and not a dependence of its own. The same holds for
+one of several that the listed causes could replace.
 """
 
 from __future__ import annotations

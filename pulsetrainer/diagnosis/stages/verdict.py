@@ -1,14 +1,15 @@
 """Verdict: the strongest cause, or that it is unknown.
 
-Where more than half of what can be explained is left, and enough to matter, the verdict is the jagged cause
-that a gate saw, since no refit takes away what it leaves; else it is `unknown`, whatever was found besides.
-Otherwise it is the cause that explains most, then what a gate on the raw data saw; that comes first where all
-others together are below half a per cent of the span. Where nothing was found it is `none`, or `inconclusive`
-if the record could not have shown half a per cent of the span of a common cause. A hum no larger than the
-noise is found and told, and takes no verdict; nor do steps that noise averages out, nor a drift or step no
-larger than slow noise, or what may be one, nor a cause that is in doubt (`rivals`, `repetition`). Of a loop
-whose branches all pass through one point within it, as those of a memristor do, more than noise from sample
-to sample is `unknown`: no Preisach operator has one, and any cause explains some of it.
+If more than half of what can be explained is left, and enough to matter, the verdict is the jagged cause that
+a gate saw, since no refit takes away what it leaves; without such a cause it is `unknown`, whatever else was
+found. Otherwise the verdict is the cause that explains most, then what a gate on the raw data saw; the gate
+comes first if all others together are below half a per cent of the span. Where nothing was found it is
+`none`, or `inconclusive` if the record could not have shown half a per cent of the span of a common cause. A
+hum no larger than the noise is found and reported, but is not a verdict; nor are steps that noise averages
+out, a drift or step no larger than slow noise, or what may be one, or a cause that is in doubt (`rivals`,
+`repetition`). If all branches of a loop pass through one point within it, as those of a memristor do,
+anything left beyond the noise from sample to sample is `unknown`: no Preisach operator has such a loop, and
+any cause explains some of it.
 """
 
 from __future__ import annotations

@@ -1,0 +1,277 @@
+"""What to record next, in words: experiments, in levels, rates and times of the device that was recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pulsetrainer.artefacts.units import shown, with_seconds, with_unit
+from pulsetrainer.diagnosis import experiment
+from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.evidence import Evidence
+from pulsetrainer.diagnosis.scale import Scale
+from pulsetrainer.diagnosis.thresholds import LIMITS
+from pulsetrainer.diagnosis.wording import LACKS, figure, joined, listed
+
+AGAIN = (
+    "record {output} and {input} again, the {input} between {low} and {high}: {missing}. Then diagnose that "
+    "recording.{command}"
+)
+# of tied causes one of which is the measurement's, another the device's: no record decides, a person may
+KNOWN = (
+    " If you know that it is the measurement ({faults}), put that right (a sensor that drifts must warm up), "
+    "record the same again, and identify the model from that."
+)
+# after what can be done with the records as they are
+LATER = f" This recording cannot show everything ({{lacked}}). If that matters to you, {AGAIN}"
+ADVICE: Mapping[str, str] = {
+    "tied, quick": "Run the full diagnosis: a quick screen cannot distinguish between {names}.",
+    "tied": (
+        "To tell {names} apart, record {experiment}{lasting}. There the two most similar causes differ by "
+        "{there:.2g} % of the span (rms, after the best fit of the model); on this recording they differ "
+        "by {here:.2g} %. Then diagnose that recording.{command}"
+    ),
+    "tied, no better": (
+        "We know of no kind of recording that would tell {names} apart much better than this one, on which "
+        "they differ by {here:.2g} % of the span (rms, after the best fit of the model). A longer one of "
+        "the same kind would help, as noise averages out."
+    ),
+    "lacks": f"To see what this recording cannot show, {AGAIN}",
+    "unknown": (
+        "No known cause fits. Record the same again and diagnose both together. If as much is left and no "
+        "cause is found, the model may not be able to follow a device of this kind; if not, something else "
+        "acts on it: vary one thing at a time, such as temperature, load or amplitude."
+    ),
+    "none": "Nothing was found in this recording beyond what is taken for noise: use the model as it is.",
+    "none, quick": "The quick screen found nothing. The full diagnosis shows smaller effects.",
+    "none, seen": (
+        "Nothing in this recording calls for another model: {names} can be seen, but in doubt or no larger "
+        "than the noise. Use the model as it is."
+    ),
+    "none, small": (
+        "Nothing that matters was found in this recording: noise alone is unlikely to look like {names}, "
+        "but it is too small to matter, or does not predict what was left out of the fit. Use the model as "
+        "it is."
+    ),
+    "none, small, quick": (
+        "Nothing that matters was found in this recording: noise alone is unlikely to look like {names}, "
+        "but it is too small to matter."
+    ),
+    "extend, quick": (
+        "Run the full diagnosis, which fits what was found: a quick screen fits nothing that a model could "
+        "be extended by, or that could be taken out of the recording."
+    ),
+    "too noisy": (
+        "These recordings could not have shown {names} as small as {matters:.2g} % of the span. Record the "
+        "same for {times:.2g} times as long, or with less noise, and diagnose that."
+    ),
+    "far too noisy": (
+        "These recordings could not have shown {names} as small as {matters:.2g} % of the span, and longer "
+        "ones would hardly do so. Record with less noise: averaged, with a finer sensor, or over a wider "
+        "range."
+    ),
+    "inconclusive": (
+        "These recordings could not have shown {names} of {matters:.2g} % of the span. "
+        f"To see it, {AGAIN}"
+    ),
+    "extend, or late": (
+        "Is the recorder late, or the device? The two look exactly alike. If it is the device, extend the "
+        "model with what was found; if it is the recorder, give its delay to pulsetrainer correct, which "
+        "takes it out. Then test the model on another recording, one that was not fitted: pulsetrainer "
+        "evaluate."
+    ),
+    "extend": (
+        "Extend the model with what was found, then test it on another recording, one that was not fitted: "
+        "pulsetrainer evaluate."
+    ),
+    "extend, correct": (
+        "Extend the model with what was found, then test it on another recording, one that was not fitted: "
+        "pulsetrainer evaluate. From the measurement: {names}; pulsetrainer correct takes that out of the "
+        "recording."
+    ),
+    "rest first": (
+        "The device was still settling when these recordings began. Let it rest for {rest} where they begin, "
+        "then record the same again and diagnose that: what was found can then be added to the model."
+    ),
+    "again": (
+        "What was found is in doubt, or does not repeat within these recordings, so nothing is added to the "
+        "model. Record again, and diagnose both recordings together."
+    ),
+    "correct": (
+        "The measurement is at fault, not the model: take {names} out of the recording (pulsetrainer "
+        "correct). If the model was identified from it, identify it again from the corrected one; a model "
+        "from a sound recording stays as it is."
+    ),
+    "correct, extend": (
+        "The measurement is at fault, and the device does something that the model lacks. First take {names} "
+        "out of the recording (pulsetrainer correct). If the model was identified from it, identify it again "
+        "from the corrected one. Then diagnose the corrected recording, and extend the model."
+    ),
+    "conditions": (
+        "The recordings were made in different conditions, such as load, zero or gain: the evidence says "
+        "which of them the model as given predicts. Put the others right, or identify a model for each "
+        "condition."
+    ),
+    "out of range": (
+        "The model knows nothing of the {input} beyond {low} and {high}: identify the device again from a "
+        "run over the whole range in which it is used, and diagnose with the new model."
+    ),
+    "repair": "No model can represent this: put right what was found, and record again.",
+    "other model": (
+        "A Preisach model does not suit this device: take the velocity as the input, or use a damper model."
+    ),
+    "other model, both": "A Preisach model does not suit this device: use a model of a damper and a spring.",
+    "strokes": (
+        "Record again in the same condition, at least three times over the whole range and with smaller "
+        "loops, and diagnose that."
+    ),
+    "identify anew": (
+        "Identify the model again in this condition, from these recordings or from a new run, and diagnose "
+        "with the new model."
+    ),
+    "warm up": (
+        "Let device and sensor warm up, record the same again, and identify the model from that recording. "
+        "If it then leaves little, something drifted here: go on with the new model. If it leaves as much, "
+        "a Preisach model may not describe this device."
+    ),
+}
+OURS = (
+    " The diagnostic signal does all of it: pulsetrainer capture diagnostic --current-max {highest} "
+    "-o diagnostic-2.h5."
+)
+TABLE = (
+    " Save it as a table with the columns {columns}, and read that with pulsetrainer import, as you did "
+    "for the recordings here."
+)
+# What to record instead
+MISSING: Mapping[str, str] = {
+    "rates": "the same loops at {slow}, {middle} and {fast}",
+    "holds": "stops of {hold} at each of {levels}",
+    "length": "{short} or more in all",
+    "time": "with the time of every sample, at several rates and with rests",
+}
+EXPERIMENTS: Mapping[str, str] = {
+    "nested loops": (
+        "loops of the {input} between {low} and {high}, ever smaller, once each at {slow}, {middle}, {quick} "
+        "and {fast}"
+    ),
+    "steps and holds": "steps of the {input} at {fast} to {levels}, with a stop of {hold} after each",
+    "equal minor loops": (
+        "loops of the {input} at {pace} that are {width} wide, up from {biases}, each reached once from "
+        "below and once from above"
+    ),
+    "equal cycles": (
+        "twenty equal cycles of the {input} between {bottom} and {top} at {middle}, and twenty at {quick}"
+    ),
+    "heating": (
+        "full loops of the {input} at {pace}, one before and one after {heating} at {high}, and one more "
+        "after {heating} at {low}"
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What advice is put in terms of: the device that was recorded."""
+
+    scale: Scale
+    unit: str = "1"  # of the input
+    timed: bool = True
+    ours: bool = False  # recorded by this program, which plays experiments itself
+    input: str = "input"  # what was measured, in words
+    output: str = "output"
+    reached: tuple[float, float] = (0.0, 1.0)  # by the input, shares of the range: none is asked for beyond
+    unit_of_output: str = "1"
+
+    def numbers(self, faster: float = 1.0) -> dict[str, str]:
+        """Levels, rates and times of the experiments, so much faster, to be set on that bench."""
+        rates = dict(zip(("slow", "middle", "quick", "fast"), sorted(experiment.RATES), strict=True))
+        rates["pace"] = experiment.PACE
+        times = {
+            "hold": experiment.HOLD_S,
+            "hold_least": LIMITS.hold_s,
+            "heating": experiment.HEATING_S,
+            "short": LIMITS.short_s,
+        }
+        shares = {"low": 0.0, "high": 1.0, "bottom": min(experiment.CYCLE), "top": max(experiment.CYCLE)}
+        return {
+            "input": self.input,
+            "output": self.output,
+            "second": "second" if self.timed else "sample",
+            "seconds": "s" if self.timed else "samples",
+            **{name: self._level(share) for name, share in shares.items()},
+            "highest": self._number(1.0),
+            "columns": joined(
+                [
+                    f"{name} in {shown(unit)}" if shown(unit) else name
+                    for name, unit in (
+                        ("time", "s"),
+                        (self.input, self.unit),
+                        (self.output, self.unit_of_output),
+                    )
+                ]
+            ),
+            "levels": self._levels(experiment.LEVELS[1:-1]),
+            "biases": self._levels(experiment.BIASES),
+            "width": with_unit(figure(experiment.WIDTH * self.scale.reach), self.unit),
+            **{name: self._rate(faster * one) for name, one in rates.items()},
+            **{name: self.time(one / faster) for name, one in times.items()},
+        }
+
+    def lasting(self, name: str, faster: float) -> str:
+        """Return how long an experiment takes, as the end of a phrase."""
+        return f", about {self.time(experiment.length_s(name) / faster)} in all" if self.timed else ""
+
+    def _level(self, share: float) -> str:
+        return with_unit(self._number(share), self.unit)
+
+    def _levels(self, shares: Sequence[float]) -> str:
+        *rest, last = [self._number(share) for share in shares]
+        return with_unit(f"{', '.join(rest)} and {last}", self.unit)
+
+    def _number(self, share: float) -> str:
+        step = float(f"1e{math.floor(math.log10(LIMITS.told_to * self.scale.reach))}")
+        share = min(max(share, self.reached[0]), self.reached[1])
+        value = round((self.scale.low + share * self.scale.reach) / step) * step
+        # a small swing about a large value needs more digits than most
+        more = max(0, math.ceil(math.log10(max(abs(value), self.scale.reach) / self.scale.reach)))
+        return figure(value, LIMITS.told_digits + 1 + more)
+
+    def _rate(self, ranges: float) -> str:
+        if not self.timed:
+            times = ranges / min(experiment.RATES)
+            return "one rate" if times == 1 else f"{times:.3g} times that rate"
+        per_second = f"{shown(self.unit) or '1'}/s"
+        return with_unit(figure(ranges * self.scale.reach / self.scale.second), per_second)
+
+    def time(self, seconds: float) -> str:
+        """Return a time of the diagnosis in words, in the unit of the record."""
+        if not self.timed:
+            return "several times as long as a loop takes"
+        return with_seconds(seconds * self.scale.second)
+
+
+def advice(one: Evidence, bench: Bench) -> str:
+    """Return what to measure next, as a sentence, in numbers of the bench."""
+    faster = one.figures.get("faster", 1.0)
+    numbers = bench.numbers(faster)
+    tied = one.kind == "tied"  # its first name is that of the experiment
+    names = one.names[1:] if tied else one.names
+    lacked, told = [name for name in names if name in LACKS], ADVICE[one.kind]
+    if lacked and "{missing}" not in told:
+        told += LATER
+    faults = [name for name in names if name not in LACKS and library()[name].corrects]
+    if one.kind in ("tied", "tied, no better") and 0 < len(faults) < len(names):
+        told += KNOWN
+    return told.format(
+        **numbers,
+        names=listed([name for name in names if name not in LACKS] or names, numbers),
+        lacked=listed(lacked, numbers),
+        faults=listed(faults, numbers),
+        experiment=EXPERIMENTS[one.names[0]].format(**numbers) if tied else "",
+        lasting=bench.lasting(one.names[0], faster) if tied else "",
+        missing="; ".join(MISSING[name].format(**numbers) for name in names if name in MISSING),
+        command=(OURS if bench.ours else TABLE).format(**numbers),
+        **{name: bench.time(value) if name == "rest" else value for name, value in one.figures.items()},
+    )
