@@ -492,9 +492,19 @@ def test_a_cause_is_exchanged_for_a_better_one_of_its_family(monkeypatch):
     assert asked[-1] == (("creep", "delay"), None, False)
 
 
-@pytest.mark.parametrize(("left", "noise", "told"), [(379.0, 1.0, 3), (381.0, 1.0, 2), (379.0, None, 2)])
-def test_a_finer_formula_is_taken_where_noise_cannot_make_the_difference(monkeypatch, left, noise, told):
-    """Twice the doubt, of which there are ten here, below the 400 that the plain formula leaves."""
+@pytest.mark.parametrize(
+    ("left", "noise", "lower", "told"),
+    [(379.0, 1.0, 0.05, 3), (381.0, 1.0, 0.05, 2), (379.0, None, 0.05, 2), (379.0, 1.0, -0.05, 2)],
+)
+def test_a_finer_formula_is_taken_where_noise_cannot_make_the_difference(
+    monkeypatch, left, noise, lower, told
+):
+    """Twice the doubt, of which there are ten here, below the 400 that the plain formula leaves.
+
+    Where its strengths may all be nothing, it is too fine for the record.
+    """
+    known = tuple(Estimate(name, 0.1, "", lower, 0.2) for name in ("rate", "bend", "slowing"))
+    monkeypatch.setattr(exchange, "estimates_of", lambda *_: {"offset-drift": known})
     drift = CAUSE["offset-drift"]
     tried = drift.finer(PROBLEM.frames[0])
     (finer,) = {cause for cause, _ in tried}
@@ -508,6 +518,22 @@ def test_a_finer_formula_is_taken_where_noise_cannot_make_the_difference(monkeyp
     _refitting(monkeypatch, fitting, squares={frozenset(): 500.0})
     plain = Fit(400.0, (Term(drift, (0.1, 0.2)),))
     after = exchange.stage(_state(plain, scores=Screen(noise=noise)))
+    assert [len(term.values) for term in after.current.terms] == [told]
+
+
+@pytest.mark.parametrize(("plain", "told"), [(419.0, 2), (421.0, 3)])
+def test_a_finer_formula_that_was_searched_for_gives_way_to_the_plain_one(monkeypatch, plain, told):
+    """Where noise can make the difference: twice the doubt, of which there are ten here, above its 400."""
+    relaxing = CAUSE["offset-drift"].relaxing
+    known = tuple(Estimate(name, 0.1, "", 0.05, 0.2) for name in ("rate", "bend", "slowing"))
+    monkeypatch.setattr(exchange, "estimates_of", lambda *_: {"offset-drift": known})
+    for module in (exchange, acceptance):
+        monkeypatch.setattr(module, "refit", lambda _, terms, *__, **___: Fit(plain, tuple(terms)))
+    monkeypatch.setattr(exchange, "doubt", lambda finer, plain, noise: 10.0)
+    monkeypatch.setattr(exchange, "ranked", lambda fitted, whole: ())
+    _refitting(monkeypatch, fitting, squares={frozenset(): 500.0})
+    fine = Fit(400.0, (Term(relaxing, (0.1, 0.2, 3.0)),))
+    after = exchange.stage(_state(fine, scores=Screen(noise=1.0)))
     assert [len(term.values) for term in after.current.terms] == [told]
 
 

@@ -117,18 +117,21 @@ def _is_nothing(state: State, finding: Finding) -> bool:
 def _is_held(state: State, finding: Finding) -> bool:
     """Whether the rest of the model holds a fault that was found."""
     term = next((one for one in state.current.terms if one.cause is finding.cause), None)
-    if term is None:
+    if term is None or not may_be_held(term):
         return False
     return is_held(state, term, state.without[finding.cause.id], finding.held_out_gain_percent)
 
 
+def may_be_held(term: Term) -> bool:
+    """Whether a cause is a slow fault of the measurement."""
+    return term.cause.drifts and term.cause.corrects
+
+
 def is_held(state: State, term: Term, without: Fitted, gain_percent: float) -> bool:
-    """Whether the rest of the model holds nearly all that a slow fault of the measurement adds.
+    """Whether the rest of the model holds nearly all that such a fault adds.
 
     Not of one that predicts nearly all that can be lowered, and mends no cause that is slow as well.
     """
-    if not (term.cause.drifts and term.cause.corrects):
-        return False
     fall = without.squares - state.current.squares
     mends = any(one.cause.family in SLOW for one in state.current.terms if one is not term)
     predicts = gain_percent / PERCENT > LIMITS.predicts_though_held and not mends

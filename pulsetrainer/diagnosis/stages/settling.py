@@ -15,7 +15,7 @@ from pulsetrainer.diagnosis.fitting import refit, weights_for
 from pulsetrainer.diagnosis.held_out import HeldOut
 from pulsetrainer.diagnosis.stages import elimination, exchange, restart, search
 from pulsetrainer.diagnosis.stages.begin import begins_at_rest, late
-from pulsetrainer.diagnosis.stages.repetition import SLOW, is_held
+from pulsetrainer.diagnosis.stages.repetition import SLOW, is_held, may_be_held
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import PERCENT
 
@@ -36,7 +36,8 @@ def stage(state: State) -> State:
     for one in (search, restart, exchange, elimination):
         again = one.stage(again)
     worse = again.current.squares - state.current.squares > state.floor.relevant
-    return state if worse or any(_is_held(again, term) for term in again.current.terms) else again
+    held = [term for term in again.current.terms if may_be_held(term) and _is_held(again, term)]
+    return state if worse or held else again
 
 
 def _is_held(state: State, term: Term) -> bool:
