@@ -28,6 +28,7 @@ from pulsetrainer.diagnosis.stages import (
     rivals,
     screened,
     search,
+    settling,
     unlisted,
     verdict,
 )
@@ -39,6 +40,7 @@ FULL: tuple[tuple[Callable[[State], State], float], ...] = (  # with the share o
     (exchange.stage, 0.62),
     (elimination.stage, 0.65),
     (first_stroke.stage, 0.66),
+    (settling.stage, 0.66),
     (unlisted.stage, 0.66),
     (jumps.stage, 0.66),
     (equal_loops.stage, 0.7),

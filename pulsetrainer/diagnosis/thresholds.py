@@ -138,6 +138,7 @@ class Thresholds:
     repeated: float = 0.5  # of what the fit gains: a smaller gain on the pieces is chance
     mends: float = 0.1  # of what can be explained: less, of a strength that may be nothing, is not found
     held_by_the_rest: float = 0.035  # of a fault's squares: foreign plants leave up to 0.035, true ones 0.039
+    even_drift: float = 4.0  # mean square of a drift that goes on evenly from zero, over its variance
     predicts_though_held: float = 0.8  # of the reducible held-out error: true drifts, though held, 0.85
     told_though_held: float = 0.001  # of the span, rms: a fault that is held and explains more is spoken of
     piece_worse: float = 0.1  # of that gain: no piece may be predicted worse by more

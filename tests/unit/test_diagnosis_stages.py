@@ -492,9 +492,19 @@ def test_a_cause_is_exchanged_for_a_better_one_of_its_family(monkeypatch):
     assert asked[-1] == (("creep", "delay"), None, False)
 
 
-@pytest.mark.parametrize(("left", "noise", "told"), [(379.0, 1.0, 3), (381.0, 1.0, 2), (379.0, None, 2)])
-def test_a_finer_formula_is_taken_where_noise_cannot_make_the_difference(monkeypatch, left, noise, told):
-    """Twice the doubt, of which there are ten here, below the 400 that the plain formula leaves."""
+@pytest.mark.parametrize(
+    ("left", "noise", "lower", "told"),
+    [(379.0, 1.0, 0.05, 3), (381.0, 1.0, 0.05, 2), (379.0, None, 0.05, 2), (379.0, 1.0, -0.05, 2)],
+)
+def test_a_finer_formula_is_taken_where_noise_cannot_make_the_difference(
+    monkeypatch, left, noise, lower, told
+):
+    """Twice the doubt, of which there are ten here, below the 400 that the plain formula leaves.
+
+    Where its strengths may all be nothing, it is too fine for the record.
+    """
+    known = tuple(Estimate(name, 0.1, "", lower, 0.2) for name in ("rate", "bend", "slowing"))
+    monkeypatch.setattr(exchange, "estimates_of", lambda *_: {"offset-drift": known})
     drift = CAUSE["offset-drift"]
     tried = drift.finer(PROBLEM.frames[0])
     (finer,) = {cause for cause, _ in tried}
@@ -508,6 +518,22 @@ def test_a_finer_formula_is_taken_where_noise_cannot_make_the_difference(monkeyp
     _refitting(monkeypatch, fitting, squares={frozenset(): 500.0})
     plain = Fit(400.0, (Term(drift, (0.1, 0.2)),))
     after = exchange.stage(_state(plain, scores=Screen(noise=noise)))
+    assert [len(term.values) for term in after.current.terms] == [told]
+
+
+@pytest.mark.parametrize(("plain", "told"), [(419.0, 2), (421.0, 3)])
+def test_a_finer_formula_that_was_searched_for_gives_way_to_the_plain_one(monkeypatch, plain, told):
+    """Where noise can make the difference: twice the doubt, of which there are ten here, above its 400."""
+    relaxing = CAUSE["offset-drift"].relaxing
+    known = tuple(Estimate(name, 0.1, "", 0.05, 0.2) for name in ("rate", "bend", "slowing"))
+    monkeypatch.setattr(exchange, "estimates_of", lambda *_: {"offset-drift": known})
+    for module in (exchange, acceptance):
+        monkeypatch.setattr(module, "refit", lambda _, terms, *__, **___: Fit(plain, tuple(terms)))
+    monkeypatch.setattr(exchange, "doubt", lambda finer, plain, noise: 10.0)
+    monkeypatch.setattr(exchange, "ranked", lambda fitted, whole: ())
+    _refitting(monkeypatch, fitting, squares={frozenset(): 500.0})
+    fine = Fit(400.0, (Term(relaxing, (0.1, 0.2, 3.0)),))
+    after = exchange.stage(_state(fine, scores=Screen(noise=1.0)))
     assert [len(term.values) for term in after.current.terms] == [told]
 
 
@@ -1503,7 +1529,7 @@ def _asked_again(monkeypatch, shares):
     monkeypatch.setattr(fitting, "refit", refitted)
     monkeypatch.setattr(repetition, "refit", refitted)
     monkeypatch.setattr(repetition, "repeated", repeated)
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: 0.0)
     names = ("creep", "thermal-drift", "output-lag", "step")
     findings = tuple(_finding(name, 20.0) for name in names)
     state = _state(_fit(500.0, *names), findings=findings, without={"step": _fit(700.0)})
@@ -1578,7 +1604,7 @@ def test_a_slow_fault_that_the_rest_of_the_model_holds_is_none(monkeypatch, name
     """It mends the formula of a creep: taken out, the next record was predicted 1.5 times worse."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: added)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: added)
     others = [] if beside is None else [_finding(beside, 80.0)]
     names = [one.cause.id for one in others]
     state = _state(_fit(500.0, *names, name), findings=(*others, _finding(name, 10.0)))
@@ -1603,7 +1629,7 @@ def test_a_drift_that_is_held_but_predicts_is_there(monkeypatch, beside, predict
     """A sensor that warms up: reversal curves hold 96 % of it, and the rest is told by time left out."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: 1e6)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: 1e6)
     drift = replace(_finding("offset-drift", 10.0), held_out_gain_percent=predicts)
     state = _state(_fit(500.0, beside, "offset-drift"), findings=(_finding(beside, 80.0), drift))
     without = {"offset-drift": _fit(600.0), "step": _fit(600.0)}
@@ -1613,7 +1639,7 @@ def test_a_drift_that_is_held_but_predicts_is_there(monkeypatch, beside, predict
 def test_a_step_below_what_the_levels_leave_is_not_held(monkeypatch):
     """Beside coarse steps the floor is above all that is left, so shares of what is above it tell nothing."""
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: 100.0)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: 100.0)
     finding, floor = _finding("step", 100.0), replace(FLOOR, white=10.0)
     state = _state(_fit(200.0, "step"), _fit(300.0), findings=(finding,), floor=floor)
     after = repetition.stage(replace(state, without={"step": _fit(300.0)}))
@@ -1630,7 +1656,7 @@ def test_a_step_beside_what_is_gone_is_asked_again_whether_it_settles(monkeypatc
     """Beside a slow cause it was a small rest of that; without it, it is that in the whole."""
     monkeypatch.setattr(repetition, "refit", _refitted)
     monkeypatch.setattr(repetition, "_weakest", lambda *_: set())
-    monkeypatch.setattr(repetition, "squares_added", lambda *_: 0.0)
+    monkeypatch.setattr(repetition, "squares_moved", lambda *_: 0.0)
     monkeypatch.setattr(wear, "is_as_good", lambda state, term: settles and len(state.current.terms) == 1)
     findings = (_finding("step", 2.0), _finding("thermal-drift", 9.0, doubts=(rivals.MAY_BE_NOTHING,)))
     state = _state(_fit(500.0, "step", "thermal-drift"), findings=findings, without={"step": _fit(520.0)})

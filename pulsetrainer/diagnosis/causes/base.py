@@ -172,6 +172,10 @@ class Cause:
         """The same with one more parameter, and values of it to begin with: for records that show it."""
         return []
 
+    def coarser(self) -> Cause | None:
+        """The same without the last parameter of the finer one; None: this is no finer one."""
+        return None
+
     def quantities(self, frame: Frame) -> tuple[Quantity, ...]:
         """Return the parameters with the bounds that a record sets."""
         return self.parameters

@@ -25,6 +25,7 @@ _MIDDLE = 4.0  # the bend is largest in the middle: a quarter of c T^2
 _PLAIN = 2  # parameters of a drift that does not relax ...
 _RELAXING = 3  # ... and of one that does
 _SLOWING = (-3.0, 3.0, 15.0)  # times it falls by 1/e in a record, tried first: it grows, or relaxes
+_EARLY = (5.0, 15.0, 50.0)  # the same where it is searched for: slower ones a parabola finds
 _STRAIGHT = 1e-6  # times: falls less than a double can tell from a parabola
 
 
@@ -70,6 +71,14 @@ class OffsetDrift(Cause):
         self._count = count
         self.relaxing = OffsetDrift(_RELAXING) if count == _PLAIN else self
 
+    def kinds(self) -> tuple[Cause, ...]:
+        """One that relaxes early is nothing like a parabola: other causes are."""
+        return (self,) if self.relaxing is self else (self, self.relaxing)
+
+    def coarser(self) -> Cause | None:
+        """The same that is a parabola."""
+        return OffsetDrift() if self.relaxing is self else None
+
     def finer(self, frame: Frame) -> list[tuple[Cause, float]]:
         """The same that relaxes, or grows."""
         if self.relaxing is self:
@@ -82,7 +91,10 @@ class OffsetDrift(Cause):
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         length = frames[0].time_s[-1] + frames[0].dt_s
         size = _TRIED * frames[0].span
-        return [[(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]]
+        both = [(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]
+        if self.relaxing is not self:
+            return [both]
+        return [[(*values, times / length) for values in both] for times in _EARLY]
 
     def on_output(self, y: FloatArray, values: Values, frame: Frame) -> FloatArray:
         return y + _drift(values, frame.time_s)

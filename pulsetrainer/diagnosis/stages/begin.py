@@ -19,6 +19,7 @@ import numpy as np
 from pulsetrainer.diagnosis.finding import Estimate, Finding, may_be_nothing
 from pulsetrainer.diagnosis.fitting import Fitted, refit
 from pulsetrainer.diagnosis.intervals import estimates_of
+from pulsetrainer.diagnosis.problem import Problem
 from pulsetrainer.diagnosis.stages.rivals import MAY_BE_NOTHING
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS
@@ -29,9 +30,8 @@ def stage(state: State) -> State:
     kept = state.repeated
     assert kept is not None
     if kept.terms:
-        at_rest = replace(state.problem, bins=replace(state.problem.bins, begins_free=False))
-        trial = refit(at_rest, kept.terms, None)
-        if trial.squares - kept.squares < state.floor.relevant or _late(trial) < _late(kept):
+        trial = refit(begins_at_rest(state.problem), kept.terms, None)
+        if trial.squares - kept.squares < state.floor.relevant or late(trial) < late(kept):
             kept = trial
     if kept is state.current:
         return replace(state, repeated_estimates=state.estimates)
@@ -41,6 +41,11 @@ def stage(state: State) -> State:
     findings = tuple(_told_by_both(one, told.get(one.cause.id, ())) for one in state.findings)
     told = {name: _hull(rows, state.estimates.get(name, ())) for name, rows in told.items()}
     return replace(state, repeated=kept, repeated_estimates=told, findings=findings)
+
+
+def begins_at_rest(problem: Problem) -> Problem:
+    """Return a problem in which no record goes on from something that was before it."""
+    return replace(problem, bins=replace(problem.bins, begins_free=False))
 
 
 def _told_by_both(found: Finding, others: tuple[Estimate, ...]) -> Finding:
@@ -62,7 +67,7 @@ def _hull(rows: tuple[Estimate, ...], others: tuple[Estimate, ...]) -> tuple[Est
     )
 
 
-def _late(fitted: Fitted) -> float:
+def late(fitted: Fitted) -> float:
     """Variance of what a fit leaves after the beginning of each record, as the model goes on: from rest."""
     bins, left = fitted.problem.bins, fitted.problem.measured - fitted.simulated
     ends = np.asarray([bins.time_s[bins.record == k].max(initial=0.0) for k in range(len(bins.number))])

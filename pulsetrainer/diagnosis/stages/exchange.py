@@ -15,7 +15,9 @@ from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.doubt import doubt
 from pulsetrainer.diagnosis.extended import Term
-from pulsetrainer.diagnosis.fitting import refit
+from pulsetrainer.diagnosis.finding import may_be_nothing
+from pulsetrainer.diagnosis.fitting import Fitted, refit
+from pulsetrainer.diagnosis.intervals import estimates_of
 from pulsetrainer.diagnosis.screening import in_place, ranked
 from pulsetrainer.diagnosis.stages.acceptance import settled
 from pulsetrainer.diagnosis.state import State
@@ -32,22 +34,35 @@ def stage(state: State) -> State:
 
 
 def _refined(state: State, term: Term) -> State:
-    """Return the state with the finer formula of a cause, where the records show it."""
-    current, noise = state.current, state.scores.noise
-    finer = term.cause.finer(state.problem.frames[0])
-    if not finer or noise is None:
+    """Return the state with the finer formula of a cause where the records show it, else the plain one."""
+    current, problem = state.current, state.problem
+    coarser, finer = term.cause.coarser(), term.cause.finer(problem.frames[0])
+    if coarser is None and not finer:
         return state
     others = [one for one in current.terms if one.cause is not term.cause]
-    begun = [(*others, Term(cause, (*term.values, value))) for cause, value in finer]
-    trials = [refit(state.problem, terms, current) for terms in begun]
-    best = min(trials, key=lambda fitted: fitted.squares)
-    if current.squares - best.squares <= LIMITS.finer * doubt(best, current, noise):
-        return state
-    return replace(state, current=settled(state.problem, best))
+    if coarser is None:
+        plain = current
+        begun = [(*others, Term(cause, (*term.values, value))) for cause, value in finer]
+        fine = min((refit(problem, terms, current) for terms in begun), key=lambda fitted: fitted.squares)
+    else:
+        plain, fine = refit(problem, (*others, Term(coarser, term.values[:-1])), current), current
+    best = fine if _shows(state, fine, plain, term.cause.id) else plain
+    return state if best is current else replace(state, current=settled(problem, best))
+
+
+def _shows(state: State, fine: Fitted, plain: Fitted, name: str) -> bool:
+    """Whether the records show a finer formula, and leave its strengths apart from zero."""
+    noise = state.scores.noise
+    if noise is None or plain.squares - fine.squares <= LIMITS.finer * doubt(fine, plain, noise):
+        return False
+    known = estimates_of(fine, state.scores, state.held_out, state.floor)[name]
+    (cause,) = (one.cause for one in fine.terms if one.cause.id == name)
+    return not may_be_nothing(cause.strengths_of(known))
 
 
 def _exchanged(state: State, cause: Cause) -> State:
     current, problem = state.current, state.problem
+    frame = problem.frames[0]
     kin = {c.id for c in library().values() if c.family == cause.family and c.id not in current.names}
     kinds = [one for one in library()[cause.id].kinds() if one is not cause] if cause.id in library() else []
     if not kin and not kinds:
@@ -55,7 +70,7 @@ def _exchanged(state: State, cause: Cause) -> State:
     # by its cause: an exchange before this one has moved all terms
     term = next(term for term in current.terms if term.cause is cause)
     without = current.without(term)
-    others = [Term(kind, term.values) for kind in kinds]
+    others = [Term(kind, term.values) for kind in kinds if len(kind.quantities(frame)) == len(term.values)]
     if kin:
         others += [in_place(term, s) for s in ranked(without, current) if s.cause.id in kin]
     trials = [refit(problem, (*without.terms, one), without, goal=current.squares) for one in others]

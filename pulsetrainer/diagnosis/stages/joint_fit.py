@@ -46,7 +46,9 @@ def _of_best_kind(state: State, score: Score) -> Fitted:
     """Refit with the kind of a cause that fits best: linearised they can hardly be told apart."""
     best = _with(state, score.cause, score.start)
     values = best.terms[best.names.index(score.cause.id)].values
+    frame = state.problem.frames[0]
     others = [one for one in library()[score.cause.id].kinds() if one is not score.cause]
+    others = [one for one in others if len(one.quantities(frame)) == len(values)]  # a finer one: `exchange`
     return min([best, *(_with(state, kind, values) for kind in others)], key=lambda fitted: fitted.squares)
 
 

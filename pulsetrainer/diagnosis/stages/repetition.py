@@ -34,7 +34,7 @@ from pulsetrainer.diagnosis.stages.rivals import (
     MAY_BE_NOTHING,
     MAY_BE_WEAR,
     SETTLES,
-    squares_added,
+    squares_moved,
 )
 from pulsetrainer.diagnosis.state import State
 from pulsetrainer.diagnosis.thresholds import LIMITS, PERCENT
@@ -115,20 +115,27 @@ def _is_nothing(state: State, finding: Finding) -> bool:
 
 
 def _is_held(state: State, finding: Finding) -> bool:
-    """Whether the rest of the model holds nearly all that a slow fault of the measurement adds."""
+    """Whether the rest of the model holds a fault that was found."""
     term = next((one for one in state.current.terms if one.cause is finding.cause), None)
-    if term is None or not (term.cause.drifts and term.cause.corrects):
+    if term is None or not may_be_held(term):
         return False
-    fall = state.without[finding.cause.id].squares - state.current.squares
-    little = fall < LIMITS.held_by_the_rest * squares_added(state, term)
-    return little and not _is_predicted(state, finding)
+    return is_held(state, term, state.without[finding.cause.id], finding.held_out_gain_percent)
 
 
-def _is_predicted(state: State, finding: Finding) -> bool:
-    """Whether a fault predicts nearly all that can be lowered, and mends no cause that is slow as well."""
-    beside = [term.cause for term in state.current.terms if term.cause.id != finding.cause.id]
-    mends = any(cause.family in SLOW for cause in beside)
-    return finding.held_out_gain_percent / PERCENT > LIMITS.predicts_though_held and not mends
+def may_be_held(term: Term) -> bool:
+    """Whether a cause is a slow fault of the measurement."""
+    return term.cause.drifts and term.cause.corrects
+
+
+def is_held(state: State, term: Term, without: Fitted, gain_percent: float) -> bool:
+    """Whether the rest of the model holds nearly all that such a fault adds.
+
+    Not of one that predicts nearly all that can be lowered, and mends no cause that is slow as well.
+    """
+    fall = without.squares - state.current.squares
+    mends = any(one.cause.family in SLOW for one in state.current.terms if one is not term)
+    predicts = gain_percent / PERCENT > LIMITS.predicts_though_held and not mends
+    return not predicts and fall < LIMITS.held_by_the_rest * squares_moved(state, term)
 
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:

@@ -33,6 +33,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pulsetrainer.core.plane import FloatArray
 from pulsetrainer.diagnosis import residual, wear
 from pulsetrainer.diagnosis.causes import library
 from pulsetrainer.diagnosis.causes.accommodation import Accommodation
@@ -140,11 +141,25 @@ def _is_in_step(state: State, term: Term, fall: float) -> bool:
 
 def squares_added(state: State, term: Term) -> float:
     """Return the sum of squares of what a cause of the model adds to the output, averaged."""
+    added = _added(state, term)
+    return float(added @ added)
+
+
+def squares_moved(state: State, term: Term) -> float:
+    """Return the same of a slow fault, but for another zero, which no model lacks.
+
+    Of one that is over soon that is most of it. In the measure of a drift that goes on evenly, of whose
+    squares a quarter is left.
+    """
+    added = _added(state, term)
+    return min(float(added @ added), LIMITS.even_drift * added.size * float(np.var(added)))
+
+
+def _added(state: State, term: Term) -> FloatArray:
     current, simulator = state.current, state.current.simulator
     others = [one for one in current.terms if one is not term]
     pairs = zip(simulator.full(current.terms), simulator.full(others), strict=True)
-    added = state.problem.bins.average([whole - rest for whole, rest in pairs])
-    return float(added @ added)
+    return state.problem.bins.average([whole - rest for whole, rest in pairs])
 
 
 def _may_be_own_error(state: State, cause: Cause, fall: float) -> bool:

@@ -1,0 +1,46 @@
+"""Settling: what goes on from the beginning of a record, long after it, has a cause.
+
+What a device did before a record decays in it, and the search fits the beginning of each record freely. A
+sensor that warms up looks the same, and a free beginning holds nearly all of it. Where no slow cause was
+found, and a model without the free beginning leaves relevantly more after the first fifth of a record, the
+search is made again without it. That counts where it finds what leaves as little as the free beginning does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pulsetrainer.diagnosis.extended import Term
+from pulsetrainer.diagnosis.fitting import refit, weights_for
+from pulsetrainer.diagnosis.held_out import HeldOut
+from pulsetrainer.diagnosis.stages import elimination, exchange, restart, search
+from pulsetrainer.diagnosis.stages.begin import begins_at_rest, late
+from pulsetrainer.diagnosis.stages.repetition import SLOW, is_held, may_be_held
+from pulsetrainer.diagnosis.state import State
+from pulsetrainer.diagnosis.thresholds import PERCENT
+
+
+def stage(state: State) -> State:
+    """Return the state of a search without free beginnings, where these hid a cause."""
+    if any(term.cause.family in SLOW for term in state.current.terms):
+        return state
+    at_rest = begins_at_rest(state.problem)
+    without = refit(at_rest, state.current.terms, None)
+    more = (late(without) - late(state.current)) * state.floor.count
+    if more < state.floor.relevant:
+        return state
+    plain = weights_for(at_rest, (), None)
+    again = replace(
+        state, problem=at_rest, baseline=plain, current=plain, held_out=HeldOut(at_rest), p_values={}
+    )
+    for one in (search, restart, exchange, elimination):
+        again = one.stage(again)
+    worse = again.current.squares - state.current.squares > state.floor.relevant
+    held = [term for term in again.current.terms if may_be_held(term) and _is_held(again, term)]
+    return state if worse or held else again
+
+
+def _is_held(state: State, term: Term) -> bool:
+    without = state.current.without(term)
+    gain = state.held_out.gain_told(without, state.current, state.floor)
+    return is_held(state, term, without, PERCENT * gain)
