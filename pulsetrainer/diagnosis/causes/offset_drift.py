@@ -91,7 +91,7 @@ class OffsetDrift(Cause):
     def starts(self, frames: Sequence[Frame], residual: Sequence[FloatArray]) -> list[list[Values]]:
         length = frames[0].time_s[-1] + frames[0].dt_s
         size = _TRIED * frames[0].span
-        both = [(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]
+        both: list[Values] = [(size / length, 0.0), (0.0, _MIDDLE * size / length**2)]
         if self.relaxing is not self:
             return [both]
         return [[(*values, times / length) for values in both] for times in _EARLY]
