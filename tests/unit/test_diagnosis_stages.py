@@ -42,6 +42,7 @@ from pulsetrainer.diagnosis.stages import (
     rivals,
     screened,
     search,
+    settling,
     unlisted,
     verdict,
 )
@@ -1726,6 +1727,43 @@ def test_the_begin_stays_free_where_something_was_going_on(monkeypatch, rise, la
     assert found.findings[0].parameters == (tuple(told) if at_rest else known)
     fewer = begin.stage(replace(state, estimates={"creep": known[:1]}))  # of another number of curves
     assert fewer.repeated_estimates["creep"] == (again if at_rest else known[:1])
+
+
+@pytest.mark.parametrize(
+    ("slow", "rise", "left", "held", "again"),
+    [
+        (False, 0.091, 109.0, False, True),
+        (False, 0.089, 109.0, False, False),  # times a hundred averages: below the 9 that are relevant
+        (False, 0.091, 109.1, False, False),  # what the free beginning leaves is not reached
+        (False, 0.091, 109.0, True, False),  # the weights hold the drift that was found
+        (True, 0.091, 109.0, False, False),  # a slow cause was found as it is
+    ],
+)
+def test_what_goes_on_long_after_the_beginning_is_searched_without_a_free_one(
+    monkeypatch, slow, rise, left, held, again
+):
+    """A sensor that warms up: a beginning that is fitted freely held nearly all of it."""
+    rest = _fit(500.0)
+    current = _fit(100.0, *(["creep"] if slow else []))
+    monkeypatch.setattr(settling, "begins_at_rest", lambda problem: "at rest")
+    monkeypatch.setattr(
+        settling, "refit", lambda problem, terms, near: rest if problem == "at rest" else None
+    )
+    monkeypatch.setattr(settling, "late", lambda fitted: 0.5 + (rise if fitted is rest else 0.0))
+    monkeypatch.setattr(settling, "weights_for", lambda problem, terms, near: rest)
+    monkeypatch.setattr(settling, "HeldOut", lambda problem: HeldOut())
+    monkeypatch.setattr(settling, "is_held", lambda *_: held)
+    drift = Fit(left, (_term("offset-drift"),), _without={"offset-drift": rest})
+    monkeypatch.setattr(settling.search, "stage", lambda state: replace(state, current=drift))
+    for module in (settling.restart, settling.exchange, settling.elimination):
+        monkeypatch.setattr(module, "stage", lambda state: state)
+    monkeypatch.setattr(Fit, "without", lambda self, term: rest)
+    before = _state(current, p_values={"delay": 0.003})
+    after = settling.stage(before)
+    assert (after is before) is not again
+    if again:
+        assert (after.current, after.baseline, after.problem) == (drift, rest, "at rest")
+        assert dict(after.p_values) == {}
 
 
 @pytest.mark.parametrize(("cosine", "in_doubt"), [((-0.1, 0.3), True), ((0.01, 0.3), False)])
