@@ -183,13 +183,16 @@ def test_cells_that_cannot_be_told_apart_share_their_mass(rounding):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_twins_are_not_exchanged_for_one_another_by_rounding(seed):
-    """Each column twice: a twin of a positive one descends by rounding alone. A few exchanges end it."""
+    """Each column twice: a twin of a positive one descends by rounding alone. A few exchanges end it.
+
+    Six on one kind of processor, five on another, whose sums round otherwise; up to 15 where rounding counts.
+    """
     rng = np.random.default_rng(seed)
     matrix = np.tile(rng.random((60, 20)), 2)
     right = matrix @ np.maximum(rng.normal(size=40), 0.0) + 0.01 * rng.normal(size=60)
     found = nnls.solve(matrix.T @ matrix, matrix.T @ right)
     print(f"seed {seed}: {found.iterations} systems")
-    assert found.iterations <= 5
+    assert found.iterations <= 6
 
 
 @pytest.mark.parametrize(("seed", "systems"), [(10250, 13), (10417, 9), (10505, 9)])
