@@ -25,6 +25,7 @@ from dataclasses import replace
 
 from pulsetrainer.diagnosis import wear
 from pulsetrainer.diagnosis.causes import library
+from pulsetrainer.diagnosis.causes.base import Cause
 from pulsetrainer.diagnosis.evidence import Evidence
 from pulsetrainer.diagnosis.extended import Term
 from pulsetrainer.diagnosis.finding import Finding
@@ -47,7 +48,7 @@ def stage(state: State) -> State:
     """Return the state with the causes that do not repeat, and the model without them."""
     state = _without_held(state)
     kept = state.current
-    asked = [one for one in state.findings if one.cause.lasting and not one.cause.by_contrast]
+    asked = [one for one in state.findings if _is_asked(state, one.cause)]
     told: dict[str, str] = {one.cause.id: A_FAULT for one in asked if _may_be_a_fault(one)}
     told |= {one.cause.id: NOT_ADDED for one in asked if one.in_doubt or MAY_BE_WEAR in one.doubts}
     once = set(told) or _weakest(state, kept)
@@ -61,6 +62,11 @@ def stage(state: State) -> State:
     )
     findings = tuple(replace(one, found=one.found and not _is_nothing(state, one)) for one in findings)
     return _without_what_is_gone(replace(state, findings=findings, repeated=kept))
+
+
+def _is_asked(state: State, cause: Cause) -> bool:
+    """Whether a cause must repeat: one of the device that equal loops did not show."""
+    return cause.lasting and cause.id not in state.by_contrast
 
 
 def _without_held(state: State) -> State:
@@ -140,7 +146,7 @@ def is_held(state: State, term: Term, without: Fitted, gain_percent: float) -> b
 
 def _weakest(state: State, fitted: Fitted) -> set[str]:
     """Id of the cause of a fit that repeats least, if not enough."""
-    asked = [one for one in fitted.terms if one.cause.lasting and not one.cause.by_contrast]
+    asked = [one for one in fitted.terms if _is_asked(state, one.cause)]
     shares = {one.cause.id: repeated(state.held_out, fitted.without(one), fitted) for one in asked}
     least = min(shares, key=shares.__getitem__, default="")
     return {least} if least and shares[least] < LIMITS.repeated else set()
