@@ -922,9 +922,9 @@ def test_a_small_swing_about_a_large_value_is_told_with_more_digits():
 @pytest.mark.parametrize("kind", ["none", "none, small", "extend", "extend, or late", "extend, correct"])
 def test_what_can_be_done_now_comes_before_what_to_record(kind):
     """`next` asked for a recording, `then` to extend the model: in no order."""
-    bench = wording.Bench(Scale(), "A")
-    now = wording.advice(Evidence(kind, names=("creep",)), bench)
-    both = wording.advice(Evidence(kind, names=("creep", "holds")), bench)
+    bench = advised.Bench(Scale(), "A")
+    now = advised.advice(Evidence(kind, names=("creep",)), bench)
+    both = advised.advice(Evidence(kind, names=("creep", "holds")), bench)
     assert both.startswith(f"{now} This recording cannot show everything (the input never rests")
     assert "record output and input again" in both
 
@@ -942,7 +942,7 @@ def test_who_knows_that_it_is_the_sensor_is_told_the_way_on(kind, names, known):
     """No recording decides between the sensor and the device as surely as a person who knows the sensor."""
     figures = {"there": 1.0, "here": 0.5}
     named = ("heating", *names) if kind == "tied" else names
-    said = wording.advice(Evidence(kind, figures=figures, names=named), wording.Bench(Scale(), "A"))
+    said = advised.advice(Evidence(kind, figures=figures, names=named), advised.Bench(Scale(), "A"))
     assert ("If you know that it is the measurement (offset-drift)" in said) is known
 
 
