@@ -3,13 +3,12 @@
 Every rule is explicit: the delimiter is the one that makes most cells numbers; a comma is a decimal sign
 only where something else separates; the first line is a header if it has text where the next one has a
 number; a column that begins with text, as in most rows, is one of text; text behind numbers is a remark,
-no heading; what an instrument writes about itself above the table is a comment. Times of day and ISO 8601
-time stamps are numbers: seconds. The rows themselves are read by ``csv_rows``.
+no heading; what an instrument writes about itself above the table is a comment. What a cell says is known to
+``csv_cells``, and the rows themselves are read by ``csv_rows``.
 """
 
 from __future__ import annotations
 
-import csv
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +19,15 @@ import numpy as np
 from pulsetrainer.artefacts.units import counted, is_unit, split_unit, symbol_of
 from pulsetrainer.errors import DataError
 from pulsetrainer.files import time_stamps as stamps
+from pulsetrainer.files.csv_cells import (
+    COMMA_DECIMAL,
+    MISSING,
+    is_number,
+    is_text,
+    number,
+    readable,
+    split,
+)
 
 _DELIMITERS = ("\t", ";", ",", "|", None)  # None: blanks
 _REMARKS = ("#", "%", "//")  # and a semicolon where it separates nothing
@@ -29,11 +37,6 @@ _HEADS = 3  # lines: names, units, and words below them
 _TABLE = 10  # rows of one kind make a table of what stands below a text
 _REMARK_HEADINGS = frozenset(["comment", "comments", "remark", "remarks", "kommentar", "bemerkung"])
 _STEPS = frozenset(["increment", "tinc", "dt"])  # s, beside the names of an oscilloscope's columns
-_FORTRAN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)[dD][+-]?\d+")
-_COMMA_DECIMAL = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,' \u00a0\u202f])\d{3}(\1\d{3})*([.,]\d+)?")
-MISSING = frozenset(["", "-", "--", "na", "n/a", "#n/a", "null", "none", "nan"])
-_MINUS = "\N{MINUS SIGN}"
 _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _SIGNED_DELIMITER = re.compile(r"sep=(.)")  # what a spreadsheet writes for other spreadsheets
 
@@ -79,53 +82,6 @@ class Dialect:
         while len(cells) > len(self.names) and not cells[-1]:
             cells.pop()
         return cells
-
-
-def split(line: str, delimiter: str | None) -> list[str]:
-    """Return the cells of a line, stripped."""
-    if '"' in line:
-        text = line if delimiter else line.replace("\t", " ").strip()
-        cells = next(csv.reader([text], delimiter=delimiter or " ", skipinitialspace=True))
-        return [cell.strip() for cell in cells]
-    if delimiter is None:
-        return line.split()
-    return [cell.strip() for cell in line.split(delimiter)]
-
-
-def number(cell: str, *, day_first: bool | None = None) -> float | None:
-    """Return the number in a cell, NaN where it says that the value is missing, None where it is text.
-
-    A comma in a cell is a decimal sign: where commas separate, only quotes can hold one. A time of day is in
-    seconds since midnight, a time stamp in seconds since 1970; ``day_first`` is the order of its date if
-    that has slashes.
-    """
-    try:
-        # Python reads 1_000 as a number; no instrument writes it
-        return None if "_" in cell else float(cell)
-    except ValueError:
-        if _COMMA_DECIMAL.fullmatch(cell):
-            return float(cell.replace(",", "."))
-        if cell.lower() in MISSING:
-            return np.nan
-        if cell.startswith(_MINUS):  # of a word processor
-            return number("-" + cell[1:])
-        if _FORTRAN.fullmatch(cell):
-            return float(re.sub("[dD]", "e", cell))
-        return stamps.seconds(cell, day_first=day_first)
-
-
-def has_thousands(cell: str) -> bool:
-    """Whether a cell that is no number would be one without its separators of thousands: ``1.021,0``."""
-    return _THOUSANDS.fullmatch(cell) is not None
-
-
-def _is_text(cell: str) -> bool:
-    return number(cell) is None and not has_thousands(cell)
-
-
-def _is_number(cell: str) -> bool:
-    """Whether a number stands in a cell: not text, not nothing."""
-    return cell.lower() not in MISSING and not _is_text(cell)
 
 
 def column_words(name: str) -> str:
@@ -201,17 +157,6 @@ def _encoding(path: Path) -> str:
     return "utf-8-sig"
 
 
-def readable(line: str) -> str:
-    """Return a line in which bytes that are not UTF-8 are read as Western Windows letters."""
-    if line.isascii():
-        return line
-    raw = line.encode("utf-8", "surrogateescape")
-    try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError:
-        return raw.decode("cp1252", "replace")
-
-
 def _delimiter(lines: list[str]) -> str | None:
     """Return the delimiter that makes the largest share of cells numbers, the first of equals."""
     # the first line may be a header, and more may stand above it
@@ -223,7 +168,7 @@ def _delimiter(lines: list[str]) -> str | None:
             return -1.0
         cells = [cell for row in rows for cell in row if cell]
         # a blank between thousands may be the delimiter instead
-        whole = [not _is_text(cell) and (" " not in cell or number(cell) is not None) for cell in cells]
+        whole = [not is_text(cell) and (" " not in cell or number(cell) is not None) for cell in cells]
         return float(np.mean(whole)) if cells else 0.0
 
     shares = [share(delimiter) for delimiter in _DELIMITERS]
@@ -239,16 +184,16 @@ def _below_the_units(rows: list[list[str]]) -> list[int]:
     told = [cell for cell in units if cell]
     if not (len(names) == len(units) == len(words) and told and all(map(_says_a_unit, told))):
         return []
-    return [] if any(map(_is_number, names + words)) or all(map(_says_a_unit, words)) else [start - 1]
+    return [] if any(map(is_number, names + words)) or all(map(_says_a_unit, words)) else [start - 1]
 
 
 def _says_a_unit(cell: str) -> bool:
-    return is_unit(symbol_of(cell.strip("()[] "))) and not _is_number(cell)
+    return is_unit(symbol_of(cell.strip("()[] "))) and not is_number(cell)
 
 
 def _begins_with_text(row: list[str], last: list[str]) -> bool:
     """Whether a line would be a row but for text in its first cell."""
-    return len(row) == len(last) > 1 and _is_text(row[0]) and all(map(_is_number, row[1:]))
+    return len(row) == len(last) > 1 and is_text(row[0]) and all(map(is_number, row[1:]))
 
 
 def _first_row(rows: list[list[str]]) -> int:
@@ -263,7 +208,7 @@ def _first_row(rows: list[list[str]]) -> int:
 def _tells_as_much(row: list[str], last: list[str]) -> bool:
     """Whether a line has numbers wherever the last row has some, and text only where that has text."""
     return len(row) == len(last) and all(
-        _is_number(cell) if _is_number(below) else _is_text(below) or not _is_text(cell)
+        is_number(cell) if is_number(below) else is_text(below) or not is_text(cell)
         for cell, below in zip(row, last, strict=True)
     )
 
@@ -275,7 +220,7 @@ def _above(rows: list[list[str]], parted: list[bool]) -> int:
     or headings of another count, are in error, and 0 is returned. Names stand directly above their units:
     ``parted`` says above which lines there is a remark.
     """
-    kinds = [[_is_text(cell) for cell in row] for row in rows]
+    kinds = [[is_text(cell) for cell in row] for row in rows]
     start = _first_row(rows)
     if start > 1 and _begins_with_text(rows[start - 1], rows[-1]) and all(kinds[start - 2]):
         start -= 1  # a bad row below its heading, and no remark above it
@@ -300,21 +245,21 @@ def _is_row(row: list[str], last: list[str]) -> bool:
     A remark, or a reading that failed, stands behind a number; where the others have none, theirs may lack a
     cell.
     """
-    text = [_is_text(cell) for cell in row]
+    text = [is_text(cell) for cell in row]
     if len(row) != len(last):
         return len(row) > len(last) and not any(text[: len(last)]) and all(text[len(last) :])
-    told = not text[0] and any(map(_is_number, row))
-    return told or not any(here and _is_number(below) for here, below in zip(text, last, strict=True))
+    told = not text[0] and any(map(is_number, row))
+    return told or not any(here and is_number(below) for here, below in zip(text, last, strict=True))
 
 
 def _is_heading(row: list[str]) -> bool:
     """Whether a line has text and no number; a remark has no unit."""
-    return any(map(_is_text, row)) and not any(map(_is_number, row))
+    return any(map(is_text, row)) and not any(map(is_number, row))
 
 
 def _numbers(names: list[str], below: list[str]) -> bool:
     """Whether a line numbers the channels above their units: ``x-axis,1,2`` over ``second,Volt,Volt``."""
-    numbered = _is_text(names[0]) and all(len(name) == 1 and name.isdigit() for name in names[1:])
+    numbered = is_text(names[0]) and all(len(name) == 1 and name.isdigit() for name in names[1:])
     return numbered and len(names) == len(below) > 1 and all(is_unit(symbol_of(cell)) for cell in below)
 
 
@@ -323,9 +268,9 @@ def _with_header(
 ) -> Dialect:
     """Return the dialect, with what the lines above the first row say."""
     rows = [line.cells for line in lines]
-    decimal_comma = any(_COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row)
+    decimal_comma = any(COMMA_DECIMAL.fullmatch(cell) for row in rows[1:] or rows for cell in row)
     rate = _cut_settings(rows)
-    text = [[_is_text(cell) for cell in row] for row in rows]
+    text = [[is_text(cell) for cell in row] for row in rows]
     heads = _heading_lines(text, rows)
     if heads == len(rows):
         raise DataError(f"{path} has no rows below its header", hint="export the recording again")
@@ -382,13 +327,13 @@ def _filled(column: int, body: list[list[str]]) -> list[str]:
 
 def _mostly_text(cells: list[str]) -> bool:
     """Whether cells begin with text, and half of them or more are."""
-    text = list(map(_is_text, cells))
+    text = list(map(is_text, cells))
     return any(text[:1]) and 2 * sum(text) >= len(text)
 
 
 def _is_stamped(cells: list[str]) -> bool:
     """Whether the first cell that is no text is a time of day or a time stamp."""
-    return stamps.seconds(next((cell for cell in cells if not _is_text(cell)), "")) is not None
+    return stamps.seconds(next((cell for cell in cells if not is_text(cell)), "")) is not None
 
 
 def _columns(rows: list[list[str]], delimiter: str | None, last: list[str]) -> list[tuple[str, ...]]:
@@ -426,7 +371,7 @@ def ends_in_a_number(path: Path, dialect: Dialect) -> bool:
     return (
         len(set(before)) == 1
         and last < before[0]
-        and all(_is_number(cells[-1].removesuffix(sign)) for cells in rows)
+        and all(is_number(cells[-1].removesuffix(sign)) for cells in rows)
     )
 
 
@@ -459,7 +404,7 @@ def _heading_lines(text: list[list[bool]], rows: list[list[str]]) -> int:
     below = rows[1] if len(rows) > 1 else []
     if len(rows) > 2 and _numbers(rows[0], below):
         return 2
-    if not (all(text[0]) or any(a and _is_number(b) for a, b in zip(text[0], below, strict=False))):
+    if not (all(text[0]) or any(a and is_number(b) for a, b in zip(text[0], below, strict=False))):
         return 0
     return 2 if len(text) > 2 and _is_heading(below) and not all(text[2]) else 1
 

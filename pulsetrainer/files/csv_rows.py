@@ -15,7 +15,8 @@ import numpy as np
 from pulsetrainer.artefacts import FloatArray
 from pulsetrainer.artefacts.units import counted
 from pulsetrainer.errors import DataError
-from pulsetrainer.files.csv_dialect import Dialect, column_words, has_thousands, number, readable
+from pulsetrainer.files.csv_cells import has_thousands, number, readable
+from pulsetrainer.files.csv_dialect import Dialect, column_words
 
 PIECE = 1 << 21  # characters: numpy and Python hold some ten times as much while they parse them
 _SPARE = 1.02  # of the room that the first piece lets expect; what is never written to takes no memory
